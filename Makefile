@@ -1,0 +1,81 @@
+# Every target works alone on a fresh checkout: what it needs is installed in .venv first.
+#   make test PYTHON=/path/to/python    another interpreter for a new .venv (3.11 or newer)
+#   make test ARGS="-k wheel"           more arguments for pytest
+VENV := .venv
+PY := $(VENV)/bin/python
+PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
+ARGS ?=
+
+.DEFAULT_GOAL := help
+.PHONY: help fits test test-all lint format wheel clean
+
+help:  ## list the targets
+	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
+
+fits: $(VENV)/.installed  ## simulate, fit every recipe, write the records and the report into fits/
+	$(VENV)/bin/profilefit regenerate --preset quick --out fits
+	$(VENV)/bin/profilefit report --fits fits --figures fits/figures
+
+test: lint  ## what CI runs: lint, and all tests but the slow ones
+	$(PY) -m pytest -m "not slow" $(ARGS)
+
+test-all: lint  ## lint, and all tests
+	$(PY) -m pytest $(ARGS)
+
+lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
+	$(PY) -m ruff check
+	$(PY) -m ruff format --check
+	$(PY) -m mypy
+
+format: $(VENV)/.installed-test  ## let ruff fix and format the sources
+	$(PY) -m ruff check --fix
+	$(PY) -m ruff format
+
+wheel: $(VENV)/.installed-test  ## build the sdist, and from it the wheel, into dist/
+	$(PY) -m build
+
+clean:  ## remove build products and caches; .venv and fits/ stay
+	rm -rf dist build .pytest_cache .mypy_cache .ruff_cache
+	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# A stamp is as new as the last installation from pyproject.toml. The second waits for the first, so `make -j` is safe.
+$(VENV)/.installed: pyproject.toml
+	@sh -c "$$CREATE_VENV"
+	@echo "installing profilefit and what it needs into $(VENV)"
+	@$(PIP) install --editable .
+	@touch $@
+
+$(VENV)/.installed-test: $(VENV)/.installed
+	@echo "installing what the tests need into $(VENV)"
+	@$(PIP) install --editable '.[test]'
+	@touch $@
+
+# Keeps a .venv that works. Debian splits ensurepip, which a new one needs, from python3 into a package of its own.
+define CREATE_VENV
+set -eu
+if $(PY) -m pip --version >/dev/null 2>&1; then exit 0; fi
+python=
+for candidate in $(or $(PYTHON),python3.11 python3 python3.14 python3.13 python3.12); do
+    if "$$candidate" -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null; then
+        python=$$candidate
+        break
+    fi
+done
+if [ -z "$$python" ]; then
+    echo "found no Python 3.11 or newer: install one, or name it with make PYTHON=/path/to/python" >&2
+    exit 1
+fi
+if ! "$$python" -c 'import ensurepip, venv' 2>/dev/null; then
+    package=$$("$$python" -c 'import sys; print("python%d.%d-venv" % sys.version_info[:2])')
+    if [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
+        echo "$$python cannot make a virtual environment: install $$package (apt-get install $$package, as root)" >&2
+        exit 1
+    fi
+    echo "installing $$package with apt-get: $$python cannot make a virtual environment without it"
+    apt-get -qq update
+    DEBIAN_FRONTEND=noninteractive apt-get -qq -y --no-install-recommends install "$$package" >/dev/null
+fi
+echo "creating $(VENV) with $$python"
+"$$python" -m venv --clear $(VENV)
+endef
+export CREATE_VENV

@@ -1,0 +1,13 @@
+"""What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
+
+
+class InputError(ValueError):
+    """An argument that no physics or file format allows."""
+
+
+class SettingError(InputError):
+    """Light or surface that this code does not solve, or two settings that do not mix."""
+
+
+class StoreError(RuntimeError):
+    """A folder of photon batches that is damaged, foreign, or cannot be written."""

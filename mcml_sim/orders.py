@@ -1,0 +1,209 @@
+"""The order-resolved run: one simulation without absorption answers for every albedo, and for its derivative."""
+
+from __future__ import annotations
+
+import operator
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import order_bins, tally, tracer
+from mcml_sim.errors import InputError, SettingError
+from mcml_sim.grid import Grid
+from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, roulette_weight
+from mcml_sim.run import run_batches
+from mcml_sim.setting import Setting
+from mcml_sim.store import Store
+from mcml_sim.tally import Counts, Estimate, Ledger
+
+Floats = NDArray[np.float64]
+
+SOLVED = Setting()
+MAX_PHOTONS = 10**13  # weeks on the largest machines; more is a slip of the pen
+
+
+@dataclass(frozen=True, eq=False)
+class Orders:
+    """Photons of a white half space by ring and number of scatterings; lengths in mean free paths [mfp].
+
+    Every method takes the single-scattering albedo `alpha` in [0, 1], a number or an array, InputError otherwise;
+    estimates have the shape of alpha, then that of the rings. All albedos come from the same photons, so their
+    errors are strongly correlated: `covariance_factor` says how. Photons with more than 8192 scatterings are cut:
+    `cut` bounds what that takes from the reflectance.
+    """
+
+    grid: Grid
+    photons: int
+    seed: int
+    setting: Setting
+    counts: Counts
+    """The whole-numbered result from which all estimates come."""
+
+    def reflectance(self, alpha: ArrayLike) -> Estimate:
+        """Total diffuse reflectance A [-], beyond the last ring included."""
+        return self._of_rows(self.counts.exits.sum(axis=0), order_bins.weights(_checked_alpha(alpha)))
+
+    def energy(self, alpha: ArrayLike) -> Estimate:
+        """Integral of 2 pi r R_d over each ring [-]."""
+        return self._estimate(self.ring_order_counts, order_bins.weights(_checked_alpha(alpha)))
+
+    def overflow(self, alpha: ArrayLike) -> Estimate:
+        """Reflectance beyond the last ring [-]."""
+        return self._of_rows(self.counts.exits[-1], order_bins.weights(_checked_alpha(alpha)))
+
+    def profile(self, alpha: ArrayLike) -> Estimate:
+        """Mean of R_d over the area of each ring [1/mfp^2]: not its value at the middle, R_d rises as 1/r to r = 0."""
+        return self.energy(alpha).scaled(1 / self.grid.r_areas)
+
+    def profile_derivative(self, alpha: ArrayLike) -> Estimate:
+        """d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
+        weights = order_bins.weight_derivatives(_checked_alpha(alpha))
+        return self._estimate(self.ring_order_counts, weights).scaled(1 / self.grid.r_areas)
+
+    def covariance_factor(self, alpha: ArrayLike, rank: int = 8) -> tuple[Floats, float]:
+        """Covariance of `energy` between albedos, ring by ring, in closed form.
+
+        alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
+        of any ring's variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
+        condition number 1e16), so a small rank holds all there is. Between rings i != j the covariance is
+        -E_i E_j / N, which no factor holds: next to nothing when there are many rings.
+        """
+        albedos = np.atleast_1d(_checked_alpha(alpha))
+        if albedos.ndim != 1:
+            raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
+        limit = _checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
+        return tally.covariance_factor(self.ring_order_counts, order_bins.weights(albedos), self.photons, limit)
+
+    def merged(self, r_edges: ArrayLike) -> Orders:
+        """The same photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
+        grid = Grid.from_edges(r=r_edges)
+        index = np.searchsorted(self.grid.r_edges, grid.r_edges)
+        if index[-1] >= self.grid.r_edges.size or np.any(self.grid.r_edges[index] != grid.r_edges):
+            raise InputError(f"r_edges must be edges of the run's own grid, got {grid.rings} rings that are not")
+        exits = np.add.reduceat(self.counts.exits, index, axis=0)  # the last piece gathers all beyond the last edge
+        return replace(self, grid=grid, counts=replace(self.counts, exits=exits))
+
+    def cut(self, alpha: ArrayLike) -> float | Floats:
+        """Upper bound on the reflectance that ending photons at the highest order took away [-]."""
+        lost = float(roulette_weight(MAX_ORDER)) * self.counts.cut / self.photons
+        return _scalar_or_array(lost * _checked_alpha(alpha) ** MAX_ORDER)
+
+    @property
+    def ledger(self) -> Ledger:
+        """What became of every photon started."""
+        return self.counts.ledger
+
+    @property
+    def ring_order_counts(self) -> NDArray[np.int64]:
+        """Photons by ring and bin of order, without the overflow, int64 (rings, bins)."""
+        return self.counts.exits[:-1]
+
+    @property
+    def orders(self) -> Floats:
+        """Representative order of each bin [-], float64 (bins,)."""
+        return order_bins.MEAN_ORDERS
+
+    def weights(self, alpha: ArrayLike) -> Floats:
+        """What one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
+        return order_bins.weights(_checked_alpha(alpha))
+
+    def _estimate(self, counts: NDArray[np.int64], weights: Floats) -> Estimate:
+        return tally.estimate(counts, weights, self.photons)
+
+    def _of_rows(self, counts: NDArray[np.int64], weights: Floats) -> Estimate:
+        """Estimate from one row of counts, in the shape of alpha."""
+        rows = self._estimate(counts[None, :], weights)
+        parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
+        return Estimate(*map(_scalar_or_array, parts))
+
+
+def simulate_orders(
+    grid: Grid,
+    photons: int,
+    seed: int = 0,
+    setting: Setting = SOLVED,
+    store: str | Path | None = None,
+    workers: int | None = None,
+    progress: bool | None = None,
+) -> Orders:
+    """Simulate a white, index-matched, isotropic half space under a normal pencil beam, resolved by order.
+
+    grid      rings, edges in mean free paths [mfp]
+    photons   how many to start, 1 to 1e13
+    seed      whole number >= 0; equal seeds start with equal photons
+    setting   only Setting() is solved: SettingError on any other
+    store     folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes
+    workers   threads, by default one a core; the result does not depend on it
+    progress  show a bar on stderr; by default only if that is a terminal
+
+    InputError on other arguments; StoreError if the folder is another run's, damaged, or cannot be written. Ctrl-C
+    stops after the batches in flight, which the store keeps too.
+    """
+    if setting != SOLVED:
+        raise SettingError(f"simulate_orders solves setting {SOLVED} only, got {setting}")
+    _require_resolved(grid)
+    number = _checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
+    key = _checked_whole("seed", seed, lowest=0)
+    threads = None if workers is None else _checked_whole("workers", workers, lowest=1, highest=4096)
+    kept = None if store is None else Store(Path(store), _made_by(grid, key, setting), _shape(grid))
+    counts = run_batches(partial(tracer.trace_batch, grid, key), tracer.BATCH_PHOTONS, number, threads, kept, progress)
+    return Orders(grid, number, key, setting, counts)
+
+
+def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
+    """What decides which photons a batch holds and how they are counted."""
+    return {
+        "setting": str(setting),
+        "seed": seed,
+        "grid": grid.digest,
+        "r_edges": grid.r_edges.tolist(),
+        "batch_photons": tracer.BATCH_PHOTONS,
+        "max_order": MAX_ORDER,
+        "first_roulette": FIRST_ROULETTE,
+        "last_exact_order": order_bins.LAST_EXACT,
+        "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
+    }
+
+
+def _shape(grid: Grid) -> tuple[int, int]:
+    return grid.rings + 1, len(order_bins.LAST_ORDERS)
+
+
+def _require_resolved(grid: Grid) -> None:
+    """InputError unless `grid` is one, in rings that a float32 radius can tell apart."""
+    if not isinstance(grid, Grid):
+        raise InputError(f"grid must be a mcml_sim.Grid, got {grid!r}")
+    narrow = np.diff(tracer.single_edges(grid)) <= 0
+    if np.any(narrow) or not np.isfinite(tracer.single_edges(grid)[-1]):
+        edge = grid.r_edges[int(np.argmax(narrow))] if np.any(narrow) else grid.r_edges[-1]
+        raise InputError(f"grid must have rings that single precision can resolve, got one that cannot at r = {edge!r}")
+
+
+def _checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:
+    """A whole number, 1e6 included."""
+    accepted = f"a whole number >= {lowest}" + (f" and <= {highest:g}" if highest else "")
+    try:
+        whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
+    except TypeError:
+        raise InputError(f"{name} must be {accepted}, got {number!r}") from None
+    if isinstance(number, bool) or whole < lowest or (highest is not None and whole > highest):
+        raise InputError(f"{name} must be {accepted}, got {number!r}")
+    return whole
+
+
+def _checked_alpha(alpha: ArrayLike) -> Floats:
+    try:
+        albedos = np.asarray(alpha, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {alpha!r}") from None
+    outside = ~((albedos >= 0) & (albedos <= 1))
+    if np.any(outside):
+        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {albedos[outside].flat[0]:g}")
+    return albedos
+
+
+def _scalar_or_array(values: Floats) -> float | Floats:
+    return values if np.ndim(values) else float(values)

@@ -1,0 +1,127 @@
+"""Counts of photons, and the estimates with standard errors that they make."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+
+# At 100 effective samples the standard error of an estimate is itself known to about 10 %, and its distribution is
+# near enough to a normal one for tests and weights to trust it.
+ENOUGH_SAMPLES = 100.0
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Numbers from a simulation with their errors: arrays of one shape, or floats."""
+
+    value: float | Floats
+    """The estimate, in the unit its maker states."""
+    standard_error: float | Floats
+    """Its standard error, in the same unit. Meaningless where `effective_samples` is small: see `is_sampled`."""
+    effective_samples: float | Floats
+    """Number of equally weighted photons that would be worth as much, (sum w)^2 / sum w^2 [-]."""
+
+    def __float__(self) -> float:
+        if np.ndim(self.value):
+            raise TypeError(f"only a scalar estimate is a float, this one has shape {np.shape(self.value)}")
+        return float(self.value)
+
+    def is_sampled(self, at_least: float = ENOUGH_SAMPLES) -> bool | NDArray[np.bool_]:
+        """True where enough photons arrived to believe value and standard error.
+
+        Where the photons that carry most of the light were never seen, the standard error collapses along with the
+        value: a small error bar there is no sign of accuracy.
+        """
+        return cast("bool | NDArray[np.bool_]", np.greater_equal(self.effective_samples, at_least))
+
+    def scaled(self, factor: float | Floats) -> Estimate:
+        """The estimate times a positive constant, which broadcasts against it."""
+        return Estimate(self.value * factor, self.standard_error * factor, self.effective_samples)
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """What became of all photons: started = exited + rouletted + cut."""
+
+    started: int
+    exited: int
+    rouletted: int
+    cut: int
+
+
+@dataclass(frozen=True, eq=False)
+class Counts:
+    """Whole photons of one or more batches."""
+
+    exits: NDArray[np.int64]
+    """Photons that left, by ring (the last row: beyond the last ring) and bin of order, (rings + 1, bins)."""
+    rouletted: int
+    """Photons ended by roulette."""
+    cut: int
+    """Photons ended by the cap on the order."""
+    started: int
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(
+            self.exits + other.exits,
+            self.rouletted + other.rouletted,
+            self.cut + other.cut,
+            self.started + other.started,
+        )
+
+    @property
+    def ledger(self) -> Ledger:
+        """The totals."""
+        return Ledger(self.started, int(self.exits.sum()), self.rouletted, self.cut)
+
+    @property
+    def is_closed(self) -> bool:
+        """True if every photon started is accounted for."""
+        ledger = self.ledger
+        return ledger.started == ledger.exited + ledger.rouletted + ledger.cut
+
+    def require_closed(self) -> None:
+        """RuntimeError if a photon was lost: a defect of the tracer, not of its input."""
+        if not self.is_closed:
+            raise RuntimeError(f"photons were lost or made: {self.ledger}")
+
+
+def estimate(counts: NDArray[np.int64], weights: Floats, photons: int) -> Estimate:
+    """Mean weight per photon started, of photons counted by bin, in float64.
+
+    counts (rows, bins), weights (..., bins) per photon of a bin -> Estimate of shape (..., rows). A photon that adds
+    to no bin adds 0, so the variance of the mean is (sum w^2 - (sum w)^2 / N) / N^2.
+    """
+    total = weights @ counts.T.astype(np.float64)
+    squares = weights**2 @ counts.T.astype(np.float64)
+    variance = np.maximum(squares - total**2 / photons, 0) / float(photons) ** 2
+    effective = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
+    return Estimate(total / photons, np.sqrt(variance), effective)
+
+
+def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, rank: int) -> tuple[Floats, float]:
+    """Factors of each row's covariance between weightings, truncated to `rank` directions.
+
+    counts (rows, bins), weights (alphas, bins) -> L (rows, alphas, rank) with L L^T the covariance of the row's means,
+    sum_n H_n g_n(a) g_n(b) / N^2 - E(a) E(b) / N, and the largest share of a row's variance that truncation drops.
+    The covariance is a sum over all photons of (g(a) - E(a)) (g(b) - E(b)), those that add 0 included. Its factor is
+    decomposed, not itself: squaring would lose half the digits of a nearly singular matrix.
+    """
+    rank = min(rank, len(weights), weights.shape[1])
+    factors = np.empty((len(counts), len(weights), rank))
+    dropped = 0.0
+    silent = np.concatenate([weights, np.zeros((len(weights), 1))], axis=1)
+    for row, hits in enumerate(counts):
+        number = np.append(hits, photons - hits.sum()).astype(np.float64)
+        centred = (silent - (silent @ number / photons)[:, None]) * (np.sqrt(number) / photons)
+        left, singular, _ = np.linalg.svd(centred, full_matrices=False)
+        factors[row] = left[:, :rank] * singular[:rank]
+        variance = np.sum(singular**2)
+        if variance > 0:
+            dropped = max(dropped, float(np.sum(singular[rank:] ** 2) / variance))
+    return factors, dropped

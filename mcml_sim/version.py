@@ -1,0 +1,5 @@
+"""The version of the distribution that holds this package."""
+
+from importlib.metadata import version
+
+__version__ = version("profilefit")

@@ -1,0 +1,5 @@
+"""`python -m profilefit` is the profilefit command."""
+
+from profilefit.cli import main
+
+main()

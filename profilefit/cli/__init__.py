@@ -1,0 +1,54 @@
+"""profilefit on the command line: `regenerate` makes records, `report` shows them."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+from rich.console import Console
+
+from mcml_sim import __version__
+from profilefit.cli.regenerate import regenerate
+from profilefit.cli.report import report
+from profilefit.errors import InputError, OutputError, StoreError
+
+__all__ = ["app", "main"]
+
+BAD_INPUT = 2
+INTERRUPTED = 130
+
+app = typer.Typer(
+    name="profilefit",
+    help="Refit closed-form subsurface scattering profiles to simulated light, with error bars.",
+    no_args_is_help=True,
+    add_completion=True,
+    pretty_exceptions_enable=False,
+)
+app.command()(regenerate)
+app.command()(report)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"profilefit {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
+) -> None:
+    """Refit closed-form subsurface scattering profiles to simulated light, with error bars."""
+
+
+def main() -> None:
+    """Run a command; whatever the user can mend is one line on stderr and exit status 2."""
+    errors = Console(stderr=True, highlight=False, soft_wrap=True)
+    try:
+        app()
+    except (InputError, OutputError, StoreError) as error:
+        errors.print(f"profilefit: {error}", markup=False)
+        sys.exit(BAD_INPUT)
+    except KeyboardInterrupt:
+        errors.print("profilefit: stopped; the finished batches are kept, the same command resumes", markup=False)
+        sys.exit(INTERRUPTED)

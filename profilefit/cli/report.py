@@ -1,0 +1,61 @@
+"""profilefit report: show records as tables, and draw their figures."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from profilefit import catalogue, record
+from profilefit.errors import RecordError
+from profilefit.report import figures, tables
+
+LOCAL = Path("fits")
+
+
+def report(
+    names: Annotated[
+        list[str] | None, typer.Argument(help="Names of records; a summary of all if none is named.")
+    ] = None,
+    fits: Annotated[
+        Path | None, typer.Option(help="Folder of the records: ./fits if it has any, else the ones shipped.")
+    ] = None,
+    figures_to: Annotated[
+        Path | None, typer.Option("--figures", help="Folder for the figures; without it none are drawn.")
+    ] = None,
+    markdown: Annotated[bool, typer.Option("--markdown", help="Print the README's tables instead.")] = False,
+) -> None:
+    """Print what was fitted: constants with their errors, quality by albedo, the state of fits and chains.
+
+    Example: profilefit report liang-whole --figures figures
+    """
+    console = Console(highlight=False)
+    folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
+    contents = _contents(folder, names)
+    if markdown:
+        for table in (tables.markdown_constants(contents), tables.markdown_quality(contents)):
+            console.print(table, markup=False, soft_wrap=True)
+    else:
+        if not names:
+            console.print(tables.summary(contents))
+        for name in contents:
+            for part in tables.record_tables(contents[name]):
+                console.print(part)
+    if figures_to is not None:
+        record.require_writable(figures_to)
+        drawn, skipped = figures.draw_all(folder, figures_to, names)
+        console.print(f"drew {len(drawn)} figures into {figures_to}", markup=False)
+        for line in skipped:
+            console.print(f"left out: {line}", markup=False)
+
+
+def _contents(folder: Path, names: list[str] | None) -> dict[str, dict]:
+    known = record.available(folder)
+    if not known:
+        raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
+    for name in names or ():
+        if name not in known:
+            raise RecordError(f"record must be one of {', '.join(known)} (in {folder}), got {name!r}")
+    return {name: record.read(known[name]) for name in (names or known)}

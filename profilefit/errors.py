@@ -1,0 +1,17 @@
+"""What can go wrong in fitting, by name. Every message says what was wrong, what was got and what is accepted."""
+
+from mcml_sim.errors import InputError, SettingError, StoreError
+
+__all__ = ["InputError", "OutputError", "RecipeError", "RecordError", "SettingError", "StoreError"]
+
+
+class RecipeError(InputError):
+    """A recipe that is missing, malformed or asks for the impossible."""
+
+
+class RecordError(InputError):
+    """A record that is missing, malformed or belongs to something else."""
+
+
+class OutputError(RuntimeError):
+    """A folder or file that cannot be written."""

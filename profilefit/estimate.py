@@ -1,0 +1,208 @@
+"""Estimates: the constants of a law that fit profiles best, and four answers to how far they can be trusted.
+
+statistical   what another run's photons would change: the closed-form covariance of the ring energies carried to the
+              constants through the exact derivative of the optimum (implicit function theorem, full Hessian), so it
+              holds for a law that is not the truth (the sandwich of White, Econometrica 50, 1982)
+discrepancy   what the law's misfit leaves open if its residuals were independent noise: Levenberg-Marquardt's
+              s^2 (J^T J)^-1
+jackknife     how much the constants move when the fit does not see a sixth of the albedos: a misfit is no noise, its
+              neighbours repeat each other, and then this is the larger and the honest number
+structure     what the residuals still show: a law that is the truth leaves none
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.errors import SettingError
+from profilefit.laws.base import Constants
+from profilefit.objectives import OBJECTIVES, Rings, rings_of
+from profilefit.profiles import Profiles
+from profilefit.solver import Solution, solve, solve_batch
+
+Floats = NDArray[np.float64]
+JACKKNIFE_GROUPS = 6
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A law fitted to profiles.
+
+    law          the law at the optimum
+    free         (p,) the names of the constants that were free; the others stayed where they were
+    objective    the name of what was minimised; rings its data
+    solution     optimum, residuals, Jacobian, result
+    statistical  (p, p) covariance from photon noise; None where the truth has none
+    discrepancy  (p, p) covariance from the law's misfit, taken for independent noise
+    jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other
+    structure    measures of what is left in the residuals
+    """
+
+    law: Constants
+    free: tuple[str, ...]
+    objective: str
+    rings: Rings
+    solution: Solution
+    statistical: Floats | None
+    discrepancy: Floats
+    jackknife: Floats
+    structure: Structure
+
+    @property
+    def constants(self) -> dict[str, float]:
+        """The fitted constants by name."""
+        return dict(zip(self.free, map(float, self.solution.parameters), strict=True))
+
+    @property
+    def variance(self) -> float:
+        """s^2: the misfit per degree of freedom."""
+        return self.solution.cost / degrees_of_freedom(self.solution)
+
+    @property
+    def result(self) -> str:
+        return self.solution.result
+
+
+@dataclass(frozen=True)
+class Structure:
+    """What the residuals of a fit show.
+
+    rms           root mean square residual, in the objective's own weight
+    largest       the largest |residual|
+    along_r       lag-1 autocorrelation along the rings (or xi), along_alpha along the albedos: 0 if only noise is left
+    half_waves    number of stretches of one sign, along r times along alpha: the residuals that stand for themselves
+    """
+
+    rms: float
+    largest: float
+    along_r: float
+    along_alpha: float
+    half_waves: float
+
+
+def fit(
+    profiles: Profiles,
+    law: Constants,
+    objective: str = "energy",
+    free: Sequence[str] | None = None,
+    used: NDArray[np.bool_] | None = None,
+    limits: tuple[float, float] = (0.0, 0.0),
+    xi: Sequence[float] = (),
+) -> Fit:
+    """Fit the constants named in `free` (all, if None) of `law` to `profiles`.
+
+    objective  a name in `objectives.OBJECTIVES`: it fixes the weighting
+    used       (m, n) rings that count; limits the weights of the energy and source limits; xi shares for quantiles
+    A fit that does not converge is returned with the reason in `result`. Raises SettingError if the law and the
+    profiles belong to different light or surface.
+    """
+    if law.setting != profiles.setting:
+        raise SettingError(f"the law belongs to {law.setting}, the profiles to {profiles.setting}: they do not mix")
+    names = tuple(free) if free is not None else law.seen_by(objective)
+    problem = Problem(objective, names)
+    rings = rings_of(profiles, used, limits, xi)
+    solution = solve(problem.residual, law.vector(names), (law, rings))
+    return Fit(
+        law.with_vector(names, [float(value) for value in solution.parameters]),
+        names,
+        objective,
+        rings,
+        solution,
+        _statistical(problem, solution, law, rings, profiles),
+        discrepancy_covariance(solution),
+        _jackknife(problem, solution, law, rings),
+        residual_structure(solution.residuals.reshape(profiles.alpha.size, -1)),
+    )
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Which constants of a law move, and what is made small: hashable, so that each kind compiles once."""
+
+    objective: str
+    free: tuple[str, ...]
+
+    def residual(self, vector, data):
+        law, rings = data
+        table = OBJECTIVES[self.objective](law.with_vector(self.free, vector), rings)
+        return (rings.weight[:, None] * table).ravel()
+
+
+def degrees_of_freedom(solution: Solution) -> int:
+    """Residuals that count, less the free constants."""
+    return max(int(np.count_nonzero(solution.residuals)) - solution.parameters.size, 1)
+
+
+def discrepancy_covariance(solution: Solution) -> Floats:
+    """s^2 (J^T J)^-1 (p, p)."""
+    inverse = np.linalg.pinv(solution.jacobian.T @ solution.jacobian)
+    return np.asarray(solution.cost / degrees_of_freedom(solution) * inverse)
+
+
+def residual_structure(table: Floats) -> Structure:
+    """What residuals (m, k), a row an albedo, still show; zeros are rings that do not count."""
+    live = table[table != 0]
+    rms = float(np.sqrt(np.mean(live**2))) if live.size else 0.0
+    waves = _half_waves(table) * _half_waves(table.T)
+    return Structure(rms, float(np.max(np.abs(table), initial=0.0)), _lag_one(table), _lag_one(table.T), waves)
+
+
+def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+    """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
+    m = rings.alpha.size
+    groups = np.array_split(np.arange(m), min(JACKKNIFE_GROUPS, m))
+    weights = np.ones((len(groups), m))
+    for row, group in zip(weights, groups, strict=True):
+        row[group] = 0.0
+    data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
+    data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
+    refits = solve_batch(problem.residual, np.tile(solution.parameters, (len(groups), 1)), data)
+    moved = np.stack([refit.parameters for refit in refits])
+    spread = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
+    return np.sqrt((len(groups) - 1) / len(groups) * spread)
+
+
+def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+    """d constants / d ring energies (p, m, n) at the optimum: how the minimiser follows its data."""
+    with jax.enable_x64(True):
+        hessian, mixed = _second_derivatives(problem.residual, jnp.asarray(solution.parameters), law, rings)
+    return -np.einsum("pq,aiq->pai", np.linalg.pinv(np.asarray(hessian)), np.asarray(mixed))
+
+
+def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
+    if profiles.covariance is None:
+        return None
+    return profiles.covariance.sandwich(sensitivity(problem, solution, law, rings))
+
+
+@eqx.filter_jit
+def _second_derivatives(residual, vector, law, rings):
+    def cost(theta, energy):
+        data = eqx.tree_at(lambda tree: tree.energy, rings, energy)
+        return 0.5 * jnp.sum(residual(theta, (law, data)) ** 2)
+
+    energy = jnp.asarray(rings.energy)
+    hessian = jax.jacfwd(jax.grad(cost))(vector, energy)
+    mixed = jax.jacfwd(jax.grad(cost, argnums=1))(vector, energy)
+    return hessian, mixed
+
+
+def _half_waves(table: Floats) -> float:
+    """Mean number of stretches of one sign along the rows of a table; zeros (rings that do not count) are skipped."""
+    signs = [np.sign(row[row != 0]) for row in table]
+    counts = [1 + np.count_nonzero(np.diff(row)) for row in signs if row.size]
+    return float(np.mean(counts)) if counts else 0.0
+
+
+def _lag_one(table: Floats) -> float:
+    """Lag-1 autocorrelation along the rows of a table, about zero: a fit's residuals have no mean to remove."""
+    if table.shape[1] < 2 or not np.any(table):
+        return 0.0
+    return float(np.sum(table[:, 1:] * table[:, :-1]) / np.sqrt(np.sum(table[:, 1:] ** 2) * np.sum(table[:, :-1] ** 2)))

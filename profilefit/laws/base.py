@@ -1,0 +1,117 @@
+"""What every law offers, whatever its form: a frozen pytree whose leaves are its constants, in units of the mfp."""
+
+from __future__ import annotations
+
+import abc
+from dataclasses import fields, replace
+from typing import Self
+
+import equinox as eqx
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from mcml_sim.setting import Setting
+from profilefit.laws.evaluate import evaluated
+
+
+class Constants(eqx.Module):
+    """A frozen set of named constants: fit, sampled, recorded and exported under these names."""
+
+    setting: eqx.AbstractVar[Setting]
+
+    @classmethod
+    def constant_names(cls) -> tuple[str, ...]:
+        """The names of the constants, in the order of the flattened pytree."""
+        return tuple(f.name for f in fields(cls) if not f.metadata.get("static", False))
+
+    def seen_by(self, objective: str) -> tuple[str, ...]:
+        """The constants that move when this objective is made small: all, unless the law says otherwise."""
+        del objective
+        return self.constant_names()
+
+    def constants(self) -> dict[str, float]:
+        """Every constant by name."""
+        return {name: float(getattr(self, name)) for name in self.constant_names()}
+
+    def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
+        """The named constants as a vector."""
+        return np.array([getattr(self, name) for name in names], float)
+
+    def with_vector(self, names: tuple[str, ...], values) -> Self:
+        """The same law with the named constants replaced: a fit moves these and leaves the others."""
+        return replace(self, **{name: values[i] for i, name in enumerate(names)})
+
+
+class AlbedoLaw(Constants):
+    """A closed map between the single-scattering albedo alpha and the total reflectance A, both in [0, 1]."""
+
+    @abc.abstractmethod
+    def alpha(self, reflectance) -> Array:
+        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
+
+    @abc.abstractmethod
+    def reflectance(self, alpha) -> Array:
+        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
+
+
+class ProfileLaw(Constants):
+    """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy."""
+
+    @abc.abstractmethod
+    def scaled_profile(self, x: Array, alpha: Array) -> Array:
+        """R_d at x = r/l for l = 1 [1/mfp^2]."""
+
+    @abc.abstractmethod
+    def scaled_cdf(self, x: Array, alpha: Array) -> Array:
+        """Share of the reflected energy within x = r/l [-]."""
+
+    @abc.abstractmethod
+    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
+        """Energy reflected within x = r/l [-], before any scaling to the exact reflectance: what a fit compares."""
+
+    @abc.abstractmethod
+    def source_strength(self, alpha: Array) -> Array:
+        """Limit of 2 pi x R_d at x -> 0, before any scaling [1/mfp]; the exact one is alpha / 2."""
+
+    @property
+    @abc.abstractmethod
+    def sampler(self) -> Sampler:
+        """Draws radii for this law."""
+
+    @evaluated
+    def profile(self, r, alpha, mfp=1.0) -> Array:
+        """R_d(r) [1/length^2]: 2 pi r R_d integrates to the reflectance. `r`, `mfp` in one unit; all broadcast."""
+        return self.scaled_profile(r / mfp, alpha) / mfp**2
+
+    @evaluated
+    def cdf(self, r, alpha, mfp=1.0) -> Array:
+        """Share of the reflected energy within radius r [-]. `r` and `mfp` in one unit; all broadcast."""
+        return self.scaled_cdf(r / mfp, alpha)
+
+
+class Sampler(eqx.Module):
+    """A map from a uniform number to a radius, with the density that this very map has.
+
+    An approximate inverse does not sample its law: an estimator must divide by `pdf`, not by the law's own density.
+    """
+
+    law: eqx.AbstractVar[ProfileLaw]
+
+    @abc.abstractmethod
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        """x = r/l at xi in [0, 1)."""
+
+    @abc.abstractmethod
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        """Density in x = r/l of `scaled_sample(xi)`, xi uniform in [0, 1), atoms left out [1/mfp]."""
+
+    @evaluated
+    def sample(self, xi, alpha, mfp=1.0) -> Array:
+        """Radius [length] for a uniform number xi in [0, 1). All broadcast."""
+        return self.scaled_sample(xi, alpha) * mfp
+
+    @evaluated
+    def pdf(self, r, alpha, mfp=1.0) -> Array:
+        """Density in r of `sample` [1/length], so that it integrates to 1 less the sampler's atoms. All broadcast."""
+        return self.scaled_pdf(r / mfp, alpha) / mfp

@@ -1,0 +1,183 @@
+"""The laws of Liang et al.: a rational profile with a largest radius, and an inverse cdf fitted on its own.
+
+Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
+Software). Equation numbers are that paper's.
+"""
+
+from __future__ import annotations
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array, lax
+
+from mcml_sim.setting import Setting
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.rational import Rational
+
+PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
+INVERSE_CONSTANTS = ("g1", "g2", "g3", "g4", "h1", "h2", "h3")
+# Halvings of [0, 1] after which a float64 inverse stops moving.
+BISECTIONS = 60
+
+
+class Liang(ProfileLaw):
+    """r R_d = (a r + b) / (r + c) up to r_max = -b/a, scaled to the reflectance; lengths in units of l   (7), (18).
+
+    a = a1 alpha + a2 0.1^(-a3 (alpha - 1))                        (9)-(11), printed -0.0064, 0.00316, 30
+    b = b0 alpha^k,  k = (b1 (alpha - b2)^2 + b3) alpha + b4       (12)-(13), printed 0.461, 6.7, 0.45, 2.6, 1.3
+    c = c1 exp(c2 alpha) + c3                                      (14)-(15), printed 0.0097, 4.2, 0.166
+    g(xi) = (k1 xi - k2) sqrt(xi) ln(1 + eps - xi),  r = min(g, r_max)          (19), (21)
+    k1 = g1 alpha^(g2 alpha^g3 + g4), k2 = h1 alpha^(h2 alpha + h3)             (20), printed 1.504, 2.175, 0.7,
+                                                                                0.19, 3.993, 3.268, 0.2838
+    Valid for alpha in (0, 1]: at alpha = 0 r_max is 0/0. The reflectance that (17)-(18) normalise to is `albedo`'s.
+
+    albedo  the map from alpha to A used for normalisation (held fixed)
+    eps     the eps of (19) [-], 0.01
+    """
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Rational = eqx.field(static=True)
+    a1: float
+    a2: float
+    a3: float
+    b0: float
+    b1: float
+    b2: float
+    b3: float
+    b4: float
+    c1: float
+    c2: float
+    c3: float
+    g1: float
+    g2: float
+    g3: float
+    g4: float
+    h1: float
+    h2: float
+    h3: float
+    eps: float = eqx.field(static=True, default=0.01)
+
+    def seen_by(self, objective: str) -> tuple[str, ...]:
+        """The profile and the inverse cdf share no constant: a fit of one leaves the other alone."""
+        return INVERSE_CONSTANTS if objective in ("radius", "share") else PROFILE_CONSTANTS
+
+    def coefficients(self, alpha) -> tuple[Array, Array, Array]:
+        """a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""
+        a = self.a1 * alpha + self.a2 * 0.1 ** (-self.a3 * (alpha - 1.0))
+        k = (self.b1 * (alpha - self.b2) ** 2 + self.b3) * alpha + self.b4
+        return a, self.b0 * alpha**k, self.c1 * jnp.exp(self.c2 * alpha) + self.c3
+
+    def largest_radius(self, alpha) -> Array:
+        """r_max = -b/a in units of the mfp: beyond it the law is zero."""
+        a, b, _ = self.coefficients(alpha)
+        return -b / a
+
+    def unscaled_energy(self, x, alpha) -> Array:
+        """Energy within x = r/l before the correction (18): A cdf(r) of (17), constant beyond r_max [-]."""
+        a, b, c = self.coefficients(alpha)
+        return rational_energy(jnp.minimum(x, -b / a), a, b, c)
+
+    def source_strength(self, alpha) -> Array:
+        _, b, c = self.coefficients(alpha)
+        return 2.0 * jnp.pi * b / c
+
+    def scaled_profile(self, x: Array, alpha: Array) -> Array:
+        a, b, c = self.coefficients(alpha)
+        total = rational_energy(-b / a, a, b, c)
+        inside = x < -b / a
+        safe = jnp.where(x > 0, x, 1.0)
+        value = (a * safe + b) / (safe + c) / safe * self.albedo.reflectance(alpha) / total
+        return jnp.where(inside, jnp.where(x > 0, value, jnp.inf), 0.0)
+
+    def scaled_cdf(self, x: Array, alpha: Array) -> Array:
+        return self.unscaled_energy(x, alpha) / self.unscaled_energy(jnp.inf, alpha)
+
+    @property
+    def sampler(self) -> LiangSampler:
+        """The inverse cdf of (19)-(21), fitted to quantiles and not to this profile."""
+        return LiangSampler(self)
+
+
+def rational_energy(x, a, b, c) -> Array:
+    """2 pi times the integral from 0 to x of (a r + b) / (r + c)   (17), without the division by A."""
+    return 2.0 * jnp.pi * (a * x + (b - a * c) * jnp.log1p(x / c))
+
+
+class LiangSampler(Sampler):
+    """r = min(|g(xi)|, r_max): g is negative for xi < eps, where a radius in the opposite direction is meant.
+
+    The clip at r_max collects all larger g in one atom; `pdf` is the density beside it.
+    """
+
+    law: Liang
+
+    def unclipped(self, xi, alpha) -> Array:
+        """g(xi) in units of the mfp   (19)-(20)."""
+        law = self.law
+        k1 = law.g1 * alpha ** (law.g2 * alpha**law.g3 + law.g4)
+        k2 = law.h1 * alpha ** (law.h2 * alpha + law.h3)
+        return (k1 * xi - k2) * jnp.sqrt(xi) * jnp.log(1.0 + law.eps - xi)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return jnp.minimum(jnp.abs(self.unclipped(xi, alpha)), self.law.largest_radius(alpha))
+
+    def atom(self, alpha) -> Array:
+        """Share of the samples that the clip puts at r_max exactly [-]."""
+        return 1.0 - self._share_below(self.law.largest_radius(alpha), alpha)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        x, alpha = jnp.broadcast_arrays(x, alpha)
+        turn = self._turning_point(alpha)
+        eps = jnp.full_like(alpha, self.law.eps)
+        density = sum(
+            self._branch_density(x, alpha, low, high)
+            for low, high in ((jnp.zeros_like(alpha), turn), (turn, eps), (eps, jnp.ones_like(alpha)))
+        )
+        return jnp.where((x > 0) & (x < self.law.largest_radius(alpha)), density, 0.0)
+
+    def _radius(self, xi, alpha) -> Array:
+        return jnp.abs(self.unclipped(xi, alpha))
+
+    def _root(self, x, alpha, low, high) -> Array:
+        """xi in [low, high], where |g| is monotone, with |g(xi)| = x; an end of it where there is none."""
+        rising = self._radius(high, alpha) > self._radius(low, alpha)
+
+        def halve(_, bracket):
+            left, right = bracket
+            middle = 0.5 * (left + right)
+            beyond = (self._radius(middle, alpha) > x) == rising
+            return jnp.where(beyond, left, middle), jnp.where(beyond, middle, right)
+
+        left, right = lax.fori_loop(0, BISECTIONS, halve, (low, high))
+        return 0.5 * (left + right)
+
+    def _branch_density(self, x, alpha, low, high) -> Array:
+        ends = self._radius(low, alpha), self._radius(high, alpha)
+        reached = (x > jnp.minimum(*ends)) & (x < jnp.maximum(*ends))
+        slope = jnp.abs(self._slope(self._root(x, alpha, low, high), alpha))
+        return jnp.where(reached, 1.0 / slope, 0.0)
+
+    def _slope(self, xi, alpha) -> Array:
+        """dg/dxi."""
+        law = self.law
+        k1 = law.g1 * alpha ** (law.g2 * alpha**law.g3 + law.g4)
+        k2 = law.h1 * alpha ** (law.h2 * alpha + law.h3)
+        root, ln = jnp.sqrt(xi), jnp.log(1.0 + law.eps - xi)
+        return (k1 + (k1 * xi - k2) / (2.0 * xi)) * root * ln - (k1 * xi - k2) * root / (1.0 + law.eps - xi)
+
+    def _turning_point(self, alpha) -> Array:
+        """The xi in (0, eps) where g is most negative."""
+
+        def halve(_, bracket):
+            left, right = bracket
+            middle = 0.5 * (left + right)
+            falling = self._slope(middle, alpha) < 0
+            return jnp.where(falling, middle, left), jnp.where(falling, right, middle)
+
+        start = jnp.zeros_like(alpha), jnp.full_like(alpha, self.law.eps)
+        return lax.fori_loop(0, BISECTIONS, halve, start)[0]
+
+    def _share_below(self, x, alpha) -> Array:
+        """Share of xi whose radius is below x, for x beyond the dip of the negative branch."""
+        eps, one = jnp.full_like(alpha, self.law.eps), jnp.ones_like(alpha)
+        return jnp.where(x < self._radius(one, alpha), self._root(x, alpha, eps, one), 1.0)

@@ -1,0 +1,201 @@
+"""Recipes: fits/*.toml says what is fitted to what, how it is weighted and over which range."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import MISSING, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.errors import RecipeError
+
+Floats = NDArray[np.float64]
+# Each pipeline and the objectives it can make small.
+PIPELINES = {
+    "albedo": ("albedo", "reflectance"),
+    "profile": ("energy",),
+    "as-published": ("radial",),
+    "inverse": ("radius", "share"),
+    "evidence": (),
+}
+TRUTHS = ("orders", "exact")
+SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
+TRIMMED = ("r R_d", "R_d", "none")
+
+
+@dataclass(frozen=True)
+class Albedos:
+    """Which albedos are fitted: `count` of them, even in `spacing`, from `low` to `high` in alpha [-]."""
+
+    low: float
+    high: float
+    count: int
+    spacing: str = "sqrt(1-alpha)"
+
+    def problems(self) -> str | None:
+        if not 0 < self.low < self.high <= 1:
+            return f"albedos must have 0 < low < high <= 1, got low = {self.low!r}, high = {self.high!r}"
+        if not 3 <= self.count <= 1000:
+            return f"albedos.count must be between 3 and 1000, got {self.count!r}"
+        if self.spacing not in SPACINGS:
+            return f"albedos.spacing must be one of {', '.join(SPACINGS)}, got {self.spacing!r}"
+        return None
+
+
+@dataclass(frozen=True)
+class Rings:
+    """On which rings: even ones of width `dr`, or log-spaced from `first` to `last` [mfp]; `trim` is (6)."""
+
+    last: float
+    dr: float = 0.0
+    first: float = 0.0
+    count: int = 0
+    trim: str = "none"
+    epsilon: float = 0.005
+
+    def problems(self) -> str | None:
+        if (self.dr > 0) == (self.first > 0 and self.count > 0):
+            got = f"dr = {self.dr!r}, first = {self.first!r}, count = {self.count!r}"
+            return f"rings must have either dr > 0 or both first > 0 and count > 0, got {got}"
+        if not max(self.dr, self.first) < self.last <= 1000:
+            return f"rings.last must lie beyond the first ring and within 1000 mfp, got {self.last!r}"
+        if not 0 <= self.count <= 1000:
+            return f"rings.count must be at most 1000, got {self.count!r}"
+        if self.trim not in TRIMMED or not 0 < self.epsilon < 1:
+            accepted = f"one of {', '.join(TRIMMED)} with epsilon in (0, 1)"
+            return f"rings.trim must be {accepted}, got {self.trim!r}, epsilon = {self.epsilon!r}"
+        return None
+
+
+@dataclass(frozen=True)
+class Weighting:
+    """What is made small: an objective by name, the weights of its limits, and shares of energy for quantiles."""
+
+    objective: str
+    energy_limit: float = 0.0
+    source_limit: float = 0.0
+    shares: int = 0
+    last_share: float = 1.0
+
+    def problems(self) -> str | None:
+        if self.energy_limit < 0 or self.source_limit < 0:
+            return f"weighting limits must be >= 0, got {self.energy_limit!r}, {self.source_limit!r}"
+        if not (0 <= self.shares <= 10_000 and 0 < self.last_share <= 1):
+            got = f"{self.shares!r}, {self.last_share!r}"
+            return f"weighting needs 0 <= shares <= 10000 and 0 < last_share <= 1, got {got}"
+        return None
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """One fit, from its truth to its record. `held` are constants that stay at their starting value, and why."""
+
+    name: str
+    title: str
+    law: str
+    equations: str
+    pipeline: str
+    truth: str
+    start: str = "published"
+    albedos: Albedos = Albedos(0.05, 0.995, 24)
+    weighting: Weighting = Weighting("")
+    rings: Rings | None = None
+    mfp: tuple[float, ...] = (1.0,)
+    held: tuple[str, ...] = ()
+    note: str = ""
+    path: Path = field(default=Path(), compare=False)
+
+    def problems(self) -> str | None:
+        """What is impossible about it, in one line, or None."""
+        if self.pipeline not in PIPELINES:
+            return f"pipeline must be one of {', '.join(PIPELINES)}, got {self.pipeline!r}"
+        if self.truth not in TRUTHS:
+            return f"truth must be one of {', '.join(TRUTHS)}, got {self.truth!r}"
+        if not self.mfp or not all(0 < length < np.inf for length in self.mfp):
+            return f"mfp must be a list of lengths > 0, got {list(self.mfp)!r}"
+        if self.rings is None and self.pipeline not in ("albedo", "evidence"):
+            return f"a recipe of pipeline {self.pipeline!r} needs a table [rings]"
+        objectives = PIPELINES[self.pipeline] or ("",)
+        if self.weighting.objective not in objectives:
+            accepted, got = ", ".join(objectives), self.weighting.objective
+            return f"weighting.objective of pipeline {self.pipeline!r} must be one of {accepted}, got {got!r}"
+        parts: tuple[Albedos | Rings | Weighting | None, ...] = (self.albedos, self.rings, self.weighting)
+        return next((text for part in parts if part is not None and (text := part.problems())), None)
+
+
+def read(path: Path) -> Recipe:
+    """Read one recipe; RecipeError says the file, what was wrong, what was got and what is accepted."""
+    try:
+        table = tomllib.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RecipeError(f"{path}: there is no such recipe") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise RecipeError(f"{path}: cannot be read ({error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise RecipeError(f"{path}: is not TOML: {error}") from None
+    needed = () if table.get("pipeline") == "evidence" else ("albedos", "weighting")
+    if missing := [f"[{name}]" for name in needed if name not in table]:
+        raise RecipeError(f"{path}: missing {', '.join(missing)}")
+    recipe = _build(Recipe, {**table, "name": path.stem, "path": path}, str(path), frozenset({"path", "name"}))
+    if problem := recipe.problems():
+        raise RecipeError(f"{path}: {problem}")
+    return recipe
+
+
+def available(folder: Path) -> dict[str, Path]:
+    """The recipes of a folder by name, in order."""
+    return {path.stem: path for path in sorted(folder.glob("*.toml"))}
+
+
+def find(name: str, folder: Path) -> Recipe:
+    """A recipe by its name in `folder`, or by the path of a .toml file."""
+    if name.endswith(".toml"):
+        return read(Path(name))
+    known = available(folder)
+    if name not in known:
+        raise RecipeError(f"recipe must be one of {', '.join(known) or '(none)'} or a .toml file, got {name!r}")
+    return read(known[name])
+
+
+def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[str] = frozenset()) -> Any:
+    """Make a dataclass from a TOML table: every key known, every needed key there, every type right."""
+    known = {f.name: f for f in fields(kind)}
+    for key in table:
+        if key not in known:
+            accepted = ", ".join(name for name in known if name not in given)
+            raise RecipeError(f"{where}: unknown key {key!r}, accepted: {accepted}")
+    missing = [n for n, f in known.items() if n not in table and f.default is MISSING and f.default_factory is MISSING]
+    if missing:
+        raise RecipeError(f"{where}: missing {', '.join(missing)}")
+    typed = {key: value if key in given else _typed(known[key].type, key, value, where) for key, value in table.items()}
+    return kind(**typed)
+
+
+def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
+    """A TOML value as the type its field declares, or RecipeError."""
+    tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting}
+    if annotation in tables:
+        if not isinstance(value, dict):
+            raise RecipeError(f"{where}: [{key}] must be a table, got {value!r}")
+        return _build(tables[annotation], value, f"{where}: [{key}]")
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    if annotation == "float" and number:
+        return float(value)
+    if annotation == "int" and isinstance(value, int) and not isinstance(value, bool):
+        return value
+    if annotation == "str" and isinstance(value, str):
+        return value
+    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(isinstance(v, int | float) for v in value):
+        return tuple(float(v) for v in value)
+    if annotation == "tuple[str, ...]" and isinstance(value, list) and all(isinstance(v, str) for v in value):
+        return tuple(value)
+    raise RecipeError(f"{where}: {key} must be a {_spoken(annotation)}, got {value!r}")
+
+
+def _spoken(annotation: str) -> str:
+    names = {"float": "number", "int": "whole number", "str": "text"}
+    return names.get(annotation, "list of numbers" if "float" in annotation else "list of texts")

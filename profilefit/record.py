@@ -1,0 +1,131 @@
+"""Records: fits/*.json is what came out of a recipe, and everything needed to judge it or to make it again.
+
+The same recipe, seed and versions on one CPU class write the same bytes: no dates, no times, sorted keys. Samples and
+curves that figures need lie beside it in an .npz of the same name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, is_dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from profilefit.errors import OutputError, RecordError
+
+FORMAT = 1
+# Twelve digits are beyond any error here, and within what a repeated run gives again.
+DIGITS = 12
+LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
+
+
+def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
+    """Write `name`.json and `name`.npz into `folder`, each whole or not at all. OutputError names folder and reason."""
+    body = plain({"format": FORMAT, "name": name, **content})
+    text = json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        _replace(folder / f"{name}.npz", lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+        _replace(folder / f"{name}.json", lambda file: file.write(text.encode()))
+    except OSError as error:
+        raise OutputError(f"cannot write record {name!r} into {folder}: {error.strerror or error}") from None
+    return folder / f"{name}.json"
+
+
+def require_writable(folder: Path) -> None:
+    """OutputError unless files can be made in `folder`: better now than after an hour of photons."""
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
+            pass
+    except OSError as error:
+        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from None
+
+
+def read(path: Path) -> dict[str, Any]:
+    """Read a record; RecordError says which file and what is wrong with it."""
+    try:
+        content = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them") from None
+    except OSError as error:
+        raise RecordError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except ValueError as error:
+        raise RecordError(f"{path}: is not a record: {error}") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        found = content.get("format") if isinstance(content, dict) else type(content).__name__
+        raise RecordError(f"{path}: is not a record of format {FORMAT}, got {found!r}")
+    return content
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays beside a record (`path` is the .json)."""
+    file = path.with_suffix(".npz")
+    try:
+        with np.load(file) as arrays:
+            return {name: arrays[name] for name in arrays.files}
+    except FileNotFoundError:
+        raise RecordError(f"{file}: the samples and curves of this record are missing; regenerate it") from None
+    except (OSError, ValueError, KeyError, EOFError) as error:
+        raise RecordError(f"{file}: is damaged ({error}); regenerate it") from None
+
+
+def available(folder: Path) -> dict[str, Path]:
+    """The records of a folder by name, in order."""
+    return {path.stem: path for path in sorted(folder.glob("*.json"))}
+
+
+def digest(*arrays: np.ndarray) -> str:
+    """SHA-256 of the numbers that were fitted, to tell whether two records saw the same data."""
+    sha = hashlib.sha256()
+    for array in arrays:
+        sha.update(np.ascontiguousarray(array).tobytes())
+    return sha.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """The libraries that decide the numbers."""
+    return {name: version(name) for name in LIBRARIES}
+
+
+def plain(value: Any) -> Any:
+    """Numbers, text, lists and dicts only; floats to twelve digits; what is not finite by its name."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return plain(asdict(value))
+    if isinstance(value, Mapping):
+        return {str(key): plain(item) for key, item in value.items()}
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, list | tuple):
+        return [plain(item) for item in value]
+    if isinstance(value, bool | np.bool_):
+        return bool(value)
+    if isinstance(value, int | np.integer):
+        return int(value)
+    if isinstance(value, float | np.floating):
+        return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
+    if value is None or isinstance(value, str):
+        return value
+    return str(value)
+
+
+def _replace(target: Path, fill: Callable[[Any], object]) -> None:
+    """Fill a temporary file beside `target`, then rename it: a reader sees the old file or the new one."""
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            fill(file)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise

@@ -1,0 +1,22 @@
+"""One run that several files of tests look at, and the thresholds they share."""
+
+import numpy as np
+import pytest
+from scipy.stats import norm
+
+from mcml_sim import Grid, simulate_orders
+
+# From far inside a mean free path to where only photons of high albedo arrive.
+EDGES = np.concatenate([[0.0], np.geomspace(0.01, 30.0, 40)])
+
+
+@pytest.fixture(scope="session")
+def run():
+    """4 batches of the white half space, seed 1."""
+    return simulate_orders(Grid.from_edges(r=EDGES), 2**22, seed=1)
+
+
+@pytest.fixture(scope="session")
+def sidak():
+    """|z| that the largest of m independent normal deviates exceeds with probability 1e-3."""
+    return lambda m: float(norm.isf((1 - (1 - 1e-3) ** (1 / m)) / 2))

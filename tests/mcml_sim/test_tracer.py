@@ -1,0 +1,126 @@
+"""The fast tracer against a slow obvious one, and against itself in other shapes."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, rng, tracer
+from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER
+
+PHOTONS = 200_000
+
+
+def slow_twin(photons, last_order, seed):
+    """Exit radius and order in float64 (x, y, z), with directions, no roulette; order 0 beyond `last_order`."""
+    source = np.random.default_rng(seed)
+    rho, order = np.zeros(photons), np.zeros(photons, int)
+    position = np.zeros((photons, 3))
+    position[:, 2] = source.exponential(size=photons)
+    flying = np.arange(photons)
+    for n in range(1, last_order + 1):
+        direction = source.normal(size=(flying.size, 3))
+        direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+        start = position[flying]
+        end = start + source.exponential(size=(flying.size, 1)) * direction
+        out = end[:, 2] < 0
+        at_surface = start[out] - direction[out] * (start[out, 2:] / direction[out, 2:])
+        rho[flying[out]] = np.hypot(at_surface[:, 0], at_surface[:, 1])
+        order[flying[out]] = n
+        position[flying] = end
+        flying = flying[~out]
+    return rho, order
+
+
+@pytest.fixture(scope="module")
+def ends():
+    """Ends of the first photons of batch 0, seed 0, as numpy arrays."""
+    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS))
+    return np.asarray(found.rho)[:PHOTONS], np.asarray(found.order)[:PHOTONS]
+
+
+def table(rho, order):
+    """Counts by 8 radii and 7 groups of orders to 64."""
+    left = (order >= 1) & (order <= 64)
+    radii = [0, 0.1, 0.3, 0.6, 1, 2, 4, 8, np.inf]
+    return np.histogram2d(rho[left], order[left], bins=[radii, [1, 2, 3, 5, 9, 17, 33, 65]])[0].ravel()
+
+
+def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
+    fast, slow = table(*ends), table(*slow_twin(PHOTONS, 64, seed=3))
+    enough = fast + slow > 25
+    # Difference of two Poisson counts.
+    z = (fast - slow)[enough] / np.sqrt((fast + slow)[enough])
+    assert enough.sum() > 40
+    assert np.abs(z).max() < sidak(enough.sum())
+
+
+def test_the_comparison_sees_a_twin_that_is_off_by_3_percent(ends, sidak):
+    rho, order = slow_twin(PHOTONS, 64, seed=3)
+    fast, slow = table(*ends), table(1.03 * rho, order)
+    enough = fast + slow > 25
+    assert np.abs((fast - slow)[enough] / np.sqrt((fast + slow)[enough])).max() > sidak(enough.sum())
+
+
+def test_every_photon_ends_and_none_at_a_place_that_is_no_number(ends):
+    rho, order = ends
+    assert np.all(order != 0)
+    assert np.all(np.isfinite(rho))
+    assert np.all(rho >= 0)
+
+
+def test_photons_end_inside_at_roulettes_and_at_the_cap_only(ends):
+    tosses = FIRST_ROULETTE * 2 ** np.arange(8)
+    assert tosses[-1] == MAX_ORDER
+    assert set(-ends[1][ends[1] < 0]) <= set(tosses)
+
+
+def test_first_roulette_stops_half_of_those_that_reach_it(ends):
+    stopped, went_on = np.sum(ends[1] == -FIRST_ROULETTE), np.sum(np.abs(ends[1]) > FIRST_ROULETTE)
+    assert abs(stopped - went_on) < 4 * np.sqrt(stopped + went_on)
+
+
+def test_photons_that_were_not_asked_for_are_not_started():
+    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(100))
+    assert np.all(np.asarray(found.order)[:100] != 0)
+    assert np.all(np.asarray(found.order)[100:] == 0)
+
+
+@pytest.mark.parametrize("lanes", [512, 16384])
+def test_the_number_of_lanes_does_not_change_a_bit(ends, lanes):
+    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS), lanes)
+    np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
+    np.testing.assert_array_equal(np.asarray(found.order)[:PHOTONS], ends[1])
+
+
+def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one(ends):
+    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(5000))
+    np.testing.assert_array_equal(np.asarray(found.rho)[:5000], ends[0][:5000])
+
+
+def test_double_precision_elsewhere_in_the_program_does_not_change_a_bit(ends):
+    with jax.enable_x64(True):
+        found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS))
+    np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
+    assert found.rho.dtype == np.float32
+
+
+def test_rings_are_those_of_float64_edges(ends):
+    """Edges that float32 cannot hold, some of them exactly where photons left."""
+    rho = np.unique(ends[0].astype(np.float64))
+    at = np.sort(np.random.default_rng(0).choice(rho[rho > 0], 50, replace=False))
+    grid = Grid.from_edges(r=np.unique(np.concatenate([[0.0], at, at * (1 + 1e-5), np.geomspace(1e-3, 9, 30)])))
+    counts = tracer.trace_batch(grid, 0, 0, PHOTONS)
+    left = ends[1] > 0
+    expected = np.bincount(
+        np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1, minlength=grid.rings + 1
+    )
+    np.testing.assert_array_equal(counts.exits.sum(axis=1), expected)
+
+
+def test_histogram_keeps_every_order_below_256(ends):
+    counts = tracer.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
+    expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
+    np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
+    assert counts.is_closed
+    assert counts.cut == np.sum(ends[1] == -MAX_ORDER)

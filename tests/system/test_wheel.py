@@ -1,0 +1,62 @@
+"""What a user gets: the wheel, built from the sdist, in an environment that holds nothing else."""
+
+import math
+import os
+import subprocess
+import sys
+import venv
+import zipfile
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# Downloads and unpacks jax, scipy and matplotlib: half a minute with a warm pip cache, minutes over a slow line.
+pytestmark = pytest.mark.timeout(900)
+
+
+def run(*command: str | Path, cwd: Path) -> str:
+    """The standard output of a command; where it fails, the test fails and shows all it printed."""
+    done = subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, f"{' '.join(map(str, command))}\n{done.stdout}\n{done.stderr}"
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    out = tmp_path_factory.mktemp("dist")
+    run(sys.executable, "-m", "build", "--outdir", out, ROOT, cwd=out)
+    (built,) = out.glob("*.whl")
+    return built
+
+
+@pytest.fixture(scope="module")
+def scripts(wheel, tmp_path_factory) -> Path:
+    """The folder of programs of a new environment with the wheel and its dependencies."""
+    home = tmp_path_factory.mktemp("environment")
+    venv.create(home, with_pip=True)
+    folder = home / ("Scripts" if os.name == "nt" else "bin")
+    pip = (folder / "python", "-m", "pip", "--quiet", "--no-input", "--disable-pip-version-check")
+    run(*pip, "install", wheel, cwd=home)
+    return folder
+
+
+def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {name.split("/")[0] for name in names} == {"mcml_sim", "profilefit", "profilefit-0.1.0.dist-info"}
+
+    fits = {path.name for pattern in ("*.toml", "*.json") for path in (ROOT / "fits").glob(pattern)}
+    assert any(name.endswith(".json") for name in fits)
+    assert {f"profilefit/fits/{name}" for name in fits} <= names
+
+
+def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
+    code = "import profilefit; law = profilefit.load('liang'); print(law.profile(0.5, 0.9))"
+    value = float(run(scripts / "python", "-I", "-c", code, cwd=tmp_path))
+    assert math.isfinite(value)
+    assert value > 0
+
+
+def test_installed_command_shows_its_help(scripts, tmp_path):
+    assert "regenerate" in run(scripts / "profilefit", "--help", cwd=tmp_path)
