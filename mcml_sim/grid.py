@@ -91,7 +91,7 @@ def _checked_edges(r: ArrayLike) -> NDArray[np.float64]:
     if edges.ndim != 1 or not 2 <= edges.size <= MAX_RINGS + 1:
         raise InputError(f"r must be a list of 2 to {MAX_RINGS + 1} edges, got an array of shape {edges.shape}")
     if not np.all(np.isfinite(edges)):
-        raise InputError(f"r must be finite edges, got {edges[~np.isfinite(edges)][0]!r} among them")
+        raise InputError(f"r must be finite edges, got {edges[~np.isfinite(edges)][0]:g} among them")
     if edges[0] != 0:
         raise InputError(f"r must start at 0, the beam, got a first edge of {edges[0]:g}")
     if not np.all(np.diff(edges) > 0):

@@ -39,9 +39,8 @@ def run_batches(
     threads = workers or os.cpu_count() or 1
     with _bar(progress) as bar, ThreadPoolExecutor(threads) as pool:
         run = _Run(trace, tasks, store, bar, photons)
-        futures = [pool.submit(run.work) for _ in range(min(threads, -(-photons // batch_photons)))]
         try:
-            _wait(futures)
+            _wait([pool.submit(run.work) for _ in range(min(threads, -(-photons // batch_photons)))])
         finally:
             run.stop.set()
     return run.total()

@@ -85,9 +85,13 @@ def reflectance(law, rings: Rings) -> Array:
 
 
 def radius(law, rings: Rings) -> Array:
-    """As published: g(xi) minus the radius within which the share xi of the energy leaves [mfp], unweighted in xi."""
-    alpha = rings.alpha[:, None]
-    return law.sampler.unclipped(rings.xi, alpha) - _quantile(rings)
+    """g(xi) minus the radius within which the share xi of the energy leaves [mfp], unweighted in xi."""
+    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) - _quantile(rings)
+
+
+def relative_radius(law, rings: Rings) -> Array:
+    """g(xi) over the radius within which the share xi of the energy leaves, minus 1 [-], unweighted in xi."""
+    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) / _quantile(rings) - 1.0
 
 
 def share(law, rings: Rings) -> Array:
@@ -97,7 +101,7 @@ def share(law, rings: Rings) -> Array:
     return inner - rings.xi
 
 
-OBJECTIVES: dict[str, Callable] = {f.__name__: f for f in (energy, radial, albedo, reflectance, radius, share)}
+OBJECTIVES: dict[str, Callable] = {f.__name__: f for f in (energy, radial, albedo, reflectance, radius, relative_radius, share)}
 
 
 def rings_of(profiles: Profiles, used=None, limits=(0.0, 0.0), xi=()) -> Rings:

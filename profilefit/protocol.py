@@ -113,7 +113,7 @@ def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
     """a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that gives no pole left of zero."""
     columns = np.stack([r, np.ones_like(r), -y], axis=1)[used]
     found = np.linalg.lstsq(columns, (y * r)[used], rcond=None)[0]
-    return found if found[2] > 0 else np.array([-0.05, 0.5, 0.5])
+    return np.asarray(found if found[2] > 0 else [-0.05, 0.5, 0.5], np.float64)
 
 
 def _rational_misfit(p, item):

@@ -19,7 +19,7 @@ PIPELINES = {
     "albedo": ("albedo", "reflectance"),
     "profile": ("energy",),
     "as-published": ("radial",),
-    "inverse": ("radius", "share"),
+    "inverse": ("radius", "relative_radius", "share"),
     "evidence": (),
 }
 TRUTHS = ("orders", "exact")

@@ -161,10 +161,9 @@ def _reading(equation: str, choices: str, found, curves: tuple[Floats, Floats], 
     constants = dict(zip(printed, map(float, np.atleast_1d(found)), strict=True))
     of_length = equation == LENGTH
     gaps = [abs(v - printed[k]) if of_length else abs(v / printed[k] - 1) for k, v in constants.items()]
-    difference = curves[0] / curves[1] - 1
-    rms, largest = float(np.sqrt(np.mean(difference**2))), float(np.max(np.abs(difference)))
-    verdict = judge(max(gaps), rms)
-    return Reading(equation, choices, constants, dict(printed), float(max(gaps)), rms, largest, verdict, evidence)
+    off = np.abs(curves[0] / curves[1] - 1)
+    gap, rms = float(max(gaps)), float(np.sqrt(np.mean(off**2)))
+    return Reading(equation, choices, constants, dict(printed), gap, rms, float(off.max()), judge(gap, rms), evidence)
 
 
 def _misfit_of(law: Callable) -> Callable:
@@ -187,7 +186,7 @@ def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float =
 
 def _held(columns: list[Floats], data: Floats) -> Floats:
     """Amplitudes of a law whose exponent is held at its printed value."""
-    return np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0]
+    return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
 
 
 def _albedo_readings(source: Truth, grids: dict[str, Floats]) -> list[Reading]:
@@ -210,17 +209,16 @@ def _albedo_readings(source: Truth, grids: dict[str, Floats]) -> list[Reading]:
 
 def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
     """(11), (13), (15) under the plain protocol at every sampling, and every other protocol at the last one."""
-    plain = fit_coefficients(profiles, Protocol7())
-    width = float(profiles.r_edges[1])
+    plain, width = fit_coefficients(profiles, Protocol7()), float(profiles.r_edges[1])
+    choices = Protocol7().describe(width)
     last, alpha = list(grids.items())[-1]
     found = []
     for name, here in grids.items():
-        found += _law_readings(plain.at(here), f"{Protocol7().describe(width)}; {name}", exponent_free=True)
+        found += _law_readings(plain.at(here), f"{choices}; {name}", exponent_free=True)
     only = profiles_at(profiles, alpha)
     for protocol in PROTOCOLS:
-        points = fit_coefficients(only, protocol)
-        found += _law_readings(points, f"{protocol.describe(width)}; {last}")
-    return found + _misprint_readings(plain.at(alpha), f"{Protocol7().describe(width)}; {last}", only)
+        found += _law_readings(fit_coefficients(only, protocol), f"{protocol.describe(width)}; {last}")
+    return found + _misprint_readings(plain.at(alpha), f"{choices}; {last}", only)
 
 
 def _law_readings(points: Coefficients, choices: str, exponent_free: bool = False) -> list[Reading]:
@@ -247,9 +245,8 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
 
 def _law_reading(equation, law, data, constants, held, published, alpha, choices, cuts) -> Reading:
     printed = np.array(list(published.values()))
-    ratio = data / law(alpha, printed)
+    ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
     evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
-    curves = law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed)
     return _reading(equation, f"{choices}; {held}", constants, curves, evidence, published)
 
 
@@ -294,8 +291,8 @@ def _length_readings(profiles: Profiles) -> list[Reading]:
 
 def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
     """(19)-(20): where shares stand and what is made small; k1 and k2 by linear least squares at each albedo."""
-    alpha = np.append(np.arange(1, 10) / 10, [0.95, 0.99])
-    chosen = profiles.alpha[[np.argmin(np.abs(profiles.alpha - a)) for a in alpha]]
+    wanted = [*np.arange(1, 10) / 10, 0.95, 0.99]
+    chosen = profiles.alpha[[np.argmin(np.abs(profiles.alpha - a)) for a in wanted]]
     rows = [profiles.cdf[i] for i in np.searchsorted(profiles.alpha, chosen)]
     edges = profiles.r_edges
     cuts = fit_coefficients(profiles, Protocol7()).at(chosen).cut
@@ -331,19 +328,20 @@ def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
     found = np.concatenate([_fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])])
     # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
-    mine = k1_law(INVERSE_ALPHAS, found[:4]), k2_law(INVERSE_ALPHAS, found[4:])
-    curves = _bracket(*mine), _bracket(*_printed_k(INVERSE_ALPHAS))
-    off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), _printed_k(alpha), strict=True)]
+    curves = _bracket(found), _bracket(_printed("(20)"))
+    laws = _both_k(alpha, _printed("(20)"))
+    off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), laws, strict=True)]
     evidence = f"alpha .1 to .9 by .1, .95, .99: k1, k2 at each one are {off[0]:.3f}, {off[1]:.3f} rms from (20)"
     return _reading("(20)", f"{name}; residual in {residual}", found, curves, evidence)
 
 
-def _printed_k(alpha: Floats) -> tuple[Floats, Floats]:
-    return k1_law(alpha, _printed("(20)")[:4]), k2_law(alpha, _printed("(20)")[4:])
+def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
+    return k1_law(alpha, p[:4]), k2_law(alpha, p[4:])
 
 
-def _bracket(k1: Floats, k2: Floats) -> Floats:
-    """k1 xi - k2 of (19) over INVERSE_SHARES, (alphas, shares)."""
+def _bracket(p: Floats) -> Floats:
+    """k1 xi - k2 of (19), (alphas, shares)."""
+    k1, k2 = _both_k(INVERSE_ALPHAS, p)
     return k1[:, None] * INVERSE_SHARES - k2[:, None]
 
 

@@ -44,10 +44,12 @@ class ExactTruth:
     def profiles(self, alpha: Floats) -> Profiles:
         """Ring energies by Simpson's rule on a spline of ln(2 pi r R_d): within 1e-5 of the exact integrals."""
         half = np.arange(2 * round(self.last_radius / self.ring_width) + 1) * self.ring_width / 2
-        nodes = np.geomspace(half[1] / 2, half[-1], 180)
+        nodes = np.geomspace(half[1] / 2, half[-1], 120)
         values = 2 * np.pi * nodes * np.asarray(exact.profile(nodes, alpha[:, None], setting=self.setting))
         density = np.exp(CubicSpline(np.log(nodes), np.log(values), axis=1)(np.log(np.maximum(half, nodes[0]))))
         energy = self.ring_width / 6 * (density[:, :-2:2] + 4 * density[:, 1::2] + density[:, 2::2])
+        inside = np.asarray(exact.cdf(half[2], alpha, setting=self.setting))  # r ln r at the source defeats Simpson
+        energy[:, 0] = self.reflectance(alpha) * inside
         beyond = self.reflectance(alpha) - energy.sum(axis=1)
         none = np.zeros_like(energy)
         return Profiles(alpha, half[::2], energy, none, none + np.inf, beyond, "exact", self.setting)

@@ -47,7 +47,7 @@ def regenerate(
         preset=preset.value,
         seed=seed,
         out=out,
-        store=out / PHOTON_STORE,
+        store=out / PHOTON_STORE / f"seed-{seed}",
         photons=calibrate.PHOTONS[preset.value] if photons is None else photons,
         say=lambda text: console.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=None if sys.stderr.isatty() and not quiet else False,

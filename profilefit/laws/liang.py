@@ -59,7 +59,7 @@ class Liang(ProfileLaw):
 
     def seen_by(self, objective: str) -> tuple[str, ...]:
         """The profile and the inverse cdf share no constant: a fit of one leaves the other alone."""
-        return INVERSE_CONSTANTS if objective in ("radius", "share") else PROFILE_CONSTANTS
+        return INVERSE_CONSTANTS if objective in ("radius", "relative_radius", "share") else PROFILE_CONSTANTS
 
     def coefficients(self, alpha) -> tuple[Array, Array, Array]:
         """a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""

@@ -190,8 +190,11 @@ def test_other_settings_are_refused_by_name(setting):
 
 
 def test_grids_too_fine_for_single_precision_are_refused():
-    with pytest.raises(InputError, match="single precision"):
+    with pytest.raises(InputError, match=r"rings wider than 1e-05 of their radius.*got one from 1\.0 to 1\.0"):
         simulate_orders(Grid.from_edges(r=[0, 1, 1 + 1e-12, 2]), 10)
+    for edges in ([0, 1e-40, 1], [0, 1e40]):
+        with pytest.raises(InputError, match="grid must have edges from 1e-30 to 1e"):
+            simulate_orders(Grid.from_edges(r=edges), 10)
     with pytest.raises(InputError, match=r"must be a mcml_sim\.Grid"):
         simulate_orders([0, 1, 2], 10)
 

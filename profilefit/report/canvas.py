@@ -1,0 +1,104 @@
+"""What every figure shares: size, colours that colour-blind readers tell apart, and files written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from functools import wraps
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from profilefit.errors import OutputError
+
+DPI = 150
+WIDTH = 8.0  # [inch]: 1200 pixels at DPI
+# The palette of Okabe and Ito, Color Universal Design (2008).
+BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
+YELLOW, BLUE, VERMILION, PURPLE, GREY = "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
+RC: Mapping[str, Any] = MappingProxyType(
+    {
+        "font.family": "DejaVu Sans",  # ships with matplotlib: the same letters everywhere
+        "font.size": 9.0,
+        "axes.titlesize": 9.0,
+        "axes.labelsize": 9.0,
+        "xtick.labelsize": 8.0,
+        "ytick.labelsize": 8.0,
+        "legend.fontsize": 8.0,
+        "legend.frameon": False,
+        "axes.grid": True,
+        "grid.color": "#DDDDDD",
+        "grid.linewidth": 0.5,
+        "axes.axisbelow": True,
+        "axes.formatter.use_mathtext": True,
+        "lines.linewidth": 1.4,
+        "savefig.dpi": DPI,
+        "svg.fonttype": "path",
+        "svg.hashsalt": "profilefit",  # without it the ids in an SVG are random
+    }
+)
+# How each set of constants looks in every figure.
+PUBLISHED: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": (0, (5, 2))})
+CORRECTED: Mapping[str, Any] = MappingProxyType({"color": ORANGE, "linestyle": (0, (4, 1.5, 1, 1.5))})
+AS_PUBLISHED: Mapping[str, Any] = MappingProxyType({"color": GREEN, "linestyle": "-"})
+WHOLE: Mapping[str, Any] = MappingProxyType({"color": BLUE, "linestyle": "-"})
+DATA: Mapping[str, Any] = MappingProxyType(
+    {"color": BLACK, "linestyle": "none", "marker": "o", "markersize": 2.6, "elinewidth": 0.8, "zorder": 4}
+)
+
+
+def styled(draw: Callable[..., Any]) -> Callable[..., Any]:
+    """Run a drawing function under this module's settings and put matplotlib's own back."""
+
+    @wraps(draw)
+    def call(*arguments: Any, **named: Any) -> Any:
+        with matplotlib.rc_context(dict(RC)):
+            return draw(*arguments, **named)
+
+    return call
+
+
+def canvas(height: float, width: float = WIDTH, layout: Any = "constrained") -> Figure:
+    """An empty figure of `width` x `height` [inch] with its own Agg canvas: pyplot never hears of it."""
+    figure = Figure(figsize=(width, height), layout=layout)
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def legend_below(figure: Figure, axes: list[Axes], columns: int = 3) -> None:
+    """One legend for all `axes`, under the figure, where it covers no data."""
+    found: dict[str, Any] = {}
+    for ax in axes:
+        for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
+            found.setdefault(label, handle)
+    figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns)
+
+
+def save(figure: Figure, out: Path, name: str) -> list[Path]:
+    """Write `name`.png and `name`.svg into folder `out`, each whole or not at all; the SVG carries no date."""
+    png, svg = out / f"{name}.png", out / f"{name}.svg"
+    try:
+        out.mkdir(parents=True, exist_ok=True)
+        _replace(png, lambda file: figure.savefig(file, format="png", dpi=DPI))
+        _replace(svg, lambda file: figure.savefig(file, format="svg", metadata={"Date": None}))
+    except OSError as error:
+        raise OutputError(f"cannot write figure {name!r} into {out}: {error.strerror or error}") from None
+    return [png, svg]
+
+
+def _replace(target: Path, fill: Callable[[Any], object]) -> None:
+    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
+    try:
+        with os.fdopen(handle, "wb") as file:
+            fill(file)
+        os.chmod(name, 0o644)
+        os.replace(name, target)
+    except BaseException:
+        os.unlink(name)
+        raise

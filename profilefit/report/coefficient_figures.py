@@ -1,0 +1,127 @@
+"""Equations (11), (13) and (15) redone: a, b and c of (7) against the albedo, and each law over the per-albedo fits."""
+
+from __future__ import annotations
+
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from profilefit.report.canvas import (
+    AS_PUBLISHED,
+    BLACK,
+    CORRECTED,
+    DATA,
+    PUBLISHED,
+    PURPLE,
+    WHOLE,
+    canvas,
+    legend_below,
+    save,
+    styled,
+)
+from profilefit.report.source import Fitted, Source, coefficients
+from profilefit.staged import COEFFICIENTS, CONSTANTS_OF
+
+Floats = NDArray[np.float64]
+EQUATION = {"a": "(11)", "b": "(13)", "c": "(15)"}
+UNIT = {"a": "1/mfp", "b": "-", "c": "mfp"}
+STAGED = {"color": PURPLE, "linestyle": (0, (1, 1.2))}
+Line = tuple[str, Any, Any, Fitted | None]
+
+
+@styled
+def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -> list[Path]:
+    """One coefficient against alpha [-], the end near 1 enlarged, and below each the laws over the fitted points."""
+    data = source.fitted("liang-as-published")
+    assert data is not None  # `figures` draws only what its records are there for
+    lines = _lines(letter, source, data)
+    figure = canvas(6.4)
+    axes = figure.subplots(2, 2, height_ratios=(1.6, 1.0), width_ratios=(1.5, 1.0))
+    for column, (low, high) in enumerate(((0.0, 1.0), (0.9, 1.0))):
+        top, bottom = axes[0, column], axes[1, column]
+        alpha = np.linspace(max(low, 0.02), high, 500)
+        _values(top, letter, alpha, lines, data)
+        _ratios(bottom, letter, lines, data)
+        for ax in (top, bottom):
+            ax.set_xlim(low, high + 0.02 * (high - low))
+        bottom.set_xlabel("single-scattering albedo α [-]")
+        if column:
+            _fit_y(top, letter, alpha, lines, data, low)
+    axes[0, 0].set(ylabel=f"{letter} of (7) [{UNIT[letter]}]", title=f"{letter} by {EQUATION[letter]}, l = 1")
+    axes[0, 1].set_title("the end near α = 1, enlarged")
+    axes[1, 0].set_ylabel("law over fitted point [-]")
+    if letter == "b":
+        axes[0, 0].set(yscale="log", ylim=(1e-3, 1.0))
+        axes[0, 1].set_yscale("log")
+    legend_below(figure, list(axes.flat), columns=2)
+    return save(figure, out, name or f"liang-{EQUATION[letter][1:-1]}-{letter}")
+
+
+a_figure = partial(coefficient_figure, "a")
+b_figure = partial(coefficient_figure, "b")
+c_figure = partial(coefficient_figure, "c")
+
+
+def _lines(letter: str, source: Source, data: Fitted) -> list[Line]:
+    setting, equation = data.law.setting, EQUATION[letter]
+    printed = source.printed("liang", "published", setting)
+    lines: list[Line] = [(f"{equation} as printed", printed, PUBLISHED, None)]
+    corrected = source.printed("liang", "corrected", setting)
+    if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
+        lines.append((f"{equation} with b0 = {corrected.constants()['b0']:g}", corrected, CORRECTED, None))
+    stage = data.content["stages"]["coefficient_laws"][letter]
+    staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
+    failed = "" if stage["result"] == "converged" else " (did not converge)"
+    lines.append((f"{equation} through the points{failed}", staged, STAGED, None))
+    labels = {
+        "liang-as-published": ("regenerated, the paper's protocol, jointly", AS_PUBLISHED),
+        "liang-whole": ("regenerated, whole profile", WHOLE),
+    }
+    for name, (label, style) in labels.items():
+        fitted = source.usable(name)
+        if fitted is not None:
+            lines.append((label, fitted.law, style, fitted))
+    return lines
+
+
+def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitted) -> None:
+    column = COEFFICIENTS.index(letter)
+    for label, law, style, fitted in lines:
+        band = fitted.band(lambda law: coefficients(law, alpha)[column]) if fitted else None
+        if band is not None:
+            note = "95 % of posterior draws, misfit as noise"
+            ax.fill_between(alpha, *band, color=style["color"], alpha=0.25, linewidth=0, label=note)
+        ax.plot(alpha, coefficients(law, alpha)[column], label=label, **style)
+    points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
+    ax.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
+
+
+def _ratios(ax: Axes, letter: str, lines: list[Line], data: Fitted) -> None:
+    column = COEFFICIENTS.index(letter)
+    alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
+    for _, law, style, _ in lines:
+        ax.plot(alpha, coefficients(law, alpha)[column] / points, marker=".", markersize=3, **style)
+    sigma = np.abs(data.arrays["coefficient_errors"][:, column] / points)
+    ax.errorbar(alpha, np.ones_like(alpha), sigma, **DATA)
+    ax.axhline(1.0, color=BLACK, linewidth=0.8)
+    if letter == "b":
+        ax.set(yscale="log", ylim=(0.5, 15.0))
+    else:
+        ax.set_ylim(0.6, 1.4)
+
+
+def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitted, low: float) -> None:
+    """Scale the enlarged panel to what it shows."""
+    column = COEFFICIENTS.index(letter)
+    near = data.arrays["alpha"] >= low
+    shown = [coefficients(law, alpha)[column] for _, law, _, _ in lines]
+    values = np.concatenate([*shown, data.arrays["coefficients"][near, column]])
+    if letter == "b":
+        ax.set_ylim(0.7 * values.min(), 1.4 * values.max())
+    else:
+        margin = 0.08 * np.ptp(values)
+        ax.set_ylim(values.min() - margin, values.max() + margin)

@@ -1,0 +1,191 @@
+"""The command line as a user meets it: what it writes, what it refuses, and in how many lines."""
+
+import json
+import os
+import sys
+from pathlib import Path
+
+import pytest
+
+from profilefit import catalogue
+from profilefit.cli import main
+
+RECIPE = """
+title = "A small one"
+law = "liang"
+equations = "(8)"
+pipeline = "albedo"
+truth = "orders"
+
+[albedos]
+low = 0.1
+high = 0.9
+count = 9
+
+[weighting]
+objective = "albedo"
+"""
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """Run `profilefit WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["profilefit", *words])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        printed = capsys.readouterr()
+        return int(stop.value.code or 0), printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def recipe(tmp_path) -> Path:
+    path = tmp_path / "small.toml"
+    path.write_text(RECIPE)
+    return path
+
+
+def small(recipe: Path, out: str = "out", *more: str) -> tuple[str, ...]:
+    return ("regenerate", str(recipe), "--out", out, "--photons", "20000", *more)
+
+
+def test_regenerate_writes_a_record_that_loads(command, recipe):
+    status, _, err = command(*small(recipe))
+    assert status == 0, err
+    content = json.loads(Path("out/small.json").read_text())
+    assert content["truth"]["photons"] == 20000
+    assert content["fit"]["result"] == "converged"
+    law = catalogue.albedo_law("liang", constants="out/small.json")
+    assert law.p == pytest.approx(content["constants"]["p"]["regenerated"])
+    assert content["posterior"]["statistical"]["result"] == "converged"
+
+
+def test_one_seed_gives_identical_records_and_another_does_not(command, recipe):
+    for out, seed in (("a", "3"), ("b", "3"), ("c", "4")):
+        assert command(*small(recipe, out, "--seed", seed))[0] == 0
+    for suffix in ("json", "npz"):
+        same, again, other = (Path(f"{out}/small.{suffix}").read_bytes() for out in "abc")
+        assert same == again
+        assert same != other
+
+
+def test_more_photons_resume_the_ones_that_are_there(command, recipe):
+    assert command(*small(recipe))[0] == 0
+    before = {path: path.stat().st_mtime_ns for path in Path("out/.photons").glob("*/batch-*")}
+    assert command(*small(recipe))[0] == 0
+    assert {path: path.stat().st_mtime_ns for path in Path("out/.photons").glob("*/batch-*")} == before
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ('law = "liang"|law = "lang"', "law must be one of liang, rational, got 'lang'"),
+        ("low = 0.1|low = 1.1", "albedos must have 0 < low < high <= 1, got low = 1.1"),
+        ("count = 9|count = 1", "albedos.count must be between 3 and 1000, got 1"),
+        ("count = 9|cuont = 9", "unknown key 'cuont'"),
+        ("[weighting]|[weighting", "is not TOML"),
+        ('objective = "albedo"|objective = "energy"', "must be one of albedo, reflectance, got 'energy'"),
+        ('truth = "orders"|truth = "orders"\nmfp = [0.0]', "mfp must be a list of lengths > 0, got [0.0]"),
+        ('truth = "orders"|truth = "orders"\nstart = "old"', "start must be one of published, got 'old'"),
+        ('truth = "orders"|truth = "orders"\nheld = ["z"]', "held must name constants of liang, got z"),
+    ],
+)
+def test_a_bad_recipe_is_one_line_and_writes_nothing(command, recipe, change, said):
+    old, new = change.split("|")
+    recipe.write_text(RECIPE.replace(old, new))
+    status, out, err = command(*small(recipe))
+    assert status == 2
+    assert said in err
+    assert err.count("\n") == 1
+    assert str(recipe) in err
+    assert out == ""
+    assert not list(Path("out").glob("**/*.*")) if Path("out").exists() else True
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("regenerate", "no-such-recipe"), "recipe must be one of albedo-liang,"),
+        (("regenerate", "missing.toml"), "missing.toml: there is no such recipe"),
+        (("regenerate", "albedo-liang", "--photons", "0"), "photons must be a whole number >= 1"),
+        (("regenerate", "albedo-liang", "--photons", "-5"), "photons must be a whole number >= 1"),
+        (("regenerate", "albedo-liang", "--seed", "-1"), "seed must be a whole number >= 0"),
+        (("report", "no-such-record"), "record must be one of albedo-liang,"),
+        (("report", "--fits", "empty"), "empty has no records"),
+    ],
+)
+def test_bad_words_are_one_line(command, words, said):
+    status, _, err = command(*words)
+    assert status == 2
+    assert said in err
+    assert err.count("\n") == 1
+
+
+def test_an_output_that_is_a_file_is_named(command, recipe):
+    Path("out").write_text("in the way")
+    status, _, err = command(*small(recipe))
+    assert status == 2
+    assert "cannot write into out" in err
+    assert Path("out").read_text() == "in the way"
+
+
+@pytest.mark.skipif(os.name != "posix" or not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is full")
+def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeypatch):
+    assert command(*small(recipe))[0] == 0
+    before = Path("out/small.json").read_bytes()
+    real = os.fsync
+
+    def full(handle):  # what the kernel answers on a disk that filled up meanwhile
+        with open("/dev/full", "w") as disk:
+            disk.write("x")
+            disk.flush()
+        real(handle)
+
+    monkeypatch.setattr(os, "fsync", full)
+    status, _, err = command(*small(recipe, "out", "--seed", "1"))
+    assert status == 2
+    assert "No space left on device" in err
+    assert Path("out/small.json").read_bytes() == before
+    assert not list(Path("out").glob(".small*"))
+
+
+def test_a_damaged_batch_is_named(command, recipe):
+    assert command(*small(recipe))[0] == 0
+    batch = next(Path("out/.photons").glob("*/batch-*"))
+    batch.write_bytes(batch.read_bytes()[:100])
+    status, _, err = command(*small(recipe))
+    assert status == 2
+    assert str(batch) in err
+    assert "delete it" in err
+    assert err.count("\n") == 1
+
+
+def test_the_photons_of_another_run_are_refused(command, recipe):
+    assert command(*small(recipe))[0] == 0
+    manifest = next(Path("out/.photons").glob("*/run.json"))
+    manifest.write_text(manifest.read_text().replace('"max_order": 8192', '"max_order": 4096'))
+    status, _, err = command(*small(recipe))
+    assert status == 2
+    assert "max_order is 4096 there, 8192 here" in err
+    assert err.count("\n") == 1
+
+
+def test_report_shows_shipped_records_and_draws_figures(command):
+    status, out, err = command("report", "albedo-liang", "--figures", "figures")
+    assert status == 0, err
+    assert "(8)" in out
+    assert list(Path("figures").glob("*.png"))
+
+
+def test_help_names_both_commands_and_version_is_a_number(command):
+    status, out, _ = command("--help")
+    assert status == 0
+    assert "regenerate" in out
+    assert "report" in out
+    status, out, _ = command("--version")
+    assert status == 0
+    assert out.startswith("profilefit 0.")
