@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +14,14 @@ from mcml_sim import Grid, Orders, exact, simulate_orders
 from profilefit import catalogue, record, staged
 from profilefit.errors import RecipeError
 from profilefit.estimate import Fit, fit
-from profilefit.laws.base import AlbedoLaw, Constants
+from profilefit.laws import published
+from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.posterior import LEVELS, Posterior, posterior
 from profilefit.profiles import Profiles
 from profilefit.quality import albedo_quality, profile_quality
 from profilefit.recipe import Albedos, Recipe, Rings
 from profilefit.reproduction import readings
-from profilefit.table1 import table1
+from profilefit.table1 import printed_halves, table1
 from profilefit.truth import ExactTruth, TallyTruth
 
 Floats = NDArray[np.float64]
@@ -31,6 +32,7 @@ RUN_EDGES = np.concatenate(
 )
 PHOTONS = {"quick": 20 * 2**20, "full": 400 * 2**20}
 MAX_CHAIN = {"quick": 16_000, "full": 64_000}
+EVIDENCE_RINGS = Rings(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
 
 
@@ -54,10 +56,10 @@ class Run:
 
 
 def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
-    """Run recipes and write their records; the map that others are normalised with goes first."""
+    """Run recipes and write their records: first the map that others are normalised with, last what compares them."""
     for recipe in recipes:
         _require_known(recipe)
-    ordered = sorted(recipes, key=lambda recipe: recipe.name != catalogue.ALBEDO_RECORD)
+    ordered = sorted(recipes, key=lambda r: (r.name != catalogue.ALBEDO_RECORD, r.pipeline == "evidence"))
     light = run.light() if any(recipe.truth == "orders" for recipe in ordered) else None
     written = []
     for recipe in ordered:
@@ -106,7 +108,7 @@ def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles
 def _albedo(recipe: Recipe, run: Run, light: Orders | None):
     profiles = truth_of(recipe, light)
     result = _fit(recipe, run, profiles)
-    printed = catalogue.published(f"{recipe.law}_albedo")
+    printed = published.constants(f"{recipe.law}_albedo")
     laws = {"regenerated": result.law}
     if printed:
         laws["published"] = catalogue.ALBEDO_LAWS[recipe.law](setting=profiles.setting, **printed)
@@ -119,7 +121,7 @@ def _albedo(recipe: Recipe, run: Run, light: Orders | None):
 def _profile(recipe: Recipe, run: Run, light: Orders | None):
     profiles = truth_of(recipe, light)
     result = _fit(recipe, run, profiles)
-    content, arrays = _described(recipe, run, profiles, result, catalogue.published(recipe.law))
+    content, arrays = _described(recipe, run, profiles, result, published.constants(recipe.law))
     content["quality"] = _compare(recipe, run, result.law)
     return content, arrays | _curves(profiles)
 
@@ -127,7 +129,7 @@ def _profile(recipe: Recipe, run: Run, light: Orders | None):
 def _inverse(recipe: Recipe, run: Run, light: Orders | None):
     profiles = truth_of(recipe, light)
     result = _fit(recipe, run, profiles)
-    content, arrays = _described(recipe, run, profiles, result, catalogue.published(recipe.law))
+    content, arrays = _described(recipe, run, profiles, result, published.constants(recipe.law))
     alpha = albedo_values(QUALITY_ALBEDOS)
     content["quality"] = {"alpha": alpha}
     for name in ("published", "regenerated"):
@@ -154,7 +156,7 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
     profiles = truth_of(recipe, light)
     used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
     result = _fit(recipe, run, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
-    content, arrays = _described(recipe, run, profiles, result, catalogue.published(recipe.law))
+    content, arrays = _described(recipe, run, profiles, result, published.constants(recipe.law))
     content["stages"] = {
         "coefficient_laws": {
             letter: {
@@ -174,8 +176,23 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
 
 
 def _evidence(recipe: Recipe, run: Run, light: Orders | None):
-    truth = ExactTruth() if light is None or recipe.truth == "exact" else TallyTruth(light)
-    return {"readings": readings(truth), "table1": table1()}, {}
+    truth = ExactTruth() if light is None else TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
+    rows = table1(truth, _regenerated_laws(run.out))
+    return {"readings": readings(truth), "table1": rows, "halves": printed_halves()}, {}
+
+
+def _regenerated_laws(folder: Path) -> dict[str, ProfileLaw]:
+    """The laws that a table of published ones is compared with, as far as their records are there."""
+    laws = {}
+    for label, law, name in (
+        ("normalized diffusion, regenerated", "burley", "burley-whole"),
+        ("paper, regenerated as published", "liang", "liang-as-published"),
+        ("paper, regenerated whole", "liang", "liang-whole"),
+    ):
+        places = (folder / f"{name}.json", catalogue.fits_folder() / f"{name}.json")
+        if path := next((place for place in places if place.exists()), None):
+            laws[label] = catalogue.load(law, str(path), folder=folder)
+    return laws
 
 
 PIPELINES = {
@@ -209,8 +226,8 @@ def _require_known(recipe: Recipe) -> None:
         known = catalogue.ALBEDO_LAWS if recipe.pipeline == "albedo" else catalogue.PROFILE_LAWS
         raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
     key = f"{recipe.law}_albedo" if recipe.pipeline == "albedo" else recipe.law
-    if recipe.law not in STARTS and not catalogue.published(key, recipe.start):
-        sets = [s.name for s in catalogue.SETS if s.law == key]
+    if recipe.law not in STARTS and not published.constants(key, recipe.start):
+        sets = [s.name for s in published.SETS if s.law == key]
         raise RecipeError(f"{recipe.path}: start must be one of {', '.join(sets)}, got {recipe.start!r}")
     unknown = [name for name in recipe.held if name not in kind.constant_names()]
     if unknown:
@@ -220,7 +237,7 @@ def _require_known(recipe: Recipe) -> None:
 def _start(recipe: Recipe, run: Run) -> Any:
     """The law that a fit starts from; constants named in `held` keep the values they have here."""
     if recipe.pipeline == "albedo":
-        printed = catalogue.published(f"{recipe.law}_albedo", recipe.start) or STARTS[recipe.law]
+        printed = published.constants(f"{recipe.law}_albedo", recipe.start) or STARTS[recipe.law]
         return catalogue.ALBEDO_LAWS[recipe.law](setting=exact.SEARCHLIGHT, **printed)
     return catalogue.load(recipe.law, recipe.start, folder=run.out)
 
@@ -288,12 +305,12 @@ def _compare(recipe: Recipe, run: Run, law: Any) -> dict[str, Any]:
     """The measures of every set of constants of this law, at albedos that were not fitted."""
     alpha = albedo_values(QUALITY_ALBEDOS)
     laws = {"published": catalogue.load(recipe.law, "published", folder=run.out), "regenerated": law}
-    if catalogue.published(recipe.law, "corrected"):
+    if published.constants(recipe.law, "corrected"):
         laws["corrected"] = catalogue.load(recipe.law, "corrected", folder=run.out)
     table: dict[str, Any] = {"alpha": alpha}
     for name, one in laws.items():
         quality = profile_quality(one, alpha)
-        table[name] = {key: getattr(quality, key) for key in ("rel", "ks", "l1", "mse", "r2")}
+        table[name] = {key: value for key, value in asdict(quality).items() if key != "alpha"}
     return table
 
 

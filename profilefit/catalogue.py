@@ -8,11 +8,11 @@ from typing import Any
 from mcml_sim.setting import Setting
 from profilefit import record
 from profilefit.errors import InputError, RecordError, SettingError
+from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
-from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
 
 PROFILE_LAWS: dict[str, type[ProfileLaw]] = {"liang": Liang, "burley": Burley}
@@ -75,11 +75,6 @@ def normalisation(setting: Setting, folder: Path | None = None) -> Rational:
     return Rational(setting=setting, **_of_record(content, setting, ALBEDO_RECORD))
 
 
-def published(law: str, name: str = "published") -> dict[str, float]:
-    """The printed constants of a law; empty where nothing was printed."""
-    return next((dict(s.constants) for s in SETS if s.law == law and s.name == name), {})
-
-
 def record_setting(content: dict[str, Any]) -> Setting:
     """The setting that a record belongs to."""
     return Setting(**content["setting"])
@@ -96,13 +91,13 @@ def _constants(key: str, law: str, which: str, setting: Setting, folder: Path) -
         owner = content["law"] if content["pipeline"] != "albedo" else f"albedo {content['law']}"
         if owner != key:
             raise RecordError(f"{which}: holds constants of law {owner!r}, got a request for {key!r}")
-        return {**published(law), **_of_record(content, setting, which)}
+        return {**published.constants(law), **_of_record(content, setting, which)}
     return _printed(law, which, setting)
 
 
 def _printed(law: str, which: str, setting: Setting) -> dict[str, float]:
     wanted = which.removeprefix("published:")
-    sets = [s for s in SETS if s.law == law]
+    sets = [s for s in published.SETS if s.law == law]
     chosen = next((s for s in sets if s.name == wanted), None)
     if chosen is None:
         accepted = ["regenerated", *(s.name for s in sets), "the path of a record (.json)"]

@@ -108,7 +108,7 @@ def fit(
     names = tuple(free) if free is not None else law.seen_by(objective)
     problem = Problem(objective, names)
     rings = rings_of(profiles, used, limits, xi)
-    solution = solve(problem.residual, law.vector(names), (law, rings))
+    solution = solve(problem, law.vector(names), (law, rings))
     return Fit(
         law.with_vector(names, [float(value) for value in solution.parameters]),
         names,
@@ -124,12 +124,16 @@ def fit(
 
 @dataclass(frozen=True)
 class Problem:
-    """Which constants of a law move, and what is made small: hashable, so that each kind compiles once."""
+    """The residual of a fit: which constants of a law move, and what is made small.
+
+    A callable value and not a method: jax compiles anew for what does not compare equal, and bound methods of equal
+    objects don't.
+    """
 
     objective: str
     free: tuple[str, ...]
 
-    def residual(self, vector, data):
+    def __call__(self, vector, data):
         law, rings = data
         table = OBJECTIVES[self.objective](law.with_vector(self.free, vector), rings)
         return (rings.weight[:, None] * table).ravel()
@@ -163,7 +167,7 @@ def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Ring
         row[group] = 0.0
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
     data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
-    refits = solve_batch(problem.residual, np.tile(solution.parameters, (len(groups), 1)), data)
+    refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data)
     moved = np.stack([refit.parameters for refit in refits])
     spread = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
     return np.sqrt((len(groups) - 1) / len(groups) * spread)
@@ -172,7 +176,8 @@ def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Ring
 def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """d constants / d ring energies (p, m, n) at the optimum: how the minimiser follows its data."""
     with jax.enable_x64(True):
-        hessian, mixed = _second_derivatives(problem.residual, jnp.asarray(solution.parameters), law, rings)
+        law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
+        hessian, mixed = _second_derivatives(problem, jnp.asarray(solution.parameters), law, rings)
     return -np.einsum("pq,aiq->pai", np.linalg.pinv(np.asarray(hessian)), np.asarray(mixed))
 
 

@@ -3,19 +3,23 @@
 rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l, r at 99.5 % of the energy]
 ks       max over r of |cdf_law - cdf_exact|
 l1       half the integral of |2 pi r (R_law - R_exact)| over r, over A: misplaced energy
-mse, r2  of R'_d = r R_d on an even grid over the first half, the second half and the whole of [0, r_max']
+mse, r2  of R'_d = r R_d on an even grid over [0, r'_max], the range of the trimming (6) of Liang et al.; `_halves` of
+         its first and second half, as in that paper's Table 1
 delta_A  max |A_law - A_exact|
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
+from mcml_sim.setting import Setting
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.trimming import trimmed_radius
 
 Floats = NDArray[np.float64]
 NEAREST = 0.01
@@ -25,7 +29,7 @@ RADII = 400
 
 @dataclass(frozen=True)
 class Quality:
-    """Measures of a profile law at each albedo (m,)."""
+    """Measures of a profile law at each albedo (m,); the halves are (m, 2)."""
 
     alpha: Floats
     rel: Floats
@@ -33,6 +37,8 @@ class Quality:
     l1: Floats
     mse: Floats
     r2: Floats
+    mse_halves: Floats
+    r2_halves: Floats
 
 
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
@@ -47,22 +53,43 @@ def r_squared(data: Floats, law: Floats) -> float:
     return float(1.0 - np.sum((data - law) ** 2) / np.sum((data - data.mean()) ** 2))
 
 
-def _at(law: ProfileLaw, alpha: float) -> tuple[float, ...]:
-    setting = law.setting
-    outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
+@dataclass(frozen=True)
+class _Truth:
+    """The exact half space where the measures look: log-spaced radii, far log-spaced edges, even radii [mfp]."""
+
+    r: Floats
+    profile: Floats
+    far: Floats
+    cdf: Floats
+    even: Floats
+    scaled: Floats
+
+
+@lru_cache(maxsize=256)
+def _truth(alpha: float, setting: Setting) -> _Truth:
+    outer = float(exact.quantile(ENERGY_WITHIN, alpha, setting=setting))
     r = np.geomspace(NEAREST, outer, RADII)
-    truth = np.asarray(exact.profile(r, alpha, setting=setting))
-    rel = np.mean(np.abs(law.profile(r, alpha) / truth - 1.0))
     far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
-    true_cdf = np.asarray(exact.cdf(far, alpha, setting=setting))
-    law_cdf = law.cdf(far, alpha)
-    ks = np.max(np.abs(law_cdf - true_cdf))
+    profile = np.asarray(exact.profile(r, alpha, setting=setting))
+    even = (np.arange(RADII) + 0.5) / RADII * trimmed_radius(r, r * profile)
+    scaled = even * np.asarray(exact.profile(even, alpha, setting=setting))
+    return _Truth(r, profile, far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
+
+
+def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:
+    truth = _truth(alpha, law.setting)
+    rel = np.mean(np.abs(law.profile(truth.r, alpha) / truth.profile - 1.0))
+    law_cdf = law.cdf(truth.far, alpha)
+    ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.
-    l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(true_cdf)))
-    even = (np.arange(RADII) + 0.5) / RADII * outer
-    data = even * np.asarray(exact.profile(even, alpha, setting=setting))
-    model = even * law.profile(even, alpha)
-    return float(rel), float(ks), float(l1), float(np.mean((data - model) ** 2)), r_squared(data, model)
+    l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(truth.cdf)))
+    model = truth.even * law.profile(truth.even, alpha)
+    (mse, r2), *halves = (
+        (float(np.mean((truth.scaled[part] - model[part]) ** 2)), r_squared(truth.scaled[part], model[part]))
+        for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))
+    )
+    mse_halves, r2_halves = zip(*halves, strict=True)
+    return float(rel), float(ks), float(l1), mse, r2, mse_halves, r2_halves
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from profilefit.laws import published
 from profilefit.profiles import Profiles
 from profilefit.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
 from profilefit.solver import solve
@@ -28,15 +29,18 @@ CURVE_TOLERANCE = 0.05
 CONSTANT_TOLERANCE = 0.05
 INVERSE_EPSILON = 0.01  # of (19)
 LENGTH = "(10), (12), (14)"  # how a, b, c depend on l
+_PRINTED = {**published.constants("liang_albedo"), **published.constants("liang")}
 PUBLISHED = {
-    "(8)": {"p": 5.67, "q": 3.84, "w": 0.84},
-    "(11)": {"a1": -0.0064, "a2": 0.00316, "a3": 30.0},
-    "(13)": {"b0": 0.461, "b1": 6.7, "b2": 0.45, "b3": 2.6, "b4": 1.3},
-    "(15)": {"c1": 0.0097, "c2": 4.2, "c3": 0.166},
-    "(20)": {"g1": 1.504, "g2": 2.175, "g3": 0.7, "g4": 0.19, "h1": 3.993, "h2": 3.268, "h3": 0.2838},
-    LENGTH: {"a": -1.0, "b": 0.0, "c": 1.0},
-}
-CORRECTED_B0 = 0.0641
+    equation: {name: _PRINTED[name] for name in names.split()}
+    for equation, names in {
+        "(8)": "p q w",
+        "(11)": "a1 a2 a3",
+        "(13)": "b0 b1 b2 b3 b4",
+        "(15)": "c1 c2 c3",
+        "(20)": "g1 g2 g3 g4 h1 h2 h3",
+    }.items()
+} | {LENGTH: {"a": -1.0, "b": 0.0, "c": 1.0}}
+CORRECTED_B0 = published.constants("liang", "corrected")["b0"]
 # The printed b0 and what it might be a misprint of, each with the reason to consider it.
 B0_CANDIDATES = {
     "as printed": 0.461,
@@ -163,15 +167,12 @@ def _reading(equation: str, choices: str, found, curves: tuple[Floats, Floats], 
     gaps = [abs(v - printed[k]) if of_length else abs(v / printed[k] - 1) for k, v in constants.items()]
     off = np.abs(curves[0] / curves[1] - 1)
     gap, rms = float(max(gaps)), float(np.sqrt(np.mean(off**2)))
-    return Reading(equation, choices, constants, dict(printed), gap, rms, float(off.max()), judge(gap, rms), evidence)
+    distances = gap, rms, float(off.max())
+    return Reading(equation, choices, constants, dict(printed), *distances, judge(gap, rms), evidence)
 
 
 def _misfit_of(law: Callable) -> Callable:
-    def misfit(p, item):
-        x, data, weight = item
-        return weight * (law(x, p) - data)
-
-    return misfit
+    return lambda p, item: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
 
 
 # One function object a law, so that each compiles once.
@@ -243,11 +244,11 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
     return [_law_reading(*case, alpha, choices, cuts) for case in cases]
 
 
-def _law_reading(equation, law, data, constants, held, published, alpha, choices, cuts) -> Reading:
-    printed = np.array(list(published.values()))
+def _law_reading(equation, law, data, constants, held, print_set, alpha, choices, cuts) -> Reading:
+    printed = np.array(list(print_set.values()))
     ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
     evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
-    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, published)
+    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set)
 
 
 def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Reading]:
@@ -328,8 +329,8 @@ def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
     found = np.concatenate([_fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])])
     # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
-    curves = _bracket(found), _bracket(_printed("(20)"))
-    laws = _both_k(alpha, _printed("(20)"))
+    printed = _printed("(20)")
+    curves, laws = (_bracket(found), _bracket(printed)), _both_k(alpha, printed)
     off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), laws, strict=True)]
     evidence = f"alpha .1 to .9 by .1, .95, .99: k1, k2 at each one are {off[0]:.3f}, {off[1]:.3f} rms from (20)"
     return _reading("(20)", f"{name}; residual in {residual}", found, curves, evidence)

@@ -88,7 +88,7 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
     laws = {}
     for column, letter in enumerate(COEFFICIENTS):
         names = tuple(name for name in CONSTANTS_OF[letter] if name not in held)
-        residual = _CoefficientProblem(letter, names).residual
+        residual = _CoefficientProblem(letter, names)
         data = points.values[:, column]
         solution = solve(residual, start.vector(names), (start, points.alpha, data))
         covariance = None
@@ -120,7 +120,7 @@ class _CoefficientProblem:
     letter: str
     names: tuple[str, ...]
 
-    def residual(self, vector, item):
+    def __call__(self, vector, item):
         law, alpha, data = item
         column = COEFFICIENTS.index(self.letter)
         return law.with_vector(self.names, vector).coefficients(alpha)[column] - data

@@ -7,11 +7,13 @@ each choice is a row here, and nothing decides between them but the distance to 
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS, Material
 from profilefit.profiles import Profiles
 from profilefit.protocol import cut_radius
@@ -88,8 +90,8 @@ class HalvesCheck:
     second_half_needed: float
 
 
-def table1(truth: Truth | None = None) -> tuple[Table1Row, ...]:
-    """Every candidate material, channel, range and model."""
+def table1(truth: Truth | None = None, regenerated: Mapping[str, ProfileLaw] | None = None) -> tuple[Table1Row, ...]:
+    """Every candidate material, channel, range and model; `regenerated` are further models by name."""
     source = truth or ExactTruth()
     found: list[Table1Row] = []
     for printed, names in CANDIDATES.items():
@@ -97,7 +99,7 @@ def table1(truth: Truth | None = None) -> tuple[Table1Row, ...]:
             material = BY_NAME[name]
             profiles = source.profiles(np.array(material.alpha))
             for channel in range(len(CHANNELS)):
-                found += _channel_rows(printed, material, channel, profiles)
+                found += _channel_rows(printed, material, channel, profiles, regenerated or {})
     return tuple(found)
 
 
@@ -136,7 +138,9 @@ def rational(r: Floats, alpha: float, reflectance: float, mfp: float, b0: float,
     return value * reflectance / law_energy(-b / a, np.array(alpha), b0) if corrected else value
 
 
-def _channel_rows(printed: str, material: Material, channel: int, profiles: Profiles) -> list[Table1Row]:
+def _channel_rows(
+    printed: str, material: Material, channel: int, profiles: Profiles, regenerated: Mapping[str, ProfileLaw]
+) -> list[Table1Row]:
     alpha, mfp = material.alpha[channel], material.mfp[channel]
     r = profiles.r * mfp
     data = profiles.value[channel] * profiles.r / mfp
@@ -144,6 +148,7 @@ def _channel_rows(printed: str, material: Material, channel: int, profiles: Prof
     laws = {NORMALIZED_DIFFUSION: normalized_diffusion(r, reflectance, mfp)}
     for model, (b0, corrected) in RATIONAL_MODELS.items():
         laws[model] = rational(r, alpha, reflectance, mfp, b0, corrected)
+    laws |= {model: r * np.asarray(law.profile(r, alpha, mfp)) for model, law in regenerated.items()}
     ranges = {
         "(6) on r R_d": cut_radius(r, data, "walk"),
         "one stride before (6)": cut_radius(r, data, "stride before"),
@@ -158,7 +163,7 @@ def _channel_rows(printed: str, material: Material, channel: int, profiles: Prof
 
 def _row(printed, material, channel, model, choice, end, law: Floats, data: Floats) -> Table1Row:
     mse, r2 = mean_squared_errors(law, data), r_squared(law, data)
-    printed_mse, printed_r2 = PRINTED[printed]["diffusion" if model == NORMALIZED_DIFFUSION else "paper"]
+    printed_mse, printed_r2 = PRINTED[printed]["diffusion" if model.startswith(NORMALIZED_DIFFUSION) else "paper"]
     ratio = _each(lambda x, y: x / y, mse, printed_mse)
     gaps = {name: _each(lambda x, y: x - y, values, printed_r2) for name, values in r2.items()}
     return Table1Row(material, channel, model, choice, end, mse, r2, ratio, gaps)

@@ -38,7 +38,7 @@ def regenerate(
 
     Example: profilefit regenerate albedo-liang liang-whole --out my-fits
     """
-    console = Console(stderr=True, quiet=quiet, highlight=False)
+    console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
     names = recipes or list(recipe.available(catalogue.fits_folder()))
     chosen = tuple(recipe.find(name, catalogue.fits_folder()) for name in names)
     record.require_writable(out)

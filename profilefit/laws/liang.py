@@ -12,6 +12,7 @@ from jax import Array, lax
 
 from mcml_sim.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Rational
 
 PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
@@ -121,10 +122,12 @@ class LiangSampler(Sampler):
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         return jnp.minimum(jnp.abs(self.unclipped(xi, alpha)), self.law.largest_radius(alpha))
 
+    @evaluated
     def atom(self, alpha) -> Array:
         """Share of the samples that the clip puts at r_max exactly [-]."""
         return 1.0 - self._share_below(self.law.largest_radius(alpha), alpha)
 
+    @eqx.filter_jit  # the halvings are loops, which would compile anew at each call
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = jnp.broadcast_arrays(x, alpha)
         turn = self._turning_point(alpha)

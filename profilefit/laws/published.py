@@ -50,3 +50,8 @@ SETS = (
     ),
     Published("liang_albedo", "published", SEARCHLIGHT, {"p": 5.67, "q": 3.84, "w": 0.84}, f"{LIANG}, equation (8)"),
 )
+
+
+def constants(law: str, name: str = "published") -> dict[str, float]:
+    """The printed constants of a law, in print's order; empty where nothing was printed."""
+    return next((dict(s.constants) for s in SETS if s.law == law and s.name == name), {})

@@ -13,29 +13,42 @@ from mcml_sim import exact
 from profilefit import catalogue
 from profilefit.calibrate import albedo_values
 from profilefit.recipe import Albedos
-from profilefit.report.canvas import BLACK, DATA, GREEN, GREY, PUBLISHED, WHOLE, canvas, legend_below, save, styled
+from profilefit.report.canvas import (
+    BLACK,
+    DATA,
+    GREEN,
+    PUBLISHED,
+    WHOLE,
+    band_under,
+    canvas,
+    legend_below,
+    plain_log,
+    save,
+    styled,
+)
 from profilefit.report.source import Fitted, Source
 
 Floats = NDArray[np.float64]
+Points = tuple[Floats, Floats, Floats]
 Curve = tuple[str, Any, dict[str, Any], Fitted | None]
 
 
 @styled
 def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> list[Path]:
-    """alpha [-] against A [-]; the error in alpha; sqrt(1 - alpha) over the exact one, which sets how far light goes."""
-    data = source.fitted("albedo-liang")
-    assert data is not None  # `figures` draws only what its records are there for
+    """alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
+    data = source.needed("albedo-liang")
     curves = _curves(source, data)
     figure = canvas(6.4)
     panels = figure.subplot_mosaic([["map", "error"], ["fold", "ratio"]])
     # Even in sqrt(1 - alpha): A is linear in it near A = 1, where all the trouble is.
-    alpha = 1.0 - np.linspace(1.0, 1e-3, 1200) ** 2
+    alpha = 1.0 - np.linspace(1.0, 1e-3, 500) ** 2
     reflectance = np.asarray(exact.reflectance(alpha, setting=data.law.setting))
-    _map(panels["map"], data, curves, alpha, reflectance)
-    _map(panels["fold"], data, curves, alpha, reflectance)
+    points, exact_map = _points(data), (reflectance, alpha)
+    _map(panels["map"], points, curves, exact_map)
+    _map(panels["fold"], points, curves, exact_map)
     panels["map"].set(xlim=(0, 1), ylim=(0, 1.02), title="the whole map")
     panels["fold"].set(xlim=(0.7, 1.0), ylim=(0.97, 1.002), title="its end, enlarged")
-    _errors(panels["error"], panels["ratio"], curves, alpha, reflectance)
+    _errors(panels["error"], panels["ratio"], points, curves, exact_map)
     _folds(panels, curves)
     for ax in panels.values():
         ax.set_xlabel("total reflectance A [-]")
@@ -55,50 +68,53 @@ def _curves(source: Source, data: Fitted) -> list[Curve]:
     return found
 
 
-def _map(ax: Axes, data: Fitted, curves: list[Curve], alpha: Floats, reflectance: Floats) -> None:
-    even = np.linspace(0.0, 1.0, 2001)
-    ax.plot(reflectance, alpha, color=BLACK, linewidth=0.9, label="exact", zorder=3)
+def _points(data: Fitted) -> Points:
+    """alpha, A and the standard error of A [-] of the fitted points."""
+    at = data.arrays.get("alpha")
+    alpha = albedo_values(Albedos(**data.content["protocol"]["albedos"])) if at is None else at
+    return alpha, data.arrays["reflectance"], data.arrays["reflectance_error"]
+
+
+def _map(ax: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
+    even = np.linspace(0.0, 1.0, 1001)
+    ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
     for label, law, style, fitted in curves:
-        band = fitted.band(lambda law: law.alpha(even)) if fitted else None
-        if band is not None:
-            note = "95 % of posterior draws, misfit as noise"
-            ax.fill_between(even, *band, color=style["color"], alpha=0.25, linewidth=0, label=note)
+        band_under(ax, even, fitted.band(lambda law: law.alpha(even)) if fitted else None, style["color"])
         ax.plot(even, law.alpha(even), label=label, **style)
-    measured = data.arrays["reflectance"]
-    at = data.arrays.get("alpha", albedo_values(Albedos(**data.content["protocol"]["albedos"])))
-    error = data.arrays["reflectance_error"]
-    ax.errorbar(measured, at, xerr=error, label="photons, ± 1 standard error", **DATA)
+    alpha, measured, error = points
+    ax.errorbar(measured, alpha, xerr=error, label="photons, ± 1 standard error", **DATA)
     ax.set_ylabel("single-scattering albedo α [-]")
 
 
-def _errors(error: Axes, ratio: Axes, curves: list[Curve], alpha: Floats, reflectance: Floats) -> None:
+def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
+    reflectance, alpha = exact_map
     s = np.sqrt(1.0 - alpha)
     for label, law, style, fitted in curves:
         mapped = law.alpha(reflectance)
         error.plot(reflectance, mapped - alpha, label=label, **style)
         band = fitted.band(lambda law: law.alpha(reflectance) - alpha) if fitted else None
-        if band is not None:
-            error.fill_between(reflectance, *band, color=style["color"], alpha=0.25, linewidth=0)
+        band_under(error, reflectance, band, style["color"])
         inside = mapped < 1.0
-        ratio.plot(reflectance[inside], (np.sqrt(1.0 - np.where(inside, mapped, 0.0)) / s)[inside], label=label, **style)
+        ratio.plot(reflectance[inside], np.sqrt(1.0 - mapped[inside]) / s[inside], label=label, **style)
+    true_alpha, measured, sigma = points
+    slope = np.interp(measured, reflectance, np.gradient(alpha, reflectance))
+    error.errorbar(measured, true_alpha - np.interp(measured, reflectance, alpha), sigma * slope, **DATA)
     for ax, level in ((error, 0.0), (ratio, 1.0)):
         ax.axhline(level, color=BLACK, linewidth=0.8)
-        ax.set_xlim(0, 1)
-    error.set(ylabel="error in α [-]", title="law less exact")
-    ratio.set(ylabel="√(1 − α) over exact √(1 − α) [-]", title="how far light goes, wrong by this factor", yscale="log")
-    ratio.set_ylim(0.3, 100)
+    error.set(xlim=(0, 1), ylabel="α less exact α [-]", title="error in α")
+    ratio.set(xlim=(0.5, 1), ylim=(0.4, 100), yscale="log", title="error in √(1 − α), the root of the absorbed share")
+    ratio.set_ylabel("√(1 − α) over exact √(1 − α) [-]")
+    plain_log(ratio.yaxis)
 
 
 def _folds(panels: dict[str, Axes], curves: list[Curve]) -> None:
     """Where a map falls again, two reflectances share one albedo."""
-    for _, law, style, _ in curves:
+    for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)
         if fold >= 1.0:
             continue
         for ax in panels.values():
             ax.axvline(fold, color=style["color"], linewidth=0.8, linestyle=":")
-        top = float(law.alpha(fold))
-        panels["fold"].annotate(
-            f"turns at A = {fold:.4f}", (fold, top), (0.705, top - 0.0035 if top > 0.996 else top + 0.001),
-            color=style["color"], fontsize=8, arrowprops={"arrowstyle": "->", "color": GREY, "linewidth": 0.7},
-        )  # fmt: skip
+        note = f"turns at A = {fold:.4f}, α = {float(law.alpha(fold)):.5f}"
+        panels["fold"].text(0.97, 0.05 + 0.08 * place, note, color=style["color"], transform=panels["fold"].transAxes,
+                            ha="right", fontsize=8, bbox={"color": "white", "pad": 1})  # fmt: skip

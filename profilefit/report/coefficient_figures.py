@@ -15,11 +15,14 @@ from profilefit.report.canvas import (
     BLACK,
     CORRECTED,
     DATA,
+    GREY,
     PUBLISHED,
     PURPLE,
     WHOLE,
+    band_under,
     canvas,
     legend_below,
+    plain_log,
     save,
     styled,
 )
@@ -30,14 +33,14 @@ Floats = NDArray[np.float64]
 EQUATION = {"a": "(11)", "b": "(13)", "c": "(15)"}
 UNIT = {"a": "1/mfp", "b": "-", "c": "mfp"}
 STAGED = {"color": PURPLE, "linestyle": (0, (1, 1.2))}
+RATIOS = (0.6, 1.4)  # shown of law over fitted point [-]
 Line = tuple[str, Any, Any, Fitted | None]
 
 
 @styled
 def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -> list[Path]:
     """One coefficient against alpha [-], the end near 1 enlarged, and below each the laws over the fitted points."""
-    data = source.fitted("liang-as-published")
-    assert data is not None  # `figures` draws only what its records are there for
+    data = source.needed("liang-as-published")
     lines = _lines(letter, source, data)
     figure = canvas(6.4)
     axes = figure.subplots(2, 2, height_ratios=(1.6, 1.0), width_ratios=(1.5, 1.0))
@@ -55,9 +58,13 @@ def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -
     axes[0, 1].set_title("the end near α = 1, enlarged")
     axes[1, 0].set_ylabel("law over fitted point [-]")
     if letter == "b":
-        axes[0, 0].set(yscale="log", ylim=(1e-3, 1.0))
+        axes[0, 0].set(yscale="log", ylim=(5e-4, 1.0))
         axes[0, 1].set_yscale("log")
-    legend_below(figure, list(axes.flat), columns=2)
+        plain_log(axes[0, 1].yaxis)
+    if letter == "a":
+        for ax in axes[0]:
+            ax.axhline(0.0, color=GREY, linestyle=":", label="a = 0: from here on (7) has no r$_{max}$")
+    legend_below(figure, list(axes.flat))
     return save(figure, out, name or f"liang-{EQUATION[letter][1:-1]}-{letter}")
 
 
@@ -72,7 +79,7 @@ def _lines(letter: str, source: Source, data: Fitted) -> list[Line]:
     lines: list[Line] = [(f"{equation} as printed", printed, PUBLISHED, None)]
     corrected = source.printed("liang", "corrected", setting)
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
-        lines.append((f"{equation} with b0 = {corrected.constants()['b0']:g}", corrected, CORRECTED, None))
+        lines.append((f"{equation} as printed but b0 = {corrected.constants()['b0']:g}", corrected, CORRECTED, None))
     stage = data.content["stages"]["coefficient_laws"][letter]
     staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
     failed = "" if stage["result"] == "converged" else " (did not converge)"
@@ -92,9 +99,7 @@ def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitte
     column = COEFFICIENTS.index(letter)
     for label, law, style, fitted in lines:
         band = fitted.band(lambda law: coefficients(law, alpha)[column]) if fitted else None
-        if band is not None:
-            note = "95 % of posterior draws, misfit as noise"
-            ax.fill_between(alpha, *band, color=style["color"], alpha=0.25, linewidth=0, label=note)
+        band_under(ax, alpha, band, style["color"])
         ax.plot(alpha, coefficients(law, alpha)[column], label=label, **style)
     points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
     ax.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
@@ -103,15 +108,16 @@ def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitte
 def _ratios(ax: Axes, letter: str, lines: list[Line], data: Fitted) -> None:
     column = COEFFICIENTS.index(letter)
     alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
-    for _, law, style, _ in lines:
-        ax.plot(alpha, coefficients(law, alpha)[column] / points, marker=".", markersize=3, **style)
+    for label, law, style, _ in lines:
+        ratio = coefficients(law, alpha)[column] / points
+        ax.plot(alpha, ratio, marker=".", markersize=3, **style)
+        if ratio.min() > RATIOS[1]:
+            note = f"{label}: {ratio.min():.1f} to {ratio.max():.1f} times"
+            ax.text(0.5, 0.95, note, color=style["color"], transform=ax.transAxes, ha="center", va="top", fontsize=8)
     sigma = np.abs(data.arrays["coefficient_errors"][:, column] / points)
     ax.errorbar(alpha, np.ones_like(alpha), sigma, **DATA)
     ax.axhline(1.0, color=BLACK, linewidth=0.8)
-    if letter == "b":
-        ax.set(yscale="log", ylim=(0.5, 15.0))
-    else:
-        ax.set_ylim(0.6, 1.4)
+    ax.set_ylim(*RATIOS)
 
 
 def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitted, low: float) -> None:

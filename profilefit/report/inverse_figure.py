@@ -1,4 +1,4 @@
-"""Equations (19)-(21) redone: the radius that a uniform number draws, and the error of that inverse over the albedos."""
+"""Equations (19)-(21) redone: the radius that a uniform number draws, and how wrong it is over the albedos."""
 
 from __future__ import annotations
 
@@ -14,20 +14,24 @@ from profilefit.report.canvas import (
     AS_PUBLISHED,
     BLACK,
     DATA,
+    GREY,
     PUBLISHED,
     WHOLE,
+    albedo_axis,
+    band_under,
     canvas,
     legend_below,
     save,
     styled,
 )
+from profilefit.report.content import converged
 from profilefit.report.profile_figures import PANELS
 from profilefit.report.source import Fitted, Source
 
 Floats = NDArray[np.float64]
 LAST_SHARE = 0.999  # as calibrate.inversion_error
 LABELS = {
-    "liang-inverse-as-published": ("(19) regenerated, the paper's protocol", AS_PUBLISHED),
+    "liang-inverse-as-published": ("(19) by the paper's protocol", AS_PUBLISHED),
     "liang-inverse-whole": ("(19) regenerated, in shares of energy", WHOLE),
 }
 
@@ -35,8 +39,7 @@ LABELS = {
 @styled
 def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") -> list[Path]:
     """r [mfp] against xi [-] at six albedos; max |cdf(r(xi)) - xi| [-] against alpha [-] for each set of constants."""
-    data = source.fitted("liang-inverse-whole")
-    assert data is not None  # `figures` draws only what its records are there for
+    data = source.needed("liang-inverse-whole")
     figure = canvas(8.2)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.1))
     axes = [figure.add_subplot(grid[i // 3, i % 3]) for i in range(6)]
@@ -64,11 +67,12 @@ def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
         fitted = source.usable(name)
         if fitted is None:
             continue
-        band = fitted.band(lambda law: _radius(law, xi, alpha))
-        if band is not None:
-            note = "95 % of posterior draws, misfit as noise"
-            ax.fill_between(xi, *band, color=style["color"], alpha=0.25, linewidth=0, label=note)
+        band_under(ax, xi, fitted.band(lambda law: _radius(law, xi, alpha)), style["color"])
         ax.plot(xi, _radius(fitted.law, xi, alpha), label=label, **style)
+    whole = source.usable("liang-whole")
+    if whole is not None:
+        label = "r$_{max}$ where (21) clips, whole profile"
+        ax.axhline(float(whole.law.largest_radius(alpha)), color=GREY, linestyle=":", linewidth=1.2, label=label)
     _rings(ax, data, row)
     ax.set(yscale="log", xlim=(0.0, 1.0), title=f"α = {alpha:.3f}")
     ax.set_ylim(0.3 * np.interp(0.02, np.asarray(exact.cdf(r, alpha, setting=setting)), r), 3 * _outer(alpha, setting))
@@ -83,12 +87,13 @@ def _errors(ax: Axes, source: Source) -> None:
         alpha = quality["alpha"]
         if name == "liang-inverse-whole":
             ax.plot(alpha, quality["published"]["inversion_error"], label="(19) as printed", marker=".", **PUBLISHED)
-        if content["fit"]["result"] == "converged":
+        if converged(content):
             ax.plot(alpha, quality["regenerated"]["inversion_error"], label=label, marker=".", **style)
         else:
-            ax.plot([], [], label=f"{label}: no curve, the fit did not converge", **style)
+            ax.plot([], [], label=f"{label}: the fit failed", **style)
     ax.axvspan(0.4, 0.6, color=BLACK, alpha=0.07, linewidth=0, label="α that the paper calls worst")
-    ax.set(xlabel="single-scattering albedo α [-]", ylabel="max |cdf(r(ξ)) − ξ| [-]", xlim=(0, 1))
+    albedo_axis(ax)
+    ax.set_ylabel("max |cdf(r(ξ)) − ξ| [-]")
     ax.set_ylim(bottom=0.0)
 
 
@@ -103,7 +108,9 @@ def _rings(ax: Axes, data: Fitted, row: int) -> None:
     total = energy.sum() + data.arrays["beyond"][row]
     share, sigma = np.cumsum(energy) / total, np.sqrt(np.cumsum(error**2)) / total
     some = slice(None, None, 6)
-    ax.errorbar(share[some], data.arrays["r_edges"][1:][some], xerr=sigma[some], label="photons, ± 1 standard error", **DATA)
+    ax.errorbar(
+        share[some], data.arrays["r_edges"][1:][some], xerr=sigma[some], label="photons, ± 1 standard error", **DATA
+    )
 
 
 def _outer(alpha: float, setting: Any) -> float:

@@ -18,6 +18,7 @@ from profilefit.report.canvas import (
     GREY,
     PUBLISHED,
     WHOLE,
+    band_under,
     canvas,
     legend_below,
     save,
@@ -32,7 +33,7 @@ NEAREST = 0.01  # [mfp], as in quality.NEAREST
 ENERGY_WITHIN = 0.995  # as in quality.ENERGY_WITHIN: where `rel` stops looking
 LABELS = {
     "published": "(7) as printed",
-    "corrected": "(7) with b0 = 0.0641",
+    "corrected": "(7) as printed but b0 = 0.0641",
     "liang-as-published": "(7) regenerated, the paper's protocol",
     "liang-whole": "(7) regenerated, whole profile",
 }
@@ -42,7 +43,7 @@ STYLES = {"published": PUBLISHED, "corrected": CORRECTED, "liang-as-published": 
 @styled
 def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> list[Path]:
     """r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
-    data = source.fitted("liang-as-published")
+    data = source.needed("liang-as-published")
     figure = canvas(6.6)
     axes = list(figure.subplots(2, 3).flat)
     laws = _laws(source, data)
@@ -56,7 +57,7 @@ def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> 
 @styled
 def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list[Path]:
     """R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their photon noise."""
-    data = source.fitted("liang-whole")
+    data = source.needed("liang-whole")
     figure = canvas(6.4)
     axes = list(figure.subplots(2, 3, sharey=True).flat)
     laws = _laws(source, data)
@@ -67,7 +68,7 @@ def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list
     return save(figure, out, name)
 
 
-def _laws(source: Source, data: Any) -> dict[str, Any]:
+def _laws(source: Source, data: Fitted) -> dict[str, Any]:
     """Name -> a printed law, or a record with its band."""
     law, setting = data.content["law"], data.law.setting
     regenerated = {name: source.usable(name) for name in ("liang-as-published", "liang-whole")}
@@ -75,7 +76,7 @@ def _laws(source: Source, data: Any) -> dict[str, Any]:
     return printed | {name: fitted for name, fitted in regenerated.items() if fitted is not None}
 
 
-def _rows(data: Any) -> list[int]:
+def _rows(data: Fitted) -> list[int]:
     return [round(share * (data.arrays["alpha"].size - 1)) for share in PANELS]
 
 
@@ -83,17 +84,18 @@ def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> No
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
     radii = {name: _largest_radius(one, alpha) for name, one in laws.items() if name != "published"}
+    radii = {name: radius for name, radius in radii.items() if radius > 0}  # a > 0 has none
     end = 1.25 * max(cut, *radii.values())
     r_exact, profile = exact_profile(alpha, data.law.setting, NEAREST, end)
     source_limit = alpha / (4 * np.pi)
     r = np.linspace(0.0, end, 600)
     for name, one in laws.items():
-        _draw(ax, r, one, lambda law: np.maximum(_unscaled(law, r, alpha), 1e-12), name)
+        _draw(ax, r, one, lambda law: np.maximum(unscaled(law, r, alpha), 1e-12), name)
     ax.plot(r_exact, r_exact * profile, color=BLACK, linewidth=0.9, label="exact", zorder=3)
     _rings(ax, data, row, end)
+    at_foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5}
     for name, radius in radii.items():
-        ax.plot([radius], [0.0], marker="v", markersize=6, color=STYLES[name]["color"], transform=ax.get_xaxis_transform(),
-                clip_on=False, linestyle="none", zorder=5)  # fmt: skip
+        ax.plot([radius], [0.0], marker="v", color=STYLES[name]["color"], linestyle="none", **at_foot)
     ax.axvline(cut, color=GREY, linestyle=":", linewidth=1.2, label="r'$_{max}$: where (6) trims")
     ax.plot([], [], marker="v", linestyle="none", color=GREY, label="r$_{max}$ = −b/a: where (7) ends")
     ax.set(yscale="log", xlim=(0.0, end), ylim=(source_limit * 2e-4, source_limit * 15))
@@ -123,10 +125,7 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
 def _draw(ax: Axes, r: Floats, one: Any, evaluate: Any, name: str) -> None:
     """A law's line; under it the 95 % band, where it has one."""
     fitted = isinstance(one, Fitted)
-    band = one.band(evaluate) if fitted else None
-    if band is not None:
-        label = "95 % of posterior draws, misfit as noise"
-        ax.fill_between(r, *band, color=STYLES[name]["color"], alpha=0.25, linewidth=0, label=label)
+    band_under(ax, r, one.band(evaluate) if fitted else None, STYLES[name]["color"])
     ax.plot(r, evaluate(one.law if fitted else one), label=LABELS[name], **STYLES[name])
 
 
@@ -139,16 +138,12 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     index = index[energy[row][index] > 0]
     to_profile = 1.0 / (2 * np.pi * np.diff(edges))[index]  # E = 2 pi r R_d dr
     value, sigma = energy[row][index] * to_profile, error[row][index] * to_profile
-    ax.errorbar(r[index], value, sigma, label="photons, ± 1 standard error (some of the rings)", **DATA)
+    ax.errorbar(r[index], value, sigma, label="photons, ± 1 standard error", **DATA)
 
 
 def _largest_radius(one: Any, alpha: float) -> float:
     law = one.law if isinstance(one, Fitted) else one
     return float(law.largest_radius(alpha))
-
-
-def _unscaled(law: Any, r: Floats, alpha: float) -> Floats:
-    return unscaled(law, r, alpha)
 
 
 def _outer_labels(axes: list[Axes], x: str, y: str) -> None:

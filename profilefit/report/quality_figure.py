@@ -6,7 +6,21 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from profilefit.report.canvas import BLUE, GREEN, ORANGE, PURPLE, SKY, VERMILION, canvas, legend_below, save, styled
+from profilefit.report.canvas import (
+    BLUE,
+    GREEN,
+    ORANGE,
+    PURPLE,
+    SKY,
+    VERMILION,
+    albedo_axis,
+    canvas,
+    legend_below,
+    plain_log,
+    save,
+    styled,
+)
+from profilefit.report.content import SETS, converged, measures
 from profilefit.report.source import Source
 
 MEASURES = {
@@ -33,21 +47,24 @@ def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Pat
     drawn: set[str] = set()
     for record_name in source.paths:
         content = source.content(record_name)
-        quality = content.get("quality") or {}
-        for which in ("published", "corrected", "regenerated"):
-            if "rel" not in quality.get(which, {}):
+        if not measures(content, "rel"):
+            continue
+        quality = content["quality"]
+        for which in SETS:
+            if which not in quality:
                 continue
             regenerated = which == "regenerated"
             owner = record_name if regenerated else content["law"]
             label = f"{owner}, {which}"
-            if label in drawn or (regenerated and content["fit"]["result"] != "converged"):
+            if label in drawn or (regenerated and not converged(content)):
                 continue
             drawn.add(label)
             look = LOOKS.get((owner, which), SPARE)
             for ax, key in zip(axes, MEASURES, strict=True):
                 ax.plot(quality["alpha"], quality[which][key], label=label, markersize=3.5, **look)
     for ax, title in zip(axes, MEASURES.values(), strict=True):
-        ax.set(yscale="log", xlim=(0, 1), xlabel="single-scattering albedo α [-]", title=title)
-        ax.grid(which="minor", axis="y", linewidth=0.3)
+        albedo_axis(ax)
+        ax.set(yscale="log", title=title)
+        plain_log(ax.yaxis)
     legend_below(figure, axes)
     return save(figure, out, name)

@@ -15,7 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim import exact
 from mcml_sim.setting import Setting
 from profilefit import catalogue, record
+from profilefit.errors import RecordError
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.report.content import converged
 
 Floats = NDArray[np.float64]
 # Draws of the posterior that a band is made of: enough for its 95 % edges to a tenth of the band.
@@ -36,7 +38,7 @@ class Fitted:
 
     @property
     def converged(self) -> bool:
-        return self.content["fit"]["result"] == "converged"
+        return converged(self.content)
 
     def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "discrepancy") -> tuple[Floats, Floats] | None:
         """The 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
@@ -79,6 +81,13 @@ class Source:
             content = record.read(self.paths[name])
             self._read[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
         return self._read[name]
+
+    def needed(self, name: str) -> Fitted:
+        """A record and its law; RecordError if the folder has none of that name."""
+        found = self.fitted(name)
+        if found is None:
+            raise RecordError(f"{self.folder} has no record {name!r}; `profilefit regenerate` makes it")
+        return found
 
     def usable(self, name: str) -> Fitted | None:
         """A record whose fit converged, or None: constants of a failed fit are no law to draw."""

@@ -1,15 +1,20 @@
 """Laws and light that several files of tests look at, and the thresholds they share."""
 
+import equinox as eqx
 import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 from scipy.stats import norm
 
 from mcml_sim import Grid, Setting, simulate_orders
+from mcml_sim.tally import covariance_factor
+from profilefit.laws.base import Constants
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
+from profilefit.profiles import Covariance, Profiles
 
 # A law's tests must not move with the records: this map is within 3e-6 of the exact A, its digits are frozen here.
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
@@ -58,3 +63,70 @@ def burley():
 def white_run():
     """2^20 photons of the white half space, seed 2, in 25 rings."""
     return simulate_orders(Grid.from_edges(r=EDGES), 2**20, seed=2)
+
+
+ORDERS = np.arange(1, 41)
+SHARES = 0.5 * ORDERS**-1.5 / np.sum(ORDERS**-1.5)
+
+
+class Toy(Constants):
+    """A law whose photons can be drawn: of all, SHARES[n - 1] leave after n scatterings, exponential in r/(h n^q).
+
+    Energy within x: sum over n of k alpha^n SHARES[n] (1 - e^(-x / (h n^q))), with k = 1, h = 0.5, q = 0.5.
+    """
+
+    setting: Setting = eqx.field(static=True)
+    k: float = 1.0
+    h: float = 0.5
+    q: float = 0.5
+
+    def unscaled_energy(self, x, alpha):
+        x, alpha = jnp.asarray(x)[..., None], jnp.asarray(alpha)[..., None]
+        return jnp.sum(self.k * alpha**ORDERS * SHARES * -jnp.expm1(-x / (self.h * ORDERS**self.q)), axis=-1)
+
+    def source_strength(self, alpha):
+        return jnp.sum(self.k * jnp.asarray(alpha)[..., None] ** ORDERS * SHARES / (self.h * ORDERS**self.q), axis=-1)
+
+
+class Tallies:
+    """Photons of Toy in rings up to 40 mfp, where none is left: tallies as a simulation would make them."""
+
+    photons = 200_000
+    alpha = np.array([0.4, 0.6, 0.8, 0.9, 0.97])
+    edges = np.concatenate([[0.0], np.geomspace(0.05, 40.0, 14)])
+    weights = alpha[:, None] ** ORDERS
+
+    def __init__(self):
+        inside = -np.expm1(-self.edges[:, None] / (0.5 * np.sqrt(ORDERS)))
+        self.chance = (np.diff(inside, axis=0) * SHARES).ravel()
+
+    def draw(self, seed, number):
+        """(number, rings, orders) counts."""
+        full = np.append(self.chance, 1 - self.chance.sum())
+        counts = np.random.default_rng(seed).multinomial(self.photons, full, size=number)
+        return counts[:, :-1].reshape(number, self.edges.size - 1, ORDERS.size)
+
+    def energy(self, counts):
+        """(..., alphas, rings)."""
+        return np.moveaxis(counts @ self.weights.T, -1, -2) / self.photons
+
+    def profiles(self, counts):
+        factor, dropped = covariance_factor(counts, self.weights, self.photons, 5)
+        value = self.energy(counts)
+        error = np.sqrt(np.sum(factor**2, axis=2)).T
+        effective = np.full_like(value, 1e6)
+        rest = np.zeros(self.alpha.size)
+        covariance = Covariance(factor, value, self.photons, dropped)
+        return Profiles(
+            self.alpha, self.edges, value, error, effective, rest, "orders", Setting(), self.photons, covariance
+        )
+
+
+@pytest.fixture(scope="session")
+def toy():
+    return Toy(Setting())
+
+
+@pytest.fixture(scope="session")
+def tallies():
+    return Tallies()

@@ -85,7 +85,7 @@ def test_numbers_give_numbers_and_arrays_broadcast(law):
     table = law.profile([0.1, 1.0, 2.0], np.array([[0.5], [0.9]]), mfp=[1.0, 2.0, 3.0])
     assert table.shape == (2, 3)
     assert table.dtype == np.float64
-    assert table[1, 2] == law.profile(2.0, 0.9, 3.0)
+    assert table[1, 2] == pytest.approx(law.profile(2.0, 0.9, 3.0), rel=1e-14)  # vector code may round otherwise
     assert law.sampler.pdf([0.1, 1.0, 2.0], [[0.5], [0.9]]).shape == (2, 3)
 
 
@@ -147,7 +147,7 @@ def test_a_law_is_its_constants(law):
     assert moved.constants() == {**law.constants(), names[0]: 7.0, names[1]: 8.0}
     np.testing.assert_array_equal(moved.vector(names[:2]), [7.0, 8.0])
     assert moved.setting == law.setting
-    with pytest.raises(AttributeError, match="assign|frozen"):
+    with pytest.raises(AttributeError, match="cannot assign"):
         law.setting = None
 
 
@@ -159,8 +159,8 @@ def pieces(law, alpha):
     if not hasattr(law, "largest_radius"):
         return np.concatenate([[0.0], np.geomspace(1e-3, 400.0, 60)])
     sampler, farthest = law.sampler, float(law.largest_radius(alpha))
-    xi = np.linspace(0.0, 1.0, 2_000_001)
-    g = sampler.unclipped(xi, alpha)
+    with jax.enable_x64(True):
+        g = np.asarray(sampler.unclipped(jnp.linspace(0.0, 1.0, 2_000_001), alpha))
     dip, end = float(-g.min()), min(farthest, float(g[-1]))
     return np.unique(np.concatenate([[0.0, dip / 2, dip, 1.5 * dip], np.geomspace(2 * dip, end, 40)]))
 
@@ -189,8 +189,8 @@ def test_the_density_is_that_of_the_samples(law, alpha):
 
 @LAWS
 @pytest.mark.parametrize("alpha", [0.1, 0.6, 0.95])
-def test_the_density_integrates_to_1_less_the_atom(law, alpha, x64):
-    atom = float(law.sampler.atom(jnp.asarray(alpha))) if hasattr(law, "largest_radius") else 0.0
+def test_the_density_integrates_to_1_less_the_atom(law, alpha):
+    atom = law.sampler.atom(alpha) if hasattr(law, "largest_radius") else 0.0
     assert integral(lambda r: law.sampler.pdf(r, alpha), pieces(law, alpha)).sum() + atom == pytest.approx(
         1.0, abs=2e-6
     )

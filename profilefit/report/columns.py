@@ -1,0 +1,36 @@
+"""The one kind of table that the report prints: a title, columns of text, a caption."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+from rich.table import Table
+from rich.text import Text
+
+
+def column_table(
+    title: str,
+    columns: Mapping[str, Sequence[str]],
+    caption: str = "",
+    left: Sequence[str] = ("",),
+    fold: Sequence[str] = (),
+) -> Table:
+    """Columns of equally many texts under their headers, numbers to the right.
+
+    left  headers of columns that stand to the left; fold those that may wrap, while all others keep to one line
+    """
+    table = Table(
+        title=Text(title, style="bold"),
+        title_justify="left",
+        box=None,
+        header_style="dim",
+        padding=(0, 2, 0, 0),
+        caption=Text(caption, style="dim") if caption else None,
+        caption_justify="left",
+    )
+    for header in columns:
+        side = "left" if header in left or header in fold else "right"
+        table.add_column(Text(header), justify=side, no_wrap=header not in fold, overflow="fold")  # type: ignore[arg-type]
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*(Text(cell) for cell in row))
+    return table

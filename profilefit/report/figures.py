@@ -1,0 +1,83 @@
+"""Every figure that the records of a folder allow."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+from profilefit.report.albedo_figure import albedo_figure
+from profilefit.report.coefficient_figures import a_figure, b_figure, c_figure
+from profilefit.report.content import measures
+from profilefit.report.corner_figure import corner_figure
+from profilefit.report.inverse_figure import inverse_figure
+from profilefit.report.profile_figures import error_figure, profile_figure
+from profilefit.report.quality_figure import quality_figure
+from profilefit.report.source import Source
+
+Draw = Callable[..., list[Path]]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One figure: its file's name, the records it cannot do without, those it shows if they are there, who draws it.
+
+    missing  why it cannot be drawn although its records are there; empty if it can
+    """
+
+    name: str
+    needs: tuple[str, ...]
+    uses: tuple[str, ...]
+    draw: Draw
+    missing: str = ""
+
+    def concerns(self, names: Sequence[str] | None) -> bool:
+        return names is None or not set(names).isdisjoint(self.needs + self.uses)
+
+
+PAPER = (
+    Plan("liang-7-profile", ("liang-as-published",), ("liang-whole",), profile_figure),
+    Plan("liang-7-error", ("liang-whole",), ("liang-as-published",), error_figure),
+    Plan("liang-8-albedo", ("albedo-liang",), ("albedo-rational",), albedo_figure),
+    Plan("liang-11-a", ("liang-as-published",), ("liang-whole",), a_figure),
+    Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), b_figure),
+    Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), c_figure),
+    Plan("liang-19-inverse", ("liang-inverse-whole",), ("liang-inverse-as-published", "liang-whole"), inverse_figure),
+)
+
+
+def draw_all(folder: Path, out: Path, names: Sequence[str] | None = None) -> tuple[list[Path], list[str]]:
+    """Draw every figure that the records in `folder` allow into folder `out`, as PNG and SVG.
+
+    names  records: only figures that show one of them; all if None or empty
+    Returns the files written, and a line for each figure left out, with the reason. Raises RecordError on a record
+    that is damaged, OutputError where `out` cannot be written.
+    """
+    source = Source(folder)
+    drawn: list[Path] = []
+    left_out: list[str] = []
+    for plan in plans(source):
+        if not plan.concerns(names or None):
+            continue
+        absent = [name for name in plan.needs if name not in source.paths]
+        reason = f"{folder} has no record {', '.join(absent)}" if absent else plan.missing
+        if reason:
+            left_out.append(f"{plan.name}: {reason}")
+        else:
+            drawn += plan.draw(source, out, name=plan.name)
+    return drawn, left_out
+
+
+def plans(source: Source) -> tuple[Plan, ...]:
+    """The paper's figures, the quality of all laws, and a corner plot of each record that has a posterior."""
+    profiles = tuple(name for name in source.paths if measures(source.content(name), "rel"))
+    lacking = "" if profiles else f"{source.folder} has no record of a profile law"
+    corners = (_corner(source, name) for name in source.paths if "constants" in source.content(name))
+    return (*PAPER, Plan("quality", (), profiles, quality_figure, lacking), *corners)
+
+
+def _corner(source: Source, name: str) -> Plan:
+    content = source.content(name)
+    missing = "" if "discrepancy" in content["posterior"] else f"no posterior: {content['fit']['result']}"
+    return Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), missing)

@@ -1,0 +1,119 @@
+"""The README's tables: constants with their errors, and how good each set of constants is, as GitHub markdown."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from profilefit.report.content import ERRORS, Content, converged, largest_error, measured_sets, measures
+from profilefit.report.digits import ABSENT, significant, to_error
+from profilefit.report.quality_tables import ALBEDO_MEASURES, MEANING, albedo_number, worst
+from profilefit.reproduction import LENGTH, PUBLISHED
+
+PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
+# Which equation of the paper a constant of its profile law belongs to.
+EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
+
+
+def markdown_constants(records: Mapping[str, Content]) -> str:
+    """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
+    header = ("record", "equation", "constant", "published", "regenerated", "± photons", "± misfit", "± jackknife")
+    rows: list[Sequence[str]] = []
+    failures = []
+    for name, content in _fits(records).items():
+        if not converged(content):
+            failures.append(f"`{name}` has no constants to show: {content['fit']['result']}.")
+            continue
+        for constant, values in content["constants"].items():
+            errors = [significant(values.get(key)) for key in ERRORS]
+            if not values.get("free", True):
+                errors = ["held", ABSENT, ABSENT]
+            published = values.get("published")
+            rows.append(
+                (
+                    name,
+                    EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT,
+                    constant,
+                    ABSENT if published is None else f"{published:g}",
+                    to_error(values["regenerated"], largest_error(values)),
+                    *errors,
+                )
+            )
+    note = (
+        "Digits end where the largest error does; constants trade against each other, so compute with the record's own."
+    )
+    return "\n\n".join([_table(header, rows), *failures, note])
+
+
+def markdown_quality(records: Mapping[str, Content]) -> str:
+    """Measures of every set of constants, mean and worst over alpha; those of A -> alpha maps; inversion errors."""
+    parts = [
+        _profile_quality(records),
+        _inversion_quality(records),
+        _albedo_quality(records),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def _profile_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst")))
+    rows = [
+        (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values[key])))
+        for owner, which, values in _measured(records, "rel")
+    ]
+    return _table(header, rows) if rows else ""
+
+
+def _inversion_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", "inversion error mean", "inversion error worst")
+    rows = [
+        (owner, which, *_mean_and_worst("inversion_error", values["inversion_error"]))
+        for owner, which, values in _measured(records, "inversion_error")
+    ]
+    return _table(header, rows) if rows else ""
+
+
+def _albedo_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(MEANING[measure].replace("|", "\\|") for measure in ALBEDO_MEASURES))
+    rows = [
+        (owner, which, *(albedo_number(measure, values[measure]) for measure in ALBEDO_MEASURES))
+        for owner, which, values in _measured(records, "delta_A")
+    ]
+    return _table(header, rows) if rows else ""
+
+
+def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
+    """(record or law, set, measures) of each set once: printed constants are the same in every record of their law."""
+    found: list[tuple[str, str, Content]] = []
+    for name, content in _fits(records).items():
+        for which in measured_sets(content):
+            regenerated = which == "regenerated"
+            owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
+            values = content["quality"][which]
+            failed = regenerated and not converged(content)
+            if measure in values and not failed and (owner, which) not in [item[:2] for item in found]:
+                found.append((owner, which, values))
+    return found
+
+
+def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
+    return _number(measure, float(np.mean(values))), _number(measure, worst(measure, values))
+
+
+def _number(measure: str, value: float) -> str:
+    return f"{value:.4f}" if measure == "r2" else significant(value)
+
+
+def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
+    return {name: content for name, content in records.items() if "constants" in content}
+
+
+def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A GitHub table, names to the left and numbers to the right, every line filled to the same width."""
+    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
+    names = {"record", "equation", "constant", "constants"}
+    rule = [":" + "-" * (w - 1) if h in names else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
+    lines = [header, rule, *rows]
+    return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)

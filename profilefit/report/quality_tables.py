@@ -1,0 +1,99 @@
+"""How good a record's constants are, beside the printed ones: by albedo, on average and at worst."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+
+from profilefit.report.columns import column_table
+from profilefit.report.content import Content, converged, measured_sets, measures
+from profilefit.report.digits import on_the_point, significant
+
+SHORT = {"published": "printed", "corrected": "correct.", "regenerated": "regen."}
+ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
+# Measures by the table they stand in; for r2 the smallest is the worst.
+TABLES = (("rel", "ks", "l1"), ("mse", "r2"))
+MEANING = {
+    "rel": "mean |law / exact − 1| of R_d",
+    "ks": "max |cdf − exact cdf|",
+    "l1": "share of misplaced energy",
+    "mse": "of r R_d [1/mfp²]",
+    "r2": "of r R_d",
+    "inversion_error": "max |cdf(r(ξ)) − ξ|",
+    "delta_A": "max error of A",
+    "delta_alpha": "max error of α",
+    "largest_s": "max |√(1 − α) / exact − 1|",
+    "monotone": "rises all the way",
+    "at_one": "α at A = 1",
+    "fold": "A where it turns",
+}
+ALBEDO_MEASURES = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold")
+
+
+def worst(measure: str, values: Any) -> float:
+    """The worst of a measure over the albedos, in its own unit."""
+    return float(np.min(values) if measure == "r2" else np.max(values))
+
+
+def worst_lines(content: Content) -> list[str]:
+    """The worst errors of each set in turn, a line a measure; a failed fit has no regenerated law to measure."""
+    quality = content["quality"]
+    failed = not converged(content)
+    names = [name for name in measured_sets(content) if not (failed and name == "regenerated")]
+    keys = [key for key in ("rel", "ks", "inversion_error", "delta_A", "largest_s") if key in quality["regenerated"]]
+    lines = []
+    for key in keys:
+        numbers = [significant(worst(key, quality[name][key])) for name in names]
+        lines.append(f"{key.replace('inversion_error', 'inversion')} " + " → ".join(numbers + ["failed"] * failed))
+    return lines
+
+
+def quality_tables(content: Content) -> list[RenderableType]:
+    """Measures by albedo for every set of constants, or those of an A -> alpha map."""
+    if measures(content, "delta_A"):
+        return [_albedo_table(content)]
+    present = content["quality"]["regenerated"]
+    groups = [[key for key in group if key in present] for group in (*TABLES, ("inversion_error",))]
+    return [_table(content, group) for group in groups if group]
+
+
+def _table(content: Content, group: list[str]) -> RenderableType:
+    quality, names = content["quality"], measured_sets(content)
+    alpha = quality["alpha"]
+    rows = np.unique(np.linspace(0, len(alpha) - 1, ROWS).round().astype(int))
+    columns = {"α": [*(f"{alpha[i]:.3f}" for i in rows), "mean", "worst"]}
+    for measure in group:
+        for name in names:
+            values = quality[name][measure]
+            shown = [*(values[i] for i in rows), float(np.mean(values)), worst(measure, values)]
+            header = f"{measure.replace('inversion_error', 'error')}\n{SHORT[name]}"
+            columns[header] = on_the_point([_number(measure, value) for value in shown])
+    caption = "; ".join(f"{measure.replace('inversion_error', 'error')}: {MEANING[measure]}" for measure in group)
+    return column_table("Quality at albedos that were not fitted" + _failed(content), columns, caption, left=("α",))
+
+
+def _albedo_table(content: Content) -> RenderableType:
+    quality = content["quality"]
+    columns = {"": [MEANING[measure] for measure in ALBEDO_MEASURES]}
+    for name in measured_sets(content):
+        columns[name] = [albedo_number(measure, quality[name][measure]) for measure in ALBEDO_MEASURES]
+    return column_table("Quality of the map" + _failed(content), columns)
+
+
+def albedo_number(measure: str, value: Any) -> str:
+    """One measure of an A -> alpha map as text."""
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    return f"{value:.5g}" if measure in ("at_one", "fold") else significant(value)
+
+
+def _number(measure: str, value: float) -> str:
+    if measure == "mse":
+        return f"{value:.1e}"
+    return f"{value:.4f}" if measure == "r2" else f"{value:.3f}"
+
+
+def _failed(content: Content) -> str:
+    return "" if converged(content) else " (the regenerated set is of a failed fit)"

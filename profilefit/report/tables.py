@@ -1,0 +1,215 @@
+"""Records as tables for a terminal: pure functions from what a record says to what rich prints.
+
+Cells are `Text`, so that units in brackets are no markup. Every table fits 80 columns, most of 100 look better.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from rich.console import Group, RenderableType
+from rich.padding import Padding
+from rich.table import Table
+from rich.text import Text
+
+from profilefit.report.columns import column_table
+from profilefit.report.content import ERRORS, Content, converged, largest_error
+from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
+from profilefit.report.evidence_tables import evidence_line, evidence_tables
+from profilefit.report.markdown import markdown_constants, markdown_quality
+from profilefit.report.quality_tables import quality_tables, worst_lines
+
+__all__ = ["constants_table", "markdown_constants", "markdown_quality", "record_tables", "summary"]
+
+Line = tuple[str, RenderableType]
+KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
+
+
+def summary(records: Mapping[str, Content]) -> Table:
+    """One line a record: what was fitted to what, whether it worked, and the worst error before and after."""
+    table = Table(
+        title="Records", title_justify="left", box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False
+    )
+    table.add_column("record", overflow="fold", min_width=max(map(len, records), default=0))
+    table.add_column("truth", no_wrap=True)
+    table.add_column("objective", no_wrap=True)
+    table.add_column("fit", overflow="fold", min_width=len("converged"))
+    table.add_column("worst error over α", no_wrap=True)
+    for name, content in records.items():
+        if content["pipeline"] == "evidence":
+            table.add_row(Text(name), Text(truth(content)), Text(ABSENT), Text(ABSENT), Text(evidence_line(content)))
+            continue
+        label = Text.assemble((name, "bold"), "\n", (f"{content['law']}, {content['equations']}", "dim"))
+        objective = content["protocol"]["weighting"]["objective"]
+        worst = Text("\n".join(worst_lines(content)))
+        verdict = _verdict(content["fit"]["result"].split(":")[0])
+        table.add_row(label, Text(truth(content)), Text(objective), verdict, worst)
+    table.caption = "as printed → corrected, where there is such a set → regenerated"
+    table.caption_justify = "left"
+    return table
+
+
+def record_tables(content: Content) -> list[RenderableType]:
+    """Everything about one record: where it comes from, constants, the state of fit and chains, quality."""
+    if content["pipeline"] == "evidence":
+        return [_title(content), *evidence_tables(content)]
+    parts = [_title(content), constants_table(content), intervals_table(content), fit_facts(content)]
+    if "stages" in content:
+        parts += stage_tables(content["stages"])
+    parts += quality_tables(content)
+    return [Padding(part, (0, 0, 1, 0)) for part in parts if part is not None]
+
+
+def constants_table(content: Content) -> RenderableType:
+    """Name, published and regenerated value, and the three errors, each column on its decimal point."""
+    constants = content["constants"]
+    rows = list(constants.values())
+    columns = {
+        "published": on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")]),
+        "regenerated": on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows]),
+    }
+    for header, key in zip(("± photons", "± misfit", "± jackknife"), ERRORS, strict=True):
+        columns[header] = on_the_point([significant(value) for value in _each(rows, key)])
+    columns["± photons"] = [
+        text if row.get("free", True) else "held" for text, row in zip(columns["± photons"], rows, strict=True)
+    ]
+    title = "Constants, lengths in units of the mean free path"
+    caption = (
+        "photons: another run's noise; misfit: residuals taken for independent noise; jackknife: what leaving out a "
+        "sixth of the albedos moves, the honest one for a law that is not the truth"
+    )
+    if not converged(content):
+        caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
+    return column_table(title, {"": list(constants), **columns}, caption)
+
+
+def intervals_table(content: Content) -> RenderableType:
+    """The 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
+    chains = content["posterior"]
+    if not chains:
+        return Text("No credible intervals: chains start from a fit that converged.")
+    cells: dict[str, list[str]] = {"": [], "from": [], "68 %": [], "95 %": []}
+    for name, constant in content["constants"].items():
+        for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
+            levels = constant["intervals"][kind]
+            cells[""].append("" if place else name)
+            cells["from"].append(KINDS[kind])
+            cells["68 %"].append(interval(levels.get("68%")))
+            cells["95 %"].append(interval(levels.get("95%")))
+    return column_table("Credible intervals (emcee)", cells, left=("", "from"))
+
+
+def fit_facts(content: Content) -> RenderableType:
+    """What the solver and the chains said."""
+    fit = content["fit"]
+    left = fit["residuals"]
+    lines: list[Line] = [
+        ("fit", _verdict(fit["result"])),
+        ("", f"{fit['steps']} steps, condition number {significant(fit['condition_number'], 3)}"),
+        ("residuals", f"rms {significant(left['rms'], 3)}, largest {significant(left['largest'], 3)}"),
+        ("", f"autocorrelation {left['along_r']:.2f} along r, {left['along_alpha']:.2f} along α (0: noise only)"),
+        ("", f"{left['half_waves']:.1f} stretches of one sign: so many residuals stand for themselves"),
+    ]
+    for kind, chain in content["posterior"].items():
+        facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
+        lines.append((f"chain, {KINDS.get(kind, kind)}", _verdict(chain["result"])))
+        lines.append(("", f"{facts}, {chain['steps']} steps of {chain['walkers']} walkers"))
+    if "rings_left_out" in content:
+        lines.append(("data", f"{content['rings_left_out']} rings left out: too few photons for an error of their own"))
+    return _facts("Fit", lines)
+
+
+def stage_tables(stages: Content) -> list[RenderableType]:
+    """The paper's own order: coefficient laws through per-albedo fits, and how a, b, c scale with l."""
+    cells: dict[str, list[str]] = {"": [], "through the points": [], "± photons": []}
+    states: list[Line] = []
+    for letter, law in stages["coefficient_laws"].items():
+        errors = law.get("standard_error", {}) if law["result"] == "converged" else {}
+        for name, value in law["constants"].items():
+            error = errors.get(name)
+            cells[""].append(name)
+            cells["through the points"].append(to_error(value, error))
+            cells["± photons"].append(significant(error))
+        states.append((f"law of {letter}", _verdict(law["result"])))
+        states.append(("", f"condition number {significant(law['condition_number'], 3)}"))
+    failures = {mfp: count for mfp, count in stages.get("per_albedo_failures", {}).items() if count}
+    text = "all converged" if not failures else ", ".join(f"{n} failed at l = {mfp}" for mfp, n in failures.items())
+    states.append(("fits of (7)", text))
+    if stages.get("length_exponents"):
+        powers = ", ".join(f"{letter} l^{power:.3f}" for letter, power in stages["length_exponents"].items())
+        states.append(("with l", f"{powers}; similarity says −1, 0, 1"))
+    for key in ("through the points", "± photons"):
+        cells[key] = on_the_point(cells[key])
+    return [column_table("Stages: coefficient laws through the fits at each albedo", cells), _facts("", states)]
+
+
+def truth(content: Content) -> str:
+    """What a record was fitted to, on two lines where photons were traced."""
+    source = content.get("truth") or {}
+    if source.get("photons") is None:
+        return str(source.get("kind", ABSENT))
+    return f"{source['photons']:.3g}".replace("e+0", "e") + "\nphotons"
+
+
+def _title(content: Content) -> RenderableType:
+    head = Text.assemble((content["name"], "bold"), "  ", content["title"])
+    return Group(head, Padding(_facts("", _provenance(content)), (0, 0, 0, 2)))
+
+
+def _provenance(content: Content) -> list[Line]:
+    setting = content["setting"]
+    light = f"{setting['illumination']}, n = {setting['n']:g}, g = {setting['g']:g}"
+    lines: list[Line] = [
+        ("law", f"{content['law']}, {content['equations']}"),
+        ("setting", light),
+        ("truth", f"{truth(content).replace(chr(10), ' ')}, seed {content['seed']}, preset {content['preset']}"),
+    ]
+    protocol = content.get("protocol") or {}
+    if protocol.get("albedos"):
+        a = protocol["albedos"]
+        lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
+    if protocol.get("rings"):
+        lines.append(("rings", _rings(protocol["rings"])))
+    if protocol.get("weighting"):
+        lines.append(("weighting", _weighting(protocol["weighting"])))
+    if protocol.get("held"):
+        lines.append(("held", ", ".join(protocol["held"])))
+    if content.get("note"):
+        lines.append(("note", content["note"]))
+    return lines
+
+
+def _rings(rings: Content) -> str:
+    if rings.get("dr"):
+        text = f"even, {rings['dr']:g} wide, to {rings['last']:g}"
+    else:
+        text = f"{rings['count']} edges even in ln r, {rings['first']:g} to {rings['last']:g} [mfp]"
+    trim = rings.get("trim", "none")
+    return text if trim == "none" else f"{text}; trimmed by (6) on {trim}, ε = {rings['epsilon']:g}"
+
+
+def _weighting(weighting: Content) -> str:
+    extras = [
+        f"{key.replace('_', ' ')} × {weighting[key]:g}" for key in ("energy_limit", "source_limit") if weighting[key]
+    ]
+    if weighting.get("shares"):
+        extras.append(f"{weighting['shares']} shares up to {weighting['last_share']:g}")
+    return "; ".join([f"objective {weighting['objective']}", *extras])
+
+
+def _verdict(result: str) -> Text:
+    """What a solver or a chain said; anything but success stands out."""
+    return Text(result, style="green") if result == "converged" else Text(f"FAILED: {result}", style="bold red")
+
+
+def _facts(title: str, lines: Iterable[Line]) -> RenderableType:
+    table = Table(box=None, show_header=False, padding=(0, 1, 0, 0), title=title or None, title_justify="left")
+    table.add_column(no_wrap=True, style="dim")
+    table.add_column(overflow="fold")
+    for label, line in lines:
+        table.add_row(Text(label), Text(line) if isinstance(line, str) else line)
+    return table
+
+
+def _each(rows: list[Content], key: str) -> list[float | None]:
+    return [row.get(key) for row in rows]
