@@ -22,7 +22,7 @@ from profilefit.quality import albedo_quality, profile_quality
 from profilefit.recipe import Albedos, Recipe, Rings
 from profilefit.reproduction import readings
 from profilefit.table1 import printed_halves, table1
-from profilefit.truth import ExactTruth, TallyTruth
+from profilefit.truth import ExactTruth, TallyTruth, Truth
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
@@ -176,7 +176,10 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
 
 
 def _evidence(recipe: Recipe, run: Run, light: Orders | None):
-    truth = ExactTruth() if light is None else TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
+    if recipe.truth == "orders" and light is not None:
+        truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
+    else:
+        truth = ExactTruth()
     rows = table1(truth, _regenerated_laws(run.out))
     return {"readings": readings(truth), "table1": rows, "halves": printed_halves()}, {}
 

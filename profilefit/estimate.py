@@ -21,8 +21,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.errors import SettingError
-from profilefit.laws.base import Constants
+from mcml_sim.errors import InputError, SettingError
+from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.objectives import OBJECTIVES, Rings, rings_of
 from profilefit.profiles import Profiles
 from profilefit.solver import Solution, solve, solve_batch
@@ -90,7 +90,7 @@ class Structure:
 def fit(
     profiles: Profiles,
     law: Constants,
-    objective: str = "energy",
+    objective: str | None = None,
     free: Sequence[str] | None = None,
     used: NDArray[np.bool_] | None = None,
     limits: tuple[float, float] = (0.0, 0.0),
@@ -98,21 +98,27 @@ def fit(
 ) -> Fit:
     """Fit the constants named in `free` (all, if None) of `law` to `profiles`.
 
-    objective  a name in `objectives.OBJECTIVES`: it fixes the weighting
+    objective  a name in `objectives.OBJECTIVES`: it fixes the weighting; by default "energy" for a profile law and
+               "albedo" for a map between alpha and A
     used       (m, n) rings that count; limits the weights of the energy and source limits; xi shares for quantiles
-    A fit that does not converge is returned with the reason in `result`. Raises SettingError if the law and the
-    profiles belong to different light or surface.
+    A fit that does not converge is returned with the reason in `result`. Raises InputError on an unknown objective or
+    constant, SettingError if the law and the profiles belong to different light or surface.
     """
+    target = objective or ("albedo" if isinstance(law, AlbedoLaw) else "energy")
+    if target not in OBJECTIVES:
+        raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, got {target!r}")
     if law.setting != profiles.setting:
         raise SettingError(f"the law belongs to {law.setting}, the profiles to {profiles.setting}: they do not mix")
-    names = tuple(free) if free is not None else law.seen_by(objective)
-    problem = Problem(objective, names)
+    names = tuple(free) if free is not None else law.seen_by(target)
+    if unknown := [name for name in names if name not in law.constant_names()]:
+        raise InputError(f"free must name constants of the law ({', '.join(law.constant_names())}), got {unknown[0]!r}")
+    problem = Problem(target, names)
     rings = rings_of(profiles, used, limits, xi)
     solution = solve(problem, law.vector(names), (law, rings))
     return Fit(
         law.with_vector(names, [float(value) for value in solution.parameters]),
         names,
-        objective,
+        target,
         rings,
         solution,
         _statistical(problem, solution, law, rings, profiles),

@@ -154,7 +154,7 @@ def _walk(density, covariance, fit, kind, seed, max_steps) -> Posterior:
 
 def _run(sampler, start, max_steps) -> tuple[float, int]:
     """Run in doubling stretches until the chain is long enough for its own autocorrelation time."""
-    steps, state, tau = 1000, start, np.inf
+    steps, state, tau = min(1000, max_steps), start, np.inf
     while True:
         state = sampler.run_mcmc(state, steps - sampler.iteration if sampler.iteration else steps, progress=False)
         tau = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))

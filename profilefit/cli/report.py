@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
@@ -13,6 +14,7 @@ from profilefit.errors import RecordError
 from profilefit.report import figures, tables
 
 LOCAL = Path("fits")
+WIDTH = 100
 
 
 def report(
@@ -31,7 +33,8 @@ def report(
 
     Example: profilefit report liang-whole --figures figures
     """
-    console = Console(highlight=False)
+    # Tables are laid out for 100 columns; what is piped into a file has no width of its own.
+    console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
     contents = _contents(folder, names)
     if markdown:

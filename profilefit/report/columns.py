@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from rich.console import Group, JustifyMethod, RenderableType
 from rich.table import Table
 from rich.text import Text
 
@@ -14,23 +15,16 @@ def column_table(
     caption: str = "",
     left: Sequence[str] = ("",),
     fold: Sequence[str] = (),
-) -> Table:
-    """Columns of equally many texts under their headers, numbers to the right.
+) -> Group:
+    """Columns of equally many texts under their headers, numbers to the right; title and caption as wide as the screen.
 
     left  headers of columns that stand to the left; fold those that may wrap, while all others keep to one line
     """
-    table = Table(
-        title=Text(title, style="bold"),
-        title_justify="left",
-        box=None,
-        header_style="dim",
-        padding=(0, 2, 0, 0),
-        caption=Text(caption, style="dim") if caption else None,
-        caption_justify="left",
-    )
+    table = Table(box=None, header_style="dim", padding=(0, 2, 0, 0), pad_edge=False)
     for header in columns:
-        side = "left" if header in left or header in fold else "right"
-        table.add_column(Text(header), justify=side, no_wrap=header not in fold, overflow="fold")  # type: ignore[arg-type]
+        side: JustifyMethod = "left" if header in left or header in fold else "right"
+        table.add_column(Text(header), justify=side, no_wrap=header not in fold, overflow="fold")
     for row in zip(*columns.values(), strict=True):
         table.add_row(*(Text(cell) for cell in row))
-    return table
+    parts: list[RenderableType] = [Text(title, style="bold"), table]
+    return Group(*parts, Text(caption, style="dim")) if caption else Group(*parts)

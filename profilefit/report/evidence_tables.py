@@ -15,6 +15,7 @@ from rich.text import Text
 from profilefit.report.columns import column_table
 from profilefit.report.content import Content
 from profilefit.report.digits import ABSENT, significant
+from profilefit.table1 import NORMALIZED_DIFFUSION
 
 BEST = 3  # readings shown of each equation, nearest to print first
 
@@ -64,18 +65,29 @@ def _told(reading: Content) -> str:
 
 
 def _table1(rows: list[Content]) -> RenderableType:
-    """Of each material and model, the row whose error over the whole range is nearest to print."""
-    groups = _by(rows, "material", "model").values()
-    nearest = [min(group, key=_distance) for group in groups]
+    """Every model of each material, at the channel and range that the other law's printed error points to."""
+    shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
     columns = {
-        "material": [f"{row.get('material', ABSENT)}, {row.get('channel', '')}" for row in nearest],
-        "model": [str(row.get("model", ABSENT)) for row in nearest],
-        "range": [_range(row) for row in nearest],
+        "material": [f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {_range(row)}" for row in shown],
+        "model": [str(row.get("model", ABSENT)) for row in shown],
     }
     for place, part in enumerate(("near half", "far half", "all")):
-        columns[part] = [_at(_ratio(row), place) for row in nearest]
-    caption = f"MSE over the printed one; of {len(rows)} rows, each material and model where all is nearest to 1"
-    return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model", "range"))
+        columns[part] = [_at(_ratio(row), place) for row in shown]
+    caption = (
+        f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
+        "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
+    )
+    return column_table("Table 1 redone", columns, caption, left=("material",), fold=("model",))
+
+
+def _at_its_range(rows: list[Content]) -> list[Content]:
+    known = [row for row in rows if row.get("model") == NORMALIZED_DIFFUSION]
+    if not known:
+        return rows
+    best = min(known, key=_distance)
+    return [
+        row for row in rows if all(row.get(key) == best.get(key) for key in ("channel", "range_choice", "range_mm"))
+    ]
 
 
 def _halves(rows: list[Content]) -> RenderableType:
@@ -102,8 +114,7 @@ def _at(values: list[Any], place: int) -> str:
 
 def _range(row: Content) -> str:
     size = row.get("range_mm", row.get("range"))
-    text = f"{size:g} mm" if isinstance(size, int | float) else str(size or ABSENT)
-    return f"{text}, {row['range_choice']}" if row.get("range_choice") else text
+    return f"{size:g} mm" if isinstance(size, int | float) else str(size or ABSENT)
 
 
 def _share(value: float | None) -> str:

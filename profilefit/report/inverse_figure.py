@@ -59,8 +59,9 @@ def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") ->
 def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     xi = np.concatenate([np.geomspace(1e-3, 0.05, 60), np.linspace(0.05, LAST_SHARE, 240)[1:]])
-    r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 1500)
-    ax.plot(np.asarray(exact.cdf(r, alpha, setting=setting)), r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
+    r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
+    share = np.asarray(exact.cdf(r, alpha, setting=setting))
+    ax.plot(share, r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
     printed = source.printed("liang", "published", setting)
     ax.plot(xi, _radius(printed, xi, alpha), label="(19) as printed", **PUBLISHED)
     for name, (label, style) in LABELS.items():
@@ -75,7 +76,7 @@ def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
         ax.axhline(float(whole.law.largest_radius(alpha)), color=GREY, linestyle=":", linewidth=1.2, label=label)
     _rings(ax, data, row)
     ax.set(yscale="log", xlim=(0.0, 1.0), title=f"α = {alpha:.3f}")
-    ax.set_ylim(0.3 * np.interp(0.02, np.asarray(exact.cdf(r, alpha, setting=setting)), r), 3 * _outer(alpha, setting))
+    ax.set_ylim(0.3 * np.interp(0.02, share, r), 3.0 * np.interp(LAST_SHARE, share, r))
 
 
 def _errors(ax: Axes, source: Source) -> None:
@@ -111,7 +112,3 @@ def _rings(ax: Axes, data: Fitted, row: int) -> None:
     ax.errorbar(
         share[some], data.arrays["r_edges"][1:][some], xerr=sigma[some], label="photons, ± 1 standard error", **DATA
     )
-
-
-def _outer(alpha: float, setting: Any) -> float:
-    return float(exact.quantile(LAST_SHARE, alpha, setting=setting))

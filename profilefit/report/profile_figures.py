@@ -105,7 +105,7 @@ def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> No
 def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
-    r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer), 240)
+    r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
     for name, one in laws.items():
         _draw(ax, r, one, lambda law: law.profile(r, alpha) / truth - 1.0, name)
     edges = data.arrays["r_edges"]

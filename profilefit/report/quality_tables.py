@@ -11,7 +11,7 @@ from profilefit.report.columns import column_table
 from profilefit.report.content import Content, converged, measured_sets, measures
 from profilefit.report.digits import on_the_point, significant
 
-SHORT = {"published": "printed", "corrected": "correct.", "regenerated": "regen."}
+SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
 ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
 # Measures by the table they stand in; for r2 the smallest is the worst.
 TABLES = (("rel", "ks", "l1"), ("mse", "r2"))
@@ -86,6 +86,8 @@ def albedo_number(measure: str, value: Any) -> str:
     """One measure of an A -> alpha map as text."""
     if isinstance(value, bool):
         return "yes" if value else "no"
+    if measure == "fold" and value >= 1.0:
+        return "nowhere"
     return f"{value:.5g}" if measure in ("at_one", "fold") else significant(value)
 
 

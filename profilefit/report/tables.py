@@ -27,37 +27,49 @@ KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
 
 def summary(records: Mapping[str, Content]) -> Table:
     """One line a record: what was fitted to what, whether it worked, and the worst error before and after."""
-    table = Table(
-        title="Records", title_justify="left", box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False
-    )
+    table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
+    table.title, table.title_justify = "Records", "left"
     table.add_column("record", overflow="fold", min_width=max(map(len, records), default=0))
-    table.add_column("truth", no_wrap=True)
-    table.add_column("objective", no_wrap=True)
-    table.add_column("fit", overflow="fold", min_width=len("converged"))
-    table.add_column("worst error over α", no_wrap=True)
+    for header in ("truth", "objective", "fit", "worst error over α"):
+        table.add_column(header, no_wrap=True)
     for name, content in records.items():
-        if content["pipeline"] == "evidence":
-            table.add_row(Text(name), Text(truth(content)), Text(ABSENT), Text(ABSENT), Text(evidence_line(content)))
-            continue
-        label = Text.assemble((name, "bold"), "\n", (f"{content['law']}, {content['equations']}", "dim"))
-        objective = content["protocol"]["weighting"]["objective"]
-        worst = Text("\n".join(worst_lines(content)))
-        verdict = _verdict(content["fit"]["result"].split(":")[0])
-        table.add_row(label, Text(truth(content)), Text(objective), verdict, worst)
+        table.add_row(*(_summary_evidence(name, content) if _is_evidence(content) else _summary_fit(name, content)))
     table.caption = "as printed → corrected, where there is such a set → regenerated"
     table.caption_justify = "left"
     return table
 
 
+def _summary_fit(name: str, content: Content) -> tuple[Text, ...]:
+    label = Text.assemble((name, "bold"), "\n", (f"{content['law']}, {content['equations']}", "dim"))
+    if not converged(content):
+        label.append(f"\n{content['fit']['result']}", style="red")
+    objective = content["protocol"]["weighting"]["objective"]
+    verdict = Text("converged", style="green") if converged(content) else Text("FAILED", style="bold red")
+    return label, Text(truth(content)), Text(objective), verdict, Text("\n".join(worst_lines(content)))
+
+
+def _summary_evidence(name: str, content: Content) -> tuple[Text, ...]:
+    label = Text.assemble((name, "bold"), "\n", (str(content.get("equations", "")), "dim"))
+    return label, Text(truth(content)), Text(ABSENT), Text(ABSENT), Text(evidence_line(content))
+
+
+def _is_evidence(content: Content) -> bool:
+    return content["pipeline"] == "evidence"
+
+
 def record_tables(content: Content) -> list[RenderableType]:
     """Everything about one record: where it comes from, constants, the state of fit and chains, quality."""
-    if content["pipeline"] == "evidence":
-        return [_title(content), *evidence_tables(content)]
+    if _is_evidence(content):
+        return _spaced([_title(content), *evidence_tables(content)])
     parts = [_title(content), constants_table(content), intervals_table(content), fit_facts(content)]
     if "stages" in content:
         parts += stage_tables(content["stages"])
     parts += quality_tables(content)
-    return [Padding(part, (0, 0, 1, 0)) for part in parts if part is not None]
+    return _spaced(parts)
+
+
+def _spaced(parts: list[RenderableType]) -> list[RenderableType]:
+    return [Padding(part, (0, 0, 1, 0)) for part in parts]
 
 
 def constants_table(content: Content) -> RenderableType:

@@ -77,6 +77,8 @@ ORDER = {
     ),
     "profilefit.report": (
         "digits",
+        "content",
+        "columns",
         "source",
         "canvas",
         "albedo_figure",
@@ -84,6 +86,8 @@ ORDER = {
         "profile_figures",
         "inverse_figure",
         "quality_figure",
+        "quality_tables",
+        "evidence_tables",
         "corner_figure",
         "figures",
         "tables",

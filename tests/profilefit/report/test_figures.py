@@ -1,0 +1,146 @@
+"""Figures are written whole, at the size they are shown, the same twice; what cannot be drawn is listed, and why."""
+
+import json
+import shutil
+
+import matplotlib
+import matplotlib.image
+import matplotlib.pyplot as plt
+import numpy as np
+import pytest
+
+from profilefit import catalogue
+from profilefit.errors import OutputError, RecordError
+from profilefit.report import draw_all
+from profilefit.report.figures import PAPER, plans
+from profilefit.report.source import DRAWS, Source, coefficients
+
+SHIPPED = catalogue.fits_folder()
+SMALL_CORNER = "corner-albedo-liang"
+# Every kind of figure once: corner plots differ in nothing but their record, nor does (15) from (11) but in its letter.
+EACH_KIND = (*(plan.name for plan in PAPER if plan.name != "liang-15-c"), "quality", SMALL_CORNER)
+# Cheap ones of each layout, drawn again.
+AGAIN = ("liang-11-a", "quality", SMALL_CORNER)
+
+
+@pytest.fixture(scope="module")
+def source():
+    return Source(SHIPPED)
+
+
+@pytest.fixture(scope="module")
+def drawn(source, tmp_path_factory):
+    """Every kind of figure, drawn once; and what matplotlib's settings were before and after."""
+    out = tmp_path_factory.mktemp("figures")
+    before = dict(matplotlib.rcParams)
+    chosen = [plan for plan in plans(source) if plan.name in EACH_KIND]
+    files = [file for plan in chosen for file in plan.draw(source, out, name=plan.name)]
+    return files, before, dict(matplotlib.rcParams)
+
+
+def folder_with(tmp_path, *names):
+    folder = tmp_path / "records"
+    folder.mkdir()
+    for name in names:
+        for suffix in (".json", ".npz"):
+            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
+    return folder
+
+
+def change(folder, name, edit):
+    path = folder / f"{name}.json"
+    content = json.loads(path.read_text())
+    edit(content)
+    path.write_text(json.dumps(content))
+
+
+def test_every_kind_is_there_as_png_and_svg_and_nothing_else(drawn):
+    files, _, _ = drawn
+    assert {file.name for file in files} == {f"{name}.{kind}" for name in EACH_KIND for kind in ("png", "svg")}
+    assert set(files[0].parent.iterdir()) == set(files)  # no temporary file is left
+
+
+def test_png_is_1200_pixels_wide_with_ink_that_nowhere_touches_its_edge(drawn):
+    """Text that did not fit would be cut at the edge, and leave ink there."""
+    for file in (file for file in drawn[0] if file.suffix == ".png"):
+        pixels = matplotlib.image.imread(file)[..., :3]
+        assert pixels.shape[1] == 1200, file.name
+        assert 600 <= pixels.shape[0] <= 1300, file.name
+        assert 0.01 < np.mean(pixels.min(axis=2) < 0.9) < 0.6, file.name
+        edges = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
+        assert np.all(edges > 0.99), file.name
+
+
+def test_svg_carries_no_date_and_is_the_same_twice(drawn, source, tmp_path):
+    first = {file.name: file.read_bytes() for file in drawn[0] if file.suffix == ".svg"}
+    assert not any(b"<dc:date>" in text for text in first.values())
+    for plan in plans(source):
+        if plan.name in AGAIN:
+            plan.draw(source, tmp_path, name=plan.name)
+            assert (tmp_path / f"{plan.name}.svg").read_bytes() == first[f"{plan.name}.svg"]
+
+
+def test_drawing_leaves_matplotlib_as_it_was(drawn):
+    _, before, after = drawn
+    assert before == after
+    assert plt.get_fignums() == []
+
+
+def test_what_cannot_be_drawn_is_listed(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole")
+    fit = {"result": "no fit", "steps": 9, "condition_number": 1.0, "residuals": {}}
+    change(folder, "burley-whole", lambda content: content.update(posterior={}, fit=fit))
+    files, left_out = draw_all(folder, tmp_path / "out")
+    assert [file.name for file in files] == ["quality.png", "quality.svg"]
+    assert len(left_out) == len(PAPER) + 1
+    assert f"liang-7-profile: {folder} has no record liang-as-published" in left_out
+    assert "corner-burley-whole: no posterior: no fit" in left_out
+
+
+def test_names_choose_the_figures_that_show_them(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole", "albedo-rational")
+    files, left_out = draw_all(folder, tmp_path / "out", ["albedo-rational"])
+    assert {file.stem for file in files} == {"corner-albedo-rational"}
+    assert left_out == [f"liang-8-albedo: {folder} has no record albedo-liang"]
+
+
+def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole")
+    change(folder, "burley-whole", lambda content: [c.pop("regenerated") for c in content["constants"].values()])
+    with pytest.raises(RecordError, match="damaged: its constants have no regenerated values"):
+        draw_all(folder, tmp_path / "out")
+    (folder / "burley-whole.npz").unlink()
+    with pytest.raises(RecordError, match="samples and curves of this record are missing"):
+        draw_all(folder, tmp_path / "out")
+
+
+def test_a_folder_that_cannot_be_written_is_named(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole")
+    (tmp_path / "out").write_text("a file")
+    with pytest.raises(OutputError, match=r"cannot write figure 'quality' into .*out"):
+        draw_all(folder, tmp_path / "out")
+
+
+def test_band_is_the_quantiles_of_laws_evaluated_one_by_one(source):
+    """The slow twin: a law for each draw."""
+    fitted = next(f for f in map(source.usable, ("liang-whole", "liang-as-published")) if f is not None)
+    alpha = np.array([0.2, 0.9, 0.995])
+    band = fitted.band(lambda law: coefficients(law, alpha)[2])
+    samples = fitted.arrays["samples_discrepancy"].astype(float)
+    names = tuple(fitted.content["covariance"]["names"])
+    some = samples[np.linspace(0, len(samples) - 1, DRAWS).astype(int)]
+    one_by_one = [coefficients(fitted.law.with_vector(names, list(map(float, draw))), alpha)[2] for draw in some]
+    np.testing.assert_allclose(band, np.quantile(one_by_one, [0.025, 0.975], axis=0), rtol=1e-12)
+    # Negative control: the fit itself lies inside, and the band has a width.
+    assert np.all((band[0] < coefficients(fitted.law, alpha)[2]) & (coefficients(fitted.law, alpha)[2] < band[1]))
+
+
+def test_a_failed_fit_has_no_band_and_no_law_to_draw(tmp_path):
+    folder = folder_with(tmp_path, "burley-whole")
+    change(folder, "burley-whole", lambda content: content["fit"].update(result="no convergence"))
+    here = Source(folder)
+    assert here.usable("burley-whole") is None
+    assert here.fitted("burley-whole").band(lambda law: law.cdf(np.array([1.0]), 0.5)) is None
+    assert here.fitted("liang-whole") is None
+    with pytest.raises(RecordError, match="has no record 'liang-whole'"):
+        here.needed("liang-whole")

@@ -1,0 +1,83 @@
+"""The README's tables read back to the numbers of the records."""
+
+import copy
+
+import numpy as np
+import pytest
+
+from profilefit import catalogue, record
+from profilefit.report import markdown_constants, markdown_quality
+from profilefit.report.content import converged, largest_error
+
+RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
+FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
+
+
+def parsed(text: str) -> list[list[dict[str, str]]]:
+    """Every table of a markdown text, each row by its headers."""
+    found = []
+    for block in text.split("\n\n"):
+        lines = [line for line in block.splitlines() if line.startswith("|")]
+        if len(lines) < 3:
+            continue
+        rows = [[cell.strip() for cell in line.replace(r"\|", "¦").strip("|").split("|")] for line in lines]
+        assert len({len(line) for line in lines}) == 1, "columns are aligned in the source"
+        assert all(set(cell) <= set(":-") for cell in rows[1])
+        found.append([dict(zip(rows[0], row, strict=True)) for row in rows[2:]])
+    return found
+
+
+def test_constants_read_back():
+    [rows] = parsed(markdown_constants(RECORDS))
+    by_key = {(row["record"], row["constant"]): row for row in rows}
+    expected = {(name, c) for name, content in FITS.items() if converged(content) for c in content["constants"]}
+    assert set(by_key) == expected
+    assert len(rows) == len(expected)
+    for (name, constant), row in by_key.items():
+        values = FITS[name]["constants"][constant]
+        error = largest_error(values) or 0.0
+        value = values["regenerated"]
+        assert abs(float(row["regenerated"]) - value) <= max(0.05 * error, 0.005 * abs(value))
+        if values["published"] is not None:
+            assert float(row["published"]) == values["published"]
+        if values["free"] and values.get("jackknife_error") is not None:
+            assert float(row["± jackknife"]) == pytest.approx(values["jackknife_error"], rel=0.05)
+
+
+def test_constants_of_the_paper_s_laws_name_their_equation():
+    [rows] = parsed(markdown_constants(RECORDS))
+    equations = {row["constant"]: row["equation"] for row in rows if FITS[row["record"]]["law"] == "liang"}
+    assert equations.items() >= {"p": "(8)", "a1": "(11)", "b0": "(13)", "c3": "(15)", "h1": "(20)"}.items()
+    assert all(row["equation"] == "–" for row in rows if FITS[row["record"]]["law"] != "liang")
+
+
+def test_a_failed_fit_has_a_reason_and_no_constants():
+    name = next(name for name, content in FITS.items() if converged(content))
+    broken = copy.deepcopy(FITS[name])
+    broken["fit"]["result"] = "no convergence in 9 steps"
+    records = {**RECORDS, name: broken}
+    text = markdown_constants(records)
+    assert f"`{name}` has no constants to show: no convergence in 9 steps" in text
+    assert name not in {row["record"] for table in parsed(text) for row in table}
+    assert name not in {row["record"] for table in parsed(markdown_quality(records)) for row in table}
+
+
+def test_quality_reads_back_with_printed_sets_once():
+    tables = parsed(markdown_quality(RECORDS))
+    rows = [row for table in tables for row in table]
+    of_profiles = [(row["record"], row["constants"]) for row in rows if "rel mean" in row]
+    assert len(set(of_profiles)) == len(of_profiles) > 0
+    for row in rows:
+        if row["constants"] != "regenerated":
+            continue
+        quality = FITS[row["record"]]["quality"]["regenerated"]
+        if "rel mean" in row:
+            for key in ("rel", "ks", "l1", "mse"):
+                assert float(row[f"{key} mean"]) == pytest.approx(np.mean(quality[key]), rel=0.05)
+                assert float(row[f"{key} worst"]) == pytest.approx(np.max(quality[key]), rel=0.05)
+            assert float(row["r2 worst"]) == pytest.approx(np.min(quality["r2"]), abs=5e-5)
+        elif "max error of A" in row:
+            assert float(row["max error of A"]) == pytest.approx(quality["delta_A"], rel=0.05)
+            assert row["rises all the way"] == ("yes" if quality["monotone"] else "no")
+        else:
+            assert float(row["inversion error worst"]) == pytest.approx(np.max(quality["inversion_error"]), rel=0.05)

@@ -1,0 +1,174 @@
+"""The tables say what the records say, to the digits that the errors leave, on any screen."""
+
+import copy
+import io
+import re
+from collections import Counter
+
+import pytest
+from rich.console import Console
+
+from profilefit import catalogue, record
+from profilefit.report import digits, tables
+from profilefit.report.content import ERRORS, converged, largest_error
+from profilefit.report.evidence_tables import evidence_tables
+
+RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
+FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
+REASON = "no convergence in 2000 steps: constants trade against each other"
+
+
+def rendered(parts, width: int) -> str:
+    console = Console(width=width, file=io.StringIO(), highlight=False, color_system=None)
+    for part in parts:
+        console.print(part)
+    return console.file.getvalue()
+
+
+def failed(content: dict) -> dict:
+    """The same record, had its fit failed."""
+    other = copy.deepcopy(content)
+    other["fit"]["result"] = REASON
+    other["posterior"] = {}
+    for constant in other["constants"].values():
+        constant.pop("intervals", None)
+    return other
+
+
+@pytest.mark.parametrize("width", [100, 80])
+@pytest.mark.parametrize("name", RECORDS)
+def test_a_narrow_screen_loses_and_breaks_nothing(name, width):
+    """Lines may end elsewhere, but between the same words: none is cut, abbreviated or broken inside a number."""
+    parts = tables.record_tables(RECORDS[name])
+    narrow = rendered(parts, width)
+    assert max(map(len, narrow.splitlines())) <= width
+    assert Counter(narrow.split()) == Counter(rendered(parts, 400).split())
+
+
+@pytest.mark.parametrize("width", [100, 80])
+def test_the_summary_fits_and_names_every_record(width):
+    text = rendered([tables.summary(RECORDS)], width)
+    assert max(map(len, text.splitlines())) <= width
+    assert "…" not in text
+    assert all(name in text for name in RECORDS)
+    assert Counter(text.split()) == Counter(rendered([tables.summary(RECORDS)], 400).split())
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
+    content = FITS[name]
+    lines = rendered([tables.constants_table(content)], 100).splitlines()
+    for constant, values in content["constants"].items():
+        cells = next(line.split() for line in lines if line.split()[:1] == [constant])
+        published, regenerated, photons, misfit, jackknife = cells[1:]
+        value, error = values["regenerated"], largest_error(values)
+        # Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200.
+        assert abs(float(regenerated) - value) <= max(0.05 * (error or 0.0), 0.005 * abs(value))
+        assert published == "–" if values["published"] is None else float(published) == values["published"]
+        if not values["free"]:
+            assert (photons, misfit, jackknife) == ("held", "–", "–")
+            continue
+        for text, key in zip((photons, misfit, jackknife), ERRORS, strict=True):
+            known = values.get(key)
+            assert text == "–" if known is None else float(text) == pytest.approx(known, rel=0.05)
+
+
+@pytest.mark.parametrize("name", FITS)
+def test_quality_shows_the_mean_and_the_worst_of_every_set(name):
+    content = FITS[name]
+    text = rendered(tables.quality_tables(content), 100)
+    for values in (content["quality"][s] for s in ("published", "corrected", "regenerated") if s in content["quality"]):
+        for key in ("rel", "ks", "l1", "inversion_error"):
+            if key in values:
+                assert f"{max(values[key]):.3f}" in text
+        if "delta_A" in values:
+            assert digits.significant(values["delta_A"]) in text
+
+
+def test_a_failed_fit_says_why_wherever_it_is_shown():
+    name, content = next(item for item in FITS.items() if "rel" in item[1]["quality"]["regenerated"])
+    broken = failed(content)
+    detail = rendered(tables.record_tables(broken), 100)
+    assert detail.count("FAILED") == 1 + sum("FAILED" in line for line in _stages(content))
+    assert REASON in " ".join(detail.split())
+    assert "No credible intervals" in detail
+    assert "no law" in " ".join(detail.split())
+    assert REASON in " ".join(rendered([tables.summary({name: broken})], 200).split())
+    assert "failed" in rendered([tables.summary({name: broken})], 200)
+    assert "FAILED" not in rendered([tables.constants_table(content)], 100)
+
+
+def _stages(content):
+    return rendered(tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
+
+
+def test_a_chain_that_is_too_short_says_so():
+    content = copy.deepcopy(next(content for content in FITS.values() if converged(content)))
+    kind = next(iter(content["posterior"]))
+    content["posterior"][kind]["result"] = "chain of 1000 steps is under 50 autocorrelation times (90)"
+    assert "FAILED: chain of 1000 steps is under 50" in rendered([tables.fit_facts(content)], 100)
+
+
+def test_brackets_of_units_are_no_markup():
+    content = copy.deepcopy(next(iter(FITS.values())))
+    content["title"] = content["note"] = "lengths in [mfp], [bold]not bold[/bold]"
+    text = rendered(tables.record_tables(content), 200)
+    assert text.count("[bold]not bold[/bold]") == 2
+
+
+def test_readings_are_shown_best_first_and_any_key_may_be_absent():
+    near = {
+        "equation": "(8)",
+        "choices": "near",
+        "constants": {"p": 5.63},
+        "published": {"p": 5.67},
+        "verdict": "reproduced",
+        "curve_distance": 0.004,
+        "constant_distance": 0.008,
+        "evidence": "seen",
+    }
+    far = {"equation": "(8)", "choices": "far", "curve_distance": 0.5}
+    rows = [
+        {"material": "apple", "channel": "red", "model": "normalized diffusion", "mse_over_printed": [1.0, 0.9, 1.02]},
+        {"material": "apple", "channel": "red", "model": "paper", "ratio": 0.7},
+        {"material": "apple", "channel": "blue", "model": "normalized diffusion", "ratio": 9.0},
+    ]
+    text = rendered(evidence_tables({"readings": [far, near], "table1": rows}), 100)
+    assert text.index("near") < text.index("far")
+    assert "p 5.63 (printed 5.67)" in text
+    assert "0.4 %" in text
+    assert "0.700" in text
+    # The channel is chosen by the other law's error, never by this one's.
+    assert "blue" not in text
+    assert "no readings" in rendered(evidence_tables({}), 100)
+
+
+@pytest.mark.parametrize(
+    ("value", "error", "text"),
+    [
+        (5.22099, 0.345, "5.22"),
+        (0.0522566, 0.0037542, "0.0523"),
+        (-0.00629419, 0.000162281, "-0.00629"),
+        (1.33888, 0.0782, "1.339"),
+        (11.267, 18.3, "11.3"),  # an error above the value still leaves three digits of where the fit ended
+        (15.3278, 0.0996, "15.33"),  # two digits of 0.0996 are 0.10
+        (193779.0, 24.0, "193779"),
+        (-6.39e-05, 0.00037, "-6.39e-05"),
+        (0.0, None, "0.00"),
+        (None, 1.0, "–"),
+    ],
+)
+def test_digits_end_with_those_of_the_error(value, error, text):
+    assert digits.to_error(value, error) == text
+
+
+def test_decimal_points_stand_in_one_column():
+    padded = digits.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
+    places = {text.index(".") if "." in text else len(text.rstrip()) for text in padded}
+    assert len(places) == 1
+    assert [text.strip() for text in padded] == ["-0.0064", "14.0", "30", "1.2e-05", "–"]
+
+
+def test_an_interval_has_two_digits_of_its_half_width():
+    assert digits.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
+    assert digits.interval(None) == "–"
