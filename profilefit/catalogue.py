@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from mcml_sim.setting import Setting
 from profilefit import record
 from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.laws import published
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.laws.rational import Rational
 
+Law = TypeVar("Law", bound=Constants)
 PROFILE_LAWS: dict[str, type[ProfileLaw]] = {"liang": Liang, "burley": Burley}
 ALBEDO_LAWS: dict[str, type[AlbedoLaw]] = {"liang": LiangAlbedo, "rational": Rational}
 # Which records make up the regenerated constants of a law; a later one adds to an earlier one.
@@ -55,7 +56,7 @@ def load(
         raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
     where = setting or Setting()
     values = _constants(name, name, constants, where, folder or fits_folder())
-    return PROFILE_LAWS[name](setting=where, albedo=normalisation(where, folder), **values)  # type: ignore[call-arg]
+    return _made(PROFILE_LAWS[name], values, constants, setting=where, albedo=normalisation(where, folder))
 
 
 def albedo_law(
@@ -66,18 +67,21 @@ def albedo_law(
         raise InputError(f"albedo law must be one of {', '.join(ALBEDO_LAWS)}, got {name!r}")
     where = setting or Setting()
     values = _constants(f"albedo {name}", f"{name}_albedo", constants, where, folder or fits_folder())
-    return ALBEDO_LAWS[name](setting=where, **values)
+    return _made(ALBEDO_LAWS[name], values, constants, setting=where)
 
 
 def normalisation(setting: Setting, folder: Path | None = None) -> Rational:
     """The map that scales profile laws to their reflectance."""
     content = _record(ALBEDO_RECORD, folder or fits_folder())
-    return Rational(setting=setting, **_of_record(content, setting, ALBEDO_RECORD))
+    return _made(Rational, _of_record(content, setting, ALBEDO_RECORD), ALBEDO_RECORD, setting=setting)
 
 
 def record_setting(content: dict[str, Any]) -> Setting:
     """The setting that a record belongs to."""
-    return Setting(**content["setting"])
+    try:
+        return Setting(**content["setting"])
+    except (KeyError, TypeError, InputError):
+        raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
 
 
 def _constants(key: str, law: str, which: str, setting: Setting, folder: Path) -> dict[str, float]:
@@ -88,7 +92,7 @@ def _constants(key: str, law: str, which: str, setting: Setting, folder: Path) -
         return values
     if which.endswith(".json"):
         content = record.read(Path(which))
-        owner = content["law"] if content["pipeline"] != "albedo" else f"albedo {content['law']}"
+        owner = f"albedo {content.get('law')}" if content.get("pipeline") == "albedo" else content.get("law")
         if owner != key:
             raise RecordError(f"{which}: holds constants of law {owner!r}, got a request for {key!r}")
         return {**published.constants(law), **_of_record(content, setting, which)}
@@ -120,5 +124,13 @@ def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str
         raise SettingError(f"record {name} belongs to {record_setting(content)}, got a request for {setting}")
     try:
         return {key: float(value["regenerated"]) for key, value in content["constants"].items()}
-    except (KeyError, TypeError, ValueError):
+    except (KeyError, TypeError, ValueError, AttributeError):
         raise RecordError(f"record {name} is damaged: its constants have no regenerated values") from None
+
+
+def _made(kind: type[Law], values: dict[str, float], which: str, **given: Any) -> Law:
+    """A law from its constants, every one of them there and none besides."""
+    known = kind.constant_names()
+    if set(values) != set(known):
+        raise RecordError(f"constants {which} must be {', '.join(known)}, got {', '.join(values) or '(none)'}")
+    return kind(**given, **values)  # type: ignore[arg-type]

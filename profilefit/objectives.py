@@ -101,7 +101,8 @@ def share(law, rings: Rings) -> Array:
     return inner - rings.xi
 
 
-OBJECTIVES: dict[str, Callable] = {f.__name__: f for f in (energy, radial, albedo, reflectance, radius, relative_radius, share)}
+_ALL = (energy, radial, albedo, reflectance, radius, relative_radius, share)
+OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective in _ALL}
 
 
 def rings_of(profiles: Profiles, used=None, limits=(0.0, 0.0), xi=()) -> Rings:

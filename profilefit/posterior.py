@@ -6,8 +6,9 @@ statistical   exp(-Q(theta*) / 2 s^2) with theta* = theta^ + C (theta - theta^):
               that Q is probed as far from its optimum as the photons move it
 discrepancy   exp(-Q(theta) / 2 s^2), s^2 the misfit per degree of freedom: what the law's misfit leaves open if it were
               noise. It is not, so read it beside the fit's jackknife
-Priors are flat in the constants, each within ten times its size: a misfit that is blind to a constant leaves it to the
-prior, and the interval then shows it. Chains run until they are 50 autocorrelation times long or say that they are not.
+Priors are flat in the constants, each within ten times its size or its own misfit error, whichever is larger: a
+misfit that is blind to a constant leaves it to the prior, and the interval then shows it. Chains run until they are
+50 autocorrelation times long or say that they are not.
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ class _Density(eqx.Module):
         problem = Problem(fit.objective, fit.free)
         with jax.enable_x64(True):
             centre, matrix = jnp.asarray(fit.solution.parameters), jnp.asarray(adjust)
-            bound = PRIOR_WIDTH * jnp.abs(centre)
+            bound = PRIOR_WIDTH * jnp.maximum(jnp.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         return cls(fit.law, fit.rings, centre, matrix, variance, fit.solution.cost, bound, problem)
 
     @eqx.filter_jit

@@ -82,8 +82,8 @@ class Weighting:
     last_share: float = 1.0
 
     def problems(self) -> str | None:
-        if self.energy_limit < 0 or self.source_limit < 0:
-            return f"weighting limits must be >= 0, got {self.energy_limit!r}, {self.source_limit!r}"
+        if not all(0 <= limit < np.inf for limit in (self.energy_limit, self.source_limit)):
+            return f"weighting limits must be finite and >= 0, got {self.energy_limit!r}, {self.source_limit!r}"
         if not (0 <= self.shares <= 10_000 and 0 < self.last_share <= 1):
             got = f"{self.shares!r}, {self.last_share!r}"
             return f"weighting needs 0 <= shares <= 10000 and 0 < last_share <= 1, got {got}"
@@ -182,18 +182,21 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
         if not isinstance(value, dict):
             raise RecipeError(f"{where}: [{key}] must be a table, got {value!r}")
         return _build(tables[annotation], value, f"{where}: [{key}]")
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    if annotation == "float" and number:
+    if annotation == "float" and _is_number(value):
         return float(value)
     if annotation == "int" and isinstance(value, int) and not isinstance(value, bool):
         return value
     if annotation == "str" and isinstance(value, str):
         return value
-    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(isinstance(v, int | float) for v in value):
+    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(map(_is_number, value)):
         return tuple(float(v) for v in value)
     if annotation == "tuple[str, ...]" and isinstance(value, list) and all(isinstance(v, str) for v in value):
         return tuple(value)
     raise RecipeError(f"{where}: {key} must be a {_spoken(annotation)}, got {value!r}")
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _spoken(annotation: str) -> str:

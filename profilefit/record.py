@@ -10,6 +10,8 @@ import hashlib
 import json
 import os
 import tempfile
+import zipfile
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, is_dataclass
 from importlib.metadata import version
@@ -37,6 +39,14 @@ def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[s
     except OSError as error:
         raise OutputError(f"cannot write record {name!r} into {folder}: {error.strerror or error}") from None
     return folder / f"{name}.json"
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file, whole or not at all. OutputError names file and reason."""
+    try:
+        _replace(path, lambda file: file.write(text.encode()))
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
 
 
 def require_writable(folder: Path) -> None:
@@ -69,11 +79,11 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """The arrays beside a record (`path` is the .json)."""
     file = path.with_suffix(".npz")
     try:
-        with np.load(file) as arrays:
+        with file.open("rb") as opened, np.load(opened) as arrays:
             return {name: arrays[name] for name in arrays.files}
     except FileNotFoundError:
         raise RecordError(f"{file}: the samples and curves of this record are missing; regenerate it") from None
-    except (OSError, ValueError, KeyError, EOFError) as error:
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error) as error:
         raise RecordError(f"{file}: is damaged ({error}); regenerate it") from None
 
 
@@ -96,7 +106,7 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """Numbers, text, lists and dicts only; floats to twelve digits; what is not finite by its name."""
+    """Numbers, text, lists and dicts only; floats to twelve digits; what is not finite becomes None."""
     if is_dataclass(value) and not isinstance(value, type):
         return plain(asdict(value))
     if isinstance(value, Mapping):

@@ -10,8 +10,8 @@ import typer
 from rich.console import Console
 
 from profilefit import catalogue, record
-from profilefit.errors import RecordError
-from profilefit.report import figures, tables
+from profilefit.errors import InputError, RecordError
+from profilefit.report import figures, fill, sections, tables
 
 LOCAL = Path("fits")
 WIDTH = 100
@@ -27,7 +27,9 @@ def report(
     figures_to: Annotated[
         Path | None, typer.Option("--figures", help="Folder for the figures; without it none are drawn.")
     ] = None,
-    markdown: Annotated[bool, typer.Option("--markdown", help="Print the README's tables instead.")] = False,
+    markdown: Annotated[
+        Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
+    ] = None,
 ) -> None:
     """Print what was fitted: constants with their errors, quality by albedo, the state of fits and chains.
 
@@ -37,21 +39,28 @@ def report(
     console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
     contents = _contents(folder, names)
-    if markdown:
-        for table in (tables.markdown_constants(contents), tables.markdown_quality(contents)):
-            console.print(table, markup=False, soft_wrap=True)
-    else:
-        if not names:
-            console.print(tables.summary(contents))
-        for name in contents:
-            for part in tables.record_tables(contents[name]):
-                console.print(part)
+    if markdown is not None:
+        _fill(markdown, contents)
+        return
+    if not names:
+        console.print(tables.summary(contents))
+    for content in contents.values():
+        for part in tables.record_tables(content):
+            console.print(part)
     if figures_to is not None:
         record.require_writable(figures_to)
         drawn, skipped = figures.draw_all(folder, figures_to, names)
         console.print(f"drew {len(drawn)} figures into {figures_to}", markup=False)
         for line in skipped:
             console.print(f"left out: {line}", markup=False)
+
+
+def _fill(path: Path, contents: dict[str, dict]) -> None:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    record.write_text(path, fill(text, sections(contents)))
 
 
 def _contents(folder: Path, names: list[str] | None) -> dict[str, dict]:

@@ -35,8 +35,8 @@ def evidence_tables(content: Content) -> list[RenderableType]:
         found.append(_readings(equation, readings))
     if content.get("table1"):
         found.append(_table1(content["table1"]))
-    if content.get("printed_halves"):
-        found.append(_halves(content["printed_halves"]))
+    if content.get("halves"):
+        found.append(_halves(content["halves"]))
     return found or [Text("This record holds no readings.")]
 
 

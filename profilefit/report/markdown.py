@@ -57,6 +57,50 @@ def markdown_quality(records: Mapping[str, Content]) -> str:
     return "\n\n".join(part for part in parts if part)
 
 
+def markdown_readings(records: Mapping[str, Content]) -> str:
+    """Of each equation the reading nearest to print: what it chose, what came out, and the verdict."""
+    header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
+    readings = [r for content in records.values() for r in content.get("readings") or ()]
+    best: dict[str, Content] = {}
+    for reading in sorted(readings, key=lambda r: (r["curve_distance"] is None, r["curve_distance"])):
+        best.setdefault(reading["equation"], reading)
+    rows = [
+        (
+            equation,
+            best[equation]["choices"],
+            ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
+            ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
+            f"{best[equation]['constant_distance']:.1%}",
+            f"{best[equation]['curve_distance']:.1%}",
+            best[equation]["verdict"],
+        )
+        for equation in dict.fromkeys(reading["equation"] for reading in readings)
+    ]
+    return _table(header, rows) if rows else ""
+
+
+def sections(records: Mapping[str, Content]) -> dict[str, str]:
+    """The tables of a README by the names of their marks."""
+    found = {
+        "quality": _profile_quality(records),
+        "constants": markdown_constants(records),
+        "readings": markdown_readings(records),
+        "inversion": _inversion_quality(records),
+        "maps": _albedo_quality(records),
+    }
+    return {name: text for name, text in found.items() if text}
+
+
+def fill(text: str, tables: Mapping[str, str]) -> str:
+    """Put each table between its marks, <!-- name --> and <!-- /name -->; marks without a table stay as they are."""
+    for name, table in tables.items():
+        begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        if begin in text and end in text:
+            head, rest = text.split(begin, 1)
+            text = f"{head}{begin}\n{table}\n{end}{rest.split(end, 1)[1]}"
+    return text
+
+
 def _profile_quality(records: Mapping[str, Content]) -> str:
     header = ("record", "constants", *(f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst")))
     rows = [
@@ -113,7 +157,7 @@ def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
 def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A GitHub table, names to the left and numbers to the right, every line filled to the same width."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    names = {"record", "equation", "constant", "constants"}
+    names = {"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed", "verdict"}
     rule = [":" + "-" * (w - 1) if h in names else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
     lines = [header, rule, *rows]
     return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)

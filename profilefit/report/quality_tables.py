@@ -14,13 +14,23 @@ from profilefit.report.digits import on_the_point, significant
 SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
 ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
 # Measures by the table they stand in; for r2 the smallest is the worst.
-TABLES = (("rel", "ks", "l1"), ("mse", "r2"))
+TABLES = (
+    ("rel", "ks", "l1"),
+    ("mse", "r2"),
+    ("mse near", "mse far"),
+    ("r2 near", "r2 far"),
+    ("inversion_error",),
+)
 MEANING = {
     "rel": "mean |law / exact − 1| of R_d",
     "ks": "max |cdf − exact cdf|",
     "l1": "share of misplaced energy",
     "mse": "of r R_d [1/mfp²]",
     "r2": "of r R_d",
+    "mse near": "of the nearer half of the trimmed range [1/mfp²]",
+    "mse far": "of the farther half",
+    "r2 near": "of the nearer half of the trimmed range",
+    "r2 far": "of the farther half",
     "inversion_error": "max |cdf(r(ξ)) − ξ|",
     "delta_A": "max error of A",
     "delta_alpha": "max error of α",
@@ -34,7 +44,16 @@ ALBEDO_MEASURES = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", 
 
 def worst(measure: str, values: Any) -> float:
     """The worst of a measure over the albedos, in its own unit."""
-    return float(np.min(values) if measure == "r2" else np.max(values))
+    return float(np.min(values) if measure.startswith("r2") else np.max(values))
+
+
+def values_of(one: Content, measure: str) -> list[float] | None:
+    """A measure of one set at each albedo, halves apart; None if the record does not know it."""
+    name, _, half = measure.partition(" ")
+    if not half:
+        return one.get(name)
+    halves = one.get(f"{name}_halves")
+    return None if halves is None else [row[half == "far"] for row in halves]
 
 
 def worst_lines(content: Content) -> list[str]:
@@ -54,8 +73,8 @@ def quality_tables(content: Content) -> list[RenderableType]:
     """Measures by albedo for every set of constants, or those of an A -> alpha map."""
     if measures(content, "delta_A"):
         return [_albedo_table(content)]
-    present = content["quality"]["regenerated"]
-    groups = [[key for key in group if key in present] for group in (*TABLES, ("inversion_error",))]
+    sets = [content["quality"][name] for name in measured_sets(content)]
+    groups = [[key for key in group if all(values_of(one, key) is not None for one in sets)] for group in TABLES]
     return [_table(content, group) for group in groups if group]
 
 
@@ -66,7 +85,7 @@ def _table(content: Content, group: list[str]) -> RenderableType:
     columns = {"α": [*(f"{alpha[i]:.3f}" for i in rows), "mean", "worst"]}
     for measure in group:
         for name in names:
-            values = quality[name][measure]
+            values = values_of(quality[name], measure) or []
             shown = [*(values[i] for i in rows), float(np.mean(values)), worst(measure, values)]
             header = f"{measure.replace('inversion_error', 'error')}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
@@ -92,9 +111,9 @@ def albedo_number(measure: str, value: Any) -> str:
 
 
 def _number(measure: str, value: float) -> str:
-    if measure == "mse":
+    if measure.startswith("mse"):
         return f"{value:.1e}"
-    return f"{value:.4f}" if measure == "r2" else f"{value:.3f}"
+    return f"{value:.4f}" if measure.startswith("r2") else f"{value:.3f}"
 
 
 def _failed(content: Content) -> str:

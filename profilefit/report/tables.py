@@ -16,10 +16,9 @@ from profilefit.report.columns import column_table
 from profilefit.report.content import ERRORS, Content, converged, largest_error
 from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
 from profilefit.report.evidence_tables import evidence_line, evidence_tables
-from profilefit.report.markdown import markdown_constants, markdown_quality
 from profilefit.report.quality_tables import quality_tables, worst_lines
 
-__all__ = ["constants_table", "markdown_constants", "markdown_quality", "record_tables", "summary"]
+__all__ = ["constants_table", "record_tables", "summary"]
 
 Line = tuple[str, RenderableType]
 KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
@@ -43,7 +42,7 @@ def _summary_fit(name: str, content: Content) -> tuple[Text, ...]:
     label = Text.assemble((name, "bold"), "\n", (f"{content['law']}, {content['equations']}", "dim"))
     if not converged(content):
         label.append(f"\n{content['fit']['result']}", style="red")
-    objective = content["protocol"]["weighting"]["objective"]
+    objective = content["protocol"]["weighting"]["objective"].replace("_", "\n")
     verdict = Text("converged", style="green") if converged(content) else Text("FAILED", style="bold red")
     return label, Text(truth(content)), Text(objective), verdict, Text("\n".join(worst_lines(content)))
 

@@ -75,24 +75,20 @@ def test_constants_scatter_as_predicted(tallies, toy, sidak):
 
 def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sidak):
     """Normalized diffusion misses these photons by a tenth, and only the sandwich knows how it scatters."""
-    free = ("s0", "s1")
-    one, scattered = refits(tallies, burley, free)
+    one, scattered = refits(tallies, burley, ("s0", "s1", "s2"))
     assert one.structure.rms > 0.02
     assert spread(scattered, one.statistical) > 1e-3
-    assert np.abs(whitened(scattered, one.statistical)).max() < sidak(3)
+    assert np.abs(whitened(scattered, one.statistical)).max() < sidak(6)
     # The misfit taken for noise is another question, and no answer to this one.
     assert spread(scattered, one.discrepancy) < 1e-20
-    # Neither is Gauss and Newton's short cut, the sandwich without the residuals' curvature: as far as it is off.
-    assert np.all(np.linalg.eigvalsh(one.statistical) > 0)
 
 
-@pytest.mark.parametrize("objective", ["energy"])
-def test_sensitivity_is_that_of_refitting(tallies, burley, objective):
+def test_sensitivity_is_that_of_refitting(tallies, burley):
     """d constants / d ring energy, by moving single energies of a law that does not fit."""
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     free = ("s0", "s1", "s2")
-    one = fit(profiles, burley, objective, free)
-    problem = Problem(objective, free)
+    one = fit(profiles, burley, "energy", free)
+    problem = Problem("energy", free)
     found = sensitivity(problem, one.solution, burley, one.rings)
     assert found.shape == (3, *profiles.energy.shape)
     for a, i in ((0, 0), (2, 5), (4, 9)):

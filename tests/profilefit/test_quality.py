@@ -92,7 +92,7 @@ def test_l1_is_half_the_integral_of_the_difference(burley):
 
 @pytest.mark.parametrize(("alpha", "cut"), [(0.8, 6.0), (0.9, 8.0), (0.99, 14.0)])
 def test_mse_and_r2_are_of_r_times_the_profile(burley, alpha, cut):
-    """Over the range of the trimming (6): `cut` is the first radius of its walk where r R_d is under .005 of its largest."""
+    """Over the range of (6): `cut` is the first radius of its walk where r R_d is under .005 of its largest."""
     walk = np.arange(5.0, 20.0)
     largest = alpha / (4 * np.pi)  # at r = 0
     assert walk[np.argmax(walk * exact.profile(walk, alpha) <= 0.005 * largest)] == cut

@@ -2,7 +2,6 @@
 
 import copy
 import io
-import re
 from collections import Counter
 
 import pytest
@@ -164,8 +163,8 @@ def test_digits_end_with_those_of_the_error(value, error, text):
 
 def test_decimal_points_stand_in_one_column():
     padded = digits.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
-    places = {text.index(".") if "." in text else len(text.rstrip()) for text in padded}
-    assert len(places) == 1
+    from_right = {len(text) - (text.index(".") if "." in text else len(text.rstrip())) for text in padded}
+    assert from_right == {len(".2e-05")}
     assert [text.strip() for text in padded] == ["-0.0064", "14.0", "30", "1.2e-05", "–"]
 
 

@@ -1,0 +1,156 @@
+"""Laws by name: every form of `constants`, and what each wrong one is told."""
+
+import json
+
+import pytest
+
+import profilefit
+from mcml_sim import Setting, exact
+from profilefit import record
+from profilefit.catalogue import fits_folder
+from profilefit.errors import InputError, RecordError, SettingError
+from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.laws.published import SETS
+
+
+def constants_of(law, name):
+    return next(dict(s.constants) for s in SETS if (s.law, s.name) == (law, name))
+
+
+def make_record(folder, name, law, values, pipeline="profile", setting=None, **extra):
+    content = {
+        "law": law,
+        "pipeline": pipeline,
+        "setting": setting or Setting(),
+        "constants": {key: {"regenerated": value} for key, value in values.items()},
+        **extra,
+    }
+    return record.write(folder, name, content, {})
+
+
+def test_names():
+    assert {"liang", "burley"} <= set(profilefit.names())
+    assert isinstance(profilefit.names(), tuple)
+
+
+@pytest.mark.parametrize("name", profilefit.names())
+def test_every_law_loads_as_regenerated_and_is_a_law(name):
+    law = profilefit.load(name)
+    assert isinstance(law, ProfileLaw)
+    assert law.setting == Setting()
+    assert 0 < law.profile(1.0, 0.8, 1.0) < 1
+    # The map it normalises with is the exact one but for a few parts in a million.
+    assert float(law.albedo.reflectance(0.8)) == pytest.approx(exact.reflectance(0.8), abs=1e-5)
+
+
+@pytest.mark.parametrize("name", ["liang", "rational"])
+def test_every_map_loads_as_regenerated(name):
+    law = profilefit.albedo_law(name)
+    assert isinstance(law, AlbedoLaw)
+    # Equation (8) is right to .005 in alpha where A <= .75; the rational one to 1e-5.
+    assert law.alpha(exact.reflectance(0.8)) == pytest.approx(0.8, abs=0.02)
+
+
+@pytest.mark.parametrize(
+    ("asked", "found"), [("published", "published"), ("published:corrected", "corrected"), ("corrected", "corrected")]
+)
+def test_printed_sets_by_name(asked, found):
+    assert profilefit.load("liang", asked).constants() == constants_of("liang", found)
+
+
+def test_printed_sets_of_maps():
+    assert profilefit.albedo_law("liang", "published").constants() == {"p": 5.67, "q": 3.84, "w": 0.84}
+
+
+def test_a_records_path(tmp_path):
+    """A record of the profile alone leaves the inverse as printed."""
+    values = {**constants_of("liang", "corrected"), "a1": -0.007}
+    path = make_record(tmp_path, "mine", "liang", {"a1": values["a1"], "b0": values["b0"]})
+    assert profilefit.load("liang", str(path)).constants() == values
+    path = make_record(tmp_path, "map", "liang", {"p": 5.0, "q": 3.5, "w": 0.8}, pipeline="albedo")
+    assert profilefit.albedo_law("liang", str(path)).constants() == {"p": 5.0, "q": 3.5, "w": 0.8}
+
+
+def test_regenerated_records_of_another_folder_come_first(tmp_path):
+    make_record(tmp_path, "burley-whole", "burley", {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0})
+    here, shipped = profilefit.load("burley", folder=tmp_path), profilefit.load("burley")
+    assert here.constants() == {"s0": 1.0, "s1": 2.0, "s2": 3.0, "s3": 4.0}
+    assert shipped.constants() != here.constants()
+    assert here.albedo == shipped.albedo  # not in that folder: the installation's own
+
+
+def test_shipped_records_belong_to_the_installation():
+    assert (fits_folder() / "albedo-rational.json").is_file()
+
+
+@pytest.mark.parametrize(
+    ("call", "words"),
+    [
+        (lambda: profilefit.load("lambert"), r"law must be one of liang, burley.*, got 'lambert'"),
+        (lambda: profilefit.albedo_law("burley"), r"albedo law must be one of liang, rational, got 'burley'"),
+        (
+            lambda: profilefit.load("liang", "best"),
+            r"constants must be one of regenerated, published, corrected, the path",
+        ),
+        (lambda: profilefit.load("burley", "published:corrected"), r"got 'published:corrected'"),
+        (lambda: profilefit.albedo_law("rational", "published"), r"constants must be one of regenerated, the path"),
+        (lambda: profilefit.load("liang", "/nowhere/x.json"), r"/nowhere/x\.json: there is no such record"),
+    ],
+)
+def test_unknown_names_are_told_what_is_accepted(call, words):
+    with pytest.raises(InputError, match=words):
+        call()
+
+
+@pytest.mark.parametrize("constants", ["regenerated", "published"])
+@pytest.mark.parametrize("setting", [Setting("diffuse"), Setting(n=1.4)])
+def test_constants_of_another_setting_are_refused(constants, setting):
+    for call in (profilefit.load, profilefit.albedo_law):
+        with pytest.raises(SettingError, match=r"belongs? to searchlight, n = 1, g = 0, got a request for"):
+            call("liang", constants, setting)
+
+
+def test_a_record_of_another_setting_is_refused(tmp_path):
+    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"), setting=Setting("diffuse"))
+    with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request for searchlight"):
+        profilefit.load("burley", str(path))
+
+
+def test_a_record_of_another_law_is_refused(tmp_path):
+    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
+    with pytest.raises(RecordError, match=r"holds constants of law 'burley', got a request for 'liang'"):
+        profilefit.load("liang", str(path))
+    path = make_record(tmp_path, "map", "liang", {"p": 5.0, "q": 3.5, "w": 0.8}, pipeline="albedo")
+    with pytest.raises(RecordError, match=r"holds constants of law 'albedo liang', got a request for 'liang'"):
+        profilefit.load("liang", str(path))
+
+
+@pytest.mark.parametrize(
+    "damage",
+    [
+        {"constants": {"s0": {"published": 1.0}}},
+        {"constants": {"s0": {"regenerated": None}}},
+        {"constants": {"s0": {"regenerated": "much"}}},
+        {"constants": None},
+        {"constants": {"s9": {"regenerated": 1.0}}},
+        {"setting": None},
+        {"setting": {"illumination": "searchlight", "colour": "red"}},
+        {"law": None},
+    ],
+    ids=str,
+)
+def test_damaged_records_are_told_in_one_line(tmp_path, damage):
+    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
+    path.write_text(json.dumps({**json.loads(path.read_text()), **damage}))
+    with pytest.raises(RecordError, match=r"mine"):
+        profilefit.load("burley", str(path))
+
+
+@pytest.mark.parametrize("key", ["law", "setting", "constants"])
+def test_records_that_lack_a_part_are_told_in_one_line(tmp_path, key):
+    path = make_record(tmp_path, "mine", "burley", constants_of("burley", "published"))
+    content = json.loads(path.read_text())
+    del content[key]
+    path.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match=r"mine"):
+        profilefit.load("burley", str(path))

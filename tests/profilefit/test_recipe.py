@@ -1,0 +1,218 @@
+"""Recipes: the shipped ones read, and each mistake gets one line that names file, key and what is accepted."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from profilefit.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder
+from profilefit.errors import InputError, RecipeError
+from profilefit.objectives import OBJECTIVES
+from profilefit.recipe import PIPELINES, available, find, read
+
+GOOD = """
+title = "A fit"
+law = "liang"
+equations = "(7)"
+pipeline = "profile"
+truth = "exact"
+start = "published"
+
+[albedos]
+low = 0.1
+high = 0.9
+count = 9
+spacing = "alpha"
+
+[rings]
+first = 0.01
+last = 30
+count = 20
+
+[weighting]
+objective = "energy"
+energy_limit = 3.0
+"""
+
+
+@pytest.fixture
+def write(tmp_path):
+    def to_file(text, name="mine.toml"):
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    return to_file
+
+
+@pytest.fixture
+def refuse(write):
+    """Reads GOOD with one piece replaced, and expects one line with the file's name and the given words."""
+
+    def check(old, new, words):
+        assert GOOD.count(old) == 1, "the piece to spoil must be there, once"
+        path = write(GOOD.replace(old, new))
+        with pytest.raises(RecipeError, match=re.escape(words)) as caught:
+            read(path)
+        message = str(caught.value)
+        assert message.startswith(str(path))
+        assert "\n" not in message
+
+    return check
+
+
+@pytest.mark.parametrize("path", available(fits_folder()).values(), ids=lambda path: path.stem)
+def test_every_shipped_recipe_reads(path):
+    recipe = read(path)
+    assert recipe.name == path.stem
+    assert recipe.title
+    assert recipe.law in {**PROFILE_LAWS, **ALBEDO_LAWS}
+    assert recipe.weighting.objective in {**OBJECTIVES, "": None}
+
+
+def test_there_are_shipped_recipes():
+    assert {"liang-whole", "liang-as-published", "burley-whole", "albedo-rational"} <= set(available(fits_folder()))
+
+
+def test_every_objective_has_a_pipeline_and_the_other_way_round():
+    named = [objective for objectives in PIPELINES.values() for objective in objectives]
+    assert sorted(named) == sorted(OBJECTIVES)
+
+
+def test_a_good_recipe_holds_what_its_file_says(write):
+    recipe = read(write(GOOD))
+    assert (recipe.name, recipe.law, recipe.pipeline, recipe.truth) == ("mine", "liang", "profile", "exact")
+    assert (recipe.albedos.low, recipe.albedos.high, recipe.albedos.count) == (0.1, 0.9, 9)
+    assert recipe.rings.last == 30.0
+    assert isinstance(recipe.rings.last, float)
+    assert recipe.weighting.energy_limit == 3.0
+    assert (recipe.mfp, recipe.held, recipe.note) == ((1.0,), (), "")
+
+
+def test_lists_become_tuples(write):
+    recipe = read(write('mfp = [1, 2.5]\nheld = ["a3", "b0"]\n' + GOOD))
+    assert recipe.mfp == (1.0, 2.5)
+    assert recipe.held == ("a3", "b0")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('law = "liang"', 'lore = "liang"', "unknown key 'lore', accepted: title, law, equations"),
+        (
+            'spacing = "alpha"',
+            'spaces = "alpha"',
+            "[albedos]: unknown key 'spaces', accepted: low, high, count, spacing",
+        ),
+        ('title = "A fit"', "", "missing title"),
+        ("low = 0.1", "", "[albedos]: missing low"),
+        ('objective = "energy"', "", "[weighting]: missing objective"),
+    ],
+)
+def test_keys_must_be_known_and_there(refuse, old, new, words):
+    refuse(old, new, words)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('title = "A fit"', "title = 7", "title must be a text, got 7"),
+        ("low = 0.1", 'low = "a tenth"', "low must be a number, got 'a tenth'"),
+        ("low = 0.1", "low = true", "low must be a number, got True"),
+        ("count = 9", "count = 9.5", "count must be a whole number, got 9.5"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = 1.0', "mfp must be a list of numbers, got 1.0"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = ["far"]', "mfp must be a list of numbers, got ['far']"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [true]', "mfp must be a list of numbers, got [True]"),
+        ('truth = "exact"', 'truth = "exact"\nheld = "a3"', "held must be a list of texts, got 'a3'"),
+        ('[weighting]\nobjective = "energy"\nenergy_limit = 3.0', "[[weighting]]", "[weighting] must be a table"),
+    ],
+)
+def test_types_must_be_right(refuse, old, new, words):
+    refuse(old, new, words)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ('pipeline = "profile"', 'pipeline = "magic"', "pipeline must be one of albedo, profile, as-published"),
+        ('truth = "exact"', 'truth = "hearsay"', "truth must be one of orders, exact, got 'hearsay'"),
+        ('objective = "energy"', 'objective = "beauty"', "must be one of energy, got 'beauty'"),
+        ('objective = "energy"', 'objective = "radius"', "must be one of energy, got 'radius'"),
+        ("high = 0.9", "high = 1.1", "0 < low < high <= 1, got low = 0.1, high = 1.1"),
+        ("low = 0.1", "low = 0.0", "0 < low < high <= 1, got low = 0.0"),
+        ("low = 0.1", "low = 0.9", "0 < low < high <= 1, got low = 0.9, high = 0.9"),
+        ("low = 0.1", "low = nan", "0 < low < high <= 1, got low = nan"),
+        ("count = 9", "count = 2", "albedos.count must be between 3 and 1000, got 2"),
+        ("count = 9", "count = 1001", "albedos.count must be between 3 and 1000, got 1001"),
+        (
+            'spacing = "alpha"',
+            'spacing = "even"',
+            "albedos.spacing must be one of alpha, reflectance, sqrt(1-alpha), got",
+        ),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [1.0, 0.0]', "mfp must be a list of lengths > 0, got [1.0, 0.0]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [-1]', "mfp must be a list of lengths > 0, got [-1.0]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [inf]', "mfp must be a list of lengths > 0, got [inf]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = []', "mfp must be a list of lengths > 0, got []"),
+        ("first = 0.01", "first = 0.01\ndr = 0.1", "either dr > 0 or both first > 0 and count > 0"),
+        ("first = 0.01", "first = -0.01", "either dr > 0 or both first > 0 and count > 0"),
+        ("last = 30", "last = 0.005", "rings.last must lie beyond the first ring and within 1000 mfp, got 0.005"),
+        ("last = 30", "last = 1e4", "rings.last must lie beyond the first ring and within 1000 mfp, got 10000.0"),
+        ("last = 30", "last = nan", "rings.last must lie beyond the first ring"),
+        ("count = 20", "count = 5000", "rings.count must be at most 1000, got 5000"),
+        ("last = 30", 'last = 30\ntrim = "R"', "rings.trim must be one of r R_d, R_d, none"),
+        ("last = 30", "last = 30\nepsilon = 1.0", "with epsilon in (0, 1), got"),
+        ("energy_limit = 3.0", "energy_limit = -3.0", "weighting limits must be"),
+        ("energy_limit = 3.0", "energy_limit = nan", "weighting limits must be"),
+        ("energy_limit = 3.0", "source_limit = inf", "weighting limits must be"),
+        ("energy_limit = 3.0", "shares = -1", "0 <= shares <= 10000"),
+        ("energy_limit = 3.0", "last_share = 0.0", "0 < last_share <= 1"),
+    ],
+)
+def test_values_must_be_possible(refuse, old, new, words):
+    refuse(old, new, words)
+
+
+def test_profiles_need_rings(write):
+    text = GOOD[: GOOD.index("[rings]")] + GOOD[GOOD.index("[weighting]") :]
+    with pytest.raises(RecipeError, match=r"mine\.toml: a recipe of pipeline 'profile' needs a table \[rings\]"):
+        read(write(text))
+    assert read(write(text.replace('"profile"', '"albedo"').replace('"energy"', '"albedo"'))).rings is None
+
+
+@pytest.mark.parametrize("table", ["albedos", "weighting"])
+def test_tables_must_be_there(write, table):
+    text = re.sub(rf"\[{table}\][^\[]*", "", GOOD)
+    with pytest.raises(RecipeError, match=rf"mine\.toml: missing \[{table}\]"):
+        read(write(text))
+
+
+def test_what_is_not_toml_is_told_with_its_place(write):
+    with pytest.raises(RecipeError, match=r"mine\.toml: is not TOML: .*line 2"):
+        read(write("\nthis is no recipe\n"))
+
+
+def test_a_file_that_cannot_be_read(tmp_path):
+    with pytest.raises(RecipeError, match=r"gone\.toml: there is no such recipe"):
+        read(tmp_path / "gone.toml")
+    (tmp_path / "folder.toml").mkdir()
+    with pytest.raises(RecipeError, match=r"folder\.toml: cannot be read"):
+        read(tmp_path / "folder.toml")
+    (tmp_path / "latin.toml").write_bytes(b'title = "caf\xe9"')
+    with pytest.raises(RecipeError, match=r"latin\.toml: cannot be read"):
+        read(tmp_path / "latin.toml")
+
+
+def test_find_by_name_or_path(write, tmp_path):
+    path = write(GOOD)
+    write(GOOD, "another.toml")
+    assert list(available(tmp_path)) == ["another", "mine"]
+    assert find("mine", tmp_path) == read(path)
+    assert find(str(path), Path("/")).path == path
+    with pytest.raises(RecipeError, match=r"recipe must be one of another, mine or a \.toml file, got 'yours'"):
+        find("yours", tmp_path)
+    with pytest.raises(RecipeError, match=r"one of \(none\) or a \.toml file"):
+        find("yours", tmp_path / "empty")
+
+
+def test_a_recipe_error_is_an_input_error():
+    assert issubclass(RecipeError, InputError)

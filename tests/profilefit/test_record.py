@@ -1,0 +1,165 @@
+"""Records: what is written is read, the same twice, whole or not at all."""
+
+import json
+import os
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from profilefit import record
+from profilefit.errors import InputError, OutputError, RecordError
+
+CONTENT = {"law": "liang", "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}
+ARRAYS = {"samples": np.arange(6.0).reshape(2, 3), "alpha": np.array([0.5])}
+
+
+def test_round_trip(tmp_path):
+    path = record.write(tmp_path / "new" / "folder", "mine", CONTENT, ARRAYS)
+    assert path == tmp_path / "new" / "folder" / "mine.json"
+    assert record.read(path) == {"format": record.FORMAT, "name": "mine", **CONTENT}
+    arrays = record.read_arrays(path)
+    assert sorted(arrays) == ["alpha", "samples"]
+    np.testing.assert_array_equal(arrays["samples"], ARRAYS["samples"])
+    assert record.available(path.parent) == {"mine": path}
+
+
+def test_the_same_content_is_the_same_bytes(tmp_path):
+    """Whatever the order of keys, and whenever it is written."""
+    turned = {"constants": dict(reversed(CONTENT["constants"].items())), "law": "liang"}
+    first, again = (record.write(tmp_path / d, "mine", c, ARRAYS) for d, c in (("a", CONTENT), ("b", turned)))
+    os.utime(first, (0, 0))
+    for suffix in (".json", ".npz"):
+        assert first.with_suffix(suffix).read_bytes() == again.with_suffix(suffix).read_bytes()
+    other = record.write(tmp_path / "c", "mine", {**CONTENT, "law": "burley"}, ARRAYS)
+    assert other.read_bytes() != first.read_bytes()
+
+
+def test_numbers_to_twelve_digits_and_nan_to_null(tmp_path):
+    @dataclass
+    class Part:
+        value: np.float64
+        where: Path
+
+    content = {
+        "third": 1 / 3,
+        "tiny": np.float64(5e-301),
+        "nan": np.nan,
+        "infinite": -np.inf,
+        "whole": np.int64(7),
+        "flag": np.bool_(True),
+        "array": np.array([[1.0, np.nan]]),
+        "zero_d": np.array(2.0),
+        "pair": (1, "two", None),
+        "part": Part(np.float64(3.0), Path("x")),
+        5: "key",
+    }
+    found = record.read(record.write(tmp_path, "mine", content, {}))
+    assert found["third"] == 0.333333333333
+    assert found["tiny"] == 5e-301
+    assert found["nan"] is None
+    assert found["infinite"] is None
+    assert found["whole"] == 7
+    assert found["flag"] is True
+    assert found["array"] == [[1.0, None]]
+    assert found["zero_d"] == 2.0
+    assert found["pair"] == [1, "two", None]
+    assert found["part"] == {"value": 3.0, "where": "x"}
+    assert found["5"] == "key"
+    assert "NaN" not in (tmp_path / "mine.json").read_text()
+
+
+def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch):
+    path = record.write(tmp_path, "mine", CONTENT, ARRAYS)
+    before = {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)}
+
+    def full_disk(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(os, "fsync", full_disk)
+    with pytest.raises(OutputError, match=r"cannot write record 'mine' into .*: No space left on device"):
+        record.write(tmp_path, "mine", {"law": "other"}, {})
+    assert {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)} == before
+    assert record.read(path)["law"] == "liang"
+
+
+def test_an_interruption_leaves_nothing_behind(tmp_path, monkeypatch):
+    def control_c(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(os, "replace", control_c)
+    with pytest.raises(KeyboardInterrupt):
+        record.write(tmp_path, "mine", CONTENT, ARRAYS)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_folder_that_cannot_be_made_is_named(tmp_path):
+    (tmp_path / "file").write_text("in the way")
+    with pytest.raises(OutputError, match=r"cannot write record 'mine' into .*file"):
+        record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", r"mine\.json: is not a record"),
+        ("{", r"mine\.json: is not a record"),
+        ("[1, 2]", r"mine\.json: is not a record of format 1, got 'list'"),
+        ("{}", r"mine\.json: is not a record of format 1, got None"),
+        ('{"format": 99}', r"mine\.json: is not a record of format 1, got 99"),
+    ],
+)
+def test_what_is_no_record_is_named(tmp_path, text, words):
+    path = tmp_path / "mine.json"
+    path.write_text(text)
+    with pytest.raises(RecordError, match=words):
+        record.read(path)
+
+
+def test_records_that_cannot_be_read_are_named(tmp_path):
+    with pytest.raises(RecordError, match=r"gone\.json: there is no such record; `profilefit regenerate` makes them"):
+        record.read(tmp_path / "gone.json")
+    (tmp_path / "binary.json").write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(RecordError, match=r"binary\.json: is not a record"):
+        record.read(tmp_path / "binary.json")
+    (tmp_path / "folder.json").mkdir()
+    with pytest.raises(RecordError, match=r"folder\.json: cannot be read"):
+        record.read(tmp_path / "folder.json")
+
+
+@pytest.mark.parametrize("damage", ["missing", "empty", "text", "cut short", "a byte flipped"])
+def test_damaged_arrays_are_named(tmp_path, damage):
+    path = record.write(tmp_path, "mine", CONTENT, {"noise": np.random.default_rng(0).standard_normal(1000)})
+    file = path.with_suffix(".npz")
+    whole = file.read_bytes()
+    flipped = bytearray(whole)
+    flipped[len(whole) // 2] ^= 0xFF
+    pieces = {
+        "empty": b"",
+        "text": b"no arrays",
+        "cut short": whole[: len(whole) // 2],
+        "a byte flipped": bytes(flipped),
+    }
+    file.unlink()
+    if damage in pieces:
+        file.write_bytes(pieces[damage])
+    words = "are missing; regenerate it" if damage == "missing" else r"is damaged \(.*\); regenerate it"
+    with pytest.raises(RecordError, match=rf"mine\.npz: .*{words}"):
+        record.read_arrays(path)
+
+
+def test_digest_tells_numbers_apart():
+    a, b = np.arange(4.0), np.array([1.0, 2.0])
+    assert record.digest(a, b) == record.digest(a[::-1][::-1], b)
+    assert record.digest(a, b) != record.digest(a, b + 1e-15)
+    assert len(record.digest()) == 64
+
+
+def test_versions_name_what_decides_the_numbers():
+    assert {"profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy"} == set(record.versions())
+
+
+def test_a_record_error_is_an_input_error():
+    assert issubclass(RecordError, InputError)
+    assert json.loads(json.dumps(record.plain({"a": np.nan}))) == {"a": None}
