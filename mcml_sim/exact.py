@@ -116,7 +116,7 @@ def _ln_h(nu: NDArray, ln_dispersion: NDArray) -> NDArray:
     return -(nu / np.pi) * LOG_STEP * np.einsum("kmx,kx->km", kernel, ln_dispersion)
 
 
-@lru_cache(maxsize=512)
+@lru_cache(maxsize=8192)
 def _reflectance(alpha: float, illumination: str) -> float:
     if alpha == 1.0:
         return 1.0

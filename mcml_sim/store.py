@@ -30,7 +30,7 @@ MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
 # What numpy and zip raise at a file that is not what was written.
-DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, zipfile.BadZipFile, zlib.error)
+DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
 
 
 class Store:
