@@ -4,10 +4,12 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
+# A file's tests stay in one process, which compiles what they share once; the files go to every core.
+PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help fits test test-all lint format wheel clean
+.PHONY: help fits readme test test-all lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
@@ -16,11 +18,14 @@ fits: $(VENV)/.installed  ## simulate, fit every recipe, write the records and t
 	$(VENV)/bin/profilefit regenerate --preset quick --out fits
 	$(VENV)/bin/profilefit report --fits fits --figures fits/figures
 
+readme: fits  ## make fits, and put its tables into the README
+	$(VENV)/bin/profilefit report --fits fits --markdown README.md
+
 test: lint  ## what CI runs: lint, and all tests but the slow ones
-	$(PY) -m pytest -m "not slow" $(ARGS)
+	$(PYTEST) -m "not slow" $(ARGS)
 
 test-all: lint  ## lint, and all tests
-	$(PY) -m pytest $(ARGS)
+	$(PYTEST) $(ARGS)
 
 lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
 	$(PY) -m ruff check

@@ -66,19 +66,21 @@ class Orders:
         weights = order_bins.weight_derivatives(_checked_alpha(alpha))
         return self._estimate(self.ring_order_counts, weights).scaled(1 / self.grid.r_areas)
 
-    def covariance_factor(self, alpha: ArrayLike, rank: int = 8) -> tuple[Floats, float]:
+    def covariance_factor(self, alpha: ArrayLike, rank: int = 8, overflow: bool = False) -> tuple[Floats, float]:
         """Covariance of `energy` between albedos, ring by ring, in closed form.
 
         alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
         of any ring's variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
         condition number 1e16), so a small rank holds all there is. Between rings i != j the covariance is
-        -E_i E_j / N, which no factor holds: next to nothing when there are many rings.
+        -E_i E_j / N, which no factor holds: next to nothing when there are many rings. With `overflow` a last row
+        stands for the light beyond the last ring.
         """
         albedos = np.atleast_1d(_checked_alpha(alpha))
         if albedos.ndim != 1:
             raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
         limit = _checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
-        return tally.covariance_factor(self.ring_order_counts, order_bins.weights(albedos), self.photons, limit)
+        counts = self.counts.exits if overflow else self.ring_order_counts
+        return tally.covariance_factor(counts, order_bins.weights(albedos), self.photons, limit)
 
     def merged(self, r_edges: ArrayLike) -> Orders:
         """The same photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""

@@ -180,7 +180,8 @@ def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Ring
 
 
 def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
-    """d constants / d ring energies (p, m, n) at the optimum: how the minimiser follows its data."""
+    """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
+    its data."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
         hessian, mixed = _second_derivatives(problem, jnp.asarray(solution.parameters), law, rings)
@@ -195,13 +196,13 @@ def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
 
 @eqx.filter_jit
 def _second_derivatives(residual, vector, law, rings):
-    def cost(theta, energy):
-        data = eqx.tree_at(lambda tree: tree.energy, rings, energy)
+    def cost(theta, energies):
+        data = eqx.tree_at(lambda tree: (tree.energy, tree.beyond), rings, (energies[:, :-1], energies[:, -1]))
         return 0.5 * jnp.sum(residual(theta, (law, data)) ** 2)
 
-    energy = jnp.asarray(rings.energy)
-    hessian = jax.jacfwd(jax.grad(cost))(vector, energy)
-    mixed = jax.jacfwd(jax.grad(cost, argnums=1))(vector, energy)
+    energies = jnp.column_stack([jnp.asarray(rings.energy), jnp.asarray(rings.beyond)])
+    hessian = jax.jacfwd(jax.grad(cost))(vector, energies)
+    mixed = jax.jacfwd(jax.grad(cost, argnums=1))(vector, energies)
     return hessian, mixed
 
 

@@ -25,8 +25,9 @@ FEWEST_EFFECTIVE_SAMPLES = 50.0
 class Covariance:
     """Covariance of ring energies between rings and albedos, in the closed form of a multinomial tally.
 
-    factor   (rings, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab
-    energy   (alphas, rings) ring energies E: between rings i != j, cov(E_i(a), E_j(b)) = -E_i(a) E_j(b) / photons
+    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
+             ring is one more
+    energy   (alphas, rings + 1) energies E: between rings i != j, cov(E_i(a), E_j(b)) = -E_i(a) E_j(b) / photons
     dropped  the largest share of a ring's variance that the truncation to `rank` leaves out
     """
 
@@ -40,9 +41,14 @@ class Covariance:
         return self.factor.shape[-1]
 
     def sandwich(self, weights: Floats) -> Floats:
-        """Covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, rings) times ring energy."""
-        within = np.einsum("pai,iak->pik", weights, self.factor)
-        ring = np.einsum("pai,ai->pi", weights, self.energy)
+        """Covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
+
+        Rings at the end that only one of the two knows count for nothing: a fit to trimmed rings sees no light beyond,
+        and a tally without an overflow has none.
+        """
+        rings = min(weights.shape[-1], len(self.factor))
+        within = np.einsum("pai,iak->pik", weights[..., :rings], self.factor[:rings])
+        ring = np.einsum("pai,ai->pi", weights[..., :rings], self.energy[:, :rings])
         total = ring.sum(axis=1)
         between = np.outer(total, total) - ring @ ring.T
         return np.einsum("pik,qik->pq", within, within) - between / self.photons
@@ -79,17 +85,19 @@ class Profiles:
         albedos = _albedos(alpha)
         energy = orders.energy(albedos)
         value = np.asarray(energy.value)
+        beyond = np.asarray(orders.overflow(albedos).value)
         covariance = None
         if correlated:
-            factor, dropped = orders.covariance_factor(albedos, rank=min(COVARIANCE_RANK, albedos.size))
-            covariance = Covariance(factor, value, orders.photons, dropped)
+            rank = min(COVARIANCE_RANK, albedos.size)
+            factor, dropped = orders.covariance_factor(albedos, rank, overflow=True)
+            covariance = Covariance(factor, np.column_stack([value, beyond]), orders.photons, dropped)
         return cls(
             albedos,
             orders.grid.r_edges,
             value,
             np.asarray(energy.standard_error),
             np.asarray(energy.effective_samples),
-            np.asarray(orders.overflow(albedos).value),
+            beyond,
             "orders",
             orders.setting,
             orders.photons,

@@ -137,6 +137,9 @@ def read(path: Path) -> Recipe:
         raise RecipeError(f"{path}: cannot be read ({error})") from None
     except tomllib.TOMLDecodeError as error:
         raise RecipeError(f"{path}: is not TOML: {error}") from None
+    for key in ("name", "path"):
+        if key in table:
+            raise RecipeError(f"{path}: unknown key {key!r}: a recipe is named by its file")
     needed = () if table.get("pipeline") == "evidence" else ("albedos", "weighting")
     if missing := [f"[{name}]" for name in needed if name not in table]:
         raise RecipeError(f"{path}: missing {', '.join(missing)}")

@@ -34,7 +34,8 @@ def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[s
     text = json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        _replace(folder / f"{name}.npz", lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
+        if arrays:
+            _replace(folder / f"{name}.npz", lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
         _replace(folder / f"{name}.json", lambda file: file.write(text.encode()))
     except OSError as error:
         raise OutputError(f"cannot write record {name!r} into {folder}: {error.strerror or error}") from None

@@ -68,6 +68,7 @@ class Liang(ProfileLaw):
         k = (self.b1 * (alpha - self.b2) ** 2 + self.b3) * alpha + self.b4
         return a, self.b0 * alpha**k, self.c1 * jnp.exp(self.c2 * alpha) + self.c3
 
+    @evaluated
     def largest_radius(self, alpha) -> Array:
         """r_max = -b/a in units of the mfp: beyond it the law is zero."""
         a, b, _ = self.coefficients(alpha)
@@ -112,6 +113,7 @@ class LiangSampler(Sampler):
 
     law: Liang
 
+    @evaluated
     def unclipped(self, xi, alpha) -> Array:
         """g(xi) in units of the mfp   (19)-(20)."""
         law = self.law

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mcml_sim import Setting, SettingError
+from mcml_sim import Grid, Setting, SettingError, simulate_orders
 from profilefit.estimate import Problem, discrepancy_covariance, fit, residual_structure, sensitivity
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.objectives import rings_of
 from profilefit.profiles import Covariance, Profiles
 from profilefit.solver import solve, solve_batch
@@ -90,7 +91,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
     one = fit(profiles, burley, "energy", free)
     problem = Problem("energy", free)
     found = sensitivity(problem, one.solution, burley, one.rings)
-    assert found.shape == (3, *profiles.energy.shape)
+    assert found.shape == (3, 5, profiles.energy.shape[1] + 1)  # and the light beyond the last ring
     for a, i in ((0, 0), (2, 5), (4, 9)):
         ends = []
         for sign in (-1, 1):
@@ -270,3 +271,14 @@ def test_rings_of_a_fit_are_its_data(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     one = fit(profiles, toy)
     np.testing.assert_array_equal(one.rings.energy, rings_of(profiles).energy)
+
+
+def test_noise_of_the_light_beyond_the_last_ring_counts():
+    """A fit of A sees one number an albedo; where the rings end cannot matter to its error."""
+    law = LiangAlbedo(Setting(), 5.67, 3.84, 0.84)
+    alpha = 1.0 - np.linspace(0.9, 0.2, 8) ** 2
+    light = simulate_orders(Grid.from_edges(r=[0.0, 0.02, 1.9, 1000.0]), 2**18, seed=3)
+    far, near = (fit(Profiles.from_orders(light.merged(edges), alpha), law) for edges in ([0.0, 1000.0], [0.0, 0.02]))
+    np.testing.assert_allclose(near.solution.parameters, far.solution.parameters, rtol=1e-6)
+    # Eight directions a ring keep all but 1e-6 of the variance; one ring has fewer of them than two.
+    np.testing.assert_allclose(np.sqrt(np.diag(near.statistical)), np.sqrt(np.diag(far.statistical)), rtol=1e-2)
