@@ -100,8 +100,10 @@ def ring_edges(rings: Rings | None, mfp: float = 1.0) -> Floats:
 def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles:
     """The profiles that a recipe fits."""
     alpha, edges = albedo_values(recipe.albedos), ring_edges(recipe.rings, mfp)
-    if recipe.truth == "exact" or light is None:
+    if recipe.truth == "exact":
         return Profiles.from_exact(alpha, edges)
+    if light is None:
+        raise ValueError(f"recipe {recipe.name} needs photons, got none")
     return Profiles.from_orders(light.merged(edges), alpha, correlated=mfp == 1.0)
 
 
