@@ -108,9 +108,10 @@ def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, 
     """Factors of each row's covariance between weightings, truncated to `rank` directions.
 
     counts (rows, bins), weights (alphas, bins) -> L (rows, alphas, rank) with L L^T the covariance of the row's means,
-    sum_n H_n g_n(a) g_n(b) / N^2 - E(a) E(b) / N, and the largest share of a row's variance that truncation drops.
+    sum_n H_n g_n(a) g_n(b) / N^2 - E(a) E(b) / N, and the largest share of any one variance that truncation drops.
     The covariance is a sum over all photons of (g(a) - E(a)) (g(b) - E(b)), those that add 0 included. Its factor is
-    decomposed, not itself: squaring would lose half the digits of a nearly singular matrix.
+    decomposed, not itself: squaring would lose half the digits of a nearly singular matrix. Each weighting counts in
+    units of its own standard deviation, or the strong ones would take all the directions.
     """
     rank = min(rank, len(weights), weights.shape[1])
     factors = np.empty((len(counts), len(weights), rank))
@@ -119,9 +120,9 @@ def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, 
     for row, hits in enumerate(counts):
         number = np.append(hits, photons - hits.sum()).astype(np.float64)
         centred = (silent - (silent @ number / photons)[:, None]) * (np.sqrt(number) / photons)
-        left, singular, _ = np.linalg.svd(centred, full_matrices=False)
-        factors[row] = left[:, :rank] * singular[:rank]
-        variance = np.sum(singular**2)
-        if variance > 0:
-            dropped = max(dropped, float(np.sum(singular[rank:] ** 2) / variance))
+        deviation = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
+        unit = np.divide(centred, deviation, out=np.zeros_like(centred), where=deviation > 0)
+        left, singular, _ = np.linalg.svd(unit, full_matrices=False)
+        factors[row] = deviation * left[:, :rank] * singular[:rank]
+        dropped = max(dropped, float(np.max(np.sum((left[:, rank:] * singular[rank:]) ** 2, axis=1), initial=0.0)))
     return factors, dropped

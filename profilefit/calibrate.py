@@ -125,6 +125,7 @@ def _profile(recipe: Recipe, run: Run, light: Orders | None):
     result = _fit(recipe, run, profiles)
     content, arrays = _described(recipe, run, profiles, result, published.constants(recipe.law))
     content["quality"] = _compare(recipe, run, result.law)
+    content["normalisation"] = catalogue.normalisation(profiles.setting, run.out).constants()
     return content, arrays | _curves(profiles)
 
 
@@ -142,7 +143,8 @@ def _inverse(recipe: Recipe, run: Run, light: Orders | None):
 
 def _as_published(recipe: Recipe, run: Run, light: Orders | None):
     rings = recipe.rings
-    assert rings is not None  # a recipe of this pipeline has them
+    if rings is None:
+        raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
     start = _start(recipe, run)
     points = []
     for mfp in recipe.mfp:
@@ -173,6 +175,7 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
         "per_albedo_failures": {f"{p.mfp:g}": sum(r != "converged" for r in p.results) for p in points},
     }
     content["quality"] = _compare(recipe, run, result.law)
+    content["normalisation"] = catalogue.normalisation(profiles.setting, run.out).constants()
     arrays |= {"coefficients": unit.values, "coefficient_errors": unit.standard_error, "r_trim": unit.r_trim}
     return content, arrays | _curves(profiles)
 
@@ -182,8 +185,9 @@ def _evidence(recipe: Recipe, run: Run, light: Orders | None):
         truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
     else:
         truth = ExactTruth()
-    rows = table1(truth, _regenerated_laws(run.out))
-    return {"readings": readings(truth), "table1": rows, "halves": printed_halves()}, {}
+    laws = _regenerated_laws(run.out)
+    found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
+    return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 
 def _regenerated_laws(folder: Path) -> dict[str, ProfileLaw]:
@@ -234,9 +238,16 @@ def _require_known(recipe: Recipe) -> None:
     if recipe.law not in STARTS and not published.constants(key, recipe.start):
         sets = [s.name for s in published.SETS if s.law == key]
         raise RecipeError(f"{recipe.path}: start must be one of {', '.join(sets)}, got {recipe.start!r}")
+    if kind.seen_by(recipe.weighting.objective) and not _free(recipe, kind):
+        raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
     unknown = [name for name in recipe.held if name not in kind.constant_names()]
     if unknown:
         raise RecipeError(f"{recipe.path}: held must name constants of {recipe.law}, got {', '.join(unknown)}")
+
+
+def _free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
+    """The constants that a recipe moves."""
+    return tuple(name for name in kind.seen_by(recipe.weighting.objective) if name not in recipe.held)
 
 
 def _start(recipe: Recipe, run: Run) -> Any:
@@ -254,10 +265,9 @@ STARTS = {"rational": {"b": 0.5, "c": 2.0, "d": 1.0}}
 def _fit(recipe: Recipe, run: Run, profiles: Profiles, start: Constants | None = None, used=None) -> Fit:
     law = start or _start(recipe, run)
     weighting = recipe.weighting
-    free = tuple(name for name in law.seen_by(weighting.objective) if name not in recipe.held)
     shares = (np.arange(weighting.shares) + 0.5) / max(weighting.shares, 1) * weighting.last_share
     limits = (weighting.energy_limit, weighting.source_limit)
-    return fit(profiles, law, weighting.objective, free, used, limits, tuple(shares))
+    return fit(profiles, law, weighting.objective, _free(recipe, law), used, limits, tuple(shares))
 
 
 def _described(recipe: Recipe, run: Run, profiles: Profiles, result: Fit, printed: dict[str, float]):
@@ -290,8 +300,17 @@ def _described(recipe: Recipe, run: Run, profiles: Profiles, result: Fit, printe
     }
     if profiles.covariance is not None:
         content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
-        content["rings_left_out"] = int(np.sum(~profiles.trusted))
+        content["left_out"] = _left_out(profiles, result)
     return content, {f"samples_{c.kind}": c.samples.astype(np.float32) for c in chains}
+
+
+def _left_out(profiles: Profiles, result: Fit) -> dict[str, int]:
+    """What rests on too few effective photons to count: rings, where the objective sees rings, and whole albedos."""
+    sees_rings = result.objective in ("energy", "radial")
+    return {
+        "rings": int(np.sum(~profiles.trusted)) if sees_rings else 0,
+        "albedos": int(np.sum(np.asarray(result.rings.weight) == 0)),
+    }
 
 
 def _chains(result: Fit, run: Run) -> list[Posterior]:

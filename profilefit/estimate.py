@@ -13,7 +13,7 @@ structure     what the residuals still show: a law that is the truth leaves none
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import equinox as eqx
 import jax
@@ -23,12 +23,15 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError, SettingError
 from profilefit.laws.base import AlbedoLaw, Constants
+from profilefit.laws.liang import QUANTILES
 from profilefit.objectives import OBJECTIVES, Rings, rings_of
 from profilefit.profiles import Profiles
 from profilefit.solver import Solution, solve, solve_batch
 
 Floats = NDArray[np.float64]
 JACKKNIFE_GROUPS = 6
+# Half of float64's digits: J^T J has the square of this condition number, and nothing is left of its inverse.
+DEGENERATE = 1e7
 
 
 @dataclass(frozen=True)
@@ -41,7 +44,9 @@ class Fit:
     solution     optimum, residuals, Jacobian, result
     statistical  (p, p) covariance from photon noise; None where the truth has none
     discrepancy  (p, p) covariance from the law's misfit, taken for independent noise
-    jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other
+    jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other; NaN with fewer
+                 than six albedos, or where a refit fails
+    Covariances are NaN where the fit failed.
     structure    measures of what is left in the residuals
     """
 
@@ -110,11 +115,17 @@ def fit(
     if law.setting != profiles.setting:
         raise SettingError(f"the law belongs to {law.setting}, the profiles to {profiles.setting}: they do not mix")
     names = tuple(free) if free is not None else law.seen_by(target)
+    if not law.seen_by(target):
+        raise InputError(f"objective {target!r} does not apply to {type(law).__name__}")
+    if target in QUANTILES and not len(xi):
+        raise InputError(f"objective {target!r} needs shares xi of the energy, got none")
+    if not names or len(set(names)) < len(names):
+        raise InputError(f"free must name at least one constant, each once, got {', '.join(names) or '(none)'}")
     if unknown := [name for name in names if name not in law.constant_names()]:
         raise InputError(f"free must name constants of the law ({', '.join(law.constant_names())}), got {unknown[0]!r}")
     problem = Problem(target, names)
     rings = rings_of(profiles, used, limits, xi)
-    solution = solve(problem, law.vector(names), (law, rings))
+    solution = _judged(solve(problem, law.vector(names), (law, rings)), names)
     return Fit(
         law.with_vector(names, [float(value) for value in solution.parameters]),
         names,
@@ -151,9 +162,27 @@ def degrees_of_freedom(solution: Solution) -> int:
 
 
 def discrepancy_covariance(solution: Solution) -> Floats:
-    """s^2 (J^T J)^-1 (p, p)."""
-    inverse = np.linalg.pinv(solution.jacobian.T @ solution.jacobian)
+    """s^2 (J^T J)^-1 (p, p); NaN where the fit failed."""
+    if not solution.converged:
+        return np.full((solution.parameters.size,) * 2, np.nan)
+    inverse = scaled_inverse(solution.jacobian.T @ solution.jacobian)
     return np.asarray(solution.cost / degrees_of_freedom(solution) * inverse)
+
+
+def scaled_inverse(matrix: Floats) -> Floats:
+    """Inverse of a symmetric matrix whose rows differ by decades in size."""
+    scale = np.sqrt(np.abs(np.diag(matrix)))
+    return np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
+
+
+def _judged(solution: Solution, names: tuple[str, ...]) -> Solution:
+    """A solution whose constants the data cannot tell apart has failed, however small its misfit."""
+    condition = solution.condition_number
+    if not solution.converged or condition <= DEGENERATE:
+        return solution
+    blind = [name for name, column in zip(names, solution.jacobian.T, strict=True) if not np.any(column)]
+    what = f"{', '.join(blind)} moves nothing" if blind else "constants trade against each other"
+    return replace(solution, result=f"degenerate, condition number {condition:.1g}: {what}; hold a constant")
 
 
 def residual_structure(table: Floats) -> Structure:
@@ -167,13 +196,17 @@ def residual_structure(table: Floats) -> Structure:
 def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
     m = rings.alpha.size
-    groups = np.array_split(np.arange(m), min(JACKKNIFE_GROUPS, m))
-    weights = np.ones((len(groups), m))
+    if not solution.converged or m < JACKKNIFE_GROUPS:
+        return np.full(solution.parameters.size, np.nan)
+    groups = np.array_split(np.arange(m), JACKKNIFE_GROUPS)
+    weights = np.tile(np.asarray(rings.weight), (len(groups), 1))
     for row, group in zip(weights, groups, strict=True):
         row[group] = 0.0
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
     data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
     refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data)
+    if not all(_judged(refit, problem.free).converged for refit in refits):
+        return np.full(solution.parameters.size, np.nan)
     moved = np.stack([refit.parameters for refit in refits])
     spread = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)
     return np.sqrt((len(groups) - 1) / len(groups) * spread)
@@ -185,13 +218,27 @@ def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rin
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
         hessian, mixed = _second_derivatives(problem, jnp.asarray(solution.parameters), law, rings)
-    return -np.einsum("pq,aiq->pai", np.linalg.pinv(np.asarray(hessian)), np.asarray(mixed))
+    return -np.einsum("pq,aiq->pai", scaled_inverse(np.asarray(hessian)), np.asarray(mixed))
+
+
+def curvature(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+    """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
+    with jax.enable_x64(True):
+        law = jax.tree.map(jnp.asarray, law)
+        return np.asarray(_hessian(problem, jnp.asarray(solution.parameters), law, rings))
 
 
 def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
     if profiles.covariance is None:
         return None
+    if not solution.converged:
+        return np.full((solution.parameters.size,) * 2, np.nan)
     return profiles.covariance.sandwich(sensitivity(problem, solution, law, rings))
+
+
+@eqx.filter_jit
+def _hessian(residual, vector, law, rings):
+    return jax.hessian(lambda theta: 0.5 * jnp.sum(residual(theta, (law, rings)) ** 2))(vector)
 
 
 @eqx.filter_jit

@@ -15,7 +15,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.profiles import Profiles
+from mcml_sim.errors import InputError
+from profilefit.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 
 Values = Array | NDArray[np.float64]
 # A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
@@ -26,7 +27,7 @@ class Rings(eqx.Module):
     """The part of `Profiles` that residuals read, as one pytree.
 
     alpha (m,); r_edges (n + 1,) [mfp]; energy (m, n) [-]; beyond (m,) [-]; used (m, n) 1 where a ring counts, else 0
-    weight (m,) of each albedo; limits (2,) weights of the energy limit and of the source limit
+    weight (m,) 1 where an albedo counts, else 0; limits (2,) weights of the energy limit and of the source limit
     xi (k,) shares of energy for quantiles
     """
 
@@ -106,17 +107,26 @@ OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective i
 
 
 def rings_of(profiles: Profiles, used=None, limits=(0.0, 0.0), xi=()) -> Rings:
-    """The residuals' view of `profiles`; rings with too few effective photons, or outside `used`, do not count."""
+    """The residuals' view of `profiles`.
+
+    Rings with too few effective photons, or outside `used`, do not count, and neither do albedos whose reflectance,
+    or whose outermost share of energy in `xi`, rests on too few. InputError if none is left.
+    """
     keep = profiles.trusted & (profiles.energy > 0)
     if used is not None:
         keep &= used
+    smallest = min([*xi, *(1.0 - np.asarray(xi)), 1.0])
+    weight = profiles.albedo_samples * smallest >= FEWEST_EFFECTIVE_SAMPLES
+    if not np.any(weight):
+        needed = f"{FEWEST_EFFECTIVE_SAMPLES / smallest:.0f}"
+        raise InputError(f"too few photons: no albedo rests on {needed} effective ones, as this fit needs; trace more")
     return Rings(
         profiles.alpha,
         profiles.r_edges,
         profiles.energy,
         profiles.beyond,
         keep.astype(float),
-        np.ones(profiles.alpha.size),
+        weight.astype(float),
         np.asarray(limits, float),
         np.asarray(xi, float),
     )

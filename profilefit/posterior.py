@@ -23,7 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.errors import InputError
-from profilefit.estimate import Fit, Problem
+from profilefit.estimate import Fit, Problem, curvature
 
 Floats = NDArray[np.float64]
 # emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
@@ -69,6 +69,10 @@ def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int
     """
     if kind not in ("statistical", "discrepancy"):
         raise InputError(f"kind must be 'statistical' or 'discrepancy', got {kind!r}")
+    if not fit.solution.converged:
+        raise InputError(f"a posterior needs a fit that converged, got: {fit.result}")
+    if max_steps < 1:
+        raise InputError(f"max_steps must be at least 1, got {max_steps!r}")
     covariance = fit.statistical if kind == "statistical" else fit.discrepancy
     if covariance is None:
         raise InputError(
@@ -93,7 +97,7 @@ class _Density(eqx.Module):
     @classmethod
     def of(cls, fit: Fit, kind: str, covariance: Floats) -> _Density:
         if kind == "statistical":
-            adjust, variance = _curvature_adjustment(fit.solution.jacobian, covariance)
+            adjust, variance = _curvature_adjustment(_positive_curvature(fit), covariance)
         else:
             adjust, variance = np.eye(len(fit.free)), fit.variance
         problem = Problem(fit.objective, fit.free)
@@ -113,10 +117,19 @@ class _Density(eqx.Module):
         return jnp.where(jnp.isfinite(value), value, -jnp.inf)
 
 
-def _curvature_adjustment(jacobian: Floats, covariance: Floats) -> tuple[Floats, float]:
-    """C of determinant 1 and s^2 with C^T (J^T J) C / s^2 = covariance^-1, in scaled constants to keep digits."""
+def _positive_curvature(fit: Fit) -> Floats:
+    """The Hessian of Q/2, or J^T J where a saddle of the residuals' own curvature has made it indefinite."""
+    hessian = curvature(Problem(fit.objective, fit.free), fit.solution, fit.law, fit.rings)
+    scale = np.sqrt(np.abs(np.diag(hessian)))
+    if np.all(np.linalg.eigvalsh(hessian / np.outer(scale, scale)) > 0):
+        return hessian
+    return fit.solution.jacobian.T @ fit.solution.jacobian
+
+
+def _curvature_adjustment(hessian: Floats, covariance: Floats) -> tuple[Floats, float]:
+    """C of determinant 1 and s^2 with C^T H C / s^2 = covariance^-1, in scaled constants to keep digits."""
     scale = np.sqrt(np.diag(covariance))
-    working = (jacobian * scale).T @ (jacobian * scale)
+    working = hessian * np.outer(scale, scale)
     root = np.linalg.inv(np.linalg.cholesky(covariance / np.outer(scale, scale)))
     adjust = np.linalg.inv(np.linalg.cholesky(working)).T @ root
     size = np.exp(np.linalg.slogdet(adjust)[1] / scale.size)
@@ -140,7 +153,7 @@ def _walk(density, covariance, fit, kind, seed, max_steps) -> Posterior:
     # Differential evolution with snooker steps mixes these elongated posteriors three times faster than stretches.
     moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
     sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True, moves=moves)
-    sampler.random_state = np.random.RandomState(seed).get_state()
+    sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()
     tau, steps = _run(sampler, start, max_steps)
     long_enough = np.isfinite(tau) and steps >= LENGTHS * tau
     burn = int(min(steps // 2, 5 * tau if np.isfinite(tau) else steps // 2))

@@ -9,12 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
 from mcml_sim.errors import InputError
+from mcml_sim.grid import Grid
 from mcml_sim.orders import Orders
 from mcml_sim.setting import Setting
 
 Floats = NDArray[np.float64]
-# Thirty-two albedos of one ring are reweightings of the same photons: eight directions carry all but 1e-6 of their
-# variance, and the rest is rounding that a least-squares fit must not trust.
+# Albedos of one ring are reweightings of the same photons and nearly dependent: few directions carry their variance,
+# and each record states the largest share of any one variance that is left out.
 COVARIANCE_RANK = 8
 # A reweighted ring that rests on fewer photons than this has a standard error that is itself unknown by a tenth,
 # and that collapses where the heavy photons are missing altogether.
@@ -28,7 +29,7 @@ class Covariance:
     factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
              ring is one more
     energy   (alphas, rings + 1) energies E: between rings i != j, cov(E_i(a), E_j(b)) = -E_i(a) E_j(b) / photons
-    dropped  the largest share of a ring's variance that the truncation to `rank` leaves out
+    dropped  the largest share of any one variance that the truncation to `rank` leaves out
     """
 
     factor: Floats
@@ -108,7 +109,7 @@ class Profiles:
     def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:
         """The exact half space on rings: integrals over them, without noise."""
         where = setting or Setting()
-        albedos, edges = _albedos(alpha), np.asarray(r_edges, float)
+        albedos, edges = _albedos(alpha), Grid.from_edges(r=r_edges).r_edges
         total = np.asarray(exact.reflectance(albedos, setting=where))
         inside = total[:, None] * np.asarray(exact.cdf(edges, albedos[:, None], setting=where))
         energy = np.diff(inside, axis=1)
@@ -140,6 +141,13 @@ class Profiles:
         """Share of the reflected energy within each edge, (m, n + 1)."""
         inside = np.concatenate([np.zeros((self.alpha.size, 1)), np.cumsum(self.energy, axis=1)], axis=1)
         return inside / self.reflectance[:, None]
+
+    @property
+    def albedo_samples(self) -> Floats:
+        """(m,) effective samples of the whole reflectance within the rings."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            squares = np.where(self.energy > 0, self.energy**2 / self.effective_samples, 0.0).sum(axis=1)
+            return np.where(squares > 0, self.energy.sum(axis=1) ** 2 / squares, np.inf)
 
     @property
     def trusted(self) -> NDArray[np.bool_]:

@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
+import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
 from profilefit.errors import RecipeError
 
-Floats = NDArray[np.float64]
 # Each pipeline and the objectives it can make small.
 PIPELINES = {
     "albedo": ("albedo", "reflectance"),
@@ -22,9 +19,16 @@ PIPELINES = {
     "inverse": ("radius", "relative_radius", "share"),
     "evidence": (),
 }
+# Pipelines that know the equations of these laws only.
+PIPELINE_LAWS = {"as-published": ("liang",), "inverse": ("liang",)}
 TRUTHS = ("orders", "exact")
 SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
 TRIMMED = ("r R_d", "R_d", "none")
+MFP = (1e-3, 1e3)  # beyond three decades a length is a slip of the pen
+FINEST = 0.0025  # the first edge of the run that rings are merged from [mfp]
+FEWEST_RINGS, MOST_RINGS = 3, 4000  # the run has 4000 even rings
+LONGEST_SHOWN = 60  # characters of a value in a message
+MAX_LIMIT = 1e6  # a weight beyond this makes the rings round off beside it
 
 
 @dataclass(frozen=True)
@@ -58,16 +62,29 @@ class Rings:
     epsilon: float = 0.005
 
     def problems(self) -> str | None:
-        if (self.dr > 0) == (self.first > 0 and self.count > 0):
+        even = self.dr > 0 and self.first == 0 and self.count == 0
+        log_spaced = self.dr == 0 and self.first > 0 and self.count > 0
+        if not (even or log_spaced):
             got = f"dr = {self.dr!r}, first = {self.first!r}, count = {self.count!r}"
             return f"rings must have either dr > 0 or both first > 0 and count > 0, got {got}"
         if not max(self.dr, self.first) < self.last <= 1000:
             return f"rings.last must lie beyond the first ring and within 1000 mfp, got {self.last!r}"
-        if not 0 <= self.count <= 1000:
-            return f"rings.count must be at most 1000, got {self.count!r}"
+        if log_spaced and not self.first >= FINEST:
+            return f"rings.first must be at least {FINEST} mfp, the finest ring of the run, got {self.first!r}"
+        if log_spaced and not 3 <= self.count <= 1000:
+            return f"rings.count must be between 3 and 1000, got {self.count!r}"
         if self.trim not in TRIMMED or not 0 < self.epsilon < 1:
             accepted = f"one of {', '.join(TRIMMED)} with epsilon in (0, 1)"
             return f"rings.trim must be {accepted}, got {self.trim!r}, epsilon = {self.epsilon!r}"
+        return None
+
+    def problems_at(self, mfp: float) -> str | None:
+        """What is impossible about even rings in a medium of this mean free path, or None."""
+        # Rounded: 0.15 / 0.05 is 3 rings, and 2.9999999999999996 in binary.
+        if self.dr > 0 and not FEWEST_RINGS <= round(self.last * mfp / self.dr, 6) <= MOST_RINGS:
+            accepted = f"between {FEWEST_RINGS} and {MOST_RINGS} rings"
+            got = f"last = {self.last!r}, mfp = {mfp!r}, dr = {self.dr!r}"
+            return f"rings must have last * mfp / dr {accepted}, got {got}"
         return None
 
 
@@ -82,8 +99,9 @@ class Weighting:
     last_share: float = 1.0
 
     def problems(self) -> str | None:
-        if not all(0 <= limit < np.inf for limit in (self.energy_limit, self.source_limit)):
-            return f"weighting limits must be finite and >= 0, got {self.energy_limit!r}, {self.source_limit!r}"
+        if not all(0 <= limit <= MAX_LIMIT for limit in (self.energy_limit, self.source_limit)):
+            got = f"{self.energy_limit!r}, {self.source_limit!r}"
+            return f"weighting limits must be between 0 and {MAX_LIMIT:g}, got {got}"
         if not (0 <= self.shares <= 10_000 and 0 < self.last_share <= 1):
             got = f"{self.shares!r}, {self.last_share!r}"
             return f"weighting needs 0 <= shares <= 10000 and 0 < last_share <= 1, got {got}"
@@ -115,16 +133,29 @@ class Recipe:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {self.pipeline!r}"
         if self.truth not in TRUTHS:
             return f"truth must be one of {', '.join(TRUTHS)}, got {self.truth!r}"
-        if not self.mfp or not all(0 < length < np.inf for length in self.mfp):
-            return f"mfp must be a list of lengths > 0, got {list(self.mfp)!r}"
+        laws = PIPELINE_LAWS.get(self.pipeline, (self.law,))
+        if self.law not in laws:
+            return f"law of pipeline {self.pipeline!r} must be {' or '.join(laws)}, got {self.law!r}"
+        low, high = MFP
+        if not self.mfp or not all(low <= length <= high for length in self.mfp):
+            return f"mfp must be a list of lengths from {low:g} to {high:g}, got {list(self.mfp)!r}"
+        if len(set(self.mfp)) < len(self.mfp):
+            return f"mfp must be a list of different lengths, got {list(self.mfp)!r}"
+        if self.pipeline == "as-published" and 1.0 not in self.mfp:
+            return f"mfp of pipeline 'as-published' must contain 1.0, got {list(self.mfp)!r}"
         if self.rings is None and self.pipeline not in ("albedo", "evidence"):
             return f"a recipe of pipeline {self.pipeline!r} needs a table [rings]"
         objectives = PIPELINES[self.pipeline] or ("",)
         if self.weighting.objective not in objectives:
             accepted, got = ", ".join(objectives), self.weighting.objective
             return f"weighting.objective of pipeline {self.pipeline!r} must be one of {accepted}, got {got!r}"
+        if self.pipeline == "inverse" and self.weighting.shares == 0:
+            return "weighting.shares of pipeline 'inverse' must be between 1 and 10000, got 0"
         parts: tuple[Albedos | Rings | Weighting | None, ...] = (self.albedos, self.rings, self.weighting)
-        return next((text for part in parts if part is not None and (text := part.problems())), None)
+        if text := next((text for part in parts if part is not None and (text := part.problems())), None):
+            return text
+        lengths = self.mfp if self.pipeline == "as-published" else (1.0,)
+        return next((text for mfp in lengths if self.rings and (text := self.rings.problems_at(mfp))), None)
 
 
 def read(path: Path) -> Recipe:
@@ -135,7 +166,7 @@ def read(path: Path) -> Recipe:
         raise RecipeError(f"{path}: there is no such recipe") from None
     except (OSError, UnicodeDecodeError) as error:
         raise RecipeError(f"{path}: cannot be read ({error})") from None
-    except tomllib.TOMLDecodeError as error:
+    except (ValueError, RecursionError) as error:  # besides bad syntax: whole numbers and nests too long for Python
         raise RecipeError(f"{path}: is not TOML: {error}") from None
     for key in ("name", "path"):
         if key in table:
@@ -183,11 +214,11 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
     tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting}
     if annotation in tables:
         if not isinstance(value, dict):
-            raise RecipeError(f"{where}: [{key}] must be a table, got {value!r}")
+            raise RecipeError(f"{where}: [{key}] must be a table, got {_shown(value)}")
         return _build(tables[annotation], value, f"{where}: [{key}]")
     if annotation == "float" and _is_number(value):
         return float(value)
-    if annotation == "int" and isinstance(value, int) and not isinstance(value, bool):
+    if annotation == "int" and _is_number(value) and isinstance(value, int):
         return value
     if annotation == "str" and isinstance(value, str):
         return value
@@ -195,13 +226,27 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
         return tuple(float(v) for v in value)
     if annotation == "tuple[str, ...]" and isinstance(value, list) and all(isinstance(v, str) for v in value):
         return tuple(value)
-    raise RecipeError(f"{where}: {key} must be a {_spoken(annotation)}, got {value!r}")
+    raise RecipeError(f"{where}: {key} must be a {_spoken(annotation)}, got {_shown(value)}")
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    """Whether it is a number that float64 can hold."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
+
+
+def _shown(value: Any) -> str:
+    """A value for a message, shortened: a whole number can have as many digits as a file."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python spells no whole number beyond 4300 digits
+        return "one of more than 4300 digits"
+    if isinstance(value, int) and len(text) > LONGEST_SHOWN:
+        return f"one of {len(text)} digits"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def _spoken(annotation: str) -> str:
-    names = {"float": "number", "int": "whole number", "str": "text"}
-    return names.get(annotation, "list of numbers" if "float" in annotation else "list of texts")
+    names = {"float": "finite number", "int": "whole number", "str": "text"}
+    return names.get(annotation, "list of finite numbers" if "float" in annotation else "list of texts")

@@ -14,6 +14,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.estimate import scaled_inverse
 from profilefit.laws.liang import Liang
 from profilefit.profiles import Profiles
 from profilefit.solver import Solution, solve, solve_batch
@@ -57,19 +58,22 @@ class CoefficientLaw:
     covariance: Floats | None
 
 
-def trimmed(profiles: Profiles, what: str, epsilon: float) -> tuple[NDArray[np.bool_], Floats]:
-    """Rings (m, n) that the trimming keeps, and the radius (m,) of the cut; `what` is "R_d", "r R_d" or "none"."""
+def trimmed(profiles: Profiles, what: str, epsilon: float, mfp: float = 1.0) -> tuple[NDArray[np.bool_], Floats]:
+    """Rings (m, n) that the trimming keeps, and the radius (m,) of the cut [mfp]; `what` is "R_d", "r R_d" or "none".
+
+    The strides of (6) are lengths: in a medium of mean free path `mfp` they are other numbers of it.
+    """
     r = profiles.r
     if what == "none":
         return np.ones_like(profiles.energy, bool), np.full(profiles.alpha.size, r[-1])
     quantity = profiles.value * r if what == "r R_d" else profiles.value
-    cut = np.array([trimmed_radius(r, row, epsilon) for row in quantity])
+    cut = np.array([trimmed_radius(r * mfp, row, epsilon) / mfp for row in quantity])
     return r <= cut[:, None], cut
 
 
 def fit_per_albedo(profiles: Profiles, start: Liang, mfp: float, what: str, epsilon: float) -> PerAlbedo:
     """Fit (7) at every albedo of `profiles` by unweighted least squares of r R_d on the rings that (6) keeps."""
-    used, cut = trimmed(profiles, what, epsilon)
+    used, cut = trimmed(profiles, what, epsilon, mfp)
     used = used & profiles.trusted
     data = profiles.value * profiles.r
     starts = np.stack([[float(v) for v in start.coefficients(float(a))] for a in profiles.alpha])
@@ -101,7 +105,10 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
 
 
 def length_exponents(points: tuple[PerAlbedo, ...]) -> dict[str, float]:
-    """The powers of l in a, b and c, by a straight line through ln|coefficient| over ln l: -1, 0, 1 by similarity."""
+    """The powers of l in a, b and c, by a straight line through ln|coefficient| over ln l.
+
+    Similarity says -1, 0, 1; the strides of (6), which stay what they are, move them a little.
+    """
     ln_l = np.log([p.mfp for p in points])
     in_length = np.stack([p.values * np.array([1.0 / p.mfp, 1.0, p.mfp]) for p in points])
     slopes = np.polyfit(ln_l, np.log(np.abs(in_length)).reshape(len(points), -1), 1)[0].reshape(-1, 3)
@@ -162,4 +169,4 @@ def _gain(residual, vector, law, alpha, data) -> Floats:
     """d constants / d coefficients (p, m) of a coefficient law."""
     with jax.enable_x64(True):
         hessian, mixed = _gain_arrays(residual, jnp.asarray(vector), law, jnp.asarray(alpha), jnp.asarray(data))
-    return -np.linalg.pinv(np.asarray(hessian)) @ np.asarray(mixed).T
+    return -scaled_inverse(np.asarray(hessian)) @ np.asarray(mixed).T

@@ -45,10 +45,17 @@ def main() -> None:
     """Run a command; whatever the user can mend is one line on stderr and exit status 2."""
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
-        app()
+        # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
+        status = app(standalone_mode=False) or 0
     except (InputError, OutputError, StoreError) as error:
         errors.print(f"profilefit: {error}", markup=False)
-        sys.exit(BAD_INPUT)
-    except KeyboardInterrupt:
+        status = BAD_INPUT
+    except typer.TyperException as error:
+        if message := error.format_message():  # without arguments typer has shown the help and says no more
+            errors.print(f"profilefit: {message} (--help shows what is accepted)", markup=False)
+        status = error.exit_code
+    except (KeyboardInterrupt, typer.Abort):
+        status = INTERRUPTED
+    if status == INTERRUPTED:  # from here, or as typer returns a Ctrl-C
         errors.print("profilefit: stopped; the finished batches are kept, the same command resumes", markup=False)
-        sys.exit(INTERRUPTED)
+    sys.exit(status)

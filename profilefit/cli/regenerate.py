@@ -12,9 +12,11 @@ import typer
 from rich.console import Console
 
 from profilefit import calibrate, catalogue, recipe, record
+from profilefit.errors import InputError, RecipeError
 
 OUT = Path("fits")
 PHOTON_STORE = ".photons"
+MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
 
 
 class Preset(StrEnum):
@@ -30,7 +32,7 @@ def regenerate(
     ] = None,
     preset: Annotated[Preset, typer.Option(help="quick: 2.1e7 photons, minutes. full: 4.2e8 photons.")] = Preset.QUICK,
     out: Annotated[Path, typer.Option(help="Folder for the records, and for the photons that a rerun resumes.")] = OUT,
-    seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, a whole number >= 0.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, 0 to 4294967295.")] = 1,
     photons: Annotated[int | None, typer.Option(help="Number of photons instead of the preset's.")] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
@@ -38,9 +40,14 @@ def regenerate(
 
     Example: profilefit regenerate albedo-liang liang-whole --out my-fits
     """
+    if not 0 <= seed <= MAX_SEED:
+        raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")
+    if photons is not None and photons < 1:
+        raise InputError(f"photons must be a whole number >= 1, got {photons}")
     console = Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
     names = recipes or list(recipe.available(catalogue.fits_folder()))
     chosen = tuple(recipe.find(name, catalogue.fits_folder()) for name in names)
+    _require_one_record_each(chosen)
     record.require_writable(out)
     begin = time.perf_counter()
     run = calibrate.Run(
@@ -54,3 +61,13 @@ def regenerate(
     )
     written = calibrate.regenerate(chosen, run)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
+
+
+def _require_one_record_each(recipes: tuple[recipe.Recipe, ...]) -> None:
+    """RecipeError if two recipes would write the same record."""
+    first: dict[str, Path] = {}
+    for one in recipes:
+        if one.name in first:
+            paths = f"{first[one.name]} and {one.path}"
+            raise RecipeError(f"recipes must have different names, as their records do, got {paths}")
+        first[one.name] = one.path

@@ -70,4 +70,4 @@ def _contents(folder: Path, names: list[str] | None) -> dict[str, dict]:
     for name in names or ():
         if name not in known:
             raise RecordError(f"record must be one of {', '.join(known)} (in {folder}), got {name!r}")
-    return {name: record.read(known[name]) for name in (names or known)}
+    return {name: record.read(known[name], whole=True) for name in (names or known)}

@@ -25,10 +25,11 @@ class Constants(eqx.Module):
         """The names of the constants, in the order of the flattened pytree."""
         return tuple(f.name for f in fields(cls) if not f.metadata.get("static", False))
 
-    def seen_by(self, objective: str) -> tuple[str, ...]:
-        """The constants that move when this objective is made small: all, unless the law says otherwise."""
+    @classmethod
+    def seen_by(cls, objective: str) -> tuple[str, ...]:
+        """The constants that move when this objective is made small; none if it does not apply to the law."""
         del objective
-        return self.constant_names()
+        return cls.constant_names()
 
     def constants(self) -> dict[str, float]:
         """Every constant by name."""
@@ -46,6 +47,10 @@ class Constants(eqx.Module):
 class AlbedoLaw(Constants):
     """A closed map between the single-scattering albedo alpha and the total reflectance A, both in [0, 1]."""
 
+    @classmethod
+    def seen_by(cls, objective: str) -> tuple[str, ...]:
+        return cls.constant_names() if objective in ("albedo", "reflectance") else ()
+
     @abc.abstractmethod
     def alpha(self, reflectance) -> Array:
         """Single-scattering albedo alpha [-] at total reflectance A [-]."""
@@ -57,6 +62,10 @@ class AlbedoLaw(Constants):
 
 class ProfileLaw(Constants):
     """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy."""
+
+    @classmethod
+    def seen_by(cls, objective: str) -> tuple[str, ...]:
+        return cls.constant_names() if objective == "energy" else ()
 
     @abc.abstractmethod
     def scaled_profile(self, x: Array, alpha: Array) -> Array:

@@ -17,6 +17,7 @@ from profilefit.laws.rational import Rational
 
 PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
 INVERSE_CONSTANTS = ("g1", "g2", "g3", "g4", "h1", "h2", "h3")
+QUANTILES = ("radius", "relative_radius", "share")
 # Halvings of [0, 1] after which a float64 inverse stops moving.
 BISECTIONS = 60
 
@@ -58,9 +59,12 @@ class Liang(ProfileLaw):
     h3: float
     eps: float = eqx.field(static=True, default=0.01)
 
-    def seen_by(self, objective: str) -> tuple[str, ...]:
+    @classmethod
+    def seen_by(cls, objective: str) -> tuple[str, ...]:
         """The profile and the inverse cdf share no constant: a fit of one leaves the other alone."""
-        return INVERSE_CONSTANTS if objective in ("radius", "relative_radius", "share") else PROFILE_CONSTANTS
+        if objective in ("energy", "radial"):
+            return PROFILE_CONSTANTS
+        return INVERSE_CONSTANTS if objective in QUANTILES else ()
 
     def coefficients(self, alpha) -> tuple[Array, Array, Array]:
         """a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""

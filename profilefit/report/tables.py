@@ -125,8 +125,11 @@ def fit_facts(content: Content) -> RenderableType:
         facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
         lines.append((f"chain, {KINDS.get(kind, kind)}", _verdict(chain["result"])))
         lines.append(("", f"{facts}, {chain['steps']} steps of {chain['walkers']} walkers"))
-    if "rings_left_out" in content:
-        lines.append(("data", f"{content['rings_left_out']} rings left out: too few photons for an error of their own"))
+    if left := content.get("left_out"):
+        told = (
+            f"{left['rings']} rings and {left['albedos']} albedos left out: too few photons for an error of their own"
+        )
+        lines.append(("data", told))
     return _facts("Fit", lines)
 
 

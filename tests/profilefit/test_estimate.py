@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mcml_sim import Grid, Setting, SettingError, simulate_orders
+from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
 from profilefit.estimate import Problem, discrepancy_covariance, fit, residual_structure, sensitivity
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.liang_albedo import LiangAlbedo
@@ -282,3 +282,40 @@ def test_noise_of_the_light_beyond_the_last_ring_counts():
     np.testing.assert_allclose(near.solution.parameters, far.solution.parameters, rtol=1e-6)
     # Eight directions a ring keep all but 1e-6 of the variance; one ring has fewer of them than two.
     np.testing.assert_allclose(np.sqrt(np.diag(near.statistical)), np.sqrt(np.diag(far.statistical)), rtol=1e-2)
+
+
+def test_a_constant_that_moves_nothing_is_a_failed_fit(tallies, liang):
+    """Not one with an error of zero, which the inverse of a singular matrix would make of it."""
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "b0", "g1"))
+    assert one.result.startswith("degenerate, condition number")
+    assert "g1 moves nothing" in one.result
+    assert np.all(np.isnan(one.discrepancy))
+    assert np.all(np.isnan(one.statistical))
+    assert np.all(np.isnan(one.jackknife))
+
+
+def test_a_jackknife_without_enough_albedos_is_no_number(line):
+    alpha, reflectance, _ = line
+    few = fit(line_profiles(reflectance[:5], alpha[:5]), Line(Setting()), "reflectance")
+    assert few.result == "converged"
+    assert np.all(np.isnan(few.jackknife))
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"objective": "depth"}, "objective must be one of energy, radial,"),
+        ({"objective": "radial"}, "objective 'radial' does not apply to Burley"),
+        ({"free": ()}, "free must name at least one constant, each once, got \\(none\\)"),
+        ({"free": ("s0", "s0")}, "free must name at least one constant, each once, got s0, s0"),
+        ({"free": ("s9",)}, "free must name constants of the law \\(s0, s1, s2, s3\\), got 's9'"),
+    ],
+)
+def test_misuse_is_named(tallies, burley, words, said):
+    with pytest.raises(InputError, match=said):
+        fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, **words)
+
+
+def test_quantiles_need_shares(tallies, liang):
+    with pytest.raises(InputError, match="objective 'share' needs shares xi of the energy, got none"):
+        fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "share")

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Setting
+from mcml_sim import InputError, Setting
 from profilefit import objectives
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.objectives import OBJECTIVES, Rings, rings_of
@@ -166,11 +166,14 @@ def test_rings_of_leaves_out_what_is_not_trusted():
     profiles = Profiles(np.array([0.5]), np.arange(5.0), energy, energy, effective, np.zeros(1), "orders", Setting())
     np.testing.assert_array_equal(rings_of(profiles).used, [[1, 0, 1, 0]])
     used = np.array([[False, True, True, True]])
-    chosen = rings_of(profiles, used, limits=(1.0, 2.0), xi=(0.1, 0.2))
+    chosen = rings_of(profiles, used, limits=(1.0, 2.0), xi=(0.4, 0.5))
     np.testing.assert_array_equal(chosen.used, [[0, 0, 1, 0]])
     np.testing.assert_array_equal(chosen.limits, [1.0, 2.0])
-    np.testing.assert_array_equal(chosen.xi, [0.1, 0.2])
+    np.testing.assert_array_equal(chosen.xi, [0.4, 0.5])
     np.testing.assert_array_equal(chosen.weight, [1.0])
+    # The albedo rests on .3^2 / (.01/100 + .01/49 + .01/51) = 180 effective photons, and a tenth of them is too few.
+    with pytest.raises(InputError, match="no albedo rests on 500 effective ones"):
+        rings_of(profiles, xi=(0.1, 0.2))
 
 
 def test_rings_know_reflectance_and_cdf():

@@ -8,7 +8,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.estimate import fit
+from profilefit.estimate import Problem, curvature, fit
 from profilefit.laws.base import AlbedoLaw
 from profilefit.posterior import _curvature_adjustment, posterior
 from profilefit.profiles import Covariance, Profiles
@@ -98,7 +98,7 @@ def test_curvature_adjustment_is_the_identity_it_claims():
         jacobian = rng.standard_normal((40, size)) / scale
         root = rng.standard_normal((size, size)) * scale[:, None]
         covariance = root @ root.T
-        adjust, variance = _curvature_adjustment(jacobian, covariance)
+        adjust, variance = _curvature_adjustment(jacobian.T @ jacobian, covariance)
         identity = adjust.T @ jacobian.T @ jacobian @ adjust / variance @ covariance
         # In scaled constants, where rounding is alike everywhere.
         np.testing.assert_allclose(identity * scale[:, None] / scale, np.eye(size), atol=1e-6)
@@ -135,3 +135,25 @@ def test_kind_must_be_known(line_fit):
 def test_without_photon_noise_only_the_misfit_is_left(line_fit):
     with pytest.raises(InputError, match=r"no photon noise: only kind='discrepancy' applies, got 'statistical'"):
         posterior(replace(line_fit, statistical=None))
+
+
+def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
+    """The chain has the sandwich's width although residuals are large and curved: there J^T J is not the curvature."""
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))
+    chain = posterior(one, "statistical", seed=4)
+    assert chain.result == "converged"
+    expected = np.sqrt(np.diag(one.statistical))
+    # 1000 thinned draws know a standard deviation to 1/sqrt(2000) = 2.2 %: four of these, and 2 % of curvature.
+    np.testing.assert_allclose(chain.standard_deviation / expected, 1.0, atol=0.11)
+    # A negative control: with J^T J for the curvature the width is wrong by more than that.
+    jacobian = one.solution.jacobian
+    short, variance = _curvature_adjustment(jacobian.T @ jacobian, one.statistical)
+    full = curvature(Problem(one.objective, one.free), one.solution, one.law, one.rings)
+    width = np.sqrt(np.diag(np.linalg.inv(short.T @ full @ short / variance)))
+    assert np.max(np.abs(width / expected - 1.0)) > 0.02
+
+
+def test_no_posterior_of_a_fit_that_failed(tallies, liang):
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
+    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
+        posterior(one)

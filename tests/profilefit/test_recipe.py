@@ -117,12 +117,12 @@ def test_keys_must_be_known_and_there(refuse, old, new, words):
     ("old", "new", "words"),
     [
         ('title = "A fit"', "title = 7", "title must be a text, got 7"),
-        ("low = 0.1", 'low = "a tenth"', "low must be a number, got 'a tenth'"),
-        ("low = 0.1", "low = true", "low must be a number, got True"),
+        ("low = 0.1", 'low = "a tenth"', "low must be a finite number, got 'a tenth'"),
+        ("low = 0.1", "low = true", "low must be a finite number, got True"),
         ("count = 9", "count = 9.5", "count must be a whole number, got 9.5"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = 1.0', "mfp must be a list of numbers, got 1.0"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = ["far"]', "mfp must be a list of numbers, got ['far']"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = [true]', "mfp must be a list of numbers, got [True]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = 1.0', "mfp must be a list of finite numbers, got 1.0"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = ["far"]', "mfp must be a list of finite numbers, got ['far']"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [true]', "mfp must be a list of finite numbers, got [True]"),
         ('truth = "exact"', 'truth = "exact"\nheld = "a3"', "held must be a list of texts, got 'a3'"),
         ('[weighting]\nobjective = "energy"\nenergy_limit = 3.0', "[[weighting]]", "[weighting] must be a table"),
     ],
@@ -141,7 +141,7 @@ def test_types_must_be_right(refuse, old, new, words):
         ("high = 0.9", "high = 1.1", "0 < low < high <= 1, got low = 0.1, high = 1.1"),
         ("low = 0.1", "low = 0.0", "0 < low < high <= 1, got low = 0.0"),
         ("low = 0.1", "low = 0.9", "0 < low < high <= 1, got low = 0.9, high = 0.9"),
-        ("low = 0.1", "low = nan", "0 < low < high <= 1, got low = nan"),
+        ("low = 0.1", "low = nan", "low must be a finite number, got nan"),
         ("count = 9", "count = 2", "albedos.count must be between 3 and 1000, got 2"),
         ("count = 9", "count = 1001", "albedos.count must be between 3 and 1000, got 1001"),
         (
@@ -149,27 +149,85 @@ def test_types_must_be_right(refuse, old, new, words):
             'spacing = "even"',
             "albedos.spacing must be one of alpha, reflectance, sqrt(1-alpha), got",
         ),
-        ('truth = "exact"', 'truth = "exact"\nmfp = [1.0, 0.0]', "mfp must be a list of lengths > 0, got [1.0, 0.0]"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = [-1]', "mfp must be a list of lengths > 0, got [-1.0]"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = [inf]', "mfp must be a list of lengths > 0, got [inf]"),
-        ('truth = "exact"', 'truth = "exact"\nmfp = []', "mfp must be a list of lengths > 0, got []"),
+        (
+            'truth = "exact"',
+            'truth = "exact"\nmfp = [1.0, 0.0]',
+            "mfp must be a list of lengths from 0.001 to 1000, got [1.0, 0.0]",
+        ),
+        (
+            'truth = "exact"',
+            'truth = "exact"\nmfp = [-1]',
+            "mfp must be a list of lengths from 0.001 to 1000, got [-1.0]",
+        ),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [inf]', "mfp must be a list of finite numbers, got [inf]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = []', "mfp must be a list of lengths from 0.001 to 1000, got []"),
         ("first = 0.01", "first = 0.01\ndr = 0.1", "either dr > 0 or both first > 0 and count > 0"),
         ("first = 0.01", "first = -0.01", "either dr > 0 or both first > 0 and count > 0"),
         ("last = 30", "last = 0.005", "rings.last must lie beyond the first ring and within 1000 mfp, got 0.005"),
         ("last = 30", "last = 1e4", "rings.last must lie beyond the first ring and within 1000 mfp, got 10000.0"),
-        ("last = 30", "last = nan", "rings.last must lie beyond the first ring"),
-        ("count = 20", "count = 5000", "rings.count must be at most 1000, got 5000"),
+        ("last = 30", "last = nan", "last must be a finite number, got nan"),
+        ("count = 20", "count = 5000", "rings.count must be between 3 and 1000, got 5000"),
         ("last = 30", 'last = 30\ntrim = "R"', "rings.trim must be one of r R_d, R_d, none"),
         ("last = 30", "last = 30\nepsilon = 1.0", "with epsilon in (0, 1), got"),
         ("energy_limit = 3.0", "energy_limit = -3.0", "weighting limits must be"),
-        ("energy_limit = 3.0", "energy_limit = nan", "weighting limits must be"),
-        ("energy_limit = 3.0", "source_limit = inf", "weighting limits must be"),
+        ("energy_limit = 3.0", "energy_limit = nan", "energy_limit must be a finite number, got nan"),
+        ("energy_limit = 3.0", "source_limit = inf", "source_limit must be a finite number, got inf"),
+        (
+            "energy_limit = 3.0",
+            "source_limit = 1e7",
+            "weighting limits must be between 0 and 1e+06, got 0.0, 10000000.0",
+        ),
+        ("energy_limit = 3.0", f"energy_limit = {10**400}", "must be a finite number, got one of 401 digits"),
+        ("count = 9", f"count = {10**400}", "count must be a whole number, got one of 401 digits"),
+        ("count = 9", f"count = 0x1{'0' * 5000}", "count must be a whole number, got one of more than 4300 digits"),
+        ("count = 9", f"count = {'9' * 5000}", "is not TOML"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [1e300]', "lengths from 0.001 to 1000, got [1e+300]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [1e-9]', "lengths from 0.001 to 1000, got [1e-09]"),
+        ('truth = "exact"', 'truth = "exact"\nmfp = [1, 2, 1.0]', "a list of different lengths, got [1.0, 2.0, 1.0]"),
+        ("first = 0.01", "first = 0.001", "rings.first must be at least 0.0025 mfp"),
+        ("count = 20", "count = 2", "rings.count must be between 3 and 1000, got 2"),
+        ("first = 0.01", "dr = -0.1\nfirst = 0.01", "either dr > 0 or both first > 0 and count > 0"),
         ("energy_limit = 3.0", "shares = -1", "0 <= shares <= 10000"),
         ("energy_limit = 3.0", "last_share = 0.0", "0 < last_share <= 1"),
     ],
 )
 def test_values_must_be_possible(refuse, old, new, words):
     refuse(old, new, words)
+
+
+EVEN = (
+    GOOD.replace('"profile"', '"as-published"').replace('"energy"', '"radial"').replace("first = 0.01", "dr = 0.05")
+).replace("count = 20\n", "")
+INVERSE = (
+    GOOD.replace('"profile"', '"inverse"').replace('"energy"', '"share"').replace("energy_limit = 3.0", "shares = 64")
+)
+
+
+@pytest.mark.parametrize(
+    ("good", "old", "new", "words"),
+    [
+        (EVEN, "dr = 0.05", "dr = 1e-9", "last * mfp / dr between 3 and 4000 rings, got last = 30.0, mfp = 1.0, dr ="),
+        (EVEN, "dr = 0.05", "dr = 20", "last * mfp / dr between 3 and 4000 rings"),
+        (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [1, 10]', "got last = 30.0, mfp = 10.0, dr = 0.05"),
+        (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [0.5, 2]', "must contain 1.0, got [0.5, 2.0]"),
+        (EVEN, 'law = "liang"', 'law = "burley"', "law of pipeline 'as-published' must be liang, got 'burley'"),
+        (INVERSE, 'law = "liang"', 'law = "burley"', "law of pipeline 'inverse' must be liang, got 'burley'"),
+        (INVERSE, "shares = 64", "shares = 0", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
+        (INVERSE, "shares = 64", "", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
+    ],
+)
+def test_each_pipeline_has_its_own_needs(write, good, old, new, words):
+    assert read(write(good)).law == "liang"
+    assert good.count(old) == 1, "the piece to spoil must be there, once"
+    with pytest.raises(RecipeError, match=re.escape(words)) as caught:
+        read(write(good.replace(old, new)))
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("dr", "last"), [(0.05, 0.15), (0.01, 40.0)])
+def test_the_fewest_and_the_most_rings_are_accepted(write, dr, last):
+    rings = read(write(EVEN.replace("dr = 0.05", f"dr = {dr}").replace("last = 30", f"last = {last}"))).rings
+    assert (rings.dr, rings.last) == (dr, last)
 
 
 def test_profiles_need_rings(write):

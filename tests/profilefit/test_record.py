@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 
 from profilefit import record
+from profilefit.catalogue import fits_folder
 from profilefit.errors import InputError, OutputError, RecordError
 
-CONTENT = {"law": "liang", "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}
+NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
+CONTENT = {**NAMED, "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}
 ARRAYS = {"samples": np.arange(6.0).reshape(2, 3), "alpha": np.array([0.5])}
 
 
@@ -27,7 +29,7 @@ def test_round_trip(tmp_path):
 
 def test_the_same_content_is_the_same_bytes(tmp_path):
     """Whatever the order of keys, and whenever it is written."""
-    turned = {"constants": dict(reversed(CONTENT["constants"].items())), "law": "liang"}
+    turned = {**dict(reversed(CONTENT.items())), "constants": dict(reversed(CONTENT["constants"].items()))}
     first, again = (record.write(tmp_path / d, "mine", c, ARRAYS) for d, c in (("a", CONTENT), ("b", turned)))
     os.utime(first, (0, 0))
     for suffix in (".json", ".npz"):
@@ -43,6 +45,7 @@ def test_numbers_to_twelve_digits_and_nan_to_null(tmp_path):
         where: Path
 
     content = {
+        **CONTENT,
         "third": 1 / 3,
         "tiny": np.float64(5e-301),
         "nan": np.nan,
@@ -115,6 +118,64 @@ def test_what_is_no_record_is_named(tmp_path, text, words):
     path.write_text(text)
     with pytest.raises(RecordError, match=words):
         record.read(path)
+
+
+PROFILE_KEYS = [*record.NAMED, *record.CONSTANTS, *record.TOLD, *record.PROFILE]
+
+
+def _spoiled(key, spoil):
+    """A shipped record of which the value at a dotted key is lost, or made true."""
+    content = json.loads((fits_folder() / "liang-whole.json").read_text())
+    *above, last = key.split(".")
+    part = content
+    for name in above:
+        part = part[next(iter(part)) if name == "*" else name]
+    last = next(iter(part)) if last == "*" else last
+    if spoil == "lost":
+        del part[last]
+    else:
+        part[last] = True
+    return content, last
+
+
+@pytest.mark.parametrize("path", record.available(fits_folder()).values(), ids=lambda path: path.stem)
+def test_shipped_records_are_whole(path):
+    assert record.read(path, whole=True)["name"] == path.stem
+
+
+@pytest.mark.parametrize("key", [key for key in PROFILE_KEYS if not key.endswith("*")])
+@pytest.mark.parametrize("spoil", ["lost", "another type"])
+def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
+    content, last = _spoiled(key, spoil)
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(content))
+    got = "nothing" if spoil == "lost" else "true"
+    if key in (*record.NAMED, *record.CONSTANTS):
+        with pytest.raises(
+            RecordError, match=rf"mine\.json: is damaged: .*{last} must be .*, got {got}; regenerate it"
+        ):
+            record.read(path)
+    else:
+        assert record.read(path)["law"] == "liang", "enough to make a law from"
+    with pytest.raises(RecordError, match=rf"mine\.json: is damaged: .*{last} must be .*, got {got}; regenerate it"):
+        record.read(path, whole=True)
+
+
+@pytest.mark.parametrize(
+    ("name", "change", "words"),
+    [
+        ("liang-whole", {"pipeline": "magic"}, "pipeline must be one of albedo, profile, inverse, .*, got 'magic'"),
+        ("liang-whole", {"constants": {"a1": 3.0}}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
+        ("liang-as-published", {"stages": []}, r"stages must be a table, got \[\]"),
+        ("reproduction", {"readings": {}}, r"readings must be a list, got {}"),
+        ("reproduction", {"table1": ["skin"]}, r'table1\.0 must be a table, got "skin"'),
+    ],
+)
+def test_each_pipeline_has_its_own_needs(tmp_path, name, change, words):
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps({**json.loads((fits_folder() / f"{name}.json").read_text()), **change}))
+    with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
+        record.read(path, whole=True)
 
 
 def test_records_that_cannot_be_read_are_named(tmp_path):

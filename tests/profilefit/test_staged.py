@@ -157,3 +157,18 @@ def test_errors_of_the_stages_are_those_of_refitting(liang):
 def test_the_coefficients_here_are_the_laws(liang, x64):
     for column, value in enumerate(liang.coefficients(jnp.asarray(ALPHAS))):
         np.testing.assert_allclose(np.asarray(value), coefficients(liang, ALPHAS)[:, column], rtol=1e-12)
+
+
+def test_strides_of_the_trimming_are_lengths():
+    """(6) walks in units of length: at another mean free path it stops at another number of them."""
+    edges = np.arange(0.0, 12.01, 0.01)
+    r = 0.5 * (edges[1:] + edges[:-1])
+    energy = (2 * np.pi * np.exp(-r / 0.8) * 0.01)[None]  # r R_d = e^{-r/0.8}, low enough at 4.24
+    none = np.zeros_like(energy)
+    profiles = Profiles(np.array([0.5]), edges, energy, none, none + np.inf, np.zeros(1), "exact", Setting())
+    stops = {mfp: float(trimmed(profiles, "r R_d", 0.005, mfp)[1][0]) for mfp in (0.1, 1.0, 2.0)}
+    # 4.24 mfp are 0.424, 4.24 and 8.48 lengths, where strides are 0.05, 0.5 and 1: stops at 0.45, 4.5 and 9.
+    assert stops == pytest.approx({0.1: 4.5, 1.0: 4.5, 2.0: 4.5})
+    finer = float(trimmed(profiles, "r R_d", 0.005, 0.2)[1][0])  # 0.848 lengths, strides of 0.1: stops at 0.9
+    assert finer == pytest.approx(4.5)
+    assert float(trimmed(profiles, "r R_d", 0.005, 0.24)[1][0]) == pytest.approx(1.2 / 0.24)  # 1.02, strides of 0.2

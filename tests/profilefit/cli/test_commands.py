@@ -2,7 +2,10 @@
 
 import json
 import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -74,10 +77,58 @@ def test_one_seed_gives_identical_records_and_another_does_not(command, recipe):
 
 
 def test_more_photons_resume_the_ones_that_are_there(command, recipe):
-    assert command(*small(recipe))[0] == 0
-    before = {path: path.stat().st_mtime_ns for path in Path("out/.photons").glob("*/batch-*")}
-    assert command(*small(recipe))[0] == 0
-    assert {path: path.stat().st_mtime_ns for path in Path("out/.photons").glob("*/batch-*")} == before
+    """Two batches and then a third make the record of three at once, and the two are not traced again."""
+
+    def batches() -> dict[Path, tuple[int, bytes]]:
+        found = Path("out/.photons").glob("*/batch-*")
+        return {path: (path.stat().st_mtime_ns, path.read_bytes()) for path in found}
+
+    assert command(*small(recipe, "out", "--photons", str(2 * 2**20)))[0] == 0
+    before = batches()
+    assert len(before) == 2
+    assert command(*small(recipe, "out", "--photons", str(3 * 2**20)))[0] == 0
+    after = batches()
+    assert len(after) == 3
+    assert {path: after[path] for path in before} == before
+    assert command(*small(recipe, "at-once", "--photons", str(3 * 2**20)))[0] == 0
+    for suffix in ("json", "npz"):
+        assert Path(f"out/small.{suffix}").read_bytes() == Path(f"at-once/small.{suffix}").read_bytes()
+
+
+def test_control_c_is_one_line_and_keeps_the_batches(recipe, tmp_path):
+    """In a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
+    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "runpy.run_module('profilefit', run_name='__main__', alter_sys=True)"
+    words = ("regenerate", str(recipe), "--out", "out", "--photons", str(2**30))
+    with subprocess.Popen([sys.executable, "-c", code, *words], cwd=tmp_path, stderr=subprocess.PIPE, text=True) as run:
+        end = time.monotonic() + 120
+        while not list(tmp_path.glob("out/.photons/*/run.json")) and run.poll() is None and time.monotonic() < end:
+            time.sleep(0.1)
+        run.send_signal(signal.SIGINT)
+        try:
+            _, err = run.communicate(timeout=120)
+        finally:
+            run.kill()
+    assert run.returncode == 130, err
+    assert err == "profilefit: stopped; the finished batches are kept, the same command resumes\n"
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        (("regenerate", "--nonsense"), 2, "profilefit: No such option: --nonsense"),
+        (("regenerate", "--photons", "many"), 2, "profilefit: Invalid value for '--photons'"),
+        (("nonsense",), 2, "profilefit: No such command 'nonsense'"),
+        (("--help",), 0, ""),
+    ],
+)
+def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp_path):
+    run = subprocess.run(
+        [sys.executable, "-m", "profilefit", *words], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert run.returncode == status
+    assert run.stderr.startswith(said)
+    assert run.stderr.count("\n") == (1 if status else 0)
 
 
 @pytest.mark.parametrize(
@@ -89,7 +140,10 @@ def test_more_photons_resume_the_ones_that_are_there(command, recipe):
         ("count = 9|cuont = 9", "unknown key 'cuont'"),
         ("[weighting]|[weighting", "is not TOML"),
         ('objective = "albedo"|objective = "energy"', "must be one of albedo, reflectance, got 'energy'"),
-        ('truth = "orders"|truth = "orders"\nmfp = [0.0]', "mfp must be a list of lengths > 0, got [0.0]"),
+        (
+            'truth = "orders"|truth = "orders"\nmfp = [0.0]',
+            "mfp must be a list of lengths from 0.001 to 1000, got [0.0]",
+        ),
         ('truth = "orders"|truth = "orders"\nstart = "old"', "start must be one of published, got 'old'"),
         ('truth = "orders"|truth = "orders"\nheld = ["z"]', "held must name constants of liang, got z"),
     ],
@@ -113,7 +167,10 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(command, recipe, change, sa
         (("regenerate", "missing.toml"), "missing.toml: there is no such recipe"),
         (("regenerate", "albedo-liang", "--photons", "0"), "photons must be a whole number >= 1"),
         (("regenerate", "albedo-liang", "--photons", "-5"), "photons must be a whole number >= 1"),
-        (("regenerate", "albedo-liang", "--seed", "-1"), "seed must be a whole number >= 0"),
+        (("regenerate", "albedo-rational", "--photons", "0"), "photons must be a whole number >= 1, got 0"),
+        (("regenerate", "albedo-liang", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
+        (("regenerate", "albedo-rational", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
+        (("regenerate", "missing.toml", "--seed", str(2**32)), "seed must be a whole number in [0, 4294967295], got"),
         (("report", "no-such-record"), "record must be one of albedo-liang,"),
         (("report", "--fits", "empty"), "empty has no records"),
     ],
@@ -123,6 +180,30 @@ def test_bad_words_are_one_line(command, words, said):
     assert status == 2
     assert said in err
     assert err.count("\n") == 1
+    assert not list(Path().iterdir()), "refused before anything is made"
+
+
+def test_two_recipes_of_one_name_are_refused(command, recipe):
+    other = Path("other/small.toml")
+    other.parent.mkdir()
+    other.write_text(RECIPE)
+    status, _, err = command("regenerate", str(recipe), str(other), "--out", "out", "--photons", "20000")
+    assert status == 2
+    assert f"recipes must have different names, as their records do, got {recipe} and {other}" in err
+    assert err.count("\n") == 1
+    assert not Path("out").exists()
+
+
+def test_a_damaged_record_is_one_line(command):
+    Path("fits").mkdir()
+    content = json.loads((catalogue.fits_folder() / "liang-whole.json").read_text())
+    del content["fit"]
+    Path("fits/liang-whole.json").write_text(json.dumps(content))
+    status, out, err = command("report", "liang-whole")
+    assert status == 2
+    assert "fits/liang-whole.json: is damaged: fit must be a table, got nothing; regenerate it" in err
+    assert err.count("\n") == 1
+    assert out == ""
 
 
 def test_an_output_that_is_a_file_is_named(command, recipe):
@@ -136,7 +217,8 @@ def test_an_output_that_is_a_file_is_named(command, recipe):
 @pytest.mark.skipif(os.name != "posix" or not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is full")
 def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeypatch):
     assert command(*small(recipe))[0] == 0
-    before = Path("out/small.json").read_bytes()
+    before = {path: path.read_bytes() for path in Path("out").glob("small.*")}
+    recipe.write_text(RECIPE.replace("count = 9", "count = 10"))  # another record, if it were written
     real = os.fsync
 
     def full(handle):  # what the kernel answers on a disk that filled up meanwhile
@@ -146,11 +228,14 @@ def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeyp
         real(handle)
 
     monkeypatch.setattr(os, "fsync", full)
-    status, _, err = command(*small(recipe, "out", "--seed", "1"))
+    status, _, err = command(*small(recipe))
     assert status == 2
     assert "No space left on device" in err
-    assert Path("out/small.json").read_bytes() == before
+    assert {path: path.read_bytes() for path in before} == before
     assert not list(Path("out").glob(".small*"))
+    monkeypatch.setattr(os, "fsync", real)
+    assert command(*small(recipe))[0] == 0
+    assert all(path.read_bytes() != old for path, old in before.items()), "else this test could not fail"
 
 
 def test_a_damaged_batch_is_named(command, recipe):

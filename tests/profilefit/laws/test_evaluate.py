@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+from mcml_sim import InputError
 from profilefit.laws.evaluate import evaluated
 
 
@@ -60,3 +61,29 @@ def test_jax_anywhere_stays_jax(where):
 def test_a_method_keeps_its_name_and_words():
     assert Doubler.twice.__name__ == "twice"
     assert Doubler.twice.__doc__ == "Twice x, and y."
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        ({"r": 0.5, "alpha": 1.5}, r"alpha must be in \[0, 1\], got 1.5"),
+        ({"r": 0.5, "alpha": np.nan}, r"alpha must be in \[0, 1\], got nan"),
+        ({"r": [0.5, -1.0], "alpha": 0.5}, "r must be >= 0, got -1"),
+        ({"r": 0.5, "alpha": 0.5, "mfp": 0.0}, "mfp must be > 0 and finite, got 0"),
+        ({"r": "far", "alpha": 0.5}, "r must be a number or an array of numbers, got 'far'"),
+    ],
+)
+def test_numbers_out_of_range_are_named(burley, words, said):
+    with pytest.raises(InputError, match=said):
+        burley.profile(**words)
+    with pytest.raises(InputError, match=said):
+        burley.profile(*words.values())
+
+
+def test_samplers_and_maps_name_theirs(burley, liang_printed):
+    with pytest.raises(InputError, match=r"xi must be in \[0, 1\], got 2"):
+        burley.sampler.sample(2.0, 0.5)
+    with pytest.raises(InputError, match=r"reflectance must be in \[0, 1\], got 1.2"):
+        burley.albedo.alpha(1.2)
+    with pytest.raises(InputError, match=r"alpha must be in \[0, 1\], got -0.1"):
+        liang_printed.largest_radius(-0.1)
