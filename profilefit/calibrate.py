@@ -22,14 +22,11 @@ from profilefit.quality import albedo_quality, profile_quality
 from profilefit.recipe import Albedos, Recipe, Rings
 from profilefit.reproduction import readings
 from profilefit.table1 import printed_halves, table1
+from profilefit.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
 from profilefit.truth import ExactTruth, TallyTruth, Truth
 
 Floats = NDArray[np.float64]
 Say = Callable[[str], None]
-# Even rings for the paper's protocol, log-spaced ones beyond it; every recipe's rings are unions of these [mfp].
-RUN_EDGES = np.concatenate(
-    [[0.0, 0.0025, 0.005], np.round(np.arange(1, 4001) * 0.01, 2), np.geomspace(40, 1000, 41)[1:]]
-)
 PHOTONS = {"quick": 20 * 2**20, "full": 400 * 2**20}
 MAX_CHAIN = {"quick": 16_000, "full": 64_000}
 EVIDENCE_RINGS = Rings(last=30.0, dr=0.01)
@@ -67,44 +64,6 @@ def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
         content, arrays = PIPELINES[recipe.pipeline](recipe, run, light)
         written.append(record.write(run.out, recipe.name, {**_header(recipe, run, light), **content}, arrays))
     return written
-
-
-def albedo_values(albedos: Albedos) -> Floats:
-    """The albedos (count,) of a recipe, rising, even in its spacing."""
-    if albedos.spacing == "alpha":
-        return np.linspace(albedos.low, albedos.high, albedos.count)
-    if albedos.spacing == "reflectance":
-        dense = 1.0 - np.linspace(1.0, 0.0, 4001) ** 2
-        low, high = np.asarray(exact.reflectance([albedos.low, albedos.high]))
-        return np.interp(np.linspace(low, high, albedos.count), exact.reflectance(dense), dense)
-    s = np.linspace(np.sqrt(1.0 - albedos.low), np.sqrt(1.0 - albedos.high), albedos.count)
-    return 1.0 - s**2
-
-
-def ring_edges(rings: Rings | None, mfp: float = 1.0) -> Floats:
-    """The edges [mfp] of a recipe's rings in a medium of this mean free path, each one an edge of the run."""
-    if rings is None:
-        return np.array([0.0, RUN_EDGES[-1]])
-    if rings.dr > 0:
-        width = rings.dr / mfp
-        wanted = np.arange(0.0, rings.last + 0.5 * width, width)
-    else:
-        wanted = np.concatenate([[0.0], np.geomspace(rings.first, rings.last, rings.count)])
-    index = np.unique(np.abs(RUN_EDGES[None, :] - wanted[:, None]).argmin(axis=1))
-    found = RUN_EDGES[index]
-    if rings.dr > 0 and (found.size != wanted.size or np.max(np.abs(found - wanted)) > 1e-9):
-        raise RecipeError(f"rings.dr / mfp must be a multiple of 0.01 up to 40 mfp, got {rings.dr!r} / {mfp!r}")
-    return found
-
-
-def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles:
-    """The profiles that a recipe fits."""
-    alpha, edges = albedo_values(recipe.albedos), ring_edges(recipe.rings, mfp)
-    if recipe.truth == "exact":
-        return Profiles.from_exact(alpha, edges)
-    if light is None:
-        raise ValueError(f"recipe {recipe.name} needs photons, got none")
-    return Profiles.from_orders(light.merged(edges), alpha, correlated=mfp == 1.0)
 
 
 def _albedo(recipe: Recipe, run: Run, light: Orders | None):

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from profilefit import catalogue
-from profilefit.calibrate import albedo_values
 from profilefit.recipe import Albedos
 from profilefit.report.canvas import (
     BLACK,
@@ -27,6 +26,7 @@ from profilefit.report.canvas import (
     styled,
 )
 from profilefit.report.source import Fitted, Source
+from profilefit.targets import albedo_values
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats, Floats]

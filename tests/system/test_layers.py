@@ -47,6 +47,7 @@ ORDER = {
         "posterior",
         "staged",
         "recipe",
+        "targets",
         "record",
         "catalogue",
         "truth",

@@ -1,0 +1,62 @@
+"""From a recipe to its truth: where albedos and rings stand, and which photons they get."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, exact, simulate_orders
+from profilefit import catalogue, recipe
+from profilefit.errors import RecipeError
+from profilefit.recipe import Albedos, Rings
+from profilefit.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
+
+FITS = catalogue.fits_folder()
+
+
+@pytest.mark.parametrize(
+    ("spacing", "even"),
+    [
+        ("alpha", lambda a: a),
+        ("sqrt(1-alpha)", lambda a: np.sqrt(1 - a)),
+        ("reflectance", lambda a: np.asarray(exact.reflectance(a))),
+    ],
+)
+def test_albedos_are_even_in_their_spacing(spacing, even):
+    alpha = albedo_values(Albedos(0.1, 0.99, 12, spacing))
+    assert alpha[[0, -1]] == pytest.approx([0.1, 0.99], abs=1e-6)
+    steps = np.diff(even(alpha))
+    # The table behind the spacing in A is linear between 4001 nodes: its steps are even to 1e-4.
+    assert steps == pytest.approx(np.full(11, steps.mean()), rel=1e-3)
+
+
+def test_rings_are_edges_of_the_run():
+    for rings in (Rings(last=20.0, dr=0.05), Rings(last=100.0, first=0.01, count=34)):
+        edges = ring_edges(rings)
+        assert set(edges) <= set(RUN_EDGES)
+        assert edges[0] == 0.0
+        assert edges[-1] == pytest.approx(rings.last, rel=0.05)
+    assert np.diff(ring_edges(Rings(last=20.0, dr=0.05), mfp=0.5)) == pytest.approx(0.1)
+    assert np.diff(ring_edges(Rings(last=20.0, dr=0.05), mfp=5.0)) == pytest.approx(0.01)
+
+
+@pytest.mark.parametrize("rings", [Rings(last=20.0, dr=0.013), Rings(last=60.0, dr=0.05)])
+def test_rings_that_the_run_cannot_make_are_refused(rings):
+    with pytest.raises(RecipeError, match=r"rings.dr / mfp must be a multiple of 0.01 up to 40 mfp, got 0.0"):
+        ring_edges(rings)
+
+
+def test_photons_and_exact_truth_agree_on_a_recipes_rings():
+    chosen = recipe.find("liang-whole", FITS)
+    light = simulate_orders(Grid.from_edges(r=RUN_EDGES), 2**19, seed=11)
+    photons, exactly = truth_of(chosen, light), truth_of(replace(chosen, truth="exact"), None)
+    assert photons.source == "orders"
+    assert exactly.source == "exact"
+    seen = photons.trusted
+    error = photons.standard_error[seen]
+    z = (photons.energy - exactly.energy)[seen] / error
+    # Some 500 rings, strongly correlated between albedos: 4.5 is the Šidák bound of 500 independent ones at 0.3 %.
+    assert np.max(np.abs(z)) < 4.5
+    # A negative control: a tally that lost one photon in twenty would be seen.
+    lost = (0.95 * photons.energy - exactly.energy)[seen] / error
+    assert np.max(np.abs(lost)) > 4.5
