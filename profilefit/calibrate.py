@@ -105,18 +105,15 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
     if rings is None:
         raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
     start = _start(recipe, run)
-    points = []
-    for mfp in recipe.mfp:
-        profiles = truth_of(recipe, light, mfp)
-        points.append(staged.fit_per_albedo(profiles, start, mfp, rings.trim, rings.epsilon))
-    unit = points[recipe.mfp.index(1.0)] if 1.0 in recipe.mfp else points[0]
+    truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
+    points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
+    profiles, unit = truths[1.0], points[1.0]
     laws = staged.fit_coefficient_laws(unit, start, recipe.held)
     by_stage = {
         name: float(value)
         for law in laws.values()
         for name, value in zip(law.names, law.solution.parameters, strict=True)
     }
-    profiles = truth_of(recipe, light)
     used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
     result = _fit(recipe, run, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
     content, arrays = _described(recipe, run, profiles, result, published.constants(recipe.law))
@@ -130,8 +127,8 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None):
             }
             for letter, law in laws.items()
         },
-        "length_exponents": staged.length_exponents(tuple(points)) if len(points) > 1 else {},
-        "per_albedo_failures": {f"{p.mfp:g}": sum(r != "converged" for r in p.results) for p in points},
+        "length_exponents": staged.length_exponents(tuple(points.values())) if len(points) > 1 else {},
+        "per_albedo_failures": {f"{m:g}": sum(r != "converged" for r in p.results) for m, p in points.items()},
     }
     content["quality"] = _compare(recipe, run, result.law)
     content["normalisation"] = catalogue.normalisation(profiles.setting, run.out).constants()
