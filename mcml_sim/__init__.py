@@ -1,8 +1,9 @@
-"""What light does in a half space: photons traced in JAX, and exact solutions to hold them against."""
+"""What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
 from mcml_sim import exact
 from mcml_sim.errors import InputError, SettingError, StoreError
 from mcml_sim.grid import Grid
+from mcml_sim.medium import Layer, Medium, half_space
 from mcml_sim.orders import Orders, simulate_orders
 from mcml_sim.setting import Setting
 from mcml_sim.tally import Estimate
@@ -12,11 +13,14 @@ __all__ = [
     "Estimate",
     "Grid",
     "InputError",
+    "Layer",
+    "Medium",
     "Orders",
     "Setting",
     "SettingError",
     "StoreError",
     "__version__",
     "exact",
+    "half_space",
     "simulate_orders",
 ]

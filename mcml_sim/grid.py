@@ -1,4 +1,4 @@
-"""The rings into which light is sorted by its distance from the beam."""
+"""The bins into which light is sorted: distance from the beam, depth, and exit angle."""
 
 from __future__ import annotations
 
@@ -11,31 +11,41 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 
-MAX_RINGS = 65_536
+MAX_BINS = 65_536  # along one axis
 
 
 @dataclass(frozen=True, init=False, eq=False, repr=False)
 class Grid:
-    """Rings around the beam, in any one unit of length; what falls beyond the last edge is the overflow.
+    """Cylindrical bins around the beam, in any one unit of length; what falls beyond a last edge is the overflow.
 
-    Grid(dr, nr)              `nr` rings of equal width `dr`, as in MCML
-    Grid.from_edges(r=edges)  any rising edges that start at 0
+    Grid(dr, nr)                 `nr` rings of equal width `dr`, as in MCML
+    Grid(dr, nr, dz, nz, na=na)  also `nz` depths of equal width `dz`, and `na` exit angles between 0 and pi/2
+    Grid.from_edges(r=edges)     any rising edges that start at 0; z and na as well
 
-    A ring holds lower edge <= r < upper edge. Grids with equal edges are equal. InputError on anything else.
+    A bin holds lower edge <= x < upper edge. Grids with equal edges are equal. InputError on anything else.
     """
 
     r_edges: NDArray[np.float64]
-    """Edges [length], float64 (rings + 1,), read-only."""
+    """Edges of the rings [length], float64 (rings + 1,), read-only."""
+    z_edges: NDArray[np.float64] | None
+    """Edges of the depths [length], float64 (depths + 1,), read-only; None if depth is not resolved."""
+    a_edges: NDArray[np.float64] | None
+    """Edges of the exit angles to the surface's normal [rad], float64 (na + 1,), 0 ... pi/2; None if not resolved."""
 
-    def __init__(self, dr: float, nr: int) -> None:
-        _require_width(dr)
-        self._set_edges(dr * np.arange(_checked_number(nr) + 1, dtype=np.float64))
+    def __init__(
+        self, dr: float, nr: int, dz: float | None = None, nz: int | None = None, na: int | None = None
+    ) -> None:
+        if (dz is None) != (nz is None):
+            raise InputError(f"dz and nz must be given together, got dz = {dz!r} and nz = {nz!r}")
+        r_edges = _even_edges("r", dr, nr)
+        z_edges = None if dz is None or nz is None else _even_edges("z", dz, nz)
+        self._set_edges(r_edges, z_edges, _angle_edges(na))
 
     @classmethod
-    def from_edges(cls, *, r: ArrayLike) -> Grid:
-        """Rings between any rising edges [length], the first of them 0."""
+    def from_edges(cls, *, r: ArrayLike, z: ArrayLike | None = None, na: int | None = None) -> Grid:
+        """Rings (and depths) between any rising edges [length], the first of them 0; `na` even angles."""
         grid = object.__new__(cls)
-        grid._set_edges(_checked_edges(r))
+        grid._set_edges(_checked_edges("r", r), None if z is None else _checked_edges("z", z), _angle_edges(na))
         return grid
 
     @property
@@ -44,57 +54,102 @@ class Grid:
         return len(self.r_edges) - 1
 
     @property
+    def depths(self) -> int:
+        """Number of depth bins, without the overflow; 0 if depth is not resolved."""
+        return 0 if self.z_edges is None else len(self.z_edges) - 1
+
+    @property
+    def angles(self) -> int:
+        """Number of angle bins; 0 if angles are not resolved."""
+        return 0 if self.a_edges is None else len(self.a_edges) - 1
+
+    @property
     def r_areas(self) -> NDArray[np.float64]:
         """Areas of the rings [length^2], float64 (rings,)."""
         lower, upper = self.r_edges[:-1], self.r_edges[1:]
         return np.pi * (upper - lower) * (upper + lower)
 
     @property
+    def z_widths(self) -> NDArray[np.float64]:
+        """Widths of the depth bins [length], float64 (depths,)."""
+        if self.z_edges is None:
+            raise InputError("this grid resolves no depths, give it dz and nz")
+        return np.diff(self.z_edges)
+
+    @property
+    def solid_angles(self) -> NDArray[np.float64]:
+        """Solid angles of the angle bins, 2 pi (cos lower - cos upper) [sr], float64 (angles,)."""
+        if self.a_edges is None:
+            raise InputError("this grid resolves no angles, give it na")
+        lower, upper = self.a_edges[:-1], self.a_edges[1:]
+        return 4 * np.pi * np.sin((lower + upper) / 2) * np.sin((upper - lower) / 2)
+
+    @property
     def digest(self) -> str:
         """Hexadecimal SHA-256 of the edges: equal exactly where all edges are."""
-        return hashlib.sha256(self.r_edges.astype("<f8").tobytes()).hexdigest()
+        digest = hashlib.sha256(self.r_edges.astype("<f8").tobytes())
+        for name, edges in ((b"z", self.z_edges), (b"a", self.a_edges)):
+            if edges is not None:
+                digest.update(name + edges.astype("<f8").tobytes())
+        return digest.hexdigest()
 
     def __eq__(self, other: object) -> bool:
-        return isinstance(other, Grid) and np.array_equal(self.r_edges, other.r_edges)
+        return isinstance(other, Grid) and self.digest == other.digest
 
     def __hash__(self) -> int:
-        return hash(self.r_edges.tobytes())
+        return hash(self.digest)
 
     def __repr__(self) -> str:
-        return f"Grid({self.rings} rings to r = {self.r_edges[-1]:g}, {self.digest[:8]})"
+        z = "" if self.z_edges is None else f", {self.depths} depths to z = {self.z_edges[-1]:g}"
+        a = "" if self.a_edges is None else f", {self.angles} angles"
+        return f"Grid({self.rings} rings to r = {self.r_edges[-1]:g}{z}{a}, {self.digest[:8]})"
 
-    def _set_edges(self, edges: NDArray[np.float64]) -> None:
-        edges.setflags(write=False)
-        object.__setattr__(self, "r_edges", edges)
+    def _set_edges(
+        self,
+        r_edges: NDArray[np.float64],
+        z_edges: NDArray[np.float64] | None,
+        a_edges: NDArray[np.float64] | None,
+    ) -> None:
+        for name, edges in (("r_edges", r_edges), ("z_edges", z_edges), ("a_edges", a_edges)):
+            if edges is not None:
+                edges.setflags(write=False)
+            object.__setattr__(self, name, edges)
 
 
-def _require_width(dr: float) -> None:
-    if not (isinstance(dr, (int, float, np.number)) and not isinstance(dr, bool) and np.isfinite(dr) and dr > 0):
-        raise InputError(f"dr must be a ring width > 0, got {dr!r}")
+def _even_edges(axis: str, width: float, number: int) -> NDArray[np.float64]:
+    if not (
+        isinstance(width, (int, float, np.number)) and not isinstance(width, bool) and np.isfinite(width) and width > 0
+    ):
+        raise InputError(f"d{axis} must be a width > 0 of the bins, got {width!r}")
+    return width * np.arange(_checked_number(f"n{axis}", number) + 1, dtype=np.float64)
 
 
-def _checked_number(nr: int) -> int:
+def _angle_edges(na: int | None) -> NDArray[np.float64] | None:
+    return None if na is None else np.linspace(0.0, np.pi / 2, _checked_number("na", na) + 1)
+
+
+def _checked_number(name: str, value: int) -> int:
     try:
-        number = operator.index(nr)
+        number = operator.index(value)
     except TypeError:
         number = 0
-    if isinstance(nr, bool) or not 1 <= number <= MAX_RINGS:
-        raise InputError(f"nr must be a whole number of rings from 1 to {MAX_RINGS}, got {nr!r}")
+    if isinstance(value, bool) or not 1 <= number <= MAX_BINS:
+        raise InputError(f"{name} must be a whole number of bins from 1 to {MAX_BINS}, got {value!r}")
     return number
 
 
-def _checked_edges(r: ArrayLike) -> NDArray[np.float64]:
+def _checked_edges(axis: str, values: ArrayLike) -> NDArray[np.float64]:
     try:
-        edges = np.array(r, dtype=np.float64)
+        edges = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):
-        raise InputError(f"r must be numbers, the edges of the rings, got {r!r}") from None
-    if edges.ndim != 1 or not 2 <= edges.size <= MAX_RINGS + 1:
-        raise InputError(f"r must be a list of 2 to {MAX_RINGS + 1} edges, got an array of shape {edges.shape}")
+        raise InputError(f"{axis} must be numbers, the edges of the bins, got {values!r}") from None
+    if edges.ndim != 1 or not 2 <= edges.size <= MAX_BINS + 1:
+        raise InputError(f"{axis} must be a list of 2 to {MAX_BINS + 1} edges, got an array of shape {edges.shape}")
     if not np.all(np.isfinite(edges)):
-        raise InputError(f"r must be finite edges, got {edges[~np.isfinite(edges)][0]:g} among them")
+        raise InputError(f"{axis} must be finite edges, got {edges[~np.isfinite(edges)][0]:g} among them")
     if edges[0] != 0:
-        raise InputError(f"r must start at 0, the beam, got a first edge of {edges[0]:g}")
+        raise InputError(f"{axis} must start at 0, the beam's entry, got a first edge of {edges[0]:g}")
     if not np.all(np.diff(edges) > 0):
         at = int(np.argmin(np.diff(edges) > 0))
-        raise InputError(f"r must rise, got {edges[at + 1]:g} after {edges[at]:g}")
+        raise InputError(f"{axis} must rise, got {edges[at + 1]:g} after {edges[at]:g}")
     return edges + 0.0
