@@ -9,7 +9,7 @@ PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help fits readme test test-all lint format wheel clean
+.PHONY: help fits readme test test-all benchmark lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
@@ -26,6 +26,10 @@ test: lint  ## what CI runs: lint, and all tests but the slow ones
 
 test-all: lint  ## lint, and all tests
 	$(PYTEST) $(ARGS)
+
+benchmark: $(VENV)/.installed-test  ## speed and accuracy of the tracer, over scalar tracers, in one run
+	@$(PIP) install --editable '.[benchmark]'
+	$(PY) benchmarks/tracer.py $(ARGS)
 
 lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
 	$(PY) -m ruff check

@@ -1,26 +1,40 @@
 """What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
 from mcml_sim import exact
-from mcml_sim.errors import InputError, SettingError, StoreError
+from mcml_sim.errors import ClusterError, InputError, OutputError, SettingError, StoreError
 from mcml_sim.grid import Grid
+from mcml_sim.mcml_files import read_mci, write_mco
 from mcml_sim.medium import Layer, Medium, half_space
 from mcml_sim.orders import Orders, simulate_orders
+from mcml_sim.results import read_results, write_results
 from mcml_sim.setting import Setting
+from mcml_sim.simulation import Precision, Tally, simulate
+from mcml_sim.store import DamagedBatch
 from mcml_sim.tally import Estimate
 from mcml_sim.version import __version__
 
 __all__ = [
+    "ClusterError",
+    "DamagedBatch",
     "Estimate",
     "Grid",
     "InputError",
     "Layer",
     "Medium",
     "Orders",
+    "OutputError",
+    "Precision",
     "Setting",
     "SettingError",
     "StoreError",
+    "Tally",
     "__version__",
     "exact",
     "half_space",
+    "read_mci",
+    "read_results",
+    "simulate",
     "simulate_orders",
+    "write_mco",
+    "write_results",
 ]

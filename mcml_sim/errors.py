@@ -11,3 +11,11 @@ class SettingError(InputError):
 
 class StoreError(RuntimeError):
     """A folder of photon batches that is damaged, foreign, or cannot be written."""
+
+
+class ClusterError(RuntimeError):
+    """A Dask cluster that does not answer, or whose workers would not give the bits of this machine."""
+
+
+class OutputError(RuntimeError):
+    """A file of results that cannot be written."""

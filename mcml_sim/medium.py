@@ -90,6 +90,8 @@ class Medium:
         for number, layer in enumerate(layers[:-1], start=1):
             if math.isinf(layer.thickness):
                 raise InputError(f"thickness may be infinite in the last layer only, got it in layer {number}")
+        if self.is_half_space and not layers[-1].mu_t:
+            raise InputError("an infinitely thick layer must scatter or absorb, got mu_a = mu_s = 0")
 
     @property
     def is_half_space(self) -> bool:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import operator
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim import order_bins, tally, tracer
-from mcml_sim.errors import InputError, SettingError
+from mcml_sim import order_bins, single, tally, tracer
+from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers, require_resolved
+from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid
 from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, roulette_weight
 from mcml_sim.run import run_batches
@@ -21,11 +21,7 @@ from mcml_sim.tally import Counts, Estimate, Ledger
 
 Floats = NDArray[np.float64]
 
-SOLVED = Setting()
-MAX_PHOTONS = 10**13  # weeks on the largest machines; more is a slip of the pen
-# Float32 radii are 1.2e-7 of themselves apart; this much of its photons (1 %) a ring may gain or lose by that.
-NARROWEST_RING = 1e-5
-SHORTEST_RADIUS, LONGEST_RADIUS = 1e-30, 1e30  # well inside the range of float32 [mfp]
+SEARCHLIGHT = Setting()
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,8 +30,9 @@ class Orders:
 
     Every method takes the single-scattering albedo `alpha` in [0, 1], a number or an array, InputError otherwise;
     estimates have the shape of alpha, then that of the rings. All albedos come from the same photons, so their
-    errors are strongly correlated: `covariance_factor` says how. Photons with more than 8192 scatterings are cut:
-    `cut` bounds what that takes from the reflectance.
+    errors are strongly correlated: `covariance_factor` says how. What was scattered once is known exactly and not
+    taken from the photons (`once`), so standard errors and effective samples are those of the rest. Photons with more
+    than 8192 scatterings are cut: `cut` bounds what that takes from the reflectance.
     """
 
     grid: Grid
@@ -47,15 +44,15 @@ class Orders:
 
     def reflectance(self, alpha: ArrayLike) -> Estimate:
         """Total diffuse reflectance A [-], beyond the last ring included."""
-        return self._of_rows(self.counts.exits.sum(axis=0), order_bins.weights(_checked_alpha(alpha)))
+        return self._of_row(self.counts.exits.sum(axis=0), self._shares.sum(), alpha)
 
     def energy(self, alpha: ArrayLike) -> Estimate:
         """Integral of 2 pi r R_d over each ring [-]."""
-        return self._estimate(self.ring_order_counts, order_bins.weights(_checked_alpha(alpha)))
+        return self._estimate(self.ring_order_counts, self._shares[:-1], alpha)
 
     def overflow(self, alpha: ArrayLike) -> Estimate:
         """Reflectance beyond the last ring [-]."""
-        return self._of_rows(self.counts.exits[-1], order_bins.weights(_checked_alpha(alpha)))
+        return self._of_row(self.counts.exits[-1], self._shares[-1], alpha)
 
     def profile(self, alpha: ArrayLike) -> Estimate:
         """Mean of R_d over the area of each ring [1/mfp^2]: not its value at the middle, R_d rises as 1/r to r = 0."""
@@ -63,8 +60,14 @@ class Orders:
 
     def profile_derivative(self, alpha: ArrayLike) -> Estimate:
         """d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
-        weights = order_bins.weight_derivatives(_checked_alpha(alpha))
-        return self._estimate(self.ring_order_counts, weights).scaled(1 / self.grid.r_areas)
+        albedo = _checked_alpha(alpha)
+        weights, ones = order_bins.weight_derivatives(albedo), np.ones_like(albedo)
+        slope = self._from_weights(self.ring_order_counts, weights, np.multiply.outer(ones, self._shares[:-1]))
+        return slope.scaled(1 / self.grid.r_areas)
+
+    def once(self, alpha: ArrayLike) -> Floats:
+        """Light scattered exactly once, by ring, the last beyond the last ring [-]: part of `energy`, without error."""
+        return np.multiply.outer(_checked_alpha(alpha), self._shares)
 
     def covariance_factor(self, alpha: ArrayLike, rank: int = 8, overflow: bool = False) -> tuple[Floats, float]:
         """Covariance of `energy` between albedos, ring by ring, in closed form.
@@ -72,15 +75,15 @@ class Orders:
         alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
         of any one variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
         condition number 1e16), so a small rank holds all there is. Between rings i != j the covariance is
-        -E_i E_j / N, which no factor holds: next to nothing when there are many rings. With `overflow` a last row
-        stands for the light beyond the last ring.
+        -E_i E_j / N, E without `once`, which no factor holds: next to nothing when there are many rings. With
+        `overflow` a last row stands for the light beyond the last ring.
         """
         albedos = np.atleast_1d(_checked_alpha(alpha))
         if albedos.ndim != 1:
             raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
-        limit = _checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
+        limit = checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
         counts = self.counts.exits if overflow else self.ring_order_counts
-        return tally.covariance_factor(counts, order_bins.weights(albedos), self.photons, limit)
+        return tally.covariance_factor(counts[:, 1:], self.weights(albedos)[:, 1:], self.photons, limit)
 
     def merged(self, r_edges: ArrayLike) -> Orders:
         """The same photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
@@ -93,7 +96,7 @@ class Orders:
 
     def cut(self, alpha: ArrayLike) -> float | Floats:
         """Upper bound on the reflectance that ending photons at the highest order took away [-]."""
-        lost = float(roulette_weight(MAX_ORDER)) * self.counts.cut / self.photons
+        lost = self.entered * float(roulette_weight(MAX_ORDER)) * self.counts.cut / self.photons
         return _scalar_or_array(lost * _checked_alpha(alpha) ** MAX_ORDER)
 
     @property
@@ -113,14 +116,30 @@ class Orders:
 
     def weights(self, alpha: ArrayLike) -> Floats:
         """What one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
-        return order_bins.weights(_checked_alpha(alpha))
+        return self.entered * order_bins.weights(_checked_alpha(alpha))
 
-    def _estimate(self, counts: NDArray[np.int64], weights: Floats) -> Estimate:
-        return tally.estimate(counts, weights, self.photons)
+    @property
+    def entered(self) -> float:
+        """Share of the light that the surface lets in [-]; the photons counted are of that."""
+        return single.entered(self.setting)
 
-    def _of_rows(self, counts: NDArray[np.int64], weights: Floats) -> Estimate:
+    @cached_property
+    def _shares(self) -> Floats:
+        """`once` at alpha = 1, (rings + 1,)."""
+        return self.entered * single.ring_shares(self.grid.r_edges, self.setting)
+
+    def _estimate(self, counts: NDArray[np.int64], shares: Floats, alpha: ArrayLike) -> Estimate:
+        albedo = _checked_alpha(alpha)
+        return self._from_weights(counts, order_bins.weights(albedo), np.multiply.outer(albedo, shares))
+
+    def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
+        """Estimate from `exact`, the light scattered once, and the counted photons that were scattered again."""
+        again = tally.estimate(counts[:, 1:], self.entered * weights[..., 1:], self.photons)
+        return replace(again, value=again.value + exact)
+
+    def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
         """Estimate from one row of counts, in the shape of alpha."""
-        rows = self._estimate(counts[None, :], weights)
+        rows = self._estimate(counts[None, :], np.array([share]), alpha)
         parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
         return Estimate(*map(_scalar_or_array, parts))
 
@@ -129,32 +148,42 @@ def simulate_orders(
     grid: Grid,
     photons: int,
     seed: int = 0,
-    setting: Setting = SOLVED,
+    setting: Setting = SEARCHLIGHT,
     store: str | Path | None = None,
     workers: int | None = None,
     progress: bool | None = None,
+    scheduler: str | None = None,
 ) -> Orders:
-    """Simulate a white, index-matched, isotropic half space under a normal pencil beam, resolved by order.
+    """Simulate a white half space, resolved by scattering order.
 
     grid      rings, edges in mean free paths [mfp]
     photons   how many to start, 1 to 1e13
     seed      whole number >= 0; equal seeds start with equal photons
-    setting   only Setting() is solved: SettingError on any other
+    setting   the light and the surface; Setting() and its diffuse twin are the fastest
     store     folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes
     workers   threads, by default one a core; the result does not depend on it
     progress  show a bar on stderr; by default only if that is a terminal
+    scheduler address of a Dask scheduler whose workers trace the batches, instead of threads here
 
-    InputError on other arguments; StoreError if the folder is another run's, damaged, or cannot be written. Ctrl-C
-    stops after the batches in flight, which the store keeps too.
+    InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
+    named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
     """
-    if setting != SOLVED:
-        raise SettingError(f"simulate_orders solves setting {SOLVED} only, got {setting}")
-    _require_resolved(grid)
-    number = _checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
-    key = _checked_whole("seed", seed, lowest=0)
-    threads = None if workers is None else _checked_whole("workers", workers, lowest=1, highest=4096)
-    kept = None if store is None else Store(Path(store), _made_by(grid, key, setting), _shape(grid))
-    counts = run_batches(partial(tracer.trace_batch, grid, key), tracer.BATCH_PHOTONS, number, threads, kept, progress)
+    if not isinstance(setting, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
+    require_resolved(grid)
+    number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
+    key = checked_whole("seed", seed, lowest=0)
+    read = partial(Counts.from_arrays, shape=_shape(grid))
+    kept = None if store is None else Store(Path(store), _made_by(grid, key, setting), read)
+    counts = run_batches(
+        partial(tracer.trace_batch, grid, key, setting=setting),
+        tracer.BATCH_PHOTONS,
+        number,
+        workers=checked_workers(workers),
+        store=kept,
+        progress=progress,
+        scheduler=scheduler,
+    )
     return Orders(grid, number, key, setting, counts)
 
 
@@ -175,37 +204,6 @@ def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
 
 def _shape(grid: Grid) -> tuple[int, int]:
     return grid.rings + 1, len(order_bins.LAST_ORDERS)
-
-
-def _require_resolved(grid: Grid) -> None:
-    """InputError unless `grid` is one, whose rings hold many float32 radii each."""
-    if not isinstance(grid, Grid):
-        raise InputError(f"grid must be a mcml_sim.Grid, got {grid!r}")
-    lower, upper = grid.r_edges[:-1], grid.r_edges[1:]
-    narrow = upper - lower < NARROWEST_RING * upper
-    if np.any(narrow):
-        at = int(np.argmax(narrow))
-        raise InputError(
-            f"grid must have rings wider than {NARROWEST_RING:g} of their radius, which single precision resolves, "
-            f"got one from {float(lower[at])!r} to {float(upper[at])!r}"
-        )
-    if upper[0] < SHORTEST_RADIUS or upper[-1] > LONGEST_RADIUS:
-        raise InputError(
-            f"grid must have edges from {SHORTEST_RADIUS:g} to {LONGEST_RADIUS:g} mean free paths, "
-            f"got {upper[0]:g} to {upper[-1]:g}"
-        )
-
-
-def _checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:
-    """A whole number, 1e6 included."""
-    accepted = f"a whole number >= {lowest}" + (f" and <= {highest:g}" if highest else "")
-    try:
-        whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
-    except TypeError:
-        raise InputError(f"{name} must be {accepted}, got {number!r}") from None
-    if isinstance(number, bool) or whole < lowest or (highest is not None and whole > highest):
-        raise InputError(f"{name} must be {accepted}, got {number!r}")
-    return whole
 
 
 def _checked_alpha(alpha: ArrayLike) -> Floats:

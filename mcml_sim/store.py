@@ -1,77 +1,97 @@
 """A folder of finished photon batches, from which an interrupted or enlarged run goes on.
 
-run.json says what made the batches; batch-000000.npz, ... hold one each: only the counts that are not 0, and the
-digest of run.json's contents. A file is written under another name and renamed, so it is whole or absent.
+run.json says what made the batches; batch-00000000.npz, ... hold one each: the arrays of its result and the digest of
+run.json's contents, sealed with a digest of the whole file. A file is written under another name and renamed, so it is
+whole or absent; should the disk damage it later, the seal tells.
 """
 
 from __future__ import annotations
 
 import contextlib
+import functools
 import hashlib
+import io
 import json
 import os
 import platform
 import time
-import zipfile
-import zlib
-from collections.abc import Callable
+import warnings
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import IO
+from typing import Generic, Protocol, Self, TypeVar
 
 import jax
 import jaxlib.version
 import numpy as np
+from numpy.typing import NDArray
 
 from mcml_sim.errors import StoreError
-from mcml_sim.tally import Counts
 from mcml_sim.version import __version__
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
-# What numpy and zip raise at a file that is not what was written.
-DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+SEAL_BYTES = 64  # SHA-256 in hexadecimal
 
 
-class Store:
+class DamagedBatch(UserWarning):
+    """A batch in a store is not what was written there; it is traced again."""
+
+
+class Result(Protocol):
+    """What a batch gives: sums over photons, which add."""
+
+    @property
+    def started(self) -> int:
+        """Photons."""
+
+    def __add__(self, other: Self, /) -> Self: ...
+
+    def arrays(self) -> dict[str, NDArray]:
+        """All of it, by name; `made_by` is no name."""
+
+
+R = TypeVar("R", bound=Result)
+
+
+class Store(Generic[R]):
     """The batches in one folder, made by one kind of run.
 
     made_by  what the run is, JSON values; version, jaxlib, device and kind of CPU are added, since they decide bits
-    shape    shape of the counts (rows, bins)
+    read     makes a result of what its `arrays` gave; ValueError if they are not one
 
     StoreError names the file or folder, what is wrong, and what to do.
     """
 
-    def __init__(self, folder: Path, made_by: dict[str, object], shape: tuple[int, int]) -> None:
+    def __init__(self, folder: Path, made_by: dict[str, object], read: Callable[[Mapping[str, NDArray]], R]) -> None:
         self.folder = folder
-        self._made_by = {**made_by, **_maker()}
+        self._made_by = {**made_by, **maker()}
         self._digest = _digest(self._made_by)
-        self._shape = shape
+        self._read = read
         self._open()
 
-    def load(self, batch: int) -> Counts | None:
-        """The batch as far as it was traced, or None."""
+    def load(self, batch: int) -> R | None:
+        """The batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
         path = self._path(batch)
         try:
-            with path.open("rb") as file, np.load(file, allow_pickle=False) as fields:
-                return self._counts(path, dict(fields))
+            fields = _unsealed(path.read_bytes())
+            if str(fields.pop("made_by")) != self._digest:
+                raise StoreError(f"{path} was made by another run; delete it to redo just that batch")
+            return self._read(fields)
         except FileNotFoundError:
             return None
-        except DAMAGED as error:
-            raise StoreError(f"{path} is damaged ({_reason(error)}); delete it to redo just that batch") from None
+        except (OSError, ValueError) as error:
+            text = f"{path} is damaged ({_reason(error)}); just that batch is traced again"
+            warnings.warn(text, DamagedBatch, stacklevel=2)
+            return None
 
-    def save(self, batch: int, counts: Counts) -> None:
+    def save(self, batch: int, result: R) -> None:
         """Keep a batch, whole or not at all."""
-        (cells,) = np.nonzero(counts.exits.ravel())
-        exits = counts.exits.ravel()[cells]
-        rest = np.array([counts.rouletted, counts.cut, counts.started], np.int64)
-        self._write(
-            self._path(batch),
-            lambda file: np.savez_compressed(file, made_by=np.array(self._digest), cells=cells, exits=exits, rest=rest),
-        )
+        self._write(self._path(batch), _sealed({"made_by": np.array(self._digest), **result.arrays()}))
 
     def _path(self, batch: int) -> Path:
-        return self.folder / f"batch-{batch:06d}.npz"
+        # 1e13 photons in batches of 2^17 are 8 digits of batches: names sort as their numbers do.
+        return self.folder / f"batch-{batch:08d}.npz"
 
     def _open(self) -> None:
         try:
@@ -82,8 +102,7 @@ class Store:
         path = self.folder / MANIFEST
         found = _read_manifest(path)
         if found is None:
-            text = json.dumps(self._made_by, indent=1).encode()
-            self._write(path, lambda file: file.write(text))
+            self._write(path, json.dumps(self._made_by, indent=1).encode())
             return
         for name in sorted(self._made_by.keys() | found.keys()):
             if found.get(name) != self._made_by.get(name):
@@ -98,29 +117,40 @@ class Store:
                 if time.time() - leftover.stat().st_mtime > STALE_AFTER:
                     leftover.unlink()
 
-    def _counts(self, path: Path, fields: dict[str, np.ndarray]) -> Counts:
-        if str(fields["made_by"]) != self._digest:
-            raise StoreError(f"{path} was made by another run; delete it to redo just that batch")
-        exits = np.zeros(self._shape, np.int64)
-        exits.ravel()[fields["cells"]] = fields["exits"]
-        rouletted, cut, started = map(int, fields["rest"])
-        counts = Counts(exits, rouletted, cut, started)
-        if not counts.is_closed:
-            raise ValueError("its photons do not add up")
-        return counts
-
-    def _write(self, path: Path, write: Callable[[IO[bytes]], object]) -> None:
+    def _write(self, path: Path, data: bytes) -> None:
         part = path.with_name(f"{path.name}.{os.getpid()}.part")
         try:
             with part.open("wb") as file:
-                write(file)
+                file.write(data)
                 file.flush()
                 os.fsync(file.fileno())
             os.replace(part, path)
         except OSError as error:
-            raise StoreError(f"cannot write to store {self.folder}: {_reason(error)}") from error
+            raise StoreError(
+                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, the same run resumes"
+            ) from error
         finally:
             _remove(part)
+
+
+def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
+    """An .npz file whose last bytes, a zip file's comment, are the digest of all the others."""
+    file = io.BytesIO()
+    np.savez_compressed(file, allow_pickle=False, **arrays)
+    body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
+    return body + _seal(body)
+
+
+def _unsealed(data: bytes) -> dict[str, NDArray]:
+    """The arrays of a sealed file; ValueError if a bit of it has changed."""
+    if data[-SEAL_BYTES:] != _seal(data[:-SEAL_BYTES]):
+        raise ValueError("its bytes are not those that were written")
+    with np.load(io.BytesIO(data), allow_pickle=False) as fields:
+        return dict(fields)
+
+
+def _seal(body: bytes) -> bytes:
+    return hashlib.sha256(body).hexdigest().encode()
 
 
 def _read_manifest(path: Path) -> dict[str, object] | None:
@@ -140,15 +170,17 @@ def _remove(part: Path) -> None:
         part.unlink()
 
 
-def _maker() -> dict[str, object]:
+def maker() -> dict[str, object]:
+    """What decides the bits of a batch besides the run itself: equal makers give equal bits."""
     return {
         "mcml_sim": __version__,
         "jaxlib": jaxlib.version.__version__,
-        "device": jax.default_backend(),
+        "device": jax.devices()[0].device_kind,
         "cpu": cpu_class(),
     }
 
 
+@functools.cache
 def cpu_class() -> str:
     """Machine and the instruction sets that change how floats round: equal classes give equal bits."""
     try:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import cast
 
@@ -73,6 +74,26 @@ class Counts:
             self.cut + other.cut,
             self.started + other.started,
         )
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Everything, by name, as a store keeps it: of `exits`, which is mostly 0, only the other cells."""
+        cells = np.flatnonzero(self.exits)
+        rest = np.array([self.rouletted, self.cut, self.started], np.int64)
+        return {"cells": cells, "exits": self.exits.ravel()[cells], "rest": rest}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray], shape: tuple[int, int]) -> Counts:
+        """What `arrays` gave, `shape` being that of `exits`; ValueError if it is not that."""
+        try:
+            exits = np.zeros(shape, np.int64)
+            exits.ravel()[arrays["cells"]] = arrays["exits"]
+            rouletted, cut, started = map(int, arrays["rest"])
+        except (LookupError, TypeError) as error:
+            raise ValueError(f"these are no counts of shape {shape}: {error}") from None
+        counts = cls(exits, rouletted, cut, started)
+        if not counts.is_closed:
+            raise ValueError("its photons do not add up")
+        return counts
 
     @property
     def ledger(self) -> Ledger:

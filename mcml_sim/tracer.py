@@ -1,9 +1,6 @@
-"""One numbered batch of photons on one device, from the beam to the last exit.
+"""One numbered batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
 
-A pool of lanes is kept full: after a few events each lane whose photon has ended writes how it ended to that
-photon's own place and takes the next photon. When none is left to start, the pool is drained through ever smaller
-pools, so no photon is dropped and the last long path does not occupy thousands of lanes. Since random words belong to
-(photon, event), and results to photons, the number of lanes does not change a bit of the answer.
+Since random words belong to (photon, event), and ends to photons, the number of lanes does not change a bit.
 """
 
 from __future__ import annotations
@@ -17,16 +14,15 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from mcml_sim import order_bins, rng
+from mcml_sim import isotropic, order_bins, pool, rng, white
 from mcml_sim.grid import Grid
-from mcml_sim.isotropic import INSIDE, MAX_ORDER, OUT, Lanes, enter, scatter
+from mcml_sim.isotropic import DOUBLINGS, MAX_ORDER, Lanes
+from mcml_sim.pool import BATCH_PHOTONS, LANES
+from mcml_sim.setting import Setting
 from mcml_sim.tally import Counts
 
-BATCH_PHOTONS = 2**20
-# Measured on a 2-core AVX-512 machine; from 2048 to 8192 lanes and 8 to 14 events it is the same within 3 %.
-LANES = 4096
-EVENTS_PER_TURN = 12
-DRAIN_POOLS = (8, 64)  # the pool shrinks to 1/8, then 1/64 of its lanes
+MATCHED = Setting()
+EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 
 ROULETTED, CUT = len(order_bins.LAST_ORDERS), len(order_bins.LAST_ORDERS) + 1
 COLUMNS = CUT + 1
@@ -41,9 +37,19 @@ class Ends(NamedTuple):
     """After n scatterings, int32: n out of the surface, -n inside (roulette, or cut at MAX_ORDER), 0 never started."""
 
 
-def trace_batch(grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES) -> Counts:
-    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 2048."""
-    ends = trace(jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), lanes)
+def trace_batch(
+    grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES, setting: Setting = MATCHED
+) -> Counts:
+    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64.
+
+    Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
+    kernel is the one that needs no directions.
+    """
+    key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(DOUBLINGS)
+    if setting.is_matched_isotropic:
+        ends = trace(key, number, stops, None, lanes, illumination=setting.illumination)
+    else:
+        ends = trace(key, number, stops, white.half_space(setting), lanes)
     histogram = np.asarray(_histogram(ends, jnp.asarray(single_edges(grid)), jnp.asarray(_columns()))).astype(np.int64)
     counts = Counts(
         exits=histogram[:, :ROULETTED],
@@ -55,76 +61,67 @@ def trace_batch(grid: Grid, seed: int, batch: int, photons: int, lanes: int = LA
     return counts
 
 
-@partial(jax.jit, static_argnames="lanes")
-def trace(key: Array, photons: Array, lanes: int = LANES) -> Ends:
-    """The ends of the first `photons` (int32) photons of the batch with this key (uint32[4])."""
-    ends = Ends(jnp.zeros(BATCH_PHOTONS, jnp.float32), jnp.zeros(BATCH_PHOTONS, jnp.int32))
+@partial(jax.jit, static_argnames=("lanes", "events", "illumination"), compiler_options=pool.COMPILER_OPTIONS)
+def trace(
+    key: Array,
+    photons: Array,
+    stops: Array,
+    where: white.HalfSpace | None = None,
+    lanes: int = LANES,
+    events: int = EVENTS_PER_TURN,
+    illumination: str = "searchlight",
+) -> Ends:
+    """The ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
 
-    def turn(state: tuple[Lanes, Array, Ends]) -> tuple[Lanes, Array, Ends]:
-        pool, started, ends = state
-        pool = _events(key, pool)
-        ends = _record(ends, pool)
-        return *_refill(key, photons, pool, started), ends
+    `where` is the half space and its light, by default matched and isotropic under this `illumination`. `stops` as in
+    `isotropic.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide nothing
+    but the speed.
+    """
 
-    first = *_refill(key, photons, _idle(lanes), jnp.int32(0)), ends
-    pool, _, ends = lax.while_loop(lambda state: state[1] < photons, turn, first)
-    return _drain(key, pool, ends)
+    def enter(photon: Array) -> Lanes | white.Lanes:
+        if where is None:
+            return isotropic.enter(key, photon, stops, illumination)
+        return white.enter(key, photon, stops, where)
+
+    def turn(flying: Lanes | white.Lanes, ends: Array) -> tuple[Lanes | white.Lanes, Array]:
+        if isinstance(flying, Lanes):
+            flying = isotropic.fly(key, flying, events)
+        elif where is not None:
+            flying = white.fly(key, flying, events, where)
+        return flying, recorded(ends, flying)
+
+    return as_ends(pool.follow(enter, turn, no_ends(), photons, lanes))
 
 
 def single_edges(grid: Grid) -> NDArray[np.float32]:
     """Edges rounded up to float32: a float32 radius is in the same ring by these as by the float64 ones."""
-    edges = grid.r_edges.astype(np.float32)
-    return np.where(edges < grid.r_edges, np.nextafter(edges, np.float32(np.inf)), edges)
+    return rounded_up(grid.r_edges)
 
 
-def _idle(lanes: int) -> Lanes:
-    """Lanes without a photon: their photon number is outside the batch, so what they record is dropped."""
-    return Lanes(
-        jnp.full(lanes, OUT * 1j, jnp.complex64),
-        jnp.zeros(lanes, jnp.int32),
-        jnp.full(lanes, BATCH_PHOTONS, jnp.uint32),
-    )
+def rounded_up(values: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The smallest float32 that are not below these."""
+    nearest = values.astype(np.float32)
+    return np.where(nearest < values, np.nextafter(nearest, np.float32(np.inf)), nearest)
 
 
-def _events(key: Array, pool: Lanes) -> Lanes:
-    return lax.fori_loop(0, EVENTS_PER_TURN, lambda _, lanes: scatter(key, lanes), pool)
+def no_ends() -> Array:
+    """rho + i order of photons that were never started, and of nobody at last, complex64 (BATCH_PHOTONS + 1,)."""
+    return jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64)
 
 
-def _record(ends: Ends, pool: Lanes) -> Ends:
-    """Write the lanes that ended to their photons' places; writing one twice changes nothing."""
-    place = jnp.where(pool.ended, pool.photon.astype(jnp.int32), BATCH_PHOTONS)
-    order = jnp.where(pool.place.imag == INSIDE, -pool.order, pool.order)
-    return Ends(ends.rho.at[place].set(pool.place.real, mode="drop"), ends.order.at[place].set(order, mode="drop"))
+def as_ends(ends: Array) -> Ends:
+    """The parts of rho + i order of all photons."""
+    return Ends(ends.real[:-1], ends.imag[:-1].astype(jnp.int32))
 
 
-def _refill(key: Array, photons: Array, pool: Lanes, started: Array) -> tuple[Lanes, Array]:
-    """Give each ended lane the next photon, in the order of lanes, while there are any."""
-    rank = jnp.cumsum(pool.ended, dtype=jnp.int32)
-    photon = started + rank - 1
-    fresh = enter(key, photon.astype(jnp.uint32))
-    takes = pool.ended & (photon < photons)
-    pool = Lanes(*(jnp.where(takes, new, old) for new, old in zip(fresh, pool, strict=True)))
-    return pool, jnp.minimum(started + rank[-1], photons)
+def recorded(ends: Array, lanes: Lanes | white.Lanes) -> Array:
+    """Write the lanes that ended to their photons' places, rho + i order.
 
-
-def _drain(key: Array, pool: Lanes, ends: Ends) -> Ends:
-    """Follow the photons still in flight to their ends, in ever smaller pools."""
-    lanes = len(pool.order)
-    for smaller in (*(lanes // shrink for shrink in DRAIN_POOLS), 0):
-        pool = lax.while_loop(lambda p, n=smaller: _alive(p) > n, lambda p: _events(key, p), pool)  # type: ignore[misc]
-        ends = _record(ends, pool)
-        pool = _shrunk(pool, smaller)
-    return ends
-
-
-def _alive(pool: Lanes) -> Array:
-    return jnp.sum(~pool.ended, dtype=jnp.int32)
-
-
-def _shrunk(pool: Lanes, lanes: int) -> Lanes:
-    """The photons in flight, moved to fewer lanes."""
-    (places,) = jnp.nonzero(~pool.ended, size=lanes, fill_value=len(pool.order))
-    return Lanes(*(jnp.append(a, idle)[places] for a, idle in zip(pool, _idle(1), strict=True)))
+    The others write too, beyond the last photon: a branch that no processor can foresee costs more.
+    """
+    place = jnp.where(lanes.ended, lanes.photon.astype(jnp.int32), BATCH_PHOTONS)
+    order = jnp.where(lanes.stopped, -lanes.order, lanes.order)
+    return ends.at[place].set(lax.complex(lanes.place.real, order.astype(jnp.float32)), mode="promise_in_bounds")
 
 
 @jax.jit

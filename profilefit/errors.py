@@ -1,6 +1,6 @@
 """What can go wrong in fitting, by name. Every message says what was wrong, what was got and what is accepted."""
 
-from mcml_sim.errors import InputError, SettingError, StoreError
+from mcml_sim.errors import InputError, OutputError, SettingError, StoreError
 
 __all__ = ["InputError", "OutputError", "RecipeError", "RecordError", "SettingError", "StoreError"]
 
@@ -11,7 +11,3 @@ class RecipeError(InputError):
 
 class RecordError(InputError):
     """A record that is missing, malformed or belongs to something else."""
-
-
-class OutputError(RuntimeError):
-    """A folder or file that cannot be written."""

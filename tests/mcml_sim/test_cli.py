@@ -1,0 +1,362 @@
+"""mcml-sim as a user meets it: what it writes and prints, what it refuses, and in how many lines."""
+
+import os
+import re
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcml_sim import cli, layered
+from mcml_sim.mcml_files import read_mci
+from mcml_sim.results import read_results
+from mcml_sim.simulation import Precision, simulate
+from mcml_sim.version import __version__
+
+# One layer and one grid for all tests: the tracer is compiled once.
+RUN = """{name} A
+{photons}
+0.01 0.02
+4 5 3
+1
+1.0
+1.4 {mu_a} 90 0.5 0.05
+1.0
+"""
+
+
+def runs(*rows: tuple[str, int, float]) -> str:
+    text = "".join(RUN.format(name=name, photons=photons, mu_a=mu_a) for name, photons, mu_a in rows)
+    return f"1.0 # version\n{len(rows)} # runs\n\n{text}"
+
+
+@pytest.fixture
+def command(monkeypatch, capsys, tmp_path):
+    """Run `mcml-sim WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words: object) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["mcml-sim", *map(str, words)])
+        with pytest.raises(SystemExit) as stop:
+            cli.main()
+        printed = capsys.readouterr()
+        return int(stop.value.code or 0), printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def mci(tmp_path) -> Path:
+    path = tmp_path / "two.mci"
+    path.write_text(runs(("first.mco", 2000, 10), ("second.mco", 3000, 20)))
+    return path
+
+
+def totals(path: Path) -> list[float]:
+    """The four numbers below RAT in an .mco file."""
+    lines = path.read_text().partition("\nRAT ")[2].split("\n")[1:5]
+    return [float(line.split()[0]) for line in lines]
+
+
+def names(folder: Path = Path()) -> set[str]:
+    return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
+
+
+def test_runs_everything_and_tells_it_with_errors(command, mci):
+    status, out, err = command("run", mci)
+    assert (status, err) == (0, "")
+    assert names() == {"two.mci", "first.mco", "first.npz", "second.mco", "second.npz"}
+    told = out.split("run 2 of 2: second.mco")
+    assert told[0].startswith("run 1 of 2: first.mco\n  2000 photons, seed 0, ")
+    for text, name, run in zip(told, ("first", "second"), read_mci(mci), strict=True):
+        assert re.search(r", [0-9.]+ s, [0-9.e-]+ M photons/s\n", text)
+        kept = read_results(f"{name}.npz")
+        assert (kept.medium, kept.grid, kept.photons, kept.seed) == (run.medium, run.grid, run.photons, 0)
+        rows = ("specular_reflectance", "diffuse_reflectance", "absorbed", "transmittance")
+        np.testing.assert_allclose(totals(Path(f"{name}.mco")), [kept.estimates[row].value for row in rows], rtol=1e-5)
+        for title, row in {
+            "diffuse reflectance": "diffuse_reflectance",
+            "absorbed fraction": "absorbed",
+            "transmittance": "transmittance",
+            "of it ballistic": "ballistic_transmittance",
+            "all of these": "energy",
+        }.items():
+            found = re.search(rf"\n +{title} +([0-9.]+) ± ([0-9.]+)\n", text)
+            estimate = kept.estimates[row]
+            assert float(found[1]) == pytest.approx(estimate.value, abs=0.1 * estimate.standard_error), title
+            assert float(found[2]) == pytest.approx(estimate.standard_error, rel=0.06), title
+        assert re.search(r"\n  specular reflectance +0.0277778\n", text)
+
+
+def test_photons_seed_and_folder_are_the_users(command, mci):
+    for out, seed in (("a", 3), ("b", 3), ("c", 4)):
+        assert command("run", mci, "--photons", 1000, "--seed", seed, "--out", out, "--workers", 1)[0] == 0
+    assert names() == {"two.mci"} | {
+        f"{out}/{n}.{end}" for out in "abc" for n in ("first", "second") for end in ("mco", "npz")
+    }
+    for name in ("first.mco", "second.npz"):
+        a, b, c = (Path(out, name).read_bytes() for out in "abc")
+        assert a == b
+        assert a != c
+    assert read_results("a/first.npz").photons == 1000
+
+
+def test_what_was_there_is_replaced(command, mci):
+    Path("first.mco").write_text("old")
+    Path("first.npz").write_text("old")
+    assert command("run", mci)[0] == 0
+    assert totals(Path("first.mco"))[0] == pytest.approx(0.0277778)
+    assert read_results("first.npz").photons == 2000
+
+
+def test_an_interrupted_command_resumes(command, mci, monkeypatch):
+    """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
+    photons = 2 * layered.BATCH_PHOTONS + 77
+    words = ("run", mci, "--photons", photons)
+    assert command(*words, "--out", "at-once")[0] == 0
+    traced = []
+    trace = layered.trace_batch
+
+    def interrupted(medium, grid, seed, batch, photons):
+        if len(traced) == 4:
+            raise KeyboardInterrupt
+        traced.append(batch)
+        return trace(medium, grid, seed, batch, photons)
+
+    monkeypatch.setattr(layered, "trace_batch", interrupted)
+    status, _, err = command(*words, "--workers", 1)
+    assert status == 130
+    assert err == "mcml-sim: stopped; the finished batches are kept, the same command with --resume goes on\n"
+    kept = {"first.mco", "first.npz", "second.photons/run.json", "second.photons/batch-00000000.npz"}
+    assert {name for name in names() if not name.startswith("at-once")} == kept | {"two.mci"}
+
+    status, _, err = command(*words)
+    assert status == 2
+    assert err == (
+        "mcml-sim: second.photons holds photons of a run that was not finished: --resume goes on with them, "
+        "or delete that folder\n"
+    )
+
+    monkeypatch.setattr(layered, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
+    status, out, err = command(*words, "--resume")
+    assert (status, err) == (0, "")
+    assert sorted(traced) == [0, 0, 1, 1, 2, 2]
+    assert re.search(rf"run 1 of 2: first.mco\n  {photons} photons, seed 0, finished before\n  specular", out)
+    assert re.search(rf"run 2 of 2: second.mco\n  {photons} photons, seed 0, [0-9.]+ s, resumed\n  specular", out)
+    for name in ("first.mco", "first.npz", "second.mco", "second.npz"):
+        assert Path(name).read_bytes() == Path("at-once", name).read_bytes()
+    assert not list(Path().rglob("*.photons"))
+
+
+@pytest.mark.parametrize("words", [("--seed", 1), ("--photons", 2001)])
+def test_another_run_is_not_taken_for_finished(command, mci, words):
+    assert command("run", mci)[0] == 0
+    assert "finished before" not in command("run", mci, "--resume", *words)[1]
+    assert "finished before" in command("run", mci, "--resume", *words)[1]
+
+
+def test_batches_of_another_run_are_not_mixed_in(command, mci):
+    words = ("run", mci, "--precision", 1e-4, "--resume")
+    assert command(*words)[0] == 0
+    status, _, err = command(*words, "--seed", 5)
+    assert status == 2
+    assert err == "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; use another folder\n"
+
+
+def test_more_photons_or_more_repeats(command, mci):
+    """Not reached: it says how many photons would, and they do, on top of those at hand."""
+    mci.write_text(runs(("one.mco", 20_000, 10)))
+    status, out, _ = command("run", mci, "--precision", 2e-3, "--quantity", "absorbed")
+    assert status == 0
+    found = re.search(
+        r"absorbed: relative standard error ([0-9.e-]+), not 0.002; about ([0-9.e+]+) photons in all", out
+    )
+    kept = read_results("one.npz").estimates["absorbed"]
+    assert float(found[1]) == pytest.approx(kept.standard_error / kept.value, rel=0.05)
+    assert float(found[2]) == pytest.approx(20_000 * (kept.standard_error / kept.value / 2e-3) ** 2, rel=0.05)
+    assert "k runs of N photons with k seeds are worth one run of k N" in out
+    assert Path("one.photons").is_dir()
+    words = ("--precision", 2e-3, "--quantity", "absorbed", "--resume")
+    status, out, _ = command("run", mci, "--photons", int(1.1 * float(found[2])), *words)
+    assert status == 0
+    assert "absorbed: relative standard error 0.002 reached" in out
+    assert not Path("one.photons").exists()
+
+
+def test_precision_stops_early_on_the_schedule(command, mci):
+    mci.write_text(runs(("one.mco", 10**9, 10)))
+    status, out, _ = command("run", mci, "--precision", 0.01)
+    assert status == 0
+    assert f"\n  {8 * layered.BATCH_PHOTONS} photons, " in out
+    assert "diffuse_reflectance: relative standard error 0.01 reached" in out
+    assert Precision(0.01).is_reached(read_results("one.npz").estimates["diffuse_reflectance"])
+
+
+def test_a_quantity_without_light_has_no_answer(command, mci):
+    mci.write_text(runs(("one.mco", 2000, 1000)))  # e^-54 gets through
+    status, out, _ = command("run", mci, "--precision", 0.01, "--quantity", "ballistic_transmittance")
+    assert status == 0
+    assert "ballistic_transmittance: 0.01 not reached; some bins saw too little light to tell what would" in out
+
+
+@pytest.mark.filterwarnings("default")  # as outside of the tests
+def test_a_damaged_batch_is_named_and_done_again(command, mci):
+    words = ("run", mci, "--precision", 1e-4)
+    assert command(*words)[0] == 0
+    first = Path("first.mco").read_bytes()
+    batch = Path("first.photons/batch-00000000.npz")
+    batch.write_bytes(batch.read_bytes()[:-1])
+    Path("first.npz").unlink()
+    status, _, err = command(*words, "--resume")
+    assert status == 0
+    assert re.fullmatch(
+        r"mcml-sim: first.photons/batch-00000000.npz is damaged .*; just that batch is traced again\n", err
+    )
+    assert Path("first.mco").read_bytes() == first
+
+
+@pytest.mark.parametrize(
+    ("end", "told"),
+    [
+        ("mco", "cannot write first.mco: No space left on device"),
+        ("npz", "cannot write first.npz: No space left on device"),
+        ("photons", "cannot write to store first.photons: No space left on device; what it holds is whole, .*"),
+    ],
+)
+def test_a_full_disk_is_one_line_and_nothing_half_written(command, mci, monkeypatch, end, told):
+    mci.write_text(runs(("first.mco", 2000, 10)))
+    sync = os.fsync
+
+    def full(file):
+        if f"first.{end}" in os.readlink(f"/proc/self/fd/{file}"):
+            raise OSError(28, "No space left on device")
+        sync(file)
+
+    monkeypatch.setattr(os, "fsync", full)
+    status, _, err = command("run", mci)
+    assert status == 2
+    assert re.fullmatch(f"mcml-sim: {told}\n", err)
+    assert not [name for name in names() if name.endswith(".part")]
+    assert f"first.{end}" not in names()
+    monkeypatch.undo()
+    assert command("run", mci.resolve(), "--out", mci.parent, "--resume")[0] == 0
+    assert read_results(mci.parent / "first.npz").photons == 2000
+
+
+def lines_of(run: str) -> str:
+    return f"1.0\n1\n{run}"
+
+
+@pytest.mark.parametrize(
+    ("content", "words", "said"),
+    [
+        (None, ("run",), "Missing argument 'file'. .*"),
+        (None, ("run", "none.mci"), "none.mci: expected a file that can be read, got: No such file or directory"),
+        (None, ("run", "two.mci", "--nonsense"), "No such option: --nonsense .*"),
+        (None, ("run", "two.mci", "--photons", "many"), "Invalid value for '--photons': .*"),
+        (None, ("run", "two.mci", "--photons", "0"), "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
+        (None, ("run", "two.mci", "--seed", "-1"), "seed must be a whole number >= 0, got -1"),
+        (None, ("run", "two.mci", "--workers", "0"), "workers must be a whole number >= 1 and <= 4096, got 0"),
+        (
+            None,
+            ("run", "two.mci", "--precision", "2"),
+            r"precision must be a relative standard error in \(0, 1\), got 2.0",
+        ),
+        (None, ("run", "two.mci", "--precision", "nan"), "precision must be .*, got nan"),
+        (
+            None,
+            ("run", "two.mci", "--quantity", "absorbed"),
+            "quantity is what --precision looks at, got 'absorbed' .*",
+        ),
+        (
+            None,
+            ("run", "two.mci", "--precision", "0.1", "--quantity", "colour"),
+            "quantity must be one of specular_reflectance, .*, got 'colour'",
+        ),
+        (None, ("walk", "two.mci"), "No such command 'walk'. .*"),
+        (None, ("run", "two.mci", "--out", "two.mci"), "cannot write into two.mci: .*"),
+        (
+            None,
+            ("run", "two.mci", "--out", "a/folder"),
+            "cannot write a/folder/first.mco: it is there already, and no file",
+        ),
+        (lines_of("x.mco A\nten\n"), ("run", "two.mci"), "two.mci:4: expected the number of photons, .*, got 'ten'"),
+        (
+            runs(("two.mci", 9, 1)),
+            ("run", "two.mci"),
+            "cannot write two.mci for two.mci: it belongs to the input file .*",
+        ),
+        (
+            runs(("x.mco", 9, 1), ("x", 9, 1)),
+            ("run", "two.mci"),
+            "cannot write x.npz for x: it belongs to x.mco",
+        ),
+        (
+            runs(("../x.mco", 9, 1)),
+            ("run", "two.mci", "--out", "o"),
+            "output files must stay inside --out o, got ../x.mco",
+        ),
+        (runs(("/dev/null", 9, 1)), ("run", "two.mci"), "cannot write /dev/null: it is there already, and no file"),
+    ],
+)
+def test_what_a_user_can_mend_is_one_line(command, mci, content, words, said):
+    Path("a/folder/first.mco").mkdir(parents=True)
+    before = names()
+    if content is not None:
+        mci.write_text(content)
+    status, out, err = command(*words)
+    assert (status, out) == (2, "")
+    assert re.fullmatch(f"mcml-sim: {said}\n", err), err
+    assert names() == before, "nothing was written"
+
+
+def test_a_scheduler_is_passed_on(command, mci, monkeypatch):
+    given = []
+
+    def here(*what, scheduler, **options):
+        given.append(scheduler)
+        return simulate(*what, **options)
+
+    monkeypatch.setattr(cli, "simulate", here)
+    assert command("run", mci, "--scheduler", "tcp://10.0.0.1:8786")[0] == 0
+    assert given == ["tcp://10.0.0.1:8786"] * 2
+
+
+def test_version_and_help(command):
+    assert command("--version") == (0, f"mcml-sim {__version__}\n", "")
+    status, out, _ = command("run", "--help")
+    assert status == 0
+    assert "--precision" in out
+    assert command()[0] == 2
+
+
+def start(*words: object, cwd: Path, **streams) -> subprocess.Popen:
+    """The command in a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
+    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    code += "runpy.run_module('mcml_sim', run_name='__main__', alter_sys=True)"
+    return subprocess.Popen([sys.executable, "-c", code, *map(str, words)], cwd=cwd, text=True, **streams)
+
+
+def test_control_c_is_one_line(mci, tmp_path):
+    with start("run", mci, "--photons", 10**12, cwd=tmp_path, stdout=-1, stderr=-1) as run:
+        end = time.monotonic() + 120
+        while not list(tmp_path.glob("first.photons/batch*")) and run.poll() is None and time.monotonic() < end:
+            time.sleep(0.1)
+        run.send_signal(signal.SIGINT)
+        try:
+            out, err = run.communicate(timeout=120)
+        finally:
+            run.kill()
+    assert run.returncode == 130, err
+    assert err == "mcml-sim: stopped; the finished batches are kept, the same command with --resume goes on\n"
+    assert out == "run 1 of 2: first.mco\n"
+
+
+def test_a_full_disk_under_what_is_printed_is_one_line(tmp_path):
+    with open("/dev/full", "w") as full, start("--version", cwd=tmp_path, stdout=full, stderr=-1) as run:
+        _, err = run.communicate(timeout=120)
+    assert (run.returncode, err) == (2, "mcml-sim: cannot print: No space left on device\n")

@@ -1,0 +1,182 @@
+"""Batches on a Dask cluster of worker processes: the bits of one process, whoever dies."""
+
+import os
+import signal
+import socket
+import sys
+import threading
+from functools import partial
+
+import distributed
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, InputError, cluster, tracer
+from mcml_sim.errors import ClusterError
+from mcml_sim.run import run_batches
+from mcml_sim.store import Store
+from mcml_sim.tally import Counts
+
+GRID = Grid(0.5, 8)
+BATCH, BATCHES = 1000, 24
+TRACE = partial(tracer.trace_batch, GRID, 9)
+
+
+@pytest.fixture(scope="module")
+def workers():
+    """Two worker processes of one thread each, under nannies that restart them."""
+    with distributed.LocalCluster(
+        "127.0.0.1:0", n_workers=2, threads_per_worker=1, processes=True, dashboard_address=":0", silence_logs=50
+    ) as started:
+        yield started
+
+
+@pytest.fixture(scope="module")
+def alone():
+    return run_batches(TRACE, BATCH, BATCH * BATCHES, workers=1)
+
+
+def equal(a, b):
+    return np.array_equal(a.exits, b.exits) and a.ledger == b.ledger
+
+
+def pids(workers):
+    with distributed.Client(workers.scheduler_address, set_as_default=False) as client:
+        return set(client.run(os.getpid).values())
+
+
+def test_two_processes_give_the_bits_of_one(workers, alone):
+    assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
+
+
+def test_a_worker_killed_in_the_middle_changes_no_bit(workers, alone, tmp_path):
+    victims = pids(workers)
+    victim = min(victims)
+    saved = []
+
+    class Killing(Store):
+        """With 4 of 24 batches saved, and 8 under way, one of the two workers gets SIGKILL."""
+
+        def save(self, batch, result):
+            super().save(batch, result)
+            saved.append(batch)
+            if len(saved) == 4:
+                os.kill(victim, signal.SIGKILL)
+
+    store = Killing(tmp_path, {}, partial(Counts.from_arrays, shape=alone.exits.shape))
+    total = run_batches(TRACE, BATCH, BATCH * BATCHES, store=store, scheduler=workers.scheduler_address)
+    assert equal(total, alone)
+    assert sorted(saved) == list(range(BATCHES)), "saved here, each once"
+    assert victim not in pids(workers), "else nobody died"
+
+
+def test_a_worker_that_would_give_other_bits_is_refused_by_name(workers, monkeypatch):
+    real = cluster.maker()
+    monkeypatch.setattr(cluster, "maker", lambda: real | {"jaxlib": "0.0.1"})
+    with pytest.raises(ClusterError, match=r"worker tcp://127.* would give other bits: jaxlib is .* there, 0.0.1 here"):
+        run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
+
+
+def test_an_error_on_a_worker_rises_here(workers):
+    with pytest.raises(TypeError, match="trace_batch"):
+        run_batches(partial(tracer.trace_batch, nonsense=1), BATCH, BATCH, scheduler=workers.scheduler_address)
+
+
+def test_a_batch_that_kills_its_workers_is_given_up_by_name(workers, monkeypatch):
+    monkeypatch.setattr(workers.scheduler, "allowed_failures", 0)
+    with pytest.raises(ClusterError, match=r"^batch 0 was on 1 workers of tcp://.* when they died, .*; look at their"):
+        run_batches(lambda batch, photons: os._exit(1), BATCH, BATCH, scheduler=workers.scheduler_address)
+
+
+def test_a_worker_without_the_package_is_told_from_other_errors(workers):
+    with pytest.raises(ClusterError, match=r"a worker of tcp://.* lacks mcml_sim_; install the same profilefit there"):
+        run_batches(lambda *_: __import__("mcml_sim_"), BATCH, BATCH, scheduler=workers.scheduler_address)
+
+
+def test_a_scheduler_without_the_package_is_refused(workers, monkeypatch):
+    monkeypatch.setattr(cluster, "cpu_class", lambda: __import__("mcml_sim_"))
+    with pytest.raises(ClusterError, match=r"cannot load mcml_sim \(No module named 'mcml_sim_'\); install the same"):
+        run_batches(TRACE, BATCH, BATCH, scheduler=workers.scheduler_address)
+
+
+@pytest.fixture
+def lonely():
+    """A scheduler to which no worker has come yet."""
+    with distributed.LocalCluster(
+        n_workers=0, protocol="tcp://", processes=False, dashboard_address=":0", silence_logs=50
+    ) as started:
+        yield started
+
+
+def test_a_worker_may_come_later(lonely, alone):
+    threading.Timer(0.2, lonely.scale, [1]).start()
+    assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=lonely.scheduler_address), alone)
+
+
+@pytest.mark.usefixtures("python_handles_sigint")
+def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
+    threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
+    with pytest.raises(KeyboardInterrupt):
+        run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
+
+
+def test_a_scheduler_that_leaves_is_one_line(lonely):
+    threading.Timer(0.5, lonely.close).start()
+    with pytest.raises(ClusterError, match=r"^the scheduler at tcp://.* has gone; a run with a store resumes$"):
+        run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", 0.5)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_no_scheduler_is_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as silent:
+        address = f"tcp://127.0.0.1:{silent.getsockname()[1]}"
+        with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):
+            run_batches(TRACE, BATCH, BATCH, scheduler=address)
+    with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):  # now nobody listens
+        run_batches(TRACE, BATCH, BATCH, scheduler=address)
+
+
+@pytest.mark.usefixtures("impatient")
+def test_another_server_is_one_line():
+    with socket.create_server(("127.0.0.1", 0)) as server:
+
+        def answer():
+            connection, _ = server.accept()
+            with connection:
+                connection.sendall(b"HTTP/1.1 400 Bad Request\r\n\r\n" * 9)
+                connection.recv(1000)
+
+        thread = threading.Thread(target=answer)
+        thread.start()
+        address = f"tcp://127.0.0.1:{server.getsockname()[1]}"
+        with pytest.raises(ClusterError, match=f"^no Dask scheduler answers at {address} .*$"):
+            run_batches(TRACE, BATCH, BATCH, scheduler=address)
+        thread.join()
+
+
+def test_a_worker_is_no_scheduler(workers):
+    worker = next(iter(workers.scheduler_info["workers"]))
+    with pytest.raises(ClusterError, match="there is a Dask Worker, not a scheduler"):
+        run_batches(TRACE, BATCH, BATCH, scheduler=worker)
+
+
+@pytest.mark.parametrize("address", ["here", "", "http://127.0.0.1:8786", 8786])
+def test_no_address_is_refused(address):
+    with pytest.raises(InputError, match=r"scheduler must be an address like tcp://host:8786, got "):
+        run_batches(TRACE, BATCH, BATCH, scheduler=address)
+
+
+def test_the_optional_package_is_named(monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    with pytest.raises(InputError, match=r"pip install 'profilefit\[cluster\]'"):
+        run_batches(TRACE, BATCH, BATCH, scheduler="tcp://127.0.0.1:8786")
+
+
+def test_workers_here_and_there_are_refused():
+    with pytest.raises(InputError, match="workers must be None where a scheduler is given"):
+        run_batches(TRACE, BATCH, BATCH, workers=2, scheduler="tcp://127.0.0.1:8786")

@@ -1,0 +1,383 @@
+"""MCML's input files: what V1 accepts is read, and what nobody should accept is one line that says where and why."""
+
+import math
+import random
+import re
+import time
+import tracemalloc
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, InputError, Layer
+from mcml_sim.mci import MAX_BYTES, MAX_CELLS, MAX_RUNS, parse_mci, read_mci
+
+DATA = Path(__file__).parent / "data"
+MUTANTS = 12_000
+
+# A line for each value, so that a test can break them one at a time.
+SMALL = """1.0
+1
+out.mco A
+1000
+0.01 0.02
+3 4 5
+2
+1.1
+1.4 1 90 0.9 0.1
+1.5 2 80 0.8 0.3
+1.2
+"""
+
+
+def written(tmp_path, text: str | bytes) -> Path:
+    path = tmp_path / "small.mci"
+    path.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return path
+
+
+def with_line(number: int, line: str) -> str:
+    lines = SMALL.splitlines()
+    lines[number - 1] = line
+    return "\n".join(lines) + "\n"
+
+
+def test_reads_the_two_runs_of_the_template():
+    first, second = read_mci(DATA / "template.mci")
+    assert (first.output, first.format, first.photons) == ("temp1.mco", "A", 10)
+    assert (first.dz, first.dr, first.nz, first.nr, first.na) == (20e-4, 20e-4, 10, 20, 30)
+    assert first.medium.layers == (Layer(1.3, 20, 200, 0.7, 0.01), Layer(1.4, 10, 200, 0.9, 1e8))
+    assert not first.medium.is_half_space, "1E8 cm stays a length, as in V1"
+    assert (second.output, second.photons, second.medium.layers) == ("temp2.mco", 20, (Layer(1.4, 10, 200, 0.7, 1e8),))
+    assert second.grid == Grid(20e-4, 80, 20e-4, 80, na=30)
+
+
+def test_reads_the_three_layers_of_the_example():
+    (run,) = read_mci(str(DATA / "example.mci"))
+    rows = [(1.37, 1, 100, 0.9, 0.1), (1.37, 1, 10, 0, 0.1), (1.37, 2, 10, 0.7, 0.2)]
+    assert run.medium.layers == tuple(Layer(*row) for row in rows)
+    assert (run.medium.n_above, run.medium.n_below) == (1, 1)
+    assert (run.photons, run.grid) == (1_000_000, Grid(0.01, 50, 0.01, 40, na=1))
+
+
+def test_depths_and_rings_are_not_mixed_up(tmp_path):
+    (run,) = read_mci(written(tmp_path, SMALL))
+    assert (run.medium.n_above, run.medium.n_below) == (1.1, 1.2)
+    np.testing.assert_allclose(run.grid.z_edges, [0, 0.01, 0.02, 0.03])
+    np.testing.assert_allclose(run.grid.r_edges, [0, 0.02, 0.04, 0.06, 0.08])
+    assert run.grid.angles == 5
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        SMALL.replace("\n", "\r\n"),
+        SMALL.replace("\n", "\r"),
+        SMALL.replace("\n", "\n\n  \t\n# a comment 1 2 3\n"),
+        SMALL.replace("\n", "# right after the value\n"),
+        SMALL.replace("\n", " and more words, 1 2 3\n"),
+        SMALL.replace(" ", "\t \t"),
+        "\ufeff" + SMALL,
+        "# \u00b5\n" + SMALL + "\nwhat follows the last run is not read, as in V1\n",
+        SMALL.removesuffix("\n"),
+        SMALL + "\x1a",
+        SMALL.replace("0.01 0.02", "+1e-2 .2E-1").replace("1.1\n", "1.1e+0\n").replace("1000", "+1000"),
+    ],
+)
+def test_form_does_not_matter(tmp_path, text):
+    assert read_mci(written(tmp_path, text)) == read_mci(written(tmp_path, SMALL))
+
+
+@pytest.mark.parametrize(
+    ("line", "form"), [("A", "A"), ("B", "B"), ("b", "B"), ("binary", "B"), ("ASCII", "A"), ("", "A"), ("x", "A")]
+)
+def test_format_is_the_first_letter_as_in_v1(tmp_path, line, form):
+    (run,) = read_mci(written(tmp_path, with_line(3, f"out.mco {line}")))
+    assert (run.output, run.format) == ("out.mco", form)
+
+
+def test_last_layer_may_be_endless(tmp_path):
+    for word in ("inf", "Inf", "INFINITY", "+inf"):
+        (run,) = read_mci(written(tmp_path, with_line(10, f"1.5 2 80 0.8 {word}")))
+        assert run.medium.layers[-1].thickness == math.inf
+        assert run.medium.is_half_space
+    with pytest.raises(InputError, match=r"small.mci:9: expected thickness of layer 1 of 2 in cm, .*, got 'inf'"):
+        read_mci(written(tmp_path, with_line(9, "1.4 1 90 0.9 inf")))
+
+
+def test_clear_glass_may_have_any_mean_cosine_up_to_one(tmp_path):
+    (run,) = read_mci(written(tmp_path, with_line(9, "1.5 0 0 1 0.1")))
+    assert run.medium.layers[0] == Layer(1.5, 0, 0, 1, 0.1)
+
+
+@pytest.mark.parametrize(
+    ("number", "line", "expected", "got"),
+    [
+        (1, "mcmli2.0", "the file version, 1.0", "'mcmli2.0'"),
+        (1, "2.0", "the file version, 1.0", "'2.0'"),
+        (2, "0", "the number of runs, a whole number from 1 to 10000", "'0'"),
+        (2, "10001", "the number of runs, a whole number from 1 to 10000", "'10001'"),
+        (2, "2", "the name of an output file, and A or B", "the end of the file"),
+        (3, "a" * 256, "the name of an output file, at most 255 printable characters", f"'{'a' * 37}...'"),
+        (4, "0", "the number of photons, a whole number from 1 to 10000000000000", "'0'"),
+        (4, "-5", "the number of photons, .*", "'-5'"),
+        (4, "1e6", "the number of photons, .*", "'1e6'"),
+        (4, "10000000000001", "the number of photons, .*", "'10000000000001'"),
+        (4, "1_000", "the number of photons, .*", "'1_000'"),
+        (4, "\u0661\u0662", "the number of photons, .*", "'\u0661\u0662'"),
+        (4, "9" * 5000, "the number of photons, .*", f"'{'9' * 37}...'"),
+        (5, "0.01", "2 values, dz and dr", "1: '0.01'"),
+        (5, "0 0.02", "dz in cm, a number from 1e-12 to 1e[+]12", "'0'"),
+        (5, "0.01 nan", "dr in cm, .*", "'nan'"),
+        (5, "0.01 1e999", "dr in cm, .*", "'1e999'"),
+        (5, "0.01 0x10", "dr in cm, .*", "'0x10'"),
+        (5, "0.01,0.02", "2 values, dz and dr", "1: '0.01,0.02'"),
+        (6, "3 4", "3 values, nz, nr and na", "2: '3 4'"),
+        (6, "3 4.5 5", "nr, a number of bins, a whole number from 1 to 65536", "'4.5'"),
+        (6, "3 4 65537", "na, a number of bins, .*", "'65537'"),
+        (6, "65536 65536 1", f"nr nz, the cells of a table, to be at most {MAX_CELLS}", "4294967296"),
+        (6, "1 65536 33", "nr na, the cells .*", "2162688"),
+        (7, "1001", "the number of layers, a whole number from 1 to 1000", "'1001'"),
+        (7, "3", "5 values, n, mu_a, mu_s, g and thickness of layer 3 of 3", "1: '1.2'"),
+        (8, "0", "n above the layers, a number from 0.01 to 100", "'0'"),
+        (9, "1.4 1 90 0.9", "5 values, n, mu_a, mu_s, g and thickness of layer 1 of 2", "4: '1.4 1 90 0.9'"),
+        (9, "1.4 -1 90 0.9 0.1", "mu_a of layer 1 of 2 in 1/cm, a number from 0 to 1e[+]12", "'-1'"),
+        (9, "1.4 1 1e13 0.9 0.1", "mu_s of layer 1 of 2 in 1/cm, .*", "'1e13'"),
+        (9, "1.4 1 90 1 0.1", "g of layer 1 of 2 between -1 and 1, or 1 where nothing scatters", "'1'"),
+        (9, "1.4 0 0 -1 0.1", "g of layer 1 of 2 between -1 and 1, or 1 where nothing scatters", "'-1'"),
+        (9, "1.4 1 90 1.1 0.1", "g of layer 1 of 2, a number from -1 to 1", "'1.1'"),
+        (10, "1.5 2 80 0.8 0", "thickness of layer 2 of 2 in cm, .*", "'0'"),
+        (10, "1.5 0 0 0 inf", "mu_a or mu_s of layer 2 of 2 above 0 where it has no end", "'0' and '0'"),
+        (11, "1.2.3", "n below the layers, .*", "'1.2.3'"),
+        (11, "# 1.2", "n below the layers", "the end of the file"),
+    ],
+)
+def test_a_broken_line_is_named(tmp_path, number, line, expected, got):
+    with pytest.raises(InputError) as caught:
+        read_mci(written(tmp_path, with_line(number, line)))
+    text = str(caught.value)
+    found = re.fullmatch(rf"(.*)small\.mci:([0-9]+): expected {expected}, got (.*)", text)
+    assert found, text
+    assert found[3] == got
+    at = {"the end of the file": 12}.get(got, 11 if line == "3" else number)  # line 12: after the last line's end
+    assert int(found[2]) == at
+
+
+def test_two_runs_cannot_have_one_output(tmp_path):
+    run = SMALL.split("\n", 2)[2]
+    for again in ("out.mco", "./out.mco"):
+        text = f"1.0\n2\n{run}{run.replace('out.mco', again)}"
+        with pytest.raises(InputError, match=rf"small.mci:12: expected an output file that no .*, got '{again}'"):
+            read_mci(written(tmp_path, text))
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", r":1: expected the file version, 1.0, got the end of the file"),
+        (b"\n# only this\n", r":3: expected the file version, 1.0, got the end of the file"),
+        (b"1.0\r\n1\r\nout\x00.mco A\n", r":3: expected text in UTF-8, got the byte 0x00"),
+        (b"1.0\n# \xb5a\n", r":2: expected text in UTF-8, got the byte 0xb5"),
+        (SMALL.encode("utf-16"), r":1: expected text in UTF-8, got the byte 0xff"),
+        (b"#" * (MAX_BYTES + 1), r": expected a .mci file of at most 2097152 bytes, got a longer one"),
+    ],
+)
+def test_what_is_no_text_is_said(tmp_path, content, message):
+    with pytest.raises(InputError, match=message):
+        read_mci(written(tmp_path, content))
+
+
+def test_what_cannot_be_opened_is_said(tmp_path):
+    with pytest.raises(InputError, match=r"none.mci: expected a file that can be read, got: No such file or directory"):
+        read_mci(tmp_path / "none.mci")
+    with pytest.raises(InputError, match=r"expected a file that can be read, got: Is a directory"):
+        read_mci(tmp_path)
+    for path in ("a\x00b", 3, None):
+        with pytest.raises(InputError, match="expected a file that can be read"):
+            read_mci(path)
+
+
+NASTY = (
+    *(
+        "nan",
+        "inf",
+        "-inf",
+        "1e999",
+        "1e-999",
+        "-1",
+        "-0",
+        "0",
+        "1e8",
+        "0x10",
+        "1_000",
+        "\u0663",
+        "99999999999999999999",
+    ),
+    *(
+        "65536 65536 1",
+        "",
+        "#",
+        "A",
+        "B",
+        "\u00a0",
+        "\u2028",
+        "\x0b",
+        "1e",
+        ".",
+        "+",
+        "1.0.0",
+        "'",
+        "65536",
+        "65537",
+        "1000",
+        "10000",
+    ),
+)
+
+
+def mutant(draw: random.Random, text: bytes) -> bytes:
+    """A file with one to four changes: of bytes, words, lines, numbers, or its end."""
+    for _ in range(draw.randint(1, 4)):
+        text = draw.choice((_bytes, _bytes, _words, _words, _words, _lines, _lines, _numbers, _numbers, _end))(
+            draw, text
+        )
+    return text
+
+
+def _bytes(draw, text):
+    at, size = draw.randrange(len(text) + 1), draw.randint(0, 3)
+    return text[:at] + draw.randbytes(draw.randint(0, 3)) + text[at + size :]
+
+
+def _words(draw, text):
+    found = list(re.finditer(rb"\S+", text))
+    if not found:
+        return text
+    at, other = draw.choice(found), draw.choice(found)
+    word = draw.choice([draw.choice(NASTY).encode(), other.group(), b"", at.group() * 2, b"7" * draw.randint(1, 400)])
+    return text[: at.start()] + word + text[at.end() :]
+
+
+def _lines(draw, text):
+    lines = text.split(b"\n")
+    at, other = draw.randrange(len(lines)), draw.randrange(len(lines))
+    change = draw.randrange(4)
+    if change == 0:
+        del lines[at]
+    elif change == 1:
+        lines.insert(at, lines[other])
+    elif change == 2:
+        lines[at], lines[other] = lines[other], lines[at]
+    else:
+        lines[at:at] = lines[other : other + 12]
+    return b"\n".join(lines)
+
+
+def _numbers(draw, text):
+    found = list(re.finditer(rb"[0-9]+", text))
+    if not found:
+        return text
+    at = draw.choice(found)
+    number = draw.choice([int(at.group()[:30]) + draw.choice((-1, 1)), 10 ** draw.randint(0, 20), draw.randint(0, 99)])
+    return text[: at.start()] + str(number).encode() + text[at.end() :]
+
+
+def _end(draw, text):
+    return text[: draw.randrange(len(text) + 1)]
+
+
+def seeds() -> list[bytes]:
+    """Valid files to start from."""
+    files = [path.read_bytes() for path in sorted(DATA.glob("*.mci"))]
+    rows = "".join(
+        f"1.{at} {at} {10 * at} 0.{at} inf\n".replace("inf", "0.5" if at < 5 else "inf") for at in range(1, 6)
+    )
+    layered = f"1.0\r\n2\r\na.mco B\n7\n1 1\n9 9 9\n5\n1\n{rows}1\nb A\n8\n1e-3 1\n1 1 1\n1\n1\n1 0 0 1 1E8\n1\n"
+    return [*files, SMALL.encode(), layered.encode()]
+
+
+def require_bounded(runs):
+    """What every valid file asks for, at most; AssertionError on more."""
+    assert 1 <= len(runs) <= MAX_RUNS
+    for run in runs:
+        assert isinstance(run.photons, int)
+        assert 1 <= run.photons <= 10**13
+        assert run.format in "AB"
+        assert 1 <= len(run.output) <= 255
+        assert max(run.nr * run.nz, run.nr * run.na) <= 2**21
+        grid = run.grid
+        assert (grid.depths, grid.rings, grid.angles) == (run.nz, run.nr, run.na)
+        assert np.isfinite(grid.r_areas.sum() + grid.z_widths.sum())
+        assert 1 <= len(run.medium.layers) <= 1000
+        for layer in run.medium.layers:
+            assert math.isfinite(layer.mu_t)
+            assert layer.thickness >= 1e-12
+
+
+def outcome(content: bytes) -> str:
+    """What a file of that content is refused for, or "" if it is valid; any other exception goes up."""
+    try:
+        runs = parse_mci(content, "a.mci")
+    except InputError as error:
+        message = str(error)
+    else:
+        require_bounded(runs)
+        return ""
+    found = re.fullmatch(r"a\.mci:([0-9]+): expected (.*), got (.*)", message)
+    assert found, message
+    assert 1 <= int(found[1]) <= len(re.split(rb"\r\n|\r|\n", content))
+    return found[2]
+
+
+def test_a_mutated_file_is_refused_in_one_line_or_runs():
+    draw = random.Random(7)
+    started = seeds()
+    assert [outcome(seed) for seed in started] == [""] * 4
+    begin = time.perf_counter()
+    reasons = [outcome(mutant(draw, draw.choice(started))) for _ in range(MUTANTS)]
+    assert time.perf_counter() - begin < 60  # about 3 s: nothing hangs
+    # The mutants reach everything: valid runs, and every demand that the parser makes.
+    assert 0.1 < reasons.count("") / MUTANTS < 0.9
+    said = " | ".join(sorted(set(reasons)))
+    for demand in (
+        *("file version", "number of runs", "name of an output", "no other run", "number of photons", "dz in cm"),
+        *("dr in cm", "nz, a number", "nr, a number", "na, a number", "number of layers", "n above", "n of", "cells"),
+        *("mu_a of", "mu_s of", "g of", "thickness of", "n below", "values, ", "UTF-8"),
+    ):
+        assert demand in said, demand
+
+
+def test_mutated_files_on_disk_are_read_alike(tmp_path):
+    draw = random.Random(9)
+    path = tmp_path / "a.mci"
+    for _ in range(100):
+        content = mutant(draw, draw.choice(seeds()))
+        path.write_bytes(content)
+        if reason := outcome(content):
+            with pytest.raises(InputError, match=re.escape(reason)):
+                read_mci(path)
+        else:
+            assert read_mci(path) == parse_mci(content, "a.mci")
+
+
+def test_no_mutant_takes_much_memory():
+    draw = random.Random(8)
+    started = seeds()
+    contents = [mutant(draw, draw.choice(started)) for _ in range(300)]
+    contents += [
+        b"1.0\n10000\n" + SMALL.split("\n", 2)[2].encode(),
+        with_line(6, "32 65536 32").encode(),
+        b"1.0\n20\n"
+        + b"".join(b"%d A\n9\n1 1\n1 1 1\n1000\n1\n" % at + b"1 1 1 0 1\n" * 1000 + b"1\n" for at in range(20)),
+        *(word * (MAX_BYTES // 10) for word in (b"9", b"\n", b"1 ", b"1\n")),
+        b"1.0\n1\na A\n1\n1 " + b"9" * (MAX_BYTES - 100) + b"x\n",
+    ]
+    tracemalloc.start()
+    try:
+        for content in contents:
+            outcome(content)
+        _, peak = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert peak < 200 * 2**20, f"{peak / 2**20:.0f} MiB"

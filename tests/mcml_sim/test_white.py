@@ -1,0 +1,161 @@
+"""The white half space of any setting against a slow obvious twin, and against what is exact."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, Setting, exact, half_space, rng, simulate, simulate_orders, tracer, white
+from mcml_sim.isotropic import DOUBLINGS
+
+EDGES = np.array([0, 0.1, 0.3, 0.6, 1, 2, 4, 8.0])
+SETTINGS = [
+    Setting(n=1.4),
+    Setting(g=0.8),
+    Setting("diffuse", n=1.5, g=-0.5),
+    Setting("diffuse", n=0.8, g=0.4),
+]
+PHOTONS, LAST_ORDER = 150_000, 32
+
+
+def fresnel(n_in, n_out, cosine):
+    """Textbook, by angles: R = 1/2 [sin^2(a - b) / sin^2(a + b) + tan^2(a - b) / tan^2(a + b)]."""
+    a = np.arccos(np.clip(cosine, 1e-9, 1 - 1e-9))
+    sine = n_in / n_out * np.sin(a)
+    b = np.arcsin(np.minimum(sine, 1))
+    r = 0.5 * (np.sin(a - b) ** 2 / np.sin(a + b) ** 2 + np.tan(a - b) ** 2 / np.tan(a + b) ** 2)
+    return np.where(sine >= 1, 1.0, r)
+
+
+def entering(setting, photons, source):
+    """Directions of light that got in."""
+    if setting.illumination == "searchlight":
+        return np.tile([0.0, 0.0, 1.0], (photons, 1))
+    outside = np.sqrt(source.uniform(size=4 * photons))
+    outside = outside[source.uniform(size=outside.size) >= fresnel(1.0, setting.n, outside)]
+    sine = np.sqrt(1 - outside**2) / setting.n
+    inside = np.stack([sine, 0 * sine, np.sqrt(np.maximum(1 - sine**2, 0))], axis=1)[sine < 1]
+    return inside[:photons]
+
+
+def turned(direction, g, source):
+    """Scattered directions: a cosine by rejection-free textbook formula, around by a random perpendicular."""
+    xi = source.uniform(size=len(direction))
+    cosine = 2 * xi - 1 if g == 0 else (1 + g**2 - ((1 - g**2) / (1 - g + 2 * g * xi)) ** 2) / (2 * g)
+    aside = np.cross(direction, source.normal(size=direction.shape))
+    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    new = cosine[:, None] * direction + np.sqrt(1 - cosine**2)[:, None] * aside
+    return new / np.linalg.norm(new, axis=1, keepdims=True)
+
+
+def slow_twin(setting, photons, last_order, seed):
+    """Exit radius and order in float64 with (x, y, z) and left-over steps, no roulette; order 0 beyond `last_order`."""
+    source = np.random.default_rng(seed)
+    rho, order = np.zeros(photons), np.zeros(photons, int)
+    direction = entering(setting, photons, source)
+    position = source.exponential(size=(photons, 1)) * direction
+    flying = np.arange(photons)
+    for n in range(1, last_order + 1):
+        direction[flying] = turned(direction[flying], setting.g, source)
+        start, ray, step = position[flying], direction[flying], source.exponential(size=(flying.size, 1))
+        end = start + step * ray
+        up = end[:, 2] < 0
+        surface = start - ray * (start[:, 2:] / np.where(up, ray[:, 2], 1)[:, None])
+        back = up & (source.uniform(size=up.size) < fresnel(setting.n, 1.0, np.abs(ray[:, 2])))
+        left_over = step - np.linalg.norm(surface - start, axis=1, keepdims=True)
+        mirrored = ray * [1, 1, -1]
+        position[flying] = np.where(back[:, None], surface + left_over * mirrored, end)
+        direction[flying] = np.where(back[:, None], mirrored, ray)
+        out = up & ~back
+        rho[flying[out]] = np.hypot(surface[out, 0], surface[out, 1])
+        order[flying[out]] = n
+        flying = flying[~out]
+    return rho, order
+
+
+def table(rho, order):
+    """Counts by radii and groups of orders to 32."""
+    left = (order >= 1) & (order <= LAST_ORDER)
+    return np.histogram2d(rho[left], order[left], bins=[[*EDGES, np.inf], [1, 2, 3, 5, 9, 17, 33]])[0].ravel()
+
+
+def traced(setting, photons):
+    """Exit radius and order of the kernel, whatever the setting."""
+    ends = tracer.trace(
+        jnp.asarray(rng.batch_key(7, 0)), jnp.int32(photons), jnp.asarray(DOUBLINGS), white.half_space(setting)
+    )
+    return np.asarray(ends.rho)[:photons], np.asarray(ends.order)[:photons]
+
+
+def deviations(fast, slow):
+    enough = fast + slow > 25
+    return (fast - slow)[enough] / np.sqrt((fast + slow)[enough])
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_kernel_agrees_with_its_slow_twin_in_every_ring_and_order(setting, sidak):
+    z = deviations(table(*traced(setting, PHOTONS)), table(*slow_twin(setting, PHOTONS, LAST_ORDER, seed=3)))
+    assert z.size > 25
+    assert np.abs(z).max() < sidak(z.size)
+
+
+@pytest.mark.parametrize("wrong", [Setting(n=1.3), Setting(n=1.4, g=0.05), Setting("diffuse", n=1.4)], ids=str)
+def test_the_comparison_sees_another_setting(wrong, sidak):
+    z = deviations(table(*traced(Setting(n=1.4), PHOTONS)), table(*slow_twin(wrong, PHOTONS, LAST_ORDER, seed=3)))
+    assert np.abs(z).max() > sidak(z.size)
+
+
+def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
+    ends = tracer.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(DOUBLINGS))
+    isotropic = table(np.asarray(ends.rho)[:PHOTONS], np.asarray(ends.order)[:PHOTONS])
+    z = deviations(table(*traced(Setting(), PHOTONS)), isotropic)
+    assert np.abs(z).max() < sidak(z.size)
+
+
+@pytest.mark.parametrize("setting", [Setting(n=1.4, g=0.5), Setting(n=1.3)], ids=str)
+def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
+    grid = Grid.from_edges(r=EDGES)
+    orders = simulate_orders(grid, 2**19, seed=1, setting=setting)
+    for alpha in (0.4, 0.8, 0.95):
+        tally = simulate(half_space(alpha, n=setting.n, g=setting.g), grid, 2**17, seed=9)
+        pairs = ((orders.profile(alpha), tally.reflectance_r), (orders.reflectance(alpha), tally.diffuse_reflectance))
+        for white_, own in pairs:
+            error = np.hypot(white_.standard_error, own.standard_error)
+            sampled = np.atleast_1d(own.is_sampled() & white_.is_sampled())
+            z = np.atleast_1d((white_.value - own.value) / error)[sampled]
+            assert z.size
+            assert np.abs(z).max() < sidak(8)
+
+
+def test_diffuse_light_meets_the_exact_answer(sidak):
+    setting = Setting("diffuse")
+    orders = simulate_orders(Grid.from_edges(r=EDGES), 2**20, seed=4, setting=setting)
+    for alpha in (0.3, 0.8, 0.99):
+        found = orders.reflectance(alpha)
+        assert abs(found.value - exact.reflectance(alpha, setting=setting)) < 4 * found.standard_error
+        energy = np.diff(exact.cdf(EDGES, alpha, setting=setting)) * exact.reflectance(alpha, setting=setting)
+        rings = orders.energy(alpha)
+        z = ((rings.value - energy) / rings.standard_error)[rings.is_sampled()]
+        assert z.size > 3
+        assert np.abs(z).max() < sidak(z.size)
+
+
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_all_light_that_entered_a_white_half_space_comes_back(setting):
+    run = simulate_orders(Grid.from_edges(r=EDGES), 2**18, seed=2, setting=setting)
+    found = run.reflectance(1.0)
+    assert abs(found.value + run.cut(1.0) - run.entered) < 4 * found.standard_error + 0.5 * run.cut(1.0)
+
+
+def test_another_setting_does_not_compile_again():
+    traced(Setting(n=1.31), 100)
+    before = tracer.trace._cache_size()
+    traced(Setting("diffuse", n=1.2, g=0.3), 100)
+    assert tracer.trace._cache_size() == before
+
+
+def test_double_precision_elsewhere_does_not_change_a_bit():
+    setting = Setting("diffuse", n=1.4, g=0.7)
+    alone = traced(setting, 2000)
+    with jax.enable_x64(True):
+        np.testing.assert_array_equal(traced(setting, 2000), alone)
