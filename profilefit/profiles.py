@@ -146,10 +146,9 @@ class Profiles:
 
     @property
     def albedo_samples(self) -> Floats:
-        """(m,) effective samples of the whole reflectance within the rings."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            squares = np.where(self.energy > 0, self.energy**2 / self.effective_samples, 0.0).sum(axis=1)
-            return np.where(squares > 0, self.energy.sum(axis=1) ** 2 / squares, np.inf)
+        """(m,) equally weighted photons that would give the reflectance within the rings this relative error."""
+        with np.errstate(divide="ignore"):
+            return self.energy.sum(axis=1) ** 2 / np.sum(self.standard_error**2, axis=1)
 
     @property
     def trusted(self) -> NDArray[np.bool_]:
