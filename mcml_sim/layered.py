@@ -18,6 +18,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from mcml_sim import deposits, photon, pool, rng
+from mcml_sim.bins import Axis, axis, groups
 from mcml_sim.deposits import Deposits
 from mcml_sim.grid import Grid
 from mcml_sim.medium import Medium
@@ -28,24 +29,9 @@ Floats = NDArray[np.float64]
 BATCH_PHOTONS = 2**18
 LANES = 4096
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same
-GROUPS, FEWEST_GROUPS = 32, 8  # of photons, whose spread gives the errors of what is absorbed by ring and depth
-TABLE_BYTES = 2**26  # for the groups' tables; large grids get fewer groups
+GROUPS = 32  # of photons at most, whose spread gives the errors of what is absorbed by ring and depth
 COLUMNS = 64  # in which sums over lanes are kept, so that they are vectors
 SUM_BITS, TABLE_BITS = 30, 38  # float64 adds multiples of 2^-30 up to 2^23, of 2^-38 up to 2^15, without rounding
-
-
-class Axis(NamedTuple):
-    """Edges of one axis of bins, in the unit of the run."""
-
-    edges: Array
-    """float32 (bins + 1,)."""
-    per_length: Array
-    """Bins in a unit of length, if they are even."""
-
-    @property
-    def bins(self) -> int:
-        """Number of bins, without the overflow."""
-        return len(self.edges) - 1
 
 
 class Bins(NamedTuple):
@@ -64,8 +50,6 @@ class Shape(NamedTuple):
 
     groups: int
     """Groups of photons; 0 if depth is not resolved."""
-    even_r: bool
-    even_z: bool
     lanes: int
 
 
@@ -137,7 +121,7 @@ def trace(
         return lanes, _recorded(results, lanes, stack.layers, angles)._replace(by_layer=by_layer, by_cell=by_cell)
 
     results = pool.follow(enter, turn, results, photons, shape.lanes)
-    exits = _histogram(results, bins, shape)
+    exits = _histogram(results, bins)
     return exits, results.sums.sum(axis=-1), results.by_layer, results.by_cell
 
 
@@ -156,7 +140,7 @@ def _turn(go: Array, key: Array, stack: Stack, bins: Bins, shape: Shape, state: 
         if by_cell.size:
             left = jnp.where(paths > 0, lanes.weight - after.weight, 0)
             top = photon.pick(stack.top, lanes.layer)
-            cell, left = photon.staged(go, partial(_cell, bins, shape), after.place, after.down, top, group, left)
+            cell, left = photon.staged(go, partial(_cell, bins), after.place, after.down, top, group, left)
             by_cell = by_cell.at[cell].add(left, mode="promise_in_bounds")
         return after, by_cell
 
@@ -177,25 +161,16 @@ def _turn(go: Array, key: Array, stack: Stack, bins: Bins, shape: Shape, state: 
     return lanes._replace(event=lanes.event + EVENTS_PER_TURN, absorbed=absorbed), by_layer, by_cell
 
 
-def _group(lanes: Lanes, bins: Bins, groups: int) -> Array:
+def _group(lanes: Lanes, bins: Bins, parts: int) -> Array:
     """Group of each photon, int32."""
-    return jnp.minimum(lanes.photon.astype(jnp.float32) * bins.groups_per_photon, groups - 1).astype(jnp.int32)
+    return jnp.minimum(lanes.photon.astype(jnp.float32) * bins.groups_per_photon, parts - 1).astype(jnp.int32)
 
 
-def _cell(
-    bins: Bins, shape: Shape, place: Array, down: Array, top: Array, group: Array, left: Array
-) -> tuple[Array, Array]:
+def _cell(bins: Bins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
     """Index into the table of groups, rings and depths, and what is left there."""
-    ring = _bin(jnp.sqrt(place.real * place.real + place.imag * place.imag), bins.r, shape.even_r)
-    depth = _bin(top + down.real, bins.z, shape.even_z)
+    ring = bins.r.index(jnp.sqrt(place.real * place.real + place.imag * place.imag))
+    depth = bins.z.index(top + down.real)
     return (group * (bins.r.bins + 1) + ring) * (bins.z.bins + 1) + depth, _rounded(left, TABLE_BITS)
-
-
-def _bin(values: Array, axis: Axis, even: bool) -> Array:
-    """Index of the bin; the number of bins for what is beyond the last."""
-    if even:
-        return jnp.clip(values * axis.per_length, 0, axis.bins).astype(jnp.int32)
-    return jnp.searchsorted(axis.edges[1:], values, side="right", method="scan_unrolled").astype(jnp.int32)
 
 
 def _rounded(weights: Array, bits: int) -> Array:
@@ -232,10 +207,10 @@ def _recorded(results: Results, lanes: Lanes, layers: int, angles: bool) -> Resu
     return results._replace(exits=results.exits.at[number].set(exit_, mode="drop"), cosines=cosines, sums=sums)
 
 
-def _histogram(results: Results, bins: Bins, shape: Shape) -> Array:
+def _histogram(results: Results, bins: Bins) -> Array:
     """Weights and squared weights by side (above, below), ring and angle, float64 (2, rings + 1, angles or 1, 2)."""
     weight = results.exits.imag
-    cell = jnp.where(weight < 0, 1, 0) * (bins.r.bins + 1) + _bin(results.exits.real, bins.r, shape.even_r)
+    cell = jnp.where(weight < 0, 1, 0) * (bins.r.bins + 1) + bins.r.index(results.exits.real)
     angles = len(bins.cosines) or 1
     if len(bins.cosines):
         # Edges fall from 1, so those above the cosine are counted.
@@ -254,30 +229,17 @@ def _unit(medium: Medium) -> float:
 
 
 def _bins(grid: Grid, unit: float, photons: int, lanes: int) -> tuple[Bins, Shape]:
+    parts = groups(grid, photons, GROUPS) if grid.depths else 0
     z_edges = grid.z_edges if grid.z_edges is not None else np.array([0.0, 1.0])
-    cells = (grid.rings + 1) * (grid.depths + 1)
-    groups = min(max(FEWEST_GROUPS, min(GROUPS, TABLE_BYTES // (8 * cells))), photons) if grid.depths else 0
     # The angles' lower edges.
     cosines = np.cos(grid.a_edges[:-1]) if grid.a_edges is not None else np.zeros(0)
     bins = Bins(
-        _axis(grid.r_edges, unit),
-        _axis(z_edges, unit),
+        axis(grid.r_edges, unit),
+        axis(z_edges, unit),
         jnp.asarray(cosines, jnp.float32),
-        jnp.float32((groups or GROUPS) / photons),
+        jnp.float32((parts or GROUPS) / photons),
     )
-    return bins, Shape(groups, _is_even(grid.r_edges), _is_even(z_edges), lanes)
-
-
-def _axis(edges: Floats, unit: float) -> Axis:
-    """Edges rounded up to float32: a float32 length is in the same bin by these as by the float64 ones."""
-    scaled = edges / unit
-    single = scaled.astype(np.float32)
-    single = np.where(single < scaled, np.nextafter(single, np.float32(np.inf)), single)
-    return Axis(jnp.asarray(single), jnp.float32(unit / edges[1]))
-
-
-def _is_even(edges: Floats) -> bool:
-    return bool(np.allclose(edges, edges[1] * np.arange(len(edges)), rtol=1e-12, atol=0))
+    return bins, Shape(parts, lanes)
 
 
 def _deposits(
@@ -309,16 +271,16 @@ def _deposits(
     )
 
 
-def _variance(groups: Floats) -> Floats:
+def _variance(parts: Floats) -> Floats:
     """Of the sum of independent, equally distributed groups, by their spread: (groups, ...) -> (...)."""
-    number = len(groups)
-    return number * groups.var(axis=0, ddof=1) if number > 1 else np.zeros(groups.shape[1:])
+    number = len(parts)
+    return number * parts.var(axis=0, ddof=1) if number > 1 else np.zeros(parts.shape[1:])
 
 
-def _with_squares(groups: Floats, photons: int) -> tuple[float, float]:
+def _with_squares(parts: Floats, photons: int) -> tuple[float, float]:
     """Sum, and the sum of squares by photon that has the variance of the groups' spread."""
-    total = groups.sum()
-    return total, float(_variance(groups)) + total**2 / photons
+    total = parts.sum()
+    return total, float(_variance(parts)) + total**2 / photons
 
 
 def _all_ballistic(grid: Grid, photons: int) -> Deposits:

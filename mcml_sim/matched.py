@@ -21,6 +21,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from mcml_sim import isotropic, pool, rng, tracer
+from mcml_sim.bins import Axis, axis, groups
 from mcml_sim.deposits import Deposits
 from mcml_sim.grid import Grid
 from mcml_sim.isotropic import Lanes
@@ -42,8 +43,7 @@ STOPS = 32  # as many tosses as a random word has bits
 UNIT = 2.0**-32  # of the weights that are added on the way: int64 holds 2^31 of them, all visits of a white batch 2^30
 EVENTS_PER_TURN, VISITS_PER_TURN = 8, 6  # without deposits in (r, z), and with them: best at alpha = 0.9
 
-GROUPS, FEWEST_GROUPS = 16, 8  # of photons, whose spread gives the errors of what is absorbed
-TABLE_BYTES = 2**26  # for the groups' tables; large grids get fewer groups
+MOST_GROUPS = 16  # of photons, whose spread gives the errors of what is absorbed; 32 take a fifth more time
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,7 +98,7 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     if grid.depths:
         with jax.enable_x64(True):
             visiting = jnp.asarray(np.rint(values.visiting / UNIT).astype(np.int64))
-            ends, visits = _trace_visits(key, number, stops, visiting, bins, _groups(grid, photons), lanes)
+            ends, visits = _trace_visits(key, number, stops, visiting, bins, groups(grid, photons, MOST_GROUPS), lanes)
         visited = [np.asarray(part) for part in visits]
     else:
         ends = tracer.trace(key, number, stops, None, lanes, EVENTS_PER_TURN)
@@ -106,25 +106,6 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     with jax.enable_x64(True):
         exits, orders = _counted(key, ends, jnp.asarray(values.leaving), bins)
     return _deposits(np.asarray(exits), np.asarray(orders), values, photons, 1 - layer.alpha, visited)
-
-
-@partial(jax.tree_util.register_dataclass, data_fields=["edges", "per_length"], meta_fields=["bins", "even"])
-@dataclass(frozen=True)
-class Axis:
-    """Bins of one coordinate in mean free paths [mfp]; what is beyond them has the number `bins`."""
-
-    edges: Array
-    """All but the first, float32 (bins,)."""
-    per_length: Array
-    """Bins in a mean free path, if all are equal, float32 ()."""
-    bins: int
-    even: bool
-
-    def index(self, values: Array) -> Array:
-        """Bins of values >= 0, int32."""
-        if self.even:
-            return jnp.minimum(values * self.per_length, jnp.float32(self.bins)).astype(jnp.int32)
-        return jnp.searchsorted(self.edges, values, side="right", method="scan_unrolled").astype(jnp.int32)
 
 
 class Bins(NamedTuple):
@@ -146,37 +127,27 @@ class Visits(NamedTuple):
 
 
 def _bins(grid: Grid, mfp: float) -> Bins:
-    z = None if grid.z_edges is None else _axis(grid.z_edges, mfp)
+    z = None if grid.z_edges is None else axis(grid.z_edges, mfp)
     between: NDArray | list[float] = [] if grid.a_edges is None else np.cos(grid.a_edges[-2:0:-1])
-    return Bins(_axis(grid.r_edges, mfp), z, jnp.asarray(between, jnp.float32))
+    return Bins(axis(grid.r_edges, mfp), z, jnp.asarray(between, jnp.float32))
 
 
-def _axis(edges: Floats, mfp: float) -> Axis:
-    even = np.array_equal(edges, edges[1] * np.arange(len(edges)))
-    return Axis(jnp.asarray(tracer.rounded_up(edges[1:] / mfp)), jnp.float32(mfp / edges[1]), len(edges) - 1, even)
-
-
-def _groups(grid: Grid, photons: int) -> int:
-    cells = (grid.rings + 1) * (grid.depths + 1)
-    return min(photons, max(FEWEST_GROUPS, min(GROUPS, TABLE_BYTES // (8 * cells))))
-
-
-@partial(jax.jit, static_argnames=("groups", "lanes"), compiler_options=pool.COMPILER_OPTIONS)
+@partial(jax.jit, static_argnames=("parts", "lanes"), compiler_options=pool.COMPILER_OPTIONS)
 def _trace_visits(
-    key: Array, photons: Array, stops: Array, visiting: Array, bins: Bins, groups: int, lanes: int
+    key: Array, photons: Array, stops: Array, visiting: Array, bins: Bins, parts: int, lanes: int
 ) -> tuple[Ends, Visits]:
     """Ends as those of `tracer.trace`, and what arrived where; `visiting` (MAX_ORDER + 1,) int64 in units of UNIT."""
     depths = cast("Axis", bins.z)
-    shape = (groups, bins.r.bins + 1, depths.bins + 1)
+    shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
 
     def turn(flying: Lanes, state: tuple[Array, Array]) -> tuple[Lanes, tuple[Array, Array]]:
-        group = ((flying.photon.astype(jnp.float32) + 0.5) * (jnp.float32(groups) / photons)).astype(jnp.int32)
-        first = jnp.minimum(group, groups - 1) * (size // groups)
+        group = ((flying.photon.astype(jnp.float32) + 0.5) * (jnp.float32(parts) / photons)).astype(jnp.int32)
+        first = jnp.minimum(group, parts - 1) * (size // parts)
 
         def event(number: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
             place, table = state
-            depth = depths.index(jnp.maximum(place.imag, 0))
+            depth = depths.index(place.imag)
             cell = first + bins.r.index(place.real) * shape[2] + depth
             weight = visiting.at[flying.order + number.astype(jnp.int32) + 1].get(mode="clip")
             # Those that have ended add nothing, somewhere: a branch that no processor can foresee costs more.

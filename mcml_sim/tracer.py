@@ -15,6 +15,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from mcml_sim import isotropic, order_bins, pool, rng, white
+from mcml_sim.bins import rounded_up
 from mcml_sim.grid import Grid
 from mcml_sim.isotropic import DOUBLINGS, MAX_ORDER, Lanes
 from mcml_sim.pool import BATCH_PHOTONS, LANES
@@ -50,7 +51,8 @@ def trace_batch(
         ends = trace(key, number, stops, None, lanes, illumination=setting.illumination)
     else:
         ends = trace(key, number, stops, white.half_space(setting), lanes)
-    histogram = np.asarray(_histogram(ends, jnp.asarray(single_edges(grid)), jnp.asarray(_columns()))).astype(np.int64)
+    edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns())
+    histogram = np.asarray(_histogram(ends, edges, columns)).astype(np.int64)
     counts = Counts(
         exits=histogram[:, :ROULETTED],
         rouletted=int(histogram[:, ROULETTED].sum()),
@@ -91,17 +93,6 @@ def trace(
         return flying, recorded(ends, flying)
 
     return as_ends(pool.follow(enter, turn, no_ends(), photons, lanes))
-
-
-def single_edges(grid: Grid) -> NDArray[np.float32]:
-    """Edges rounded up to float32: a float32 radius is in the same ring by these as by the float64 ones."""
-    return rounded_up(grid.r_edges)
-
-
-def rounded_up(values: NDArray[np.float64]) -> NDArray[np.float32]:
-    """The smallest float32 that are not below these."""
-    nearest = values.astype(np.float32)
-    return np.where(nearest < values, np.nextafter(nearest, np.float32(np.inf)), nearest)
 
 
 def no_ends() -> Array:

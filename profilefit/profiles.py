@@ -147,8 +147,8 @@ class Profiles:
     @property
     def albedo_samples(self) -> Floats:
         """(m,) equally weighted photons that would give the reflectance within the rings this relative error."""
-        with np.errstate(divide="ignore"):
-            return self.energy.sum(axis=1) ** 2 / np.sum(self.standard_error**2, axis=1)
+        total, variance = self.energy.sum(axis=1), np.sum(self.standard_error**2, axis=1)
+        return np.divide(total**2, variance, out=np.full_like(total, np.inf), where=variance > 0)
 
     @property
     def trusted(self) -> NDArray[np.bool_]:

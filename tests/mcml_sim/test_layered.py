@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -208,19 +207,8 @@ def test_the_number_of_lanes_does_not_change_a_bit():
         np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
 
 
-def test_bins_are_those_of_the_edges():
-    values = np.random.default_rng(8).random(1000).astype(np.float32) * 6
-    for grid in (Grid(0.5, 10), UNEVEN):
-        bins, shape = layered._bins(grid, 1.0, 100, 512)
-        found = layered._bin(jnp.asarray(values), bins.r, shape.even_r)
-        assert shape.even_r == (grid is not UNEVEN)
-        np.testing.assert_array_equal(found, np.searchsorted(grid.r_edges[1:], values, side="right"))
-
-
-def test_a_large_table_gets_fewer_groups():
+def test_photons_are_grouped_where_depth_is_resolved():
     assert layered._bins(GRID, 1.0, 10**5, 512)[1].groups == layered.GROUPS
-    assert layered._bins(Grid(1, 1000, 1, 1000), 1.0, 10**5, 512)[1].groups == layered.FEWEST_GROUPS
-    assert layered._bins(GRID, 1.0, 3, 512)[1].groups == 3
     assert layered._bins(Grid(1, 1000), 1.0, 10**5, 512)[1].groups == 0
 
 

@@ -205,19 +205,6 @@ def test_weights_stay_around_the_threshold_once_they_have_fallen_to_it(alpha):
     assert np.all(later > matched.THRESHOLD * alpha)
 
 
-def test_even_bins_are_found_as_by_their_edges():
-    x = np.random.default_rng(0).exponential(2, 10**5).astype(np.float32)
-    even = matched._axis(0.3 * np.arange(11), 1.5)
-    at = np.asarray(even.index(jnp.asarray(x)))
-    expected = np.minimum(np.floor(x * 1.5 / 0.3), 10)
-    assert even.even
-    assert np.mean(at != expected) < 1e-5
-    uneven = matched._axis(np.geomspace(1, 9, 11) - 1, 1.5)
-    np.testing.assert_array_equal(
-        uneven.index(jnp.asarray(x)), np.searchsorted(np.geomspace(1, 9, 11)[1:] - 1, x.astype(float) * 1.5, "right")
-    )
-
-
 def test_fixed_point_sums_hold_the_longest_batch():
     """All visits of a white batch, in units, stay inside int64."""
     key = jnp.asarray(rng.batch_key(0, 0))

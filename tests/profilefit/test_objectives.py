@@ -163,7 +163,8 @@ def test_every_objective_has_a_derivative_in_its_data(name, liang, normalisation
 def test_rings_of_leaves_out_what_is_not_trusted():
     effective = np.array([[100.0, 49.0, 51.0, 1e9]])
     energy = np.array([[0.1, 0.1, 0.1, 0.0]])
-    profiles = Profiles(np.array([0.5]), np.arange(5.0), energy, energy, effective, np.zeros(1), "orders", Setting())
+    error = np.array([[0.01, 0.015, 0.015, 0.0]])
+    profiles = Profiles(np.array([0.5]), np.arange(5.0), energy, error, effective, np.zeros(1), "orders", Setting())
     np.testing.assert_array_equal(rings_of(profiles).used, [[1, 0, 1, 0]])
     used = np.array([[False, True, True, True]])
     chosen = rings_of(profiles, used, limits=(1.0, 2.0), xi=(0.4, 0.5))
@@ -171,7 +172,7 @@ def test_rings_of_leaves_out_what_is_not_trusted():
     np.testing.assert_array_equal(chosen.limits, [1.0, 2.0])
     np.testing.assert_array_equal(chosen.xi, [0.4, 0.5])
     np.testing.assert_array_equal(chosen.weight, [1.0])
-    # The albedo rests on .3^2 / (.01/100 + .01/49 + .01/51) = 180 effective photons, and a tenth of them is too few.
+    # The albedo is as precise as .3^2 / (.01^2 + .015^2 + .015^2) = 164 photons make it; a tenth is too few.
     with pytest.raises(InputError, match="no albedo rests on 500 effective ones"):
         rings_of(profiles, xi=(0.1, 0.2))
 

@@ -52,7 +52,8 @@ def test_photons_and_exact_truth_agree_on_a_recipes_rings():
     photons, exactly = truth_of(chosen, light), truth_of(replace(chosen, truth="exact"), None)
     assert photons.source == "orders"
     assert exactly.source == "exact"
-    seen = photons.trusted
+    # Where fewer photons arrive, the heavy ones may be missing, and the standard error with them: z is far from normal.
+    seen = photons.effective_samples >= 500
     error = photons.standard_error[seen]
     z = (photons.energy - exactly.energy)[seen] / error
     # Some 500 rings, strongly correlated between albedos: 4.5 is the Šidák bound of 500 independent ones at 0.3 %.

@@ -20,6 +20,7 @@ ORDER = {
         "optics",
         "phase",
         "grid",
+        "bins",
         "checks",
         "rng",
         "isotropic",

@@ -238,6 +238,7 @@ def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeyp
     assert all(path.read_bytes() != old for path, old in before.items()), "else this test could not fail"
 
 
+@pytest.mark.filterwarnings("default::mcml_sim.DamagedBatch")  # pytest would raise it; a user is shown it
 def test_a_damaged_batch_is_named_and_traced_again(command, recipe):
     assert command(*small(recipe))[0] == 0
     batch = next(Path("out/.photons").glob("*/batch-*"))
