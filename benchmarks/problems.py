@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import jax.numpy as jnp
 import numpy as np
 import scalar_half_space
 import scalar_layered
 from stopwatch import Work
 
-from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, simulate, simulate_orders
+from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, matched, rng, simulate, simulate_orders, tracer
 from mcml_sim.order_bins import LAST_ORDERS
 
 ALPHA = 0.9
@@ -74,6 +75,13 @@ def half_space_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) 
     """`simulate` on the scalar half space's problem."""
     grid = Grid(DR, NR, DZ, NZ) if tally_rz else Grid(DR, NR)
     return simulate(half_space(ALPHA), grid, photons, seed, workers=workers, progress=False)
+
+
+def half_space_events(photons: int = 2**18) -> float:
+    """Events a photon of `half_space_tally`: its scatterings, and its last flight as the yardstick counts it."""
+    stops = jnp.asarray(matched.weights(ALPHA).stops)
+    ends = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), stops)
+    return float(np.abs(np.asarray(ends.order)).sum() / photons) + 1
 
 
 def layered_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) -> Tally:

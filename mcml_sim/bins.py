@@ -16,6 +16,7 @@ from mcml_sim.grid import Grid
 Floats = NDArray[np.float64]
 
 FEWEST_GROUPS = 8
+FEWEST_IN_GROUP = 64  # photons: groups differ by one, which must not show in their spread
 TABLE_BYTES = 2**26  # for the tables of all groups
 
 
@@ -53,7 +54,7 @@ def rounded_up(values: Floats) -> NDArray[np.float32]:
 def groups(grid: Grid, photons: int, most: int) -> int:
     """Into how many groups photons are divided, whose spread gives the errors of what is absorbed by ring and depth.
 
-    Fewer than `most` if their tables would take more than 64 MiB, or if there are not as many photons.
+    Fewer than `most` if their tables would take more than 64 MiB, or if there are few photons; one tells no spread.
     """
     table = 8 * (grid.rings + 1) * (grid.depths + 1)
-    return min(photons, max(FEWEST_GROUPS, min(most, TABLE_BYTES // table)))
+    return min(max(photons // FEWEST_IN_GROUP, 1), max(FEWEST_GROUPS, min(most, TABLE_BYTES // table)))

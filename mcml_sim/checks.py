@@ -1,8 +1,12 @@
-"""What the two simulations ask of their arguments alike."""
+"""What media and simulations ask of their arguments alike."""
 
 from __future__ import annotations
 
+import math
 import operator
+import os
+from pathlib import Path
+from typing import TypeGuard
 
 import numpy as np
 
@@ -17,6 +21,12 @@ MAX_CELLS = 2**21  # bins of a table in two directions; the tracer holds eight t
 SHORTEST, LONGEST = 1e-30, 1e30  # well inside the range of float32 [length]
 
 
+def is_number(value: object) -> TypeGuard[float]:
+    """True of a real number, infinite ones included; neither of nan nor of True."""
+    kinds = (int, float, np.integer, np.floating)
+    return isinstance(value, kinds) and not isinstance(value, bool) and not math.isnan(value)
+
+
 def checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:
     """A whole number, 1e6 included; InputError on anything else."""
     accepted = f"a whole number >= {lowest}" + (f" and <= {highest:g}" if highest else "")
@@ -29,9 +39,18 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
     return whole
 
 
-def checked_workers(workers: int | None) -> int | None:
-    """A number of threads, or None for one a core."""
+def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
+    """A number of threads, or None for one a core; a scheduler has workers of its own."""
+    if workers is not None and scheduler is not None:
+        raise InputError(f"workers must be None where a scheduler is given, whose workers they are, got {workers!r}")
     return None if workers is None else checked_whole("workers", workers, lowest=1, highest=MAX_WORKERS)
+
+
+def checked_folder(store: str | os.PathLike[str] | None) -> Path | None:
+    """The folder of a store, or None."""
+    if store is not None and not isinstance(store, (str, os.PathLike)):
+        raise InputError(f"store must be the path of a folder, got {store!r}")
+    return None if store is None else Path(store)
 
 
 def require_resolved(grid: Grid) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import math
 import os
 import sys
 import time
@@ -13,35 +12,40 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 from rich.console import Console
 
+from mcml_sim import printed
 from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers
+from mcml_sim.compiling import Compiling
 from mcml_sim.errors import ClusterError, InputError, OutputError, StoreError
+from mcml_sim.grid import Grid
 from mcml_sim.mcml_files import Run, read_mci, write_mco
+from mcml_sim.medium import half_space
 from mcml_sim.results import Results, read_results, write_results
-from mcml_sim.simulation import Precision, Tally, quantities, simulate
-from mcml_sim.store import MANIFEST
-from mcml_sim.tally import Estimate
+from mcml_sim.run import FIRST_LOOK
+from mcml_sim.simulation import Precision, Tally, batch_photons, quantities, require_store, simulate
+from mcml_sim.store import ELSEWHERE, MANIFEST, RESUMES, batches
+from mcml_sim.terminal import INTERRUPTED, mend_streams, two_interrupts, without_logs
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import require_writable
 
 __all__ = ["app", "main", "run"]
 
 BAD_INPUT = 2
-INTERRUPTED = 130
 QUANTITY = "diffuse_reflectance"
-# What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.
-PRINTED = {
-    "specular_reflectance": "specular reflectance",
-    "diffuse_reflectance": "diffuse reflectance",
-    "absorbed": "absorbed fraction",
-    "transmittance": "transmittance",
-    "ballistic_transmittance": "  of it ballistic",
-    "energy": "all of these",
+# What the library tells to do about an error, as the command line says it.
+REMEDIES = {
+    ELSEWHERE: "delete that folder, or use --out elsewhere",
+    RESUMES: "the same command with --resume goes on",
 }
-MOST_DIGITS = 12  # of a printed value after the point
+FIRST_LOOKS = [f"{FIRST_LOOK * batch_photons(half_space(0.5, n=n)) / 1e6:.2g} million" for n in (1.4, 1.0)]
+PRECISION = (
+    "Stop a run early at this relative standard error, for example 1e-3. It is looked at after 8, 16, 32, ... batches, "
+    f"first at {FIRST_LOOKS[0]} photons ({FIRST_LOOKS[1]} in a matched isotropic half space), and no run goes beyond "
+    "the photons asked for."
+)
+LOOKED_AT = f"What --precision looks at: {', '.join(quantities(Grid(1, 1, 1, 1, na=1)))}."
 REPEATS = (
     "More photons or more repeats? Errors fall as 1/sqrt(photons) either way: k runs of N photons with k seeds are "
     "worth one run of k N."
@@ -72,19 +76,20 @@ def _options(
 @app.command()
 def run(
     file: Annotated[Path, typer.Argument(help="Input file of MCML V1 (.mci).")],
-    photons: Annotated[int | None, typer.Option(help="Photons of each run, instead of the file's.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the photons, >= 0.")] = 0,
-    precision: Annotated[
-        float | None, typer.Option(help="Stop a run early at this relative standard error, for example 1e-3.")
+    photons: Annotated[
+        str | None, typer.Option(metavar="NUMBER", help="Photons of each run, such as 1e7.", show_default="the file's")
     ] = None,
-    quantity: Annotated[str | None, typer.Option(help=f"What --precision looks at.  [default: {QUANTITY}]")] = None,
+    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Seed of the photons, >= 0.")] = "0",
+    precision: Annotated[float | None, typer.Option(help=PRECISION)] = None,
+    quantity: Annotated[str | None, typer.Option(help=LOOKED_AT, show_default=QUANTITY)] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
-    workers: Annotated[int | None, typer.Option(help="Threads.  [default: one a core]")] = None,
+    workers: Annotated[int | None, typer.Option(help="Threads.", show_default="one a core")] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers trace, like tcp://host:8786.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for what is written.  [default: the current folder, as MCML]")
+        Path | None,
+        typer.Option(help="Folder for what is written.", show_default="the current folder, as MCML"),
     ] = None,
 ) -> None:
     """Do every run of an MCML input file.
@@ -95,26 +100,38 @@ def run(
     Example: mcml-sim run sample.mci --photons 10000000 --precision 1e-3
     """
     runs = read_mci(file)
-    if photons is not None:
-        checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
+    number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     if quantity is not None and precision is None:
         raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
+    if workers is not None and scheduler is not None:
+        raise InputError(f"workers are those of the scheduler where --scheduler is given, got --workers {workers}")
     plan = _Plan(
-        seed=checked_whole("seed", seed, lowest=0),
+        seed=_whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
         resume=resume,
         workers=checked_workers(workers),
         scheduler=scheduler,
     )
-    jobs = [_Job(one, photons or one.photons, *_outputs(one, out)) for one in runs]
+    jobs = [_Job(one, number or one.photons, *_outputs(one, out)) for one in runs]
     _require_room(file, jobs, plan)
     console = Console(highlight=False, soft_wrap=True)
-    for number, job in enumerate(jobs, start=1):
-        console.print(f"run {number} of {len(jobs)}: {job.mco}", markup=False)
-        for line in _done(job, plan):
-            console.print(f"  {line}", markup=False)
+    with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines
+        for at, job in enumerate(jobs, start=1):
+            console.print(f"run {at} of {len(jobs)}: {job.mco}", markup=False)
+            for line in _done(job, plan):
+                console.print(f"  {line}", markup=False)
     if plan.goal is not None:
         console.print(REPEATS, markup=False)
+
+
+def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
+    """A whole number as people write them, 1e6 included."""
+    number: object = text
+    for read in (int, float):
+        with contextlib.suppress(ValueError):  # the check says what is wrong with it
+            number = read(text)
+            break
+    return checked_whole(name, number, lowest, highest)
 
 
 @dataclass(frozen=True)
@@ -141,7 +158,12 @@ class _Job:
     @property
     def is_begun(self) -> bool:
         """True if the store holds batches."""
-        return any(self.store.glob("batch-*"))
+        return bool(batches(self.store))
+
+    @property
+    def is_part_of_more(self) -> bool:
+        """True if the store holds batches beyond this run's photons, which are a longer run's."""
+        return any(batch * batch_photons(self.run.medium) >= self.photons for batch in batches(self.store))
 
     def discard_batches(self) -> None:
         """Remove what a store keeps, and its folder if nothing else is in it."""
@@ -173,6 +195,7 @@ def _require_room(file: Path, jobs: list[_Job], plan: _Plan) -> None:
             if place in taken:
                 raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
             taken[place] = job.run.output
+        require_store(job.store, job.run.medium, job.run.grid, plan.seed)
         if job.is_begun and not plan.resume:
             raise InputError(
                 f"{job.store} holds photons of a run that was not finished: --resume goes on with them, "
@@ -190,31 +213,35 @@ def _done(job: _Job, plan: _Plan) -> Iterator[str]:
         kept = read_results(job.npz)
     estimates = kept.estimates
     is_enough = plan.goal is None or plan.goal.is_reached(estimates[plan.goal.quantity])
-    if is_enough:  # else the photons at hand would save a longer run theirs
-        job.discard_batches()
     yield f"{kept.photons} photons, seed {plan.seed}, {told}"
-    for name, title in PRINTED.items():
-        yield f"{title:<22} {_told(estimates[name])}"
+    yield from printed.totals(kept)
     if plan.goal is not None:
-        yield _answer(estimates[plan.goal.quantity], plan.goal, kept.photons)
+        yield printed.answer(estimates[plan.goal.quantity], plan.goal, kept.photons)
+    if job.is_part_of_more:
+        yield f"{job.store} is kept, since it holds more photons than these: --resume with more --photons uses them"
+    elif is_enough:  # else the photons at hand would save a longer run theirs
+        job.discard_batches()
 
 
 def _traced(job: _Job, plan: _Plan) -> tuple[Tally, str]:
     """The run's tally, and how fast it went."""
     begun, start = job.is_begun, time.perf_counter()
-    tally = simulate(
-        job.run.medium,
-        job.run.grid,
-        job.photons,
-        seed=plan.seed,
-        store=job.store,
-        workers=plan.workers,
-        precision=plan.goal,
-        scheduler=plan.scheduler,
-    )
+    with Compiling() as compiling:
+        tally = simulate(
+            job.run.medium,
+            job.run.grid,
+            job.photons,
+            seed=plan.seed,
+            store=job.store,
+            workers=plan.workers,
+            precision=plan.goal,
+            scheduler=plan.scheduler,
+        )
     seconds = time.perf_counter() - start
-    # The batches that were there cost nothing: a rate would be too good.
-    return tally, f"{seconds:.1f} s, " + ("resumed" if begun else f"{tally.photons / seconds / 1e6:.3g} M photons/s")
+    if begun:  # the batches that were there cost nothing: a rate would be too good
+        return tally, f"{printed.times(seconds, compiling.seconds)}, resumed"
+    there = "" if plan.scheduler is None else ", compiling on the workers included"
+    return tally, printed.speed(tally.photons, seconds, compiling.seconds) + there
 
 
 def _finished(job: _Job, plan: _Plan) -> Results | None:
@@ -230,46 +257,21 @@ def _finished(job: _Job, plan: _Plan) -> Results | None:
     return found if (is_enough or found.photons == job.photons) and job.mco.is_file() else None
 
 
-def _told(estimate: Estimate) -> str:
-    """A value and its standard error with two digits, such as 0.23783 ± 0.00042."""
-    value, error = float(estimate.value), float(estimate.standard_error)
-    if not math.isfinite(error):
-        return f"{value:.6g} ± unknown"
-    if error <= 0:
-        return f"{value:.6g}"
-    digits = min(max(1 - math.floor(math.log10(error)), 0), MOST_DIGITS)
-    return f"{value:.{digits}f} ± {error:.{digits}f}"
-
-
-def _answer(estimate: Estimate, goal: Precision, photons: int) -> str:
-    """Whether the precision was reached, and if not, what would reach it."""
-    if goal.is_reached(estimate):
-        return f"{goal.quantity}: relative standard error {goal.relative_error:g} reached"
-    value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
-    if not (np.all(value > 0) and np.all(np.isfinite(error))):
-        return (
-            f"{goal.quantity}: {goal.relative_error:g} not reached; some bins saw too little light to tell what would"
-        )
-    found = float(np.max(error / value))
-    needed = photons * (found / goal.relative_error) ** 2
-    return (
-        f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
-        "photons in all would reach it, and these are kept: ask for more --photons, with --resume"
-    )
-
-
 def main() -> None:
     """Run a command; whatever the user can mend is one line on stderr and exit status 2."""
+    mend_streams()
     errors = Console(stderr=True, highlight=False, soft_wrap=True)
 
     def say(text: object) -> None:
         errors.print(f"mcml-sim: {text}", markup=False)
 
-    with warnings.catch_warnings():  # of a damaged batch, say: a line, without the place in the code
-        warnings.showwarning = lambda message, *_: say(message)
+    with warnings.catch_warnings(), two_interrupts():
+        warnings.showwarning = lambda message, *_: say(
+            message
+        )  # of a damaged batch, say: without the place in the code
         status = _status(say)
-    if status == INTERRUPTED:
-        say("stopped; the finished batches are kept, the same command with --resume goes on")
+        if status == INTERRUPTED:
+            say("stopped; the finished batches are kept, the same command with --resume goes on")
     sys.exit(status)
 
 
@@ -281,10 +283,10 @@ def _status(say: Callable[[object], None]) -> int:
         sys.stdout.flush()
         return int(status)
     except (ClusterError, InputError, OutputError, StoreError) as error:
-        say(error)
+        say(_remedied(str(error)))
     except typer.TyperException as error:
         if message := error.format_message():  # without arguments typer has shown the help and says no more
-            say(f"{message} (--help shows what is accepted)")
+            say(f"{message} ({_hint()})")
         return error.exit_code
     except (KeyboardInterrupt, typer.Abort):
         return INTERRUPTED
@@ -292,3 +294,16 @@ def _status(say: Callable[[object], None]) -> int:
         say(f"cannot print: {error.strerror or error}")
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())  # or Python tries once more as it ends
     return BAD_INPUT
+
+
+def _remedied(text: str) -> str:
+    """What a library error says, with remedies of the command line."""
+    for theirs, ours in REMEDIES.items():
+        text = text.replace(theirs, ours)
+    return text
+
+
+def _hint() -> str:
+    """How to put right a command that was not understood."""
+    first = next(iter(sys.argv[1:]), "")
+    return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else "--help shows what is accepted"

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+import threading
+import warnings
 from collections.abc import Callable
 from concurrent.futures import CancelledError, ThreadPoolExecutor
 from types import ModuleType, TracebackType
 from typing import Generic
 
 from mcml_sim.errors import ClusterError, InputError
-from mcml_sim.store import R, cpu_class, maker
+from mcml_sim.store import RESUMES, R, cpu_class, maker
 
 # Twice as many batches as there are threads: the next one is there when one is done.
 BATCHES_PER_THREAD = 2
@@ -19,13 +21,17 @@ PATIENCE = 5.0  # for a scheduler to answer [s]
 REMEDY = "install the same profilefit there as here"
 
 
+class Deserted(UserWarning):
+    """A Dask cluster has no workers; the run waits for one."""
+
+
 class Cluster(Generic[R]):
     """A connection to the scheduler at an address such as tcp://host:8786, whose workers call `trace`.
 
     A batch whose worker dies goes to another one. A worker that would not give the bits of this machine (another
     version, jaxlib, device or kind of CPU) refuses, whenever it joins: ClusterError says which, and what differs.
     InputError if the optional package is missing or `scheduler` is no address; ClusterError if no scheduler answers,
-    or leaves.
+    or leaves. A Deserted warning after some seconds without workers.
     """
 
     def __init__(self, scheduler: str, trace: Callable[[int, int], R]) -> None:
@@ -37,13 +43,21 @@ class Cluster(Generic[R]):
         threads = sum(self._client.nthreads().values())
         self.tasks = min(max(BATCHES_PER_THREAD * threads, MIN_TASKS), MAX_TASKS)
         """Batches that may be under way at once."""
+        self._warning, self._has_warned = threading.Lock(), False
 
     def trace(self, batch: int, photons: int) -> R:
         """What `trace` gives, computed by a worker; may be called from several threads."""
         try:
-            return self._client.submit(_trace_alike, maker(), self._trace, batch, photons, pure=False).result()
+            task = self._client.submit(_trace_alike, maker(), self._trace, batch, photons, pure=False)
+            while True:
+                try:
+                    return task.result(timeout=PATIENCE)
+                except TimeoutError:
+                    if task.done():  # it is the batch's own
+                        raise
+                self._warn_if_deserted()
         except (CancelledError, self._dask.client.ClosedClientError):
-            raise ClusterError(f"the scheduler at {self._scheduler} has gone; a run with a store resumes") from None
+            raise ClusterError(f"the scheduler at {self._scheduler} has gone; {RESUMES}") from None
         except self._dask.KilledWorker as error:
             raise ClusterError(
                 f"batch {batch} was on {error.allowed_failures + 1} workers of {self._scheduler} when they died, "
@@ -59,6 +73,18 @@ class Cluster(Generic[R]):
         self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
     ) -> None:
         self._client.close()
+
+    def _warn_if_deserted(self) -> None:
+        with self._warning:  # many threads wait, and one says so
+            if self._has_warned:
+                return
+            try:
+                self._has_warned = not self._client.nthreads()
+            except OSError:  # the scheduler is going: the batch's result says so
+                return
+        if self._has_warned:
+            text = f"no worker has come to the scheduler at {self._scheduler} so far; waiting for one"
+            warnings.warn(text, Deserted, stacklevel=2)
 
     def _require_package(self) -> None:
         """The scheduler unpickles what it passes on, so it too needs the package."""

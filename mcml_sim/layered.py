@@ -1,13 +1,14 @@
 """One numbered batch of `simulate` in any layered medium, from the beam to the last end.
 
 A turn is a few flights inside the layers, then one step across interfaces for the photons that wait there, then
-roulette. What leaves is kept by photon and sorted into bins at the end; what is absorbed is added up on the way, in
-multiples of 2^-30 or 2^-38, which float64 adds without rounding. So the number of lanes does not change a bit.
-Places are float32: one within rounding of an edge may be counted on its other side.
+roulette. What leaves, and what is absorbed by a layer, is kept by photon and added up in the order of their numbers at
+the end; what is absorbed at a place is added up on the way, in whole units. So the number of lanes does not change a
+bit. Places are float32: one within rounding of an edge may be counted on its other side.
 """
 
 from __future__ import annotations
 
+import math
 from functools import partial
 from typing import NamedTuple
 
@@ -22,7 +23,7 @@ from mcml_sim.bins import Axis, axis, groups
 from mcml_sim.deposits import Deposits
 from mcml_sim.grid import Grid
 from mcml_sim.medium import Medium
-from mcml_sim.photon import CUT, EVENTS_PER_TURN, FLIGHTS, REFLECTED, ROULETTED, SELECTED_LAYERS, Lanes, Stack
+from mcml_sim.photon import CUT, EVENTS_PER_TURN, FLIGHTS, ROULETTED, SELECTED_LAYERS, Lanes, Stack
 
 Floats = NDArray[np.float64]
 
@@ -30,8 +31,10 @@ BATCH_PHOTONS = 2**18
 LANES = 4096
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same
 GROUPS = 32  # of photons at most, whose spread gives the errors of what is absorbed by ring and depth
-COLUMNS = 64  # in which sums over lanes are kept, so that they are vectors
-SUM_BITS, TABLE_BITS = 30, 38  # float64 adds multiples of 2^-30 up to 2^23, of 2^-38 up to 2^15, without rounding
+# Sums on the way are int64 multiples of 2^-42, or of less if all layers absorb weakly: 2^18 photons of weight 1, each
+# with 2^18 events at most, then stay below 2^61 units.
+SUM_BITS, EVENT_BITS = 42, 18
+BALLISTIC, INSIDE = -1.0, -2.0  # "radii" of light that was transmitted unscattered, and that was cut
 
 
 class Bins(NamedTuple):
@@ -43,29 +46,34 @@ class Bins(NamedTuple):
     """Cosines of the edges between angles, falling, float32 (angles - 1,)."""
     groups_per_photon: Array
     """Groups of photons over photons, float32."""
+    per_weight: Array
+    """Units of the sums in a weight of 1, float64."""
 
 
 class Shape(NamedTuple):
     """What the kernels are compiled for, besides the shapes of their arrays."""
 
     groups: int
-    """Groups of photons; 0 if depth is not resolved."""
+    """Groups of photons."""
+    depths: bool
+    """Whether depth is resolved."""
     lanes: int
 
 
 class Results(NamedTuple):
-    """What became of the photons of a batch."""
+    """What became of the photons of a batch; by photon, with one more place for what nobody asks for."""
 
     exits: Array
-    """Of each photon, rho [length] + i weight, the weight negative below; 0 if it did not leave, complex64."""
+    """rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 if roulette ended it,
+    complex64 (BATCH_PHOTONS + 1,)."""
     cosines: Array
-    """Of its direction to the normal [-]; float32 (BATCH_PHOTONS,), or (1,) if angles are not resolved."""
-    sums: Array
-    """Of the quantities of `_quantities` and their squares, float64 (quantities, 2, COLUMNS)."""
+    """Of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
+    absorbed: tuple[Array, ...]
+    """What it left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + 1,) each."""
     by_layer: Array
-    """What each group left in each layer, float64 (groups * layers,), or (0,) if photons know it."""
+    """What each group left in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
     by_cell: Array
-    """What each group left in each ring and depth, float64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
+    """What each group left in each ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
 
 
 def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES) -> Deposits:
@@ -78,12 +86,13 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     if first > len(medium.layers):
         return _all_ballistic(grid, photons)
     unit = _unit(medium)
-    bins, shape = _bins(grid, unit, photons, lanes)
+    bins, shape = _bins(medium, grid, unit, photons, lanes)
     key = jnp.asarray(rng.batch_key(seed, batch))
     with jax.enable_x64(True):
         found = trace(key, jnp.int32(photons), jnp.int32(first), photon.stack(medium, unit), bins, shape)
-    exits, sums, by_layer, by_cell = (np.asarray(part) for part in found)
-    return _deposits(exits, sums, by_layer, by_cell, photons, len(medium.layers), grid)
+    exits, sums, *tables = (np.asarray(part) for part in found)
+    by_layer, by_cell = (table / float(bins.per_weight) for table in tables)
+    return _deposits(exits, sums, by_layer.reshape(shape.groups, -1), by_cell, photons, grid)
 
 
 @partial(jax.jit, static_argnames="shape", compiler_options=pool.COMPILER_OPTIONS)
@@ -97,13 +106,13 @@ def trace(
     go = photons > 0
     angles = len(bins.cosines) > 0
     followed = stack.layers if stack.layers <= SELECTED_LAYERS else 1
-    cells = shape.groups * (bins.r.bins + 1) * (bins.z.bins + 1)
+    cells = (bins.r.bins + 1) * (bins.z.bins + 1) if shape.depths else 0
     results = Results(
-        exits=jnp.zeros(BATCH_PHOTONS, jnp.complex64),
-        cosines=jnp.zeros(BATCH_PHOTONS if angles else 1, jnp.float32),
-        sums=jnp.zeros((followed + 4, 2, COLUMNS), jnp.float64),
-        by_layer=jnp.zeros(0 if followed == stack.layers else GROUPS * stack.layers, jnp.float64),
-        by_cell=jnp.zeros(cells, jnp.float64),
+        exits=jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64),
+        cosines=jnp.zeros(BATCH_PHOTONS + 1 if angles else 1, jnp.float32),
+        absorbed=(jnp.zeros(BATCH_PHOTONS + 1, jnp.float32),) * followed,
+        by_layer=jnp.zeros(0 if followed == stack.layers else shape.groups * stack.layers, jnp.int64),
+        by_cell=jnp.zeros(shape.groups * cells, jnp.int64),
     )
 
     def enter(numbers: Array) -> Lanes:
@@ -121,8 +130,7 @@ def trace(
         return lanes, _recorded(results, lanes, stack.layers, angles)._replace(by_layer=by_layer, by_cell=by_cell)
 
     results = pool.follow(enter, turn, results, photons, shape.lanes)
-    exits = _histogram(results, bins)
-    return exits, results.sums.sum(axis=-1), results.by_layer, results.by_cell
+    return _sorted(results, bins), _summed(results), results.by_layer, results.by_cell
 
 
 State = tuple[Lanes, Array, Array]
@@ -131,27 +139,23 @@ State = tuple[Lanes, Array, Array]
 def _turn(go: Array, key: Array, stack: Stack, bins: Bins, shape: Shape, state: State) -> State:
     """Flights, what they leave behind, the step across interfaces, and roulette."""
     lanes, by_layer, by_cell = state
-    here, before = photon.material(stack, lanes.layer), lanes.weight
-    group = _group(lanes, bins, shape.groups or GROUPS)
+    here, group = photon.material(stack, lanes.layer), _group(lanes, bins, shape.groups)
 
-    def flight(number: Array, state: tuple[Lanes, Array]) -> tuple[Lanes, Array]:
-        lanes, by_cell = state
-        after, paths = photon.scatter(go, key, lanes, lanes.event + number, here)
+    def flight(number: Array, state: tuple[Lanes, Array, Array]) -> tuple[Lanes, Array, Array]:
+        lanes, absorbed, by_cell = state
+        after, left = photon.scatter(go, key, lanes, lanes.event + number, here)
         if by_cell.size:
-            left = jnp.where(paths > 0, lanes.weight - after.weight, 0)
             top = photon.pick(stack.top, lanes.layer)
-            cell, left = photon.staged(go, partial(_cell, bins), after.place, after.down, top, group, left)
-            by_cell = by_cell.at[cell].add(left, mode="promise_in_bounds")
-        return after, by_cell
+            cell, units = photon.staged(go, partial(_cell, bins), after.place, after.down, top, group, left)
+            by_cell = by_cell.at[cell].add(units, mode="promise_in_bounds")
+        return after, absorbed + left, by_cell
 
-    lanes, by_cell = lax.fori_loop(jnp.uint32(0), jnp.uint32(FLIGHTS), flight, (lanes, by_cell))
-    left = before - jnp.abs(lanes.weight)
-    left = jnp.where(before > 0, left, 0)
+    begin = lanes, jnp.zeros_like(lanes.weight), by_cell
+    lanes, left, by_cell = lax.fori_loop(jnp.uint32(0), jnp.uint32(FLIGHTS), flight, begin)
     if by_layer.size:
         cell = group * stack.layers + jnp.clip(lanes.layer - 1, 0, stack.layers - 1)
-        by_layer = by_layer.at[cell].add(_rounded(left, TABLE_BITS), mode="promise_in_bounds")
-        absorbed = (lanes.absorbed[0] + left,)
-    elif len(lanes.absorbed) == 1:
+        by_layer = by_layer.at[cell].add(_units(left, bins), mode="promise_in_bounds")
+    if len(lanes.absorbed) == 1:
         absorbed = (lanes.absorbed[0] + left,)
     else:
         absorbed = tuple(
@@ -167,59 +171,69 @@ def _group(lanes: Lanes, bins: Bins, parts: int) -> Array:
 
 
 def _cell(bins: Bins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
-    """Index into the table of groups, rings and depths, and what is left there."""
+    """Index into the table of groups, rings and depths, and what is left there, in units."""
     ring = bins.r.index(jnp.sqrt(place.real * place.real + place.imag * place.imag))
     depth = bins.z.index(top + down.real)
-    return (group * (bins.r.bins + 1) + ring) * (bins.z.bins + 1) + depth, _rounded(left, TABLE_BITS)
+    return (group * (bins.r.bins + 1) + ring) * (bins.z.bins + 1) + depth, _units(left, bins)
 
 
-def _rounded(weights: Array, bits: int) -> Array:
-    """float64 multiples of 2^-bits, which is the spacing of float64 at 2^(52 - bits)."""
-    large = jnp.float64(1.5 * 2.0 ** (52 - bits))
-    return (weights.astype(jnp.float64) + large) - large
-
-
-def _quantities(lanes: Lanes, layers: int) -> tuple[Array, ...]:
-    """Of photons that have ended: weight left in layers, in all of them, accounted for, ballistic, cut."""
-    weight = -lanes.weight
-    absorbed = sum(lanes.absorbed[1:], start=lanes.absorbed[0])
-    accounted = absorbed + jnp.where(lanes.layer == ROULETTED, 0, weight)
-    transmitted = lanes.layer == layers + 1
-    ballistic = jnp.where(transmitted & ~photon.is_scattered(lanes), weight, 0)
-    cut = jnp.where(lanes.layer == CUT, weight, 0)
-    return (*lanes.absorbed, absorbed, accounted, ballistic, cut)
+def _units(left: Array, bins: Bins) -> Array:
+    """Weights in whole units, int64."""
+    return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
 def _recorded(results: Results, lanes: Lanes, layers: int, angles: bool) -> Results:
-    """Add what became of the photons that have ended since the last time."""
+    """Keep what became of the photons that have ended since the last time.
+
+    The others write too, beyond the last photon: a branch that no processor can foresee costs more.
+    """
     counts = lanes.ended & (lanes.photon < BATCH_PHOTONS)
-    values = [jnp.where(counts, value, 0).reshape(-1, COLUMNS) for value in _quantities(lanes, layers)]
-    rounded = [[_rounded(value, SUM_BITS), _rounded(value * value, SUM_BITS)] for value in values]
-    sums = results.sums + jnp.stack([jnp.stack([v.sum(axis=0) for v in pair]) for pair in rounded])
-    transmitted = (lanes.layer == layers + 1) & photon.is_scattered(lanes)
-    leaves = counts & (transmitted | (lanes.layer == REFLECTED))
-    number = jnp.where(leaves, lanes.photon.astype(jnp.int32), BATCH_PHOTONS)
+    number = jnp.where(counts, lanes.photon, BATCH_PHOTONS).astype(jnp.int32)
+    transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
-    exit_ = lax.complex(rho, jnp.where(transmitted, lanes.weight, -lanes.weight))
+    rho = jnp.where(transmitted & ~photon.is_scattered(lanes), BALLISTIC, rho)
+    rho = jnp.where(lanes.layer == CUT, INSIDE, rho).astype(jnp.float32)
+    weight = jnp.where(lanes.layer == ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
     cosines = results.cosines
     if angles:
-        cosines = cosines.at[number].set(jnp.abs(lanes.down.imag), mode="drop")
-    return results._replace(exits=results.exits.at[number].set(exit_, mode="drop"), cosines=cosines, sums=sums)
+        cosines = _written(cosines, number, jnp.abs(lanes.down.imag))
+    return results._replace(
+        exits=_written(results.exits, number, lax.complex(rho, weight)),
+        cosines=cosines,
+        absorbed=tuple(_written(old, number, new) for old, new in zip(results.absorbed, lanes.absorbed, strict=True)),
+    )
 
 
-def _histogram(results: Results, bins: Bins) -> Array:
+def _written(values: Array, number: Array, new: Array) -> Array:
+    return values.at[number].set(new, mode="promise_in_bounds")
+
+
+def _sorted(results: Results, bins: Bins) -> Array:
     """Weights and squared weights by side (above, below), ring and angle, float64 (2, rings + 1, angles or 1, 2)."""
-    weight = results.exits.imag
-    cell = jnp.where(weight < 0, 1, 0) * (bins.r.bins + 1) + bins.r.index(results.exits.real)
+    rho, signed = results.exits.real[:-1], results.exits.imag[:-1]
+    weight = jnp.where(rho >= 0, jnp.abs(signed), 0).astype(jnp.float64)
+    cell = jnp.where(signed < 0, 1, 0) * (bins.r.bins + 1) + bins.r.index(rho)
     angles = len(bins.cosines) or 1
     if len(bins.cosines):
         # Edges fall from 1, so those above the cosine are counted.
-        angle = jnp.searchsorted(-bins.cosines[1:], -results.cosines, side="right", method="scan_unrolled")
+        angle = jnp.searchsorted(-bins.cosines[1:], -results.cosines[:-1], side="right", method="scan_unrolled")
         cell = cell * angles + angle.astype(jnp.int32)
-    rounded = _rounded(jnp.abs(weight), SUM_BITS), _rounded(weight * weight, SUM_BITS)
     size = 2 * (bins.r.bins + 1) * angles
-    sums = [jnp.zeros(size, jnp.float64).at[cell].add(values, mode="promise_in_bounds") for values in rounded]
+    sums = [jnp.zeros(size, jnp.float64).at[cell].add(w, mode="promise_in_bounds") for w in (weight, weight * weight)]
     return jnp.stack(sums, axis=-1).reshape(2, bins.r.bins + 1, angles, 2)
+
+
+def _summed(results: Results) -> Array:
+    """Sums and sums of squares over photons, float64 (quantities, 2).
+
+    Quantities: what was left in layers, in all of them, what is accounted for, ballistic, cut.
+    """
+    rho, weight = results.exits.real[:-1], jnp.abs(results.exits.imag[:-1]).astype(jnp.float64)
+    by_layer = [values[:-1].astype(jnp.float64) for values in results.absorbed]
+    absorbed = sum(by_layer[1:], start=by_layer[0])
+    ballistic, cut = (jnp.where(rho == where, weight, 0) for where in (BALLISTIC, INSIDE))
+    quantities = jnp.stack([*by_layer, absorbed, absorbed + weight, ballistic, cut])
+    return jnp.stack([quantities.sum(axis=1), jnp.sum(quantities * quantities, axis=1)], axis=1)
 
 
 def _unit(medium: Medium) -> float:
@@ -228,26 +242,32 @@ def _unit(medium: Medium) -> float:
     return 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
 
 
-def _bins(grid: Grid, unit: float, photons: int, lanes: int) -> tuple[Bins, Shape]:
-    parts = groups(grid, photons, GROUPS) if grid.depths else 0
+def _bins(medium: Medium, grid: Grid, unit: float, photons: int, lanes: int) -> tuple[Bins, Shape]:
+    parts = groups(grid, photons, GROUPS)
     z_edges = grid.z_edges if grid.z_edges is not None else np.array([0.0, 1.0])
     # The angles' lower edges.
     cosines = np.cos(grid.a_edges[:-1]) if grid.a_edges is not None else np.zeros(0)
-    bins = Bins(
-        axis(grid.r_edges, unit),
-        axis(z_edges, unit),
-        jnp.asarray(cosines, jnp.float32),
-        jnp.float32((parts or GROUPS) / photons),
-    )
-    return bins, Shape(parts, lanes)
+    with jax.enable_x64(True):
+        bins = Bins(
+            axis(grid.r_edges, unit),
+            axis(z_edges, unit),
+            jnp.asarray(cosines, jnp.float32),
+            jnp.float32(parts / photons),
+            jnp.float64(2.0 ** _sum_bits(medium)),
+        )
+    return bins, Shape(parts, grid.depths > 0, lanes)
 
 
-def _deposits(
-    exits: Floats, sums: Floats, by_layer: Floats, by_cell: Floats, photons: int, layers: int, grid: Grid
-) -> Deposits:
+def _sum_bits(medium: Medium) -> int:
+    """How many binary digits after the point sums have."""
+    most = max(layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in medium.layers)
+    return SUM_BITS + max(0, math.floor(-math.log2(most)) - EVENT_BITS) if most else SUM_BITS
+
+
+def _deposits(exits: Floats, sums: Floats, by_layer: Floats, by_cell: Floats, photons: int, grid: Grid) -> Deposits:
     *absorbed, total, accounted, ballistic, cut = sums
     if by_layer.size:
-        absorbed = [_with_squares(values, photons) for values in by_layer.reshape(GROUPS, layers).T]
+        absorbed = [_with_squares(values, photons) for values in by_layer.T]
     in_layers = np.array([*absorbed, total])
     rz = by_cell.reshape(-1, grid.rings + 1, grid.depths + 1) if grid.depths else np.zeros((1, 0, 0))
     z = rz.sum(axis=1)
@@ -274,7 +294,7 @@ def _deposits(
 def _variance(parts: Floats) -> Floats:
     """Of the sum of independent, equally distributed groups, by their spread: (groups, ...) -> (...)."""
     number = len(parts)
-    return number * parts.var(axis=0, ddof=1) if number > 1 else np.zeros(parts.shape[1:])
+    return number * parts.var(axis=0, ddof=1) if number > 1 else np.full(parts.shape[1:], np.inf)
 
 
 def _with_squares(parts: Floats, photons: int) -> tuple[float, float]:

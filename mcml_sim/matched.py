@@ -169,7 +169,7 @@ def _summed(by_group: Array) -> tuple[Array, Array]:
     """Sum over groups, and its variance as their spread tells."""
     groups = len(by_group)
     if groups == 1:
-        return by_group[0], by_group[0] ** 2
+        return by_group[0], jnp.full_like(by_group[0], jnp.inf)
     total, squares = by_group.sum(axis=0), jnp.sum(by_group * by_group, axis=0)
     return total, jnp.maximum(squares - total * total / groups, 0) * (groups / (groups - 1))
 

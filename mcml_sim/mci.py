@@ -12,14 +12,16 @@ number of runs, and for each run
     1.37 1 100 0.9 0.1      n mu_a mu_s g thickness, a line for each layer
     1.0                     n below
 
-A # starts a comment, blank lines may stand anywhere, and what follows the values of a line is not read, as in V1; nor
-is what follows the last run. Unlike V1, which reads what it can of a word and takes 1e6 photons for 1, a word that is
-not quite a number is an error. V1 wrote text for B as for A, so B is read and makes no difference. Beyond V1, g may
-be negative, and the last thickness may be `inf`; the 1E8 that V1's users write for that stays a length.
+A # starts a comment, blank lines may stand anywhere, and words after the values of a line are not read, as in V1; nor
+is what follows the last run. Comments may have any bytes. Unlike V1, a number too many is an error, since it tells of
+a line too many, and so is a word that is not quite a number, of which V1 reads what it can: 1 photon of 1e6. V1 wrote
+text for B as for A, so B is read and makes no difference. Beyond V1, g may be negative, and the last thickness may be
+`inf`; the 1E8 that V1's users write for that stays a length.
 """
 
 from __future__ import annotations
 
+import itertools
 import os
 import posixpath
 import re
@@ -38,12 +40,15 @@ MAX_RUNS = 10_000
 MAX_CELLS = 2**21  # of a table of rings and depths, or of rings and angles: 16 MiB each
 MAX_NAME = 255  # characters; what V1 and most file systems hold
 LENGTHS = (1e-12, 1e12)  # [cm]
-COEFFICIENTS = (0.0, 1e12)  # [1/cm]
+COEFFICIENTS = (1e-12, 1e12)  # [1/cm]; or 0
 INDICES = (0.01, 100.0)
 
 WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
 DECIMAL = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 INFINITE = re.compile(r"\+?inf(inity)?", re.IGNORECASE)
+FORMAT = re.compile(r"[ab][^.]*", re.IGNORECASE)
+# What bytes that are no UTF-8 become; in comments they may stand.
+STRAY = re.compile(r"[\udc80-\udcff]")
 # What V1 drops from a line: control characters that are no white space (old DOS files end in one).
 CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 LONGEST_SHOWN = 40  # characters of a word in a message
@@ -110,16 +115,24 @@ class _Lines:
         self._number = 0
 
     def take(self, count: int, expected: str, optional: int = 0) -> list[str]:
-        """The first `count` words of the next line that has any, and up to `optional` more."""
+        """The first `count` words of the next line that has any, and up to `optional` more; no number may follow."""
         while self._number < len(self._lines):
             line = self._lines[self._number]
             self._number += 1
-            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=count + optional) if line else []
+            wanted = count + optional
+            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=wanted + 1) if line else []
+            if len(words) > wanted and _is_number(words[wanted]):
+                raise self.error(f"{expected} alone", f"{wanted + _numbers(words[wanted:])} values")
             if len(words) >= count:
-                return words[: count + optional]
+                return [self._text(word) for word in words[:wanted]]
             if words:
                 raise self.error(f"{count} values, {expected}", f"{len(words)}: {_shown(' '.join(words))}")
         raise self.error(expected, "the end of the file")
+
+    def _text(self, word: str) -> str:
+        if stray := STRAY.search(word):
+            raise self.error("text in UTF-8", f"the byte {ord(stray[0]) - 0xDC00:#04x}")
+        return word
 
     def error(self, expected: str, got: str) -> InputError:
         """What to raise about the line that was read last."""
@@ -131,11 +144,17 @@ class _Lines:
             return int(word)
         raise self.error(f"{name}, a whole number from 1 to {most}", _shown(word))
 
-    def decimal(self, name: str, word: str, bounds: tuple[float, float]) -> float:
+    def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
         """A number within bounds, both included."""
         if DECIMAL.fullmatch(word) and bounds[0] <= float(word) <= bounds[1]:
             return float(word) + 0.0  # no -0
-        raise self.error(f"{name}, a number from {bounds[0]:g} to {bounds[1]:g}", _shown(word))
+        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", _shown(word))
+
+    def coefficient(self, name: str, word: str) -> float:
+        """A coefficient, which may be 0, but not so little that no float32 holds the mean free path."""
+        if DECIMAL.fullmatch(word) and float(word) == 0:
+            return 0.0
+        return self.decimal(name, word, COEFFICIENTS, or_else="0 or ")
 
 
 def _run(lines: _Lines, taken: set[str]) -> Run:
@@ -154,10 +173,12 @@ def _run(lines: _Lines, taken: set[str]) -> Run:
 
 
 def _output(lines: _Lines, taken: set[str]) -> tuple[str, str]:
-    """Name and format. As in V1, no format is A, and of a longer word the first letter counts."""
+    """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     name, *form = lines.take(1, "the name of an output file, and A or B", optional=1)
     if len(name) > MAX_NAME or not name.isprintable():
         raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", _shown(name))
+    if form and not FORMAT.fullmatch(form[0]):
+        raise lines.error("A or B after the name (a name holds no spaces)", _shown(form[0]))
     same = posixpath.normpath(name)
     if same in taken:
         raise lines.error("an output file that no other run has", _shown(name))
@@ -183,8 +204,8 @@ def _layer(lines: _Lines, at: int, number: int) -> Layer:
     n, mu_a, mu_s, g, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
     values = {
         "n": lines.decimal(f"n {of}", n, INDICES),
-        "mu_a": lines.decimal(f"mu_a {of} in 1/cm", mu_a, COEFFICIENTS),
-        "mu_s": lines.decimal(f"mu_s {of} in 1/cm", mu_s, COEFFICIENTS),
+        "mu_a": lines.coefficient(f"mu_a {of} in 1/cm", mu_a),
+        "mu_s": lines.coefficient(f"mu_s {of} in 1/cm", mu_s),
         "g": lines.decimal(f"g {of}", g, (-1.0, 1.0)),
     }
     if abs(values["g"]) == 1 and (values["mu_s"] > 0 or values["g"] < 0):
@@ -199,18 +220,21 @@ def _layer(lines: _Lines, at: int, number: int) -> Layer:
 def _text(name: str, content: bytes) -> str:
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
-    try:
-        text = content.decode("utf-8").removeprefix("\ufeff")  # the mark that some editors put first
-    except UnicodeDecodeError as error:
-        raise _not_text(name, content, error.start) from None
-    if "\x00" in text:
-        raise _not_text(name, content, content.index(b"\x00"))
-    return text
+    before, null, _ = content.partition(b"\x00")
+    if null:
+        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
+        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
+    # A mark that some editors put first is no part of the text.
+    return content.decode("utf-8", errors="surrogateescape").removeprefix("\ufeff")
 
 
-def _not_text(name: str, content: bytes, at: int) -> InputError:
-    before = content[:at].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    return InputError(f"{name}:{before.count(10) + 1}: expected text in UTF-8, got the byte {content[at]:#04x}")
+def _is_number(word: str) -> bool:
+    return bool(DECIMAL.fullmatch(word) or INFINITE.fullmatch(word))
+
+
+def _numbers(words: list[str]) -> int:
+    """How many numbers there are before the first other word."""
+    return sum(1 for _ in itertools.takewhile(_is_number, " ".join(words).split()))
 
 
 def _shown(word: str) -> str:

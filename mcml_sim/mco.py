@@ -15,9 +15,9 @@ from __future__ import annotations
 
 import math
 import os
+import reprlib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,9 +26,10 @@ from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid
 from mcml_sim.simulation import Tally
 from mcml_sim.version import __version__
-from mcml_sim.whole_file import write_whole
+from mcml_sim.whole_file import checked_path, write_whole
 
 Floats = NDArray[np.float64]
+Name = str | os.PathLike[str]
 
 ENDLESS = 1e8  # the thickness that V1's users write for infinite [cm]
 EVEN = 1e-9  # relative error of edges that are even but for rounding
@@ -45,22 +46,18 @@ HEAD = (
 )
 
 
-def write_mco(tally: Tally, path: str | os.PathLike[str]) -> None:
+def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
     """Write what `simulate` found as a V1 .mco file, whole or not at all. Lengths of the tally must be in cm.
 
     The grid must have even rings and depths, as an .mco has; where it does not resolve angles, there is one bin of
     them. An infinite thickness becomes 1E+08 cm. Two arguments in the other order are taken as well. InputError on
     anything else; OutputError if the file cannot be written.
     """
-    if isinstance(tally, (str, os.PathLike)):
-        tally, path = path, tally  # type: ignore[assignment]
-    if not isinstance(tally, Tally):
-        raise InputError(f"tally must be what simulate gave, got {tally!r}")
-    try:
-        file = Path(path)
-    except TypeError:
-        raise InputError(f"path must be the name of a file, got {path!r}") from None
-    write_whole(file, "".join(_sections(tally, file.name)).encode())
+    found, name = (path, tally) if isinstance(path, Tally) else (tally, path)
+    if not isinstance(found, Tally):
+        raise InputError(f"tally must be what simulate gave, got {reprlib.repr(found)}")
+    file = checked_path(name)
+    write_whole(file, "".join(_sections(found, file.name)).encode())
 
 
 @dataclass(frozen=True)

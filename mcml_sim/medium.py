@@ -8,9 +8,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.checks import is_number
 from mcml_sim.errors import InputError
 
-NUMBERS = (int, float, np.number)
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
 
 
@@ -35,11 +35,13 @@ class Layer:
         _require_index("n", self.n)
         for name in ("mu_a", "mu_s"):
             value = getattr(self, name)
-            if not (_is_number(value) and math.isfinite(value) and value >= 0):
+            if not (is_number(value) and math.isfinite(value) and value >= 0):
                 raise InputError(f"{name} must be a coefficient >= 0, got {value!r}")
-        if not (_is_number(self.g) and (-1 < self.g < 1 or (self.g == 1 and self.mu_s == 0))):
+        if not math.isfinite(self.mu_t):
+            raise InputError(f"mu_a + mu_s must be finite, got {self.mu_a!r} and {self.mu_s!r}")
+        if not (is_number(self.g) and (-1 < self.g < 1 or (self.g == 1 and self.mu_s == 0))):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {self.g!r}")
-        if not (_is_number(self.thickness) and self.thickness > 0):
+        if not (is_number(self.thickness) and self.thickness > 0):
             raise InputError(f"thickness must be > 0, or infinite in the last layer, got {self.thickness!r}")
 
     @property
@@ -118,17 +120,13 @@ def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -
     n      refractive index [-]
     g      mean cosine of the scattering angle [-]
     """
-    if not (_is_number(alpha) and 0 <= alpha <= 1):
+    if not (is_number(alpha) and 0 <= alpha <= 1):
         raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {alpha!r}")
-    if not (_is_number(mfp) and math.isfinite(mfp) and mfp > 0):
+    if not (is_number(mfp) and math.isfinite(mfp) and mfp > 0):
         raise InputError(f"mfp must be a mean free path > 0, got {mfp!r}")
     return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp, g=g),))
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, NUMBERS) and not isinstance(value, bool) and not math.isnan(value)
-
-
 def _require_index(name: str, value: object) -> None:
-    if not (_is_number(value) and math.isfinite(value) and value > 0):  # type: ignore[arg-type, operator]
+    if not (is_number(value) and math.isfinite(value) and value > 0):
         raise InputError(f"{name} must be a refractive index > 0, got {value!r}")

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import order_bins, single, tally, tracer
-from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers, require_resolved
+from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_resolved
 from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid
 from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, roulette_weight
@@ -173,13 +173,14 @@ def simulate_orders(
     require_resolved(grid)
     number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     key = checked_whole("seed", seed, lowest=0)
+    threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     read = partial(Counts.from_arrays, shape=_shape(grid))
-    kept = None if store is None else Store(Path(store), _made_by(grid, key, setting), read)
+    kept = None if folder is None else Store(folder, _made_by(grid, key, setting), read)
     counts = run_batches(
         partial(tracer.trace_batch, grid, key, setting=setting),
         tracer.BATCH_PHOTONS,
         number,
-        workers=checked_workers(workers),
+        workers=threads,
         store=kept,
         progress=progress,
         scheduler=scheduler,
@@ -190,6 +191,7 @@ def simulate_orders(
 def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
     """What decides which photons a batch holds and how they are counted."""
     return {
+        "kind": "orders",
         "setting": str(setting),
         "seed": seed,
         "grid": grid.digest,

@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import json
 import os
+import reprlib
 import zipfile
 import zlib
 from collections.abc import Mapping
@@ -25,7 +26,7 @@ from mcml_sim.medium import Layer, Medium
 from mcml_sim.simulation import Tally, quantities
 from mcml_sim.tally import Estimate
 from mcml_sim.version import __version__
-from mcml_sim.whole_file import write_whole
+from mcml_sim.whole_file import checked_path, write_whole
 
 FORMAT = 1
 ENDS = ("", "_standard_error", "_effective_samples")  # the fields of an Estimate
@@ -43,6 +44,8 @@ class Results:
     seed: int
     version: str
     """Of mcml_sim, that made it."""
+    cut: float
+    """Light given up inside, after the last event allowed [-]."""
     estimates: Mapping[str, Estimate]
     """By the names of the tally's properties."""
 
@@ -50,8 +53,11 @@ class Results:
 def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
     """Keep every estimate of a tally in an .npz file, whole or not at all. OutputError if it cannot be written.
 
-    The same tally gives the same bytes.
+    The same tally gives the same bytes. InputError if that is not what `simulate` gave, or no path.
     """
+    if not isinstance(tally, Tally):
+        raise InputError(f"tally must be what simulate gave, got {reprlib.repr(tally)}")
+    file = checked_path(path)
     header = {
         "format": FORMAT,
         "mcml_sim": __version__,
@@ -66,16 +72,19 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
         estimate = tally.quantity(name)
         parts = (estimate.value, estimate.standard_error, estimate.effective_samples)
         arrays |= {name + end: np.asarray(part) for end, part in zip(ENDS, parts, strict=True)}
-    file = io.BytesIO()
-    np.savez_compressed(file, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
-    write_whole(Path(path), file.getvalue())
+    contents = io.BytesIO()
+    np.savez_compressed(contents, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
+    write_whole(file, contents.getvalue())
 
 
 def read_results(path: str | os.PathLike[str]) -> Results:
     """What `write_results` wrote. InputError names the file and says what is wrong with it."""
     try:
-        with Path(path).open("rb") as file, np.load(file, allow_pickle=False) as fields:
-            return _results(dict(fields))
+        with Path(path).open("rb") as file:
+            if not zipfile.is_zipfile(file):  # numpy would take it for a pickle
+                raise ValueError("not a whole .npz file")
+            with np.load(file, allow_pickle=False) as fields:
+                return _results(dict(fields))
     except DAMAGED as error:
         reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
         raise InputError(f"{path}: expected results of mcml_sim, got: {reason.splitlines()[0]}") from None
@@ -97,6 +106,7 @@ def _results(fields: Mapping[str, NDArray]) -> Results:
         photons=header["photons"],
         seed=header["seed"],
         version=header["mcml_sim"],
+        cut=header["cut"],
         estimates=estimates,
     )
 

@@ -171,5 +171,6 @@ class _RateColumn(ProgressColumn):
 
 def _bar(progress: bool | None) -> Progress:
     columns = (TextColumn("{task.description}"), BarColumn(), _RateColumn(), TimeRemainingColumn())
-    shown = sys.stderr.isatty() if progress is None else progress
+    # There is no stderr where a shell has closed it.
+    shown = (sys.stderr is not None and sys.stderr.isatty()) if progress is None else progress
     return Progress(*columns, console=Console(stderr=True), disable=not shown)

@@ -5,11 +5,9 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-import numpy as np
-
+from mcml_sim.checks import is_number
 from mcml_sim.errors import InputError
 
-NUMBERS = (int, float, np.number)
 ILLUMINATIONS = ("searchlight", "diffuse")
 
 
@@ -31,9 +29,9 @@ class Setting:
     def __post_init__(self) -> None:
         if self.illumination not in ILLUMINATIONS:
             raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {self.illumination!r}")
-        if not (isinstance(self.n, NUMBERS) and math.isfinite(self.n) and self.n > 0):
+        if not (is_number(self.n) and math.isfinite(self.n) and self.n > 0):
             raise InputError(f"n must be a refractive index > 0, got {self.n!r}")
-        if not (isinstance(self.g, NUMBERS) and -1 < self.g < 1):
+        if not (is_number(self.g) and -1 < self.g < 1):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {self.g!r}")
 
     @property

@@ -12,13 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import deposits, layered, matched, optics, pool
-from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers, require_resolved
+from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_resolved
 from mcml_sim.deposits import Deposits
 from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid
 from mcml_sim.medium import Medium
 from mcml_sim.run import run_batches
-from mcml_sim.store import Store
+from mcml_sim.store import Store, require_ours
 from mcml_sim.tally import Estimate
 
 Floats = NDArray[np.float64]
@@ -103,7 +103,10 @@ class Tally:
 
     @property
     def diffuse_reflectance(self) -> Estimate:
-        """Light that entered and left through the top, beyond the last ring included [-]."""
+        """Light that entered and left through the top, beyond the last ring included [-].
+
+        As in MCML also what was never scattered but thrown back by an interface below; it leaves at r = 0.
+        """
         return self._leaving("reflected", (0, 1))
 
     @property
@@ -256,7 +259,8 @@ def simulate(
     medium     layers; lengths in any unit
     grid       bins in the same unit: rings, and if wanted depths (for absorption) and exit angles
     photons    how many to start, 1 to 1e13; with `precision`, at most so many
-    seed       whole number >= 0; equal seeds start with equal photons
+    seed       whole number >= 0; equal seeds start with equal photons, in a matched isotropic half space those of
+               `simulate_orders` too, so give runs that are to be compared seeds of their own
     store      folder that keeps each finished batch; a run that finds batches there resumes
     workers    threads, by default one a core; the result does not depend on it
     precision  stop early: the relative standard error of the diffuse reflectance to reach, or a Precision that names
@@ -273,14 +277,15 @@ def simulate(
     require_resolved(grid)
     number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     key = checked_whole("seed", seed, lowest=0)
+    threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel = matched if medium.is_matched_isotropic_half_space else layered
     enough = None if precision is None else _enough(precision, medium, grid, key)
     shapes = deposits.shapes(grid, len(medium.layers))
     kept = (
         None
-        if store is None
+        if folder is None
         else Store(
-            Path(store),
+            folder,
             _made_by(medium, grid, key, BATCH_PHOTONS[kernel]),
             partial(Deposits.from_arrays, shapes=shapes),
         )
@@ -289,13 +294,23 @@ def simulate(
         partial(kernel.trace_batch, medium, grid, key),
         BATCH_PHOTONS[kernel],
         number,
-        workers=checked_workers(workers),
+        workers=threads,
         store=kept,
         progress=progress,
         scheduler=scheduler,
         enough=enough,
     )
     return Tally(medium, grid, sums.started, key, sums)
+
+
+def batch_photons(medium: Medium) -> int:
+    """Photons of a batch of `simulate` in this medium."""
+    return BATCH_PHOTONS[matched if medium.is_matched_isotropic_half_space else layered]
+
+
+def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
+    """StoreError if `simulate` could not keep batches in that folder because of what is there; nothing is written."""
+    require_ours(folder, _made_by(medium, grid, seed, batch_photons(medium)))
 
 
 class _Enough:
@@ -318,6 +333,7 @@ def _enough(precision: float | Precision, medium: Medium, grid: Grid, seed: int)
 def _made_by(medium: Medium, grid: Grid, seed: int, batch_photons: int) -> dict[str, object]:
     """What decides which photons a batch holds and how they are counted."""
     return {
+        "kind": "simulate",
         "medium": repr(medium),
         "seed": seed,
         "grid": grid.digest,

@@ -29,9 +29,14 @@ from mcml_sim.errors import StoreError
 from mcml_sim.version import __version__
 
 MANIFEST = "run.json"
+# Remedies, apart from what is wrong, since a command line has other words for them.
+ELSEWHERE = "delete it, or use another folder"
+RESUMES = "with its store, the same run resumes"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
 SEAL_BYTES = 64  # SHA-256 in hexadecimal
+LONGEST_SHOWN = 60  # characters of a value in a message
+SHARED_SHOWN = 12  # of them, those before the first that differs
 
 
 class DamagedBatch(UserWarning):
@@ -60,7 +65,8 @@ class Store(Generic[R]):
     made_by  what the run is, JSON values; version, jaxlib, device and kind of CPU are added, since they decide bits
     read     makes a result of what its `arrays` gave; ValueError if they are not one
 
-    StoreError names the file or folder, what is wrong, and what to do.
+    A folder without batches belongs to nobody, whatever run began there. StoreError names the file or folder, what is
+    wrong, and what to do.
     """
 
     def __init__(self, folder: Path, made_by: dict[str, object], read: Callable[[Mapping[str, NDArray]], R]) -> None:
@@ -99,17 +105,10 @@ class Store(Generic[R]):
             self._sweep()
         except OSError as error:
             raise StoreError(f"cannot use {self.folder} as a store: {_reason(error)}") from error
-        path = self.folder / MANIFEST
-        found = _read_manifest(path)
-        if found is None:
-            self._write(path, json.dumps(self._made_by, indent=1).encode())
-            return
-        for name in sorted(self._made_by.keys() | found.keys()):
-            if found.get(name) != self._made_by.get(name):
-                raise StoreError(
-                    f"{self.folder} was made by another run: {name} is {_short(found.get(name))} there, "
-                    f"{_short(self._made_by.get(name))} here; use another folder"
-                )
+        require_ours(self.folder, self._made_by)
+        path, contents = self.folder / MANIFEST, json.dumps(self._made_by, indent=1).encode()
+        if not _holds(path, contents):
+            self._write(path, contents)
 
     def _sweep(self) -> None:
         for leftover in self.folder.glob("*.part"):
@@ -127,10 +126,40 @@ class Store(Generic[R]):
             os.replace(part, path)
         except OSError as error:
             raise StoreError(
-                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, the same run resumes"
+                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole; {RESUMES}"
             ) from error
         finally:
             _remove(part)
+
+
+def require_ours(folder: Path, made_by: dict[str, object]) -> None:
+    """StoreError if that is no folder, or holds batches of a run other than `made_by`; nothing is written."""
+    here = {**made_by, **maker()}
+    if folder.exists() and not folder.is_dir():
+        raise StoreError(f"cannot use {folder} as a store: it is there already, and no folder")
+    if not batches(folder):  # it is of a run that ended before its first
+        return
+    found = _read_manifest(folder / MANIFEST)
+    if found is None:
+        return
+    # What kind of run it is tells most, and explains other differences.
+    for name in sorted(here.keys() | found.keys(), key=lambda name: (name != "kind", name)):
+        if found.get(name) != here.get(name):
+            one, other = _apart(found.get(name), here.get(name))
+            raise StoreError(f"{folder} was made by another run: {name} is {one} there, {other} here; {ELSEWHERE}")
+
+
+def batches(folder: Path) -> list[int]:
+    """The numbers of the batches in a folder, of whatever run."""
+    numbers = (path.stem.removeprefix("batch-") for path in folder.glob("batch-*.npz"))
+    return sorted(int(number) for number in numbers if number.isdecimal())
+
+
+def _holds(path: Path, contents: bytes) -> bool:
+    try:
+        return path.read_bytes() == contents
+    except OSError:
+        return False
 
 
 def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
@@ -198,6 +227,16 @@ def _reason(error: Exception) -> str:
     return (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
 
 
-def _short(value: object) -> str:
-    text = json.dumps(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
+def _apart(one: object, other: object) -> tuple[str, str]:
+    """Two values, long ones from shortly before where they differ."""
+    there, here = json.dumps(one), json.dumps(other)
+    if max(len(there), len(here)) <= LONGEST_SHOWN:
+        return there, here
+    differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)
+    start = max(next(differ, 0) - SHARED_SHOWN, 0)
+    return _cut(there, start), _cut(here, start)
+
+
+def _cut(text: str, start: int) -> str:
+    end = start + LONGEST_SHOWN
+    return ("..." if start else "") + text[start:end] + ("..." if end < len(text) else "")

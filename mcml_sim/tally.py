@@ -116,11 +116,12 @@ def estimate(counts: NDArray[np.int64], weights: Floats, photons: int) -> Estima
     """Mean weight per photon started, of photons counted by bin, in float64.
 
     counts (rows, bins), weights (..., bins) per photon of a bin -> Estimate of shape (..., rows). A photon that adds
-    to no bin adds 0, so the variance of the mean is (sum w^2 - (sum w)^2 / N) / N^2.
+    to no bin adds 0, so the variance of the mean is (sum w^2 - (sum w)^2 / N) / (N (N - 1)): infinite for one photon.
     """
     total = weights @ counts.T.astype(np.float64)
     squares = weights**2 @ counts.T.astype(np.float64)
-    variance = np.maximum(squares - total**2 / photons, 0) / float(photons) ** 2
+    spread = np.maximum(squares - total**2 / photons, 0)
+    variance = spread / (photons * (photons - 1.0)) if photons > 1 else np.full_like(spread, np.inf)
     effective = np.divide(total**2, squares, out=np.zeros_like(total), where=squares > 0)
     return Estimate(total / photons, np.sqrt(variance), effective)
 

@@ -20,8 +20,8 @@ from mcml_sim import optics, phase, rng
 from mcml_sim.isotropic import STOPPED, azimuth_cosine, stop
 from mcml_sim.setting import Setting
 
-# Directions of entering diffuse light come from a table, linear between so many even steps of probability; the
-# cosine it gives is within 1e-6 of the exact one.
+# Directions of entering diffuse light come from a table, linear between so many even steps of the cube root of the
+# probability, by which it is smooth at grazing incidence too: within 2e-6 of the exact cosine.
 STEPS = 4096
 
 
@@ -31,7 +31,7 @@ class HalfSpace(NamedTuple):
     n: Array
     g: Array
     entry: Array
-    """Cosines of the light that has entered, to the normal and inside, at even steps of probability, (STEPS + 1,)."""
+    """Cosines of the light that has entered, to the normal and inside; see `_entry_cosines`, (STEPS + 1,)."""
 
 
 class Lanes(NamedTuple):
@@ -143,14 +143,14 @@ def _deflected(
 
 def _entering(xi: Array, entry: Array) -> Array:
     """Cosine of the light that has entered, at the share xi in (0, 1) of it."""
-    at = xi * jnp.float32(STEPS)
+    at = jnp.cbrt(xi) * jnp.float32(STEPS)
     step = jnp.minimum(at.astype(jnp.int32), STEPS - 1)
     lower, upper = entry[step], entry[step + 1]
     return lower + (upper - lower) * (at - step.astype(jnp.float32))
 
 
 def _entry_cosines(setting: Setting) -> NDArray[np.float32]:
-    """Cosines inside at even steps of probability, float32 (STEPS + 1,).
+    """Cosines inside at even steps of the cube root of probability, float32 (STEPS + 1,).
 
     Diffuse light that has entered has the density 2 mu T(mu) there, T being the transmittance of the surface, which
     is the same from inside as from outside; beyond the critical angle there is none.
@@ -162,4 +162,4 @@ def _entry_cosines(setting: Setting) -> NDArray[np.float32]:
     middle = (mu[1:] + mu[:-1]) / 2
     light = (1 - optics.fresnel(setting.n, 1.0, middle)[0]) * np.diff(mu**2)
     cdf = np.concatenate([[0.0], np.cumsum(light)])
-    return np.interp(np.linspace(0, cdf[-1], STEPS + 1), cdf, mu).astype(np.float32)
+    return np.interp(np.linspace(0, 1, STEPS + 1) ** 3 * cdf[-1], cdf, mu).astype(np.float32)

@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import contextlib
 import os
+import reprlib
 import tempfile
 from pathlib import Path
 
-from mcml_sim.errors import OutputError
+from mcml_sim.errors import InputError, OutputError
+
+
+def checked_path(path: object) -> Path:
+    """The path of that name; InputError on what is none."""
+    if isinstance(path, (str, os.PathLike)):
+        return Path(path)
+    raise InputError(f"path must be the name of a file, got {reprlib.repr(path)}")
 
 
 def require_writable(path: Path) -> None:

@@ -43,4 +43,5 @@ def test_large_tables_and_few_photons_get_fewer_groups():
     assert bins.groups(Grid(0.1, 50, 0.1, 40), 10**5, most=32) == 32
     assert bins.groups(Grid(1, 1000, 1, 500), 10**5, most=32) == 16
     assert bins.groups(Grid(1, 1000, 1, 2000), 10**5, most=32) == bins.FEWEST_GROUPS
-    assert bins.groups(Grid(0.1, 50, 0.1, 40), 3, most=32) == 3
+    assert bins.groups(Grid(0.1, 50, 0.1, 40), 640, most=32) == 10
+    assert bins.groups(Grid(0.1, 50, 0.1, 40), 1, most=32) == 1

@@ -2,19 +2,18 @@
 
 import os
 import re
-import signal
-import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mcml_sim import cli, layered
+from mcml_sim.errors import ClusterError
 from mcml_sim.mcml_files import read_mci
 from mcml_sim.results import read_results
 from mcml_sim.simulation import Precision, simulate
+from mcml_sim.store import RESUMES
 from mcml_sim.version import __version__
 
 # One layer and one grid for all tests: the tracer is compiled once.
@@ -27,6 +26,9 @@ RUN = """{name} A
 1.4 {mu_a} 90 0.5 0.05
 1.0
 """
+
+
+REMEDY = "delete that folder, or use --out elsewhere\n"
 
 
 def runs(*rows: tuple[str, int, float]) -> str:
@@ -73,7 +75,7 @@ def test_runs_everything_and_tells_it_with_errors(command, mci):
     told = out.split("run 2 of 2: second.mco")
     assert told[0].startswith("run 1 of 2: first.mco\n  2000 photons, seed 0, ")
     for text, name, run in zip(told, ("first", "second"), read_mci(mci), strict=True):
-        assert re.search(r", [0-9.]+ s, [0-9.e-]+ M photons/s\n", text)
+        assert re.search(r", [0-9.]+ s( and [0-9.]+ s to compile)?, [0-9.e-]+ (M )?photons/s\n", text)
         kept = read_results(f"{name}.npz")
         assert (kept.medium, kept.grid, kept.photons, kept.seed) == (run.medium, run.grid, run.photons, 0)
         rows = ("specular_reflectance", "diffuse_reflectance", "absorbed", "transmittance")
@@ -146,7 +148,7 @@ def test_an_interrupted_command_resumes(command, mci, monkeypatch):
     assert (status, err) == (0, "")
     assert sorted(traced) == [0, 0, 1, 1, 2, 2]
     assert re.search(rf"run 1 of 2: first.mco\n  {photons} photons, seed 0, finished before\n  specular", out)
-    assert re.search(rf"run 2 of 2: second.mco\n  {photons} photons, seed 0, [0-9.]+ s, resumed\n  specular", out)
+    assert re.search(rf"run 2 of 2: second.mco\n  {photons} photons, seed 0, [0-9.]+ s.*, resumed\n  specular", out)
     for name in ("first.mco", "first.npz", "second.mco", "second.npz"):
         assert Path(name).read_bytes() == Path("at-once", name).read_bytes()
     assert not list(Path().rglob("*.photons"))
@@ -164,7 +166,59 @@ def test_batches_of_another_run_are_not_mixed_in(command, mci):
     assert command(*words)[0] == 0
     status, _, err = command(*words, "--seed", 5)
     assert status == 2
-    assert err == "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; use another folder\n"
+    assert err == "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; " + REMEDY
+
+
+def test_another_runs_store_is_found_before_any_photon(command, mci):
+    assert command("run", mci, "--precision", 1e-4, "--out", "a")[0] == 0
+    Path("b").mkdir()
+    Path("a/first.photons").rename("b/second.photons")
+    told = (
+        "mcml-sim: b/second.photons was made by another run: medium is .*mu_a=10.* there, .*mu_a=20.* here; " + REMEDY
+    )
+    for words in ((), ("--resume",)):
+        status, out, err = command("run", mci, "--out", "b", *words)
+        assert (status, out) == (2, "")
+        assert re.fullmatch(told, err), err
+    assert "b/first.mco" not in names()
+    Path("c").mkdir()
+    Path("c/second.photons").write_text("")
+    status, out, err = command("run", mci, "--out", "c")
+    assert (status, out) == (2, "")
+    assert err == "mcml-sim: cannot use c/second.photons as a store: it is there already, and no folder\n"
+
+
+def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci, monkeypatch):
+    with monkeypatch.context() as change:
+        change.setattr(layered, "trace_batch", None)
+        with pytest.raises(TypeError):
+            command("run", mci)
+    assert "first.photons/run.json" in names()
+    assert command("run", mci, "--seed", 8)[0] == 0
+    assert read_results("first.npz").seed == 8
+
+
+def test_fewer_photons_do_not_cost_the_others(command, mci):
+    photons = layered.BATCH_PHOTONS + 77
+    mci.write_text(runs(("one.mco", photons, 10)))
+    assert command("run", mci, "--precision", 1e-5)[0] == 0
+    kept = {path.name: path.read_bytes() for path in Path("one.photons").iterdir()}
+    assert len(kept) == 3
+    for _ in range(2):  # the second time it is done already
+        status, out, _ = command("run", mci, "--photons", 1000, "--resume")
+        assert status == 0
+        assert "  one.photons is kept, since it holds more photons than these: --resume with more --photons" in out
+        assert {path.name: path.read_bytes() for path in Path("one.photons").iterdir()} == kept
+    status, out, _ = command("run", mci, "--resume")
+    assert (status, Path("one.photons").exists()) == (0, False)
+    assert f"\n  {photons} photons, " in out
+
+
+@pytest.mark.parametrize("written", ["3000", "3e3", "3000.0", "+3000"])
+def test_whole_numbers_as_people_write_them(command, mci, written):
+    assert command("run", mci, "--photons", written, "--seed", written)[0] == 0
+    kept = read_results("first.npz")
+    assert (kept.photons, kept.seed) == (3000, 3000)
 
 
 def test_more_photons_or_more_repeats(command, mci):
@@ -224,7 +278,11 @@ def test_a_damaged_batch_is_named_and_done_again(command, mci):
     [
         ("mco", "cannot write first.mco: No space left on device"),
         ("npz", "cannot write first.npz: No space left on device"),
-        ("photons", "cannot write to store first.photons: No space left on device; what it holds is whole, .*"),
+        (
+            "photons",
+            "cannot write to store first.photons: No space left on device; what it holds is whole; "
+            "the same command with --resume goes on",
+        ),
     ],
 )
 def test_a_full_disk_is_one_line_and_nothing_half_written(command, mci, monkeypatch, end, told):
@@ -257,7 +315,15 @@ def lines_of(run: str) -> str:
         (None, ("run",), "Missing argument 'file'. .*"),
         (None, ("run", "none.mci"), "none.mci: expected a file that can be read, got: No such file or directory"),
         (None, ("run", "two.mci", "--nonsense"), "No such option: --nonsense .*"),
-        (None, ("run", "two.mci", "--photons", "many"), "Invalid value for '--photons': .*"),
+        (None, ("run", "two.mci", "--photons", "many"), "photons must be a whole number >= 1 .*, got 'many'"),
+        (None, ("run", "two.mci", "--photons", "1e400"), "photons must be a whole number >= 1 .*, got inf"),
+        (None, ("run", "two.mci", "--seed", "0.5"), "seed must be a whole number >= 0, got 0.5"),
+        (
+            None,
+            ("run", "two.mci", "--workers", "2", "--scheduler", "tcp://here:1"),
+            "workers are those of the scheduler where --scheduler is given, got --workers 2",
+        ),
+        (None, ("two.mci",), "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
         (None, ("run", "two.mci", "--photons", "0"), "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
         (None, ("run", "two.mci", "--seed", "-1"), "seed must be a whole number >= 0, got -1"),
         (None, ("run", "two.mci", "--workers", "0"), "workers must be a whole number >= 1 and <= 4096, got 0"),
@@ -326,37 +392,21 @@ def test_a_scheduler_is_passed_on(command, mci, monkeypatch):
     assert given == ["tcp://10.0.0.1:8786"] * 2
 
 
+def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, monkeypatch):
+    def gone(*_, **__):
+        raise ClusterError(f"the scheduler at here has gone; {RESUMES}")
+
+    monkeypatch.setattr(cli, "simulate", gone)
+    status, _, err = command("run", mci)
+    assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command with --resume goes on\n")
+
+
 def test_version_and_help(command):
     assert command("--version") == (0, f"mcml-sim {__version__}\n", "")
     status, out, _ = command("run", "--help")
     assert status == 0
     assert "--precision" in out
+    assert "[default: (one a core)]" in out
+    assert "[default: (diffuse_reflectance)]" in out
+    assert re.search(r"first at\s+(│\s+│\s+)?2.1 million", out)
     assert command()[0] == 2
-
-
-def start(*words: object, cwd: Path, **streams) -> subprocess.Popen:
-    """The command in a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
-    code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-    code += "runpy.run_module('mcml_sim', run_name='__main__', alter_sys=True)"
-    return subprocess.Popen([sys.executable, "-c", code, *map(str, words)], cwd=cwd, text=True, **streams)
-
-
-def test_control_c_is_one_line(mci, tmp_path):
-    with start("run", mci, "--photons", 10**12, cwd=tmp_path, stdout=-1, stderr=-1) as run:
-        end = time.monotonic() + 120
-        while not list(tmp_path.glob("first.photons/batch*")) and run.poll() is None and time.monotonic() < end:
-            time.sleep(0.1)
-        run.send_signal(signal.SIGINT)
-        try:
-            out, err = run.communicate(timeout=120)
-        finally:
-            run.kill()
-    assert run.returncode == 130, err
-    assert err == "mcml-sim: stopped; the finished batches are kept, the same command with --resume goes on\n"
-    assert out == "run 1 of 2: first.mco\n"
-
-
-def test_a_full_disk_under_what_is_printed_is_one_line(tmp_path):
-    with open("/dev/full", "w") as full, start("--version", cwd=tmp_path, stdout=full, stderr=-1) as run:
-        _, err = run.communicate(timeout=120)
-    assert (run.returncode, err) == (2, "mcml-sim: cannot print: No space left on device\n")

@@ -113,6 +113,21 @@ def test_a_worker_may_come_later(lonely, alone):
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=lonely.scheduler_address), alone)
 
 
+def test_a_cluster_without_workers_is_said_once(lonely, alone, monkeypatch):
+    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    threading.Timer(3, lonely.scale, [1]).start()
+    with pytest.warns(cluster.Deserted, match=r"^no worker has come to the scheduler at tcp://.* so far") as said:
+        assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=lonely.scheduler_address), alone)
+    assert len(said) == 1
+
+
+def test_a_batch_that_times_out_is_no_silence(workers):
+    with pytest.raises(TimeoutError, match="mine"):
+        run_batches(
+            lambda *_: (_ for _ in ()).throw(TimeoutError("mine")), BATCH, BATCH, scheduler=workers.scheduler_address
+        )
+
+
 @pytest.mark.usefixtures("python_handles_sigint")
 def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
     threading.Timer(0.5, signal.raise_signal, [signal.SIGINT]).start()
@@ -122,7 +137,9 @@ def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
 
 def test_a_scheduler_that_leaves_is_one_line(lonely):
     threading.Timer(0.5, lonely.close).start()
-    with pytest.raises(ClusterError, match=r"^the scheduler at tcp://.* has gone; a run with a store resumes$"):
+    with pytest.raises(
+        ClusterError, match=r"^the scheduler at tcp://.* has gone; with its store, the same run resumes$"
+    ):
         run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
 
 

@@ -207,16 +207,39 @@ def test_the_number_of_lanes_does_not_change_a_bit():
         np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
 
 
-def test_photons_are_grouped_where_depth_is_resolved():
-    assert layered._bins(GRID, 1.0, 10**5, 512)[1].groups == layered.GROUPS
-    assert layered._bins(Grid(1, 1000), 1.0, 10**5, 512)[1].groups == 0
+ABSORBING = Medium((Layer(1.37, 5, 1, 0.3, 0.5), Layer(1.5, 30, 1, -0.3, 0.5), Layer(1.2, 0.2, 3, 0.8, 1.0)))
+
+
+def test_neither_does_it_where_weights_are_small():
+    """Sums of weights of all sizes: with float64 added in the order of lanes, six arrays would differ."""
+    many, few = (layered.trace_batch(ABSORBING, GRID, 1, 0, 30_000, lanes=lanes) for lanes in (4096, 1024))
+    for name, values in many.arrays().items():
+        np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
+
+
+@pytest.mark.parametrize("absorbs", [1e-4, 1e-7, 1e-10])
+def test_weak_absorption_keeps_its_digits(absorbs):
+    """What a slab absorbs is in proportion to mu_a; 1 - mu_a / mu_t in float32 would be off by a fifth at 1e-7."""
+    d = layered.trace_batch(Medium((Layer(1, 5 * absorbs, 5, 0.5, 1),)), Grid(1, 5, 0.1, 10), 1, 0, 100_000)
+    error = np.sqrt(d.absorbed_squares[-1] - d.absorbed[-1] ** 2 / d.started)
+    # 10.777 by adding and doubling, as absorption vanishes; at 1e-4 it is a thousandth less.
+    assert 0 < error < 0.01 * d.absorbed[-1]
+    assert abs(d.absorbed[-1] - 10.777 * absorbs * d.started) < 4 * error
+    assert d.absorbed_z.sum() == pytest.approx(d.absorbed[-1], rel=1e-5)
+    assert np.sqrt(d.absorbed_z_variance.sum()) < 0.01 * d.absorbed[-1]
+
+
+def test_one_photon_says_nothing_of_its_error():
+    d = layered.trace_batch(SMALL, GRID, 1, 0, 1)
+    assert np.all(np.isinf(d.absorbed_z_variance))
+    assert np.all(np.isinf(d.absorbed_rz_variance))
 
 
 def test_another_medium_of_the_same_structure_is_not_compiled_again():
     fast()
     before = layered.trace._cache_size()
     other = Medium((Layer(1.1, 1, 2, 0.1, 3), Layer(1.1, 1, 0, 0, 1), Layer(1.2, 0, 0, 0, 2)))
-    layered.trace_batch(other, Grid(0.3, 8, 0.2, 8, na=6), 7, 3, 1000)
+    layered.trace_batch(other, Grid(0.3, 8, 0.2, 8, na=6), 7, 3, 5000)
     assert layered.trace._cache_size() == before
 
 
@@ -261,6 +284,8 @@ def test_white_half_space_ends_and_says_what_it_cut():
     assert 0 < cut < 0.02 * d.started
     error = np.sqrt(d.accounted_squares - d.accounted**2 / d.started)
     assert abs(reflected + cut - d.started) < 4 * error
+    # That the light that was cut is not half of what it should be would be seen.
+    assert abs(reflected + cut / 2 - d.started) > 2 * error
 
 
 def test_white_slab_sends_everything_back_or_through():
@@ -308,6 +333,17 @@ def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     assert d.absorbed[:-1].sum() == pytest.approx(d.absorbed[-1], rel=1e-6)
     claimed = np.sqrt(d.absorbed_squares[:-1] - d.absorbed[:-1] ** 2 / d.started)
     assert np.all((claimed / d.absorbed[:-1] > 1e-4) & (claimed / d.absorbed[:-1] < 0.01))
+
+
+def test_errors_of_many_layers_are_those_of_few_groups_too():
+    """A table so large that there are 8 groups; the same photons give the same errors but for the spread of 8."""
+    medium = Medium((Layer(1.4, 1, 9, 0.5, 0.1),) * 9)
+    few = layered.trace_batch(medium, Grid(0.01, 999, 0.01, 999), 4, 0, 30_000)
+    many = layered.trace_batch(medium, Grid(0.1, 9, 0.1, 9), 4, 0, 30_000)
+    np.testing.assert_allclose(few.absorbed, many.absorbed, rtol=1e-9)
+    variances = [d.absorbed_squares[:-1] - d.absorbed[:-1] ** 2 / d.started for d in (few, many)]
+    # Nine ratios of chi-squared of 7 and of 31 degrees of freedom; empty groups would make them a thousand.
+    assert 0.3 < np.mean(variances[0] / variances[1]) < 3
 
 
 def test_light_goes_through_glass_and_leaves_nothing_in_it():

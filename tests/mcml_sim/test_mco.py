@@ -254,6 +254,10 @@ def test_grids_that_an_mco_cannot_say(tally, tmp_path, grid, message):
 def test_misuse_is_named(tally, tmp_path):
     with pytest.raises(InputError, match="tally must be what simulate gave, got 3"):
         write_mco(3, tmp_path / "out.mco")
+    with pytest.raises(InputError, match=r"tally must be what simulate gave, got 'a.mco'"):
+        write_mco("a.mco", "b.mco")
+    with pytest.raises(InputError, match="path must be the name of a file, got Tally"):
+        write_mco(tally, tally)
     with pytest.raises(InputError, match="path must be the name of a file, got 3"):
         write_mco(tally, 3)
 

@@ -70,7 +70,7 @@ def test_half_space_takes_the_mean_free_path_of_the_light_itself():
     assert layer.mfp == pytest.approx(2.0)
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, "1", None, True])
+@pytest.mark.parametrize("value", [math.nan, math.inf, "1", None, True, np.True_, np.complex128(0.5)])
 @pytest.mark.parametrize(
     ("name", "message"),
     [
@@ -95,6 +95,11 @@ def test_a_layer_names_what_is_no_number(name, message, value):
 def test_a_layer_names_what_physics_forbids(name, value):
     with pytest.raises(InputError, match=f"^{name} must be .*, got {value!r}$"):
         Layer(**{"n": 1.4, "mu_a": 1, "mu_s": 9, "g": 0, "thickness": 1, name: value})
+
+
+def test_extinction_must_be_finite_too():
+    with pytest.raises(InputError, match=r"mu_a \+ mu_s must be finite, got 1.7e\+308 and 1.7e\+308"):
+        Layer(1, 1.7e308, 1.7e308, 0, 1)
 
 
 def test_a_medium_names_what_is_wrong():

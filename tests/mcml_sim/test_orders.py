@@ -189,6 +189,15 @@ def test_seed_and_workers_must_be_whole(name, value):
         simulate_orders(Grid(0.1, 3), 10, **{name: value})
 
 
+def test_store_must_be_a_folders_path():
+    with pytest.raises(InputError, match="store must be the path of a folder, got 3"):
+        simulate_orders(Grid(0.1, 3), 10, store=3)
+
+
+def test_one_photon_says_nothing_of_its_error():
+    assert simulate_orders(Grid(0.1, 3), 1).reflectance(0.9).standard_error == np.inf
+
+
 def test_photons_may_be_written_as_powers_of_ten():
     assert simulate_orders(Grid(0.1, 3), 1e3).photons == 1000
 

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, Layer, Medium
+from mcml_sim import Grid, InputError, Layer, Medium, simulate_orders
 from mcml_sim.deposits import Deposits, shapes
 from mcml_sim.results import read_results, write_results
 from mcml_sim.simulation import Tally, simulate
@@ -28,6 +28,7 @@ def test_everything_comes_back(tmp_path, grid):
     write_results(tally, tmp_path / "out.npz")
     found = read_results(str(tmp_path / "out.npz"))
     assert (found.medium, found.grid, found.photons, found.seed) == (LAYERS, grid, 1000, 3)
+    assert found.cut == tally.cut > 0
     assert tuple(found.estimates) == tally.quantities
     for name, estimate in found.estimates.items():
         expected = tally.quantity(name)
@@ -84,9 +85,9 @@ def damage(path, how):
 @pytest.mark.parametrize(
     ("how", "reason"),
     [
-        ("cut", ""),
-        ("text", ""),
-        ("empty", ""),
+        ("cut", "not a whole .npz file"),
+        ("text", "not a whole .npz file"),
+        ("empty", "not a whole .npz file"),
         ("missing", "No such file or directory"),
         ("format", "format 2, not 1"),
         ("layer", "mu_a must be a coefficient >= 0, got -1"),
@@ -101,3 +102,14 @@ def test_a_damaged_file_is_named(tmp_path, how, reason):
     damage(path, how)
     with pytest.raises(InputError, match=rf"out.npz: expected results of mcml_sim, got: .*{reason}"):
         read_results(path)
+
+
+def test_misuse_is_named(tmp_path):
+    tally = made_up(LAYERS, Grid(0.1, 4))
+    orders = simulate_orders(Grid(1, 2), 10, progress=False)
+    for wrong in (orders, None, tmp_path / "out.npz"):
+        with pytest.raises(InputError, match=r"^tally must be what simulate gave, got [^\n]{1,40}$"):
+            write_results(wrong, tally)
+    for wrong in (None, 3, tally):
+        with pytest.raises(InputError, match=r"^path must be the name of a file, got [^\n]{1,40}$"):
+            write_results(tally, wrong)

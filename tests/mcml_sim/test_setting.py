@@ -42,13 +42,18 @@ def test_illumination_must_be_known(illumination):
         Setting(illumination)
 
 
-@pytest.mark.parametrize("n", [0.0, -1.4, np.inf, np.nan, "glass", None])
+@pytest.mark.parametrize("n", [0.0, -1.4, np.inf, np.nan, "glass", None, True, np.complex128(1.4)])
 def test_n_must_be_a_refractive_index(n):
     with pytest.raises(InputError, match="n must be a refractive index > 0, got"):
         Setting(n=n)
 
 
-@pytest.mark.parametrize("g", [-1.0, 1.0, 2.0, np.nan, "forward", None])
+def test_numbers_of_numpy_are_numbers():
+    assert Setting(n=np.float32(1.5), g=np.float64(0.5)) == Setting(n=1.5, g=0.5)
+    assert Setting(n=np.int64(2)) == Setting(n=2.0)
+
+
+@pytest.mark.parametrize("g", [-1.0, 1.0, 2.0, np.nan, "forward", None, False, np.complex128(0.5)])
 def test_g_must_be_a_mean_cosine(g):
     with pytest.raises(InputError, match=r"g must be a mean cosine in \(-1, 1\), got"):
         Setting(g=g)

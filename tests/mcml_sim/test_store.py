@@ -11,7 +11,7 @@ import pytest
 from mcml_sim import Grid, StoreError, simulate_orders
 from mcml_sim.deposits import Deposits, shapes
 from mcml_sim.run import run_batches
-from mcml_sim.store import STALE_AFTER, DamagedBatch, Store, cpu_class
+from mcml_sim.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
 from mcml_sim.tally import Counts
 
 GRID = Grid(0.5, 3)
@@ -74,13 +74,54 @@ def test_manifest_says_what_decides_the_bits(tmp_path):
 
 def test_another_runs_store_is_refused_with_both_values(tmp_path):
     simulate_orders(GRID, 100, seed=4, store=tmp_path)
-    with pytest.raises(StoreError, match=r"made by another run: seed is 4 there, 5 here; use another folder"):
+    remedy = "delete it, or use another folder"
+    with pytest.raises(StoreError, match=rf"made by another run: seed is 4 there, 5 here; {remedy}$"):
         simulate_orders(GRID, 100, seed=5, store=tmp_path)
     with pytest.raises(StoreError, match=r'made by another run: grid is "'):
         simulate_orders(Grid(0.4, 3), 100, seed=4, store=tmp_path)
 
 
+def test_long_values_are_shown_from_where_they_differ(tmp_path):
+    one, other = ("layer " * 40 + thickness + " and so on" * 10 for thickness in ("0.25 cm", "0.5 cm"))
+    Store(tmp_path, {"medium": one}, READ).save(0, COUNTS)
+    with pytest.raises(
+        StoreError, match=r"medium is \.\.\.yer layer 0\.25 cm and .*\.\.\. there, \.\.\..*layer 0\.5 cm"
+    ) as said:
+        Store(tmp_path, {"medium": other}, READ)
+    assert len(str(said.value)) < len(str(tmp_path)) + 250
+
+
+def test_the_kind_of_run_is_named_first(tmp_path):
+    Store(tmp_path, {"kind": "orders", "a": 1}, READ).save(0, COUNTS)
+    with pytest.raises(StoreError, match='kind is "orders" there, "simulate" here'):
+        Store(tmp_path, {"kind": "simulate", "b": 2}, READ)
+
+
+@pytest.mark.parametrize("text", [json.dumps({"seed": 2}), "{", ""])
+def test_a_run_that_ended_before_its_first_batch_blocks_no_other(tmp_path, text):
+    """Killed while it was compiled, say, or without a cluster."""
+    (tmp_path / "run.json").write_text(text)
+    Store(tmp_path, MADE_BY, READ).save(0, COUNTS)
+    assert json.loads((tmp_path / "run.json").read_text()).items() >= MADE_BY.items()
+    assert Store(tmp_path, MADE_BY, READ).load(0).started == 15
+    with pytest.raises(StoreError, match="seed is 1 there, 2 here"):
+        Store(tmp_path, {"seed": 2, "grid": "abc"}, READ)
+
+
+def test_looking_at_a_store_writes_nothing(store, tmp_path):
+    store.save(0, COUNTS)
+    require_ours(tmp_path / "none", MADE_BY)
+    require_ours(tmp_path, MADE_BY)
+    with pytest.raises(StoreError, match="seed is 1 there, 3 here"):
+        require_ours(tmp_path, MADE_BY | {"seed": 3})
+    (tmp_path / "file").write_text("")
+    with pytest.raises(StoreError, match=r"cannot use .*file as a store: it is there already, and no folder"):
+        require_ours(tmp_path / "file", MADE_BY)
+    assert {path.name for path in tmp_path.iterdir()} == {"run.json", "batch-00000000.npz", "file"}
+
+
 def test_another_versions_store_is_refused(store, tmp_path):
+    store.save(0, COUNTS)
     manifest = json.loads((tmp_path / "run.json").read_text())
     (tmp_path / "run.json").write_text(json.dumps(manifest | {"jaxlib": "0.0.1"}))
     with pytest.raises(StoreError, match=r'jaxlib is "0.0.1" there, "'):

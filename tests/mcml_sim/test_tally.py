@@ -15,7 +15,7 @@ def test_estimate_is_mean_and_error_of_the_photons_one_by_one():
     for row in range(2):
         each = photon_by_photon(counts[row], weights, photons)
         assert found.value[row] == pytest.approx(each.mean())
-        assert found.standard_error[row] == pytest.approx(each.std() / np.sqrt(photons))
+        assert found.standard_error[row] == pytest.approx(each.std(ddof=1) / np.sqrt(photons))
         assert found.effective_samples[row] == pytest.approx(each.sum() ** 2 / np.sum(each**2))
 
 

@@ -5,7 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Setting, exact, half_space, rng, simulate, simulate_orders, tracer, white
+from mcml_sim import Grid, Setting, exact, half_space, optics, rng, simulate, simulate_orders, tracer, white
 from mcml_sim.isotropic import DOUBLINGS
 
 EDGES = np.array([0, 0.1, 0.3, 0.6, 1, 2, 4, 8.0])
@@ -145,6 +145,19 @@ def test_all_light_that_entered_a_white_half_space_comes_back(setting):
     run = simulate_orders(Grid.from_edges(r=EDGES), 2**18, seed=2, setting=setting)
     found = run.reflectance(1.0)
     assert abs(found.value + run.cut(1.0) - run.entered) < 4 * found.standard_error + 0.5 * run.cut(1.0)
+
+
+@pytest.mark.parametrize("n", [0.8, 1.0, 1.4])
+def test_diffuse_light_enters_at_the_exact_cosines(n):
+    """Against the cumulative distribution of 2 mu T(mu), by the trapezoid rule on many more nodes."""
+    critical = np.sqrt(max(1 - 1 / n**2, 0))
+    mu = critical + (1 - critical) * np.linspace(0, 1, 2**21 + 1) ** 3
+    density = 2 * mu * (1 - optics.fresnel(n, 1.0, mu)[0])
+    cdf = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(mu))])
+    xi = np.concatenate([np.geomspace(1e-9, 1e-3, 1000), np.linspace(1e-3, 1 - 1e-6, 10_000)]).astype(np.float32)
+    table = white.half_space(Setting("diffuse", n=n)).entry
+    found = np.asarray(white._entering(jnp.asarray(xi), table), float)
+    np.testing.assert_allclose(found, np.interp(xi.astype(float) * cdf[-1], cdf, mu), atol=2e-6)
 
 
 def test_another_setting_does_not_compile_again():
