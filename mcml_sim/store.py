@@ -31,7 +31,7 @@ from mcml_sim.version import __version__
 MANIFEST = "run.json"
 # Remedies, apart from what is wrong, since a command line has other words for them.
 ELSEWHERE = "delete it, or use another folder"
-RESUMES = "with its store, the same run resumes"
+RESUMES = "the same run with its store resumes"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
 SEAL_BYTES = 64  # SHA-256 in hexadecimal
@@ -126,7 +126,7 @@ class Store(Generic[R]):
             os.replace(part, path)
         except OSError as error:
             raise StoreError(
-                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole; {RESUMES}"
+                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, {RESUMES}"
             ) from error
         finally:
             _remove(part)

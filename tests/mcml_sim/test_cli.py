@@ -280,7 +280,7 @@ def test_a_damaged_batch_is_named_and_done_again(command, mci):
         ("npz", "cannot write first.npz: No space left on device"),
         (
             "photons",
-            "cannot write to store first.photons: No space left on device; what it holds is whole; "
+            "cannot write to store first.photons: No space left on device; what it holds is whole, "
             "the same command with --resume goes on",
         ),
     ],

@@ -138,7 +138,7 @@ def test_ctrl_c_does_not_wait_for_a_cluster_that_is_stuck(lonely):
 def test_a_scheduler_that_leaves_is_one_line(lonely):
     threading.Timer(0.5, lonely.close).start()
     with pytest.raises(
-        ClusterError, match=r"^the scheduler at tcp://.* has gone; with its store, the same run resumes$"
+        ClusterError, match=r"^the scheduler at tcp://.* has gone; the same run with its store resumes$"
     ):
         run_batches(TRACE, BATCH, BATCH, scheduler=lonely.scheduler_address)
 

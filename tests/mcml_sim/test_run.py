@@ -202,3 +202,8 @@ def test_progress_is_shown_when_asked_and_silent_otherwise(capfd):
     assert capfd.readouterr().err == ""
     run_batches(one, 10, 25, progress=True)
     assert "photons/s" in capfd.readouterr().err
+
+
+def test_a_closed_stderr_is_no_terminal(monkeypatch):
+    monkeypatch.setattr("sys.stderr", None)
+    assert run_batches(one, 10, 25).started == 25
