@@ -166,7 +166,7 @@ def cores(report: Report) -> None:
         return
     one, two = ALL_CORES[-1], ALL_CORES[-2]
     rows = []
-    for item, photons in (("orders", 4 * report.sizes.orders), ("three layers", 2 * report.sizes.layered)):
+    for item, photons in (("orders", 8 * report.sizes.orders), ("three layers", 8 * report.sizes.layered)):
         ratios: dict[str, list[float]] = {"two threads": [], "two processes": []}
         with Worker(item, [one]) as first, Worker(item, [two]) as second, Worker(item, [one, two]) as both:
             for turn in range(-1, report.turns):

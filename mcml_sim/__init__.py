@@ -6,9 +6,10 @@ from mcml_sim.grid import Grid
 from mcml_sim.mcml_files import read_mci, write_mco
 from mcml_sim.medium import Layer, Medium, half_space
 from mcml_sim.orders import Orders, simulate_orders
+from mcml_sim.quantities import Precision, Tally
 from mcml_sim.results import read_results, write_results
 from mcml_sim.setting import Setting
-from mcml_sim.simulation import Precision, Tally, simulate
+from mcml_sim.simulation import simulate
 from mcml_sim.store import DamagedBatch
 from mcml_sim.tally import Estimate
 from mcml_sim.version import __version__

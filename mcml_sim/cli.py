@@ -22,9 +22,10 @@ from mcml_sim.errors import ClusterError, InputError, OutputError, StoreError
 from mcml_sim.grid import Grid
 from mcml_sim.mcml_files import Run, read_mci, write_mco
 from mcml_sim.medium import half_space
+from mcml_sim.quantities import Precision, Tally, quantities
 from mcml_sim.results import Results, read_results, write_results
 from mcml_sim.run import FIRST_LOOK
-from mcml_sim.simulation import Precision, Tally, batch_photons, quantities, require_store, simulate
+from mcml_sim.simulation import batch_photons, require_store, simulate
 from mcml_sim.store import ELSEWHERE, MANIFEST, RESUMES, batches
 from mcml_sim.terminal import INTERRUPTED, mend_streams, two_interrupts, without_logs
 from mcml_sim.version import __version__

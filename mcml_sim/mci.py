@@ -30,14 +30,13 @@ from pathlib import Path
 
 from mcml_sim.checks import MAX_PHOTONS
 from mcml_sim.errors import InputError
-from mcml_sim.grid import MAX_BINS, Grid
+from mcml_sim.grid import MAX_BINS, MAX_CELLS, Grid
 from mcml_sim.medium import MAX_LAYERS, Layer, Medium
 
 # Bounds of a file and of what it asks for: far beyond any use, near enough that a slip of the pen fails at once and
 # not after hours or gigabytes.
 MAX_BYTES = 2**21
 MAX_RUNS = 10_000
-MAX_CELLS = 2**21  # of a table of rings and depths, or of rings and angles: 16 MiB each
 MAX_NAME = 255  # characters; what V1 and most file systems hold
 LENGTHS = (1e-12, 1e12)  # [cm]
 COEFFICIENTS = (1e-12, 1e12)  # [1/cm]; or 0

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid
-from mcml_sim.simulation import Tally
+from mcml_sim.quantities import Tally
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import checked_path, write_whole
 

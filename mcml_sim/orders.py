@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import order_bins, single, tally, tracer
-from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_resolved
+from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers
 from mcml_sim.errors import InputError
-from mcml_sim.grid import Grid
+from mcml_sim.grid import Grid, require_resolved
 from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, roulette_weight
 from mcml_sim.run import run_batches
 from mcml_sim.setting import Setting

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from mcml_sim.quantities import Precision
 from mcml_sim.results import Results
-from mcml_sim.simulation import Precision
 from mcml_sim.tally import Estimate
 
 # What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.

@@ -11,8 +11,9 @@ import pytest
 from mcml_sim import cli, layered
 from mcml_sim.errors import ClusterError
 from mcml_sim.mcml_files import read_mci
+from mcml_sim.quantities import Precision
 from mcml_sim.results import read_results
-from mcml_sim.simulation import Precision, simulate
+from mcml_sim.simulation import simulate
 from mcml_sim.store import RESUMES
 from mcml_sim.version import __version__
 

@@ -7,8 +7,9 @@ import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium, simulate_orders
 from mcml_sim.deposits import Deposits, shapes
+from mcml_sim.quantities import Tally
 from mcml_sim.results import read_results, write_results
-from mcml_sim.simulation import Tally, simulate
+from mcml_sim.simulation import simulate
 
 LAYERS = Medium((Layer(1.3, 1, 9, 0.7, 0.1), Layer(1.4, 2, 8, 0.5)), n_above=1.1, n_below=1.2)
 
