@@ -104,13 +104,11 @@ def run(
     number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     if quantity is not None and precision is None:
         raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
-    if workers is not None and scheduler is not None:
-        raise InputError(f"workers are those of the scheduler where --scheduler is given, got --workers {workers}")
     plan = _Plan(
         seed=_whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
         resume=resume,
-        workers=checked_workers(workers),
+        workers=checked_workers(workers, scheduler),
         scheduler=scheduler,
     )
     jobs = [_Job(one, number or one.photons, *_outputs(one, out)) for one in runs]
@@ -267,9 +265,8 @@ def main() -> None:
         errors.print(f"mcml-sim: {text}", markup=False)
 
     with warnings.catch_warnings(), two_interrupts():
-        warnings.showwarning = lambda message, *_: say(
-            message
-        )  # of a damaged batch, say: without the place in the code
+        # Of a damaged batch, say: a line, without the place in the code.
+        warnings.showwarning = lambda message, *_: say(message)
         status = _status(say)
         if status == INTERRUPTED:
             say("stopped; the finished batches are kept, the same command with --resume goes on")

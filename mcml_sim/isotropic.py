@@ -12,7 +12,7 @@ leading zeros of a random word. So a photon carries the order at which it will b
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import jax.numpy as jnp
 import numpy as np
@@ -35,6 +35,9 @@ DOUBLINGS = FIRST_ROULETTE * 2 ** np.arange(1 + round(np.log2(MAX_ORDER / FIRST_
 SINE = (3.141591787338257, -5.167705535888672, 2.5500307083129883, -0.5980450510978699, 0.07722011208534241)
 
 
+L = TypeVar("L", bound=Any)  # Lanes, or others with a place and an order
+
+
 class Lanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
@@ -51,12 +54,22 @@ class Lanes(NamedTuple):
     @property
     def ended(self) -> Array:
         """True where the photon has left or was stopped."""
-        return self.place.imag < 0
+        return has_ended(self.place)
 
     @property
     def stopped(self) -> Array:
         """True where the photon was stopped inside, among those that have ended."""
-        return self.place.imag != jnp.floor(self.place.imag)
+        return was_stopped(self.place)
+
+
+def has_ended(place: Array) -> Array:
+    """True where a place, as in Lanes, is that of a photon that has left or was stopped."""
+    return place.imag < 0
+
+
+def was_stopped(place: Array) -> Array:
+    """True where a photon was stopped inside, among those that have ended."""
+    return place.imag != jnp.floor(place.imag)
 
 
 def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> Lanes:
@@ -108,8 +121,8 @@ def scatter(key: Array, lanes: Lanes, place: Array, number: Array) -> Array:
     return jnp.where(place.imag < 0, place, lax.complex(rho, z))
 
 
-def landed(lanes: Lanes, place: Array, events: int) -> Lanes:
-    """Lanes that `events` scatterings have brought to `place`, or that ended before."""
+def landed(lanes: L, place: Array, events: int) -> L:
+    """Lanes, these or `white`'s, that `events` scatterings have brought to `place`, or that ended before."""
     done = jnp.where(place.imag < 0, (-place.imag).astype(jnp.int32), events)
     return lanes._replace(place=place, order=lanes.order + done)
 

@@ -43,7 +43,7 @@ class Bins(NamedTuple):
     r: Axis
     z: Axis
     cosines: Array
-    """Cosines of the edges between angles, falling, float32 (angles - 1,)."""
+    """Cosines of the lower edges of the angles, falling from 1, float32 (angles,)."""
     groups_per_photon: Array
     """Groups of photons over photons, float32."""
     per_weight: Array

@@ -14,8 +14,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
 from rich.text import Text
 
+from mcml_sim.checks import checked_workers
 from mcml_sim.cluster import Cluster
-from mcml_sim.errors import InputError
 from mcml_sim.store import R, Store
 
 # How often the waiting thread looks up: where a wait cannot be interrupted, this is the delay of Ctrl-C [s].
@@ -54,8 +54,7 @@ def run_batches(
     Errors and Ctrl-C stop all threads after the batch they are at, then rise. InputError if both `workers` and
     `scheduler` are given; ClusterError if the scheduler or its workers cannot do it.
     """
-    if workers is not None and scheduler is not None:
-        raise InputError(f"workers must be None where a scheduler is given, whose workers they are, got {workers!r}")
+    checked_workers(workers, scheduler)
     cluster = None if scheduler is None else Cluster(scheduler, trace)
     threads = min(cluster.tasks if cluster else workers or os.cpu_count() or 1, -(-photons // batch_photons))
     # Leaving, the cluster is closed first: that frees the threads that wait for it.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
+from types import ModuleType
 
 from mcml_sim import deposits, layered, matched, pool
 from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers
@@ -53,24 +54,15 @@ def simulate(
     number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     key = checked_whole("seed", seed, lowest=0)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
-    kernel = matched if medium.is_matched_isotropic_half_space else layered
+    kernel, made_by = _kernel(medium), _made_by(medium, grid, key)
     enough = None if precision is None else _enough(precision, medium, grid, key)
-    shapes = deposits.shapes(grid, len(medium.layers))
-    kept = (
-        None
-        if folder is None
-        else Store(
-            folder,
-            _made_by(medium, grid, key, BATCH_PHOTONS[kernel]),
-            partial(Deposits.from_arrays, shapes=shapes),
-        )
-    )
+    read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
     sums = run_batches(
         partial(kernel.trace_batch, medium, grid, key),
         BATCH_PHOTONS[kernel],
         number,
         workers=threads,
-        store=kept,
+        store=None if folder is None else Store(folder, made_by, read),
         progress=progress,
         scheduler=scheduler,
         enough=enough,
@@ -80,12 +72,12 @@ def simulate(
 
 def batch_photons(medium: Medium) -> int:
     """Photons of a batch of `simulate` in this medium."""
-    return BATCH_PHOTONS[matched if medium.is_matched_isotropic_half_space else layered]
+    return BATCH_PHOTONS[_kernel(medium)]
 
 
 def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
     """StoreError if `simulate` could not keep batches in that folder because of what is there; nothing is written."""
-    require_ours(folder, _made_by(medium, grid, seed, batch_photons(medium)))
+    require_ours(folder, _made_by(medium, grid, seed))
 
 
 class _Enough:
@@ -105,12 +97,16 @@ def _enough(precision: float | Precision, medium: Medium, grid: Grid, seed: int)
     return _Enough(wanted, medium, grid, seed)
 
 
-def _made_by(medium: Medium, grid: Grid, seed: int, batch_photons: int) -> dict[str, object]:
+def _kernel(medium: Medium) -> ModuleType:
+    return matched if medium.is_matched_isotropic_half_space else layered
+
+
+def _made_by(medium: Medium, grid: Grid, seed: int) -> dict[str, object]:
     """What decides which photons a batch holds and how they are counted."""
     return {
         "kind": "simulate",
         "medium": repr(medium),
         "seed": seed,
         "grid": grid.digest,
-        "batch_photons": batch_photons,
+        "batch_photons": batch_photons(medium),
     }

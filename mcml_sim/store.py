@@ -12,7 +12,6 @@ import functools
 import hashlib
 import io
 import json
-import os
 import platform
 import time
 import warnings
@@ -27,6 +26,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import StoreError
 from mcml_sim.version import __version__
+from mcml_sim.whole_file import replace_whole
 
 MANIFEST = "run.json"
 # Remedies, apart from what is wrong, since a command line has other words for them.
@@ -117,19 +117,12 @@ class Store(Generic[R]):
                     leftover.unlink()
 
     def _write(self, path: Path, data: bytes) -> None:
-        part = path.with_name(f"{path.name}.{os.getpid()}.part")
         try:
-            with part.open("wb") as file:
-                file.write(data)
-                file.flush()
-                os.fsync(file.fileno())
-            os.replace(part, path)
+            replace_whole(path, data)
         except OSError as error:
             raise StoreError(
                 f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, {RESUMES}"
             ) from error
-        finally:
-            _remove(part)
 
 
 def require_ours(folder: Path, made_by: dict[str, object]) -> None:
@@ -192,11 +185,6 @@ def _read_manifest(path: Path) -> dict[str, object] | None:
     if not isinstance(found, dict):
         raise StoreError(f"{path} is damaged (not an object); delete it, the batches beside it stay valid")
     return found
-
-
-def _remove(part: Path) -> None:
-    with contextlib.suppress(OSError):  # the folder is gone or closed to us: the error on its way up says so
-        part.unlink()
 
 
 def maker() -> dict[str, object]:

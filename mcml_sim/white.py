@@ -17,7 +17,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from mcml_sim import optics, phase, rng
-from mcml_sim.isotropic import STOPPED, azimuth_cosine, stop
+from mcml_sim.isotropic import STOPPED, azimuth_cosine, has_ended, landed, stop, was_stopped
 from mcml_sim.setting import Setting
 
 # Directions of entering diffuse light come from a table, linear between so many even steps of the cube root of the
@@ -51,12 +51,12 @@ class Lanes(NamedTuple):
     @property
     def ended(self) -> Array:
         """True where the photon has left or was stopped."""
-        return self.place.imag < 0
+        return has_ended(self.place)
 
     @property
     def stopped(self) -> Array:
         """True where the photon was stopped inside, among those that have ended."""
-        return self.place.imag != jnp.floor(self.place.imag)
+        return was_stopped(self.place)
 
 
 def half_space(setting: Setting) -> HalfSpace:
@@ -87,8 +87,7 @@ def fly(key: Array, lanes: Lanes, events: int, where: HalfSpace) -> Lanes:
         return _scattered(*state, words, number + 1, left, where)
 
     place, direction = lax.fori_loop(0, events, event, (lanes.place, lanes.direction))
-    done = jnp.where(place.imag < 0, (-place.imag).astype(jnp.int32), events)
-    return lanes._replace(place=place, direction=direction, order=lanes.order + done)
+    return landed(lanes._replace(direction=direction), place, events)
 
 
 def _scattered(
@@ -113,7 +112,7 @@ def _scattered(
     outwards = jnp.where(rho > 0, (outwards * along + around * across) / rho, outwards)
     out = -number.astype(jnp.float32)
     z = jnp.where(leaves, out, jnp.where(left == number, out - STOPPED, jnp.abs(z)))
-    place = jnp.where(place.imag < 0, place, lax.complex(rho, z))
+    place = jnp.where(has_ended(place), place, lax.complex(rho, z))
     return place, lax.complex(outwards, jnp.where(above, -down, down))
 
 

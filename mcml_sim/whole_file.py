@@ -35,6 +35,14 @@ def write_whole(path: Path, data: bytes) -> None:
     OutputError names file and reason.
     """
     target = _target(path)
+    try:
+        replace_whole(target, data)
+    except OSError as error:
+        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
+
+
+def replace_whole(target: Path, data: bytes) -> None:
+    """The same for a file that is known to be one; OSError if it cannot be written."""
     part = target.with_name(f"{target.name}.{os.getpid()}.part")
     try:
         with part.open("wb") as file:
@@ -42,8 +50,6 @@ def write_whole(path: Path, data: bytes) -> None:
             file.flush()
             os.fsync(file.fileno())
         os.replace(part, target)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
     finally:
         with contextlib.suppress(OSError):  # renamed, or the folder is gone: then the error on its way up says so
             part.unlink()

@@ -190,9 +190,12 @@ def test_another_runs_store_is_found_before_any_photon(command, mci):
 
 
 def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci, monkeypatch):
+    def dies(*_):
+        raise RuntimeError("before the first batch")
+
     with monkeypatch.context() as change:
-        change.setattr(layered, "trace_batch", None)
-        with pytest.raises(TypeError):
+        change.setattr(layered, "trace_batch", dies)
+        with pytest.raises(RuntimeError, match="before the first batch"):
             command("run", mci)
     assert "first.photons/run.json" in names()
     assert command("run", mci, "--seed", 8)[0] == 0
@@ -322,7 +325,7 @@ def lines_of(run: str) -> str:
         (
             None,
             ("run", "two.mci", "--workers", "2", "--scheduler", "tcp://here:1"),
-            "workers are those of the scheduler where --scheduler is given, got --workers 2",
+            "workers must be None where a scheduler is given, whose workers they are, got 2",
         ),
         (None, ("two.mci",), "No such command 'two.mci'. [(]mcml-sim run two.mci does its runs[)]"),
         (None, ("run", "two.mci", "--photons", "0"), "photons must be a whole number >= 1 and <= 1e[+]13, got 0"),
