@@ -69,6 +69,16 @@ def entered(setting: Setting = SEARCHLIGHT) -> float:
 
 
 @lru_cache(maxsize=64)
+def source_strength(setting: Setting = SEARCHLIGHT) -> float:
+    """Limit of 2 pi r R_d at r = 0, over alpha, per photon that arrived [1/mfp]: int k f(k) dk times `entered`.
+
+    1/2 where n = 1 and g = 0, under either light. Light scattered more than once adds nothing there.
+    """
+    k, weighted = _density(setting)
+    return float(entered(setting) * (k @ weighted))
+
+
+@lru_cache(maxsize=64)
 def _density(setting: Setting) -> tuple[Floats, Floats]:
     """Nodes k, and f(k) dk on them."""
     sine = min(1 / setting.n, 1.0)  # of the critical angle

@@ -110,6 +110,16 @@ def test_density_at_the_source_is_half_a_photon_per_mean_free_path():
     assert single.ring_shares([0, 1e-7])[0] == pytest.approx(0.5e-7, rel=1e-5)
 
 
+@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+def test_strength_at_the_source_is_what_the_nearest_ring_holds(setting):
+    """The share within r is r (1 + O(r ln r)) of it: two small rings leave no more than 1e-4."""
+    inner, outer = single.ring_shares([0, 1e-6, 2e-6], setting)[:2] * single.entered(setting)
+    strength = single.source_strength(setting)
+    assert strength == pytest.approx((2 * inner - (inner + outer) / 2) / 1e-6, rel=1e-4)
+    if setting.n == 1 and setting.g == 0:
+        assert strength == pytest.approx(0.5, rel=1e-12)
+
+
 @pytest.mark.parametrize("setting", [s for s in SETTINGS if s.illumination == "searchlight"], ids=str)
 @pytest.mark.parametrize("ring", [(0.0, 0.3), (0.3, 0.31), (4.0, 6.0)])
 def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):

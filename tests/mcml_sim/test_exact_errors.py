@@ -1,0 +1,111 @@
+"""How wrong the exact half space is, what it says of that, and what it refuses."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import InputError, Setting, SettingError, exact
+from mcml_sim.by_albedo import by_alpha
+from mcml_sim.half_space_transform import STANDARD, Rule
+from mcml_sim.hankel import profile
+
+BOTH = pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=["searchlight", "diffuse"])
+ALPHAS = np.array([[0.05], [0.3], [0.6], [0.9], [0.999], [1.0]])
+
+
+def sampled(rule, r):
+    return by_alpha(profile, r, ALPHAS, "searchlight", rule)
+
+
+@BOTH
+def test_more_nodes_change_nothing(setting):
+    """The documented errors, from the estimate itself."""
+    found = exact.error_estimate(np.append(np.geomspace(1e-3, 35.0, 30), 100.0), ALPHAS, setting=setting)
+    assert found[:, :-1].max() < 1e-10
+    assert found.max() < 2e-7
+
+
+def test_the_estimate_is_the_error():
+    """With half the nodes as with all of them: it sees what a quadrature that is too coarse gets wrong."""
+    r, rule = np.geomspace(1e-2, 10.0, 12), STANDARD.scaled(0.5)
+    coarse, finer, truth = (sampled(which, r) for which in (rule, rule.scaled(1.5), STANDARD))
+    error, estimate = np.abs(coarse / truth - 1), np.abs(coarse / finer - 1)
+    assert error.max() > 1e-6
+    assert estimate.max() == pytest.approx(error.max(), rel=0.5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("rule", [Rule(112, 24, 40), Rule(224, 6, 40), Rule(224, 24, 16)])
+def test_every_quadrature_needs_its_nodes(rule):
+    """Negative control: few nodes of any of the three are seen."""
+    r = np.geomspace(1e-2, 10.0, 12)
+    assert np.abs(sampled(rule, r) / sampled(STANDARD, r) - 1).max() > 1e-7
+
+
+def test_an_estimate_has_the_shape_of_the_profile_and_is_0_at_its_ends():
+    assert type(exact.error_estimate(1.0, 0.5)) is float
+    np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)
+    assert exact.error_estimate(2.0, 0.5, 2.0) == exact.error_estimate(1.0, 0.5)
+
+
+def test_numbers_give_numbers_and_arrays_broadcast():
+    for value in (exact.reflectance(0.5), exact.profile(1, 0.5), exact.cdf(1, 0.5), exact.quantile(0.5, 0.5)):
+        assert type(value) is float
+    assert type(exact.decay_rate(0.5)) is float
+    assert exact.reflectance([[0.5, 0.6]]).shape == (1, 2)
+    r, alpha, mfp = np.array([0.1, 1.0, 3.0]), np.array([[0.5], [0.9]]), np.array([[[1.0]], [[2.0]]])
+    table = exact.profile(r, alpha, mfp)
+    assert table.shape == (2, 2, 3)
+    assert table[1, 0, 2] == pytest.approx(exact.profile(3.0, 0.5, 2.0), rel=1e-13)
+    assert exact.cdf(r, alpha).shape == (2, 3)
+    assert exact.quantile(np.array([0.1, 0.5, 0.9]), alpha, 2.0).shape == (2, 3)
+    assert exact.profile([], 0.5).shape == exact.reflectance([]).shape == (0,)
+
+
+@pytest.mark.parametrize("alpha", [-0.1, 1.1, np.nan, [0.5, 2.0], "half", None])
+def test_albedo_must_be_in_0_to_1(alpha):
+    for call in (
+        lambda: exact.reflectance(alpha),
+        lambda: exact.profile(1.0, alpha),
+        lambda: exact.cdf(1.0, alpha),
+        lambda: exact.quantile(0.5, alpha),
+        lambda: exact.decay_rate(alpha),
+        lambda: exact.error_estimate(1.0, alpha),
+    ):
+        with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got"):
+            call()
+
+
+@pytest.mark.parametrize("r", [-1.0, np.nan, [1.0, -2.0], "far"])
+def test_radius_must_not_be_negative(r):
+    with pytest.raises(InputError, match=r"r must be a radius >= 0, got"):
+        exact.profile(r, 0.5)
+
+
+@pytest.mark.parametrize("mfp", [0.0, -1.0, np.inf, np.nan, "long"])
+def test_mfp_must_be_a_length(mfp):
+    with pytest.raises(InputError, match=r"mfp must be a mean free path > 0, got"):
+        exact.profile(1.0, 0.5, mfp)
+
+
+@pytest.mark.parametrize("xi", [-0.1, 1.5, np.nan, "most"])
+def test_share_must_be_in_0_to_1(xi):
+    with pytest.raises(InputError, match=r"xi must be a share of the energy in \[0, 1\], got"):
+        exact.quantile(xi, 0.5)
+
+
+def test_the_message_names_the_first_offender():
+    with pytest.raises(InputError, match=r"got -3\.0$"):
+        exact.profile([1.0, -3.0, -4.0], 0.5)
+
+
+@pytest.mark.parametrize("setting", [Setting(n=1.4), Setting(g=0.5), Setting("diffuse", n=1.5), "diffuse", None])
+def test_other_surfaces_are_refused_by_name(setting):
+    for call in (
+        lambda: exact.reflectance(0.5, setting),
+        lambda: exact.profile(1.0, 0.5, setting=setting),
+        lambda: exact.cdf(1.0, 0.5, setting=setting),
+        lambda: exact.quantile(0.5, 0.5, setting=setting),
+        lambda: exact.error_estimate(1.0, 0.5, setting=setting),
+    ):
+        with pytest.raises(SettingError, match=r"n = 1 and g = 0, got .*simulate it instead"):
+            call()

@@ -1,0 +1,97 @@
+"""The exact half space against photons: integrals over rings, and their derivatives in albedo."""
+
+from functools import cache
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.stats import chi2
+
+from mcml_sim import Grid, Setting, exact, simulate_orders
+from mcml_sim.by_albedo import BLOCK
+
+ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
+CHANCE = 1e-3  # that a right answer fails one of the tests of one of the albedos
+EDGES = np.concatenate([[0.0], np.geomspace(0.01, 20.0, 30)])
+
+
+def energy(alpha, edges, setting):
+    """Integral of 2 pi r R_d over each ring, (rings,) or for alpha of shape (alphas, 1) (alphas, rings)."""
+    within = exact.cdf(edges, alpha, setting=setting) * exact.reflectance(alpha, setting)
+    return within[..., 1:] - within[..., :-1]
+
+
+def chi_squared(run, alpha, expected):
+    """Of the rings that enough photons reached, and their number; rings are independent but for 1/N of themselves."""
+    found = run.energy(alpha)
+    sampled = found.is_sampled()
+    return np.sum(((found.value - expected) / found.standard_error)[sampled] ** 2), np.count_nonzero(sampled)
+
+
+def is_likely(run, setting, alphas=ALPHAS, wrong=0.0):
+    """Whether neither tail of chi-square is too unlikely at any albedo; `wrong` takes that share of the loss."""
+    p = []
+    for alpha in alphas:
+        value, degrees = chi_squared(run, alpha, energy(alpha + wrong * (1 - alpha), run.grid.r_edges, setting))
+        assert degrees > 10
+        p.append(chi2.cdf(value, degrees))
+    return CHANCE / len(p) < min(p) and max(p) < 1 - CHANCE / len(p)
+
+
+@cache
+def run_under(setting):
+    """A million photons."""
+    return simulate_orders(Grid.from_edges(r=EDGES), 2**20, seed=3, setting=setting)
+
+
+@pytest.fixture(params=["searchlight", "diffuse"])
+def lit(request):
+    """A run under either light, and its setting."""
+    setting = Setting(request.param)
+    return run_under(setting), setting
+
+
+def test_the_tracer_agrees_in_chi_square_over_the_rings(lit):
+    assert is_likely(*lit)
+
+
+def test_chi_square_tells_another_light_and_another_albedo(lit):
+    """Negative controls: 1 % less loss, and the other illumination."""
+    run, setting = lit
+    other = Setting({"searchlight": "diffuse", "diffuse": "searchlight"}[setting.illumination])
+    assert not is_likely(run, setting, wrong=0.01)
+    assert not is_likely(run, other)
+
+
+def test_the_derivative_in_albedo_is_that_of_the_order_series(sidak):
+    """sum over n of n alpha^(n-1) R_n, in standard errors, ring by ring."""
+    run, setting = run_under(Setting()), Setting()
+
+    @jax.jit
+    def with_slope(alphas):
+        return jax.jvp(lambda a: energy(a, EDGES, setting), (alphas,), (jnp.ones_like(alphas),))
+
+    with jax.enable_x64(True):
+        light, slope = (np.asarray(values) for values in with_slope(jnp.asarray(ALPHAS[:, None])))
+    assert ALPHAS.size * EDGES.size > BLOCK  # more than one turn of the traced route
+    np.testing.assert_allclose(light, energy(ALPHAS[:, None], EDGES, setting), rtol=1e-9, atol=1e-13)
+    found = run.profile_derivative(ALPHAS).scaled(run.grid.r_areas)
+    sampled = found.is_sampled()
+    z = ((found.value - slope) / found.standard_error)[sampled]
+    assert z.size > 40
+    assert np.abs(z).max() < sidak(z.size)
+    # Negative control: the light itself is not its derivative.
+    assert np.abs(((light - slope) / found.standard_error)[sampled]).max() > 20
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_a_hundred_million_photons_agree_in_chi_square(illumination):
+    """Over a hundred rings from 0.003 to 40 mfp; an albedo with 0.1 % less loss is told apart."""
+    setting = Setting(illumination)
+    edges = np.concatenate([[0.0], np.geomspace(0.003, 40.0, 100)])
+    run = simulate_orders(Grid.from_edges(r=edges), 10**8, seed=6, setting=setting)
+    alphas = np.array([0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.97])
+    assert is_likely(run, setting, alphas)
+    assert not is_likely(run, setting, alphas, wrong=1e-3)
