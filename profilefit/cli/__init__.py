@@ -1,4 +1,4 @@
-"""profilefit on the command line: `regenerate` makes records, `report` shows them."""
+"""profilefit on the command line: `regenerate` makes records, `report` shows them, `convert` changes conventions."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import typer
 from rich.console import Console
 
 from mcml_sim import __version__
+from profilefit.cli.convert import convert
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
 from profilefit.errors import InputError, OutputError, StoreError
@@ -27,6 +28,7 @@ app = typer.Typer(
 )
 app.command()(regenerate)
 app.command()(report)
+app.command()(convert)
 
 
 def _show_version(wanted: bool) -> None:

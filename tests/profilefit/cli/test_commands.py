@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from mcml_sim import Setting
 from profilefit import catalogue
 from profilefit.cli import main
 
@@ -65,6 +66,32 @@ def test_regenerate_writes_a_record_that_loads(command, recipe):
     law = catalogue.albedo_law("liang", constants="out/small.json")
     assert law.p == pytest.approx(content["constants"]["p"]["regenerated"])
     assert content["posterior"]["statistical"]["result"] == "converged"
+
+
+def test_a_surface_that_refracts_gets_its_own_record(command, tmp_path):
+    """A recipe's table [setting] says which; the record is found by the name that goes with it."""
+    path = tmp_path / "albedo-rational-n1.45.toml"
+    changes = {'"liang"': '"rational"', "count = 9": "count = 5", '"albedo"\n': '"reflectance"\n'}
+    text = (
+        RECIPE.replace('pipeline = "albedo"\n', 'pipeline = "albedo"\nrandom_starts = 3\n') + "\n[setting]\nn = 1.45\n"
+    )
+    for old, new in changes.items():
+        text = (
+            text.replace(old, new) if old != '"albedo"\n' else text.replace(f"objective = {old}", f"objective = {new}")
+        )
+    path.write_text(text)
+    status, _, err = command("regenerate", str(path), "--out", "out", "--photons", "20000")
+    assert status == 0, err
+    assert "2e+04 photons: searchlight, n = 1.45, g = 0" in err
+    assert err.count("photons:") == 1
+    content = json.loads(Path("out/albedo-rational-n1.45.json").read_text())
+    assert content["setting"] == {"illumination": "searchlight", "n": 1.45, "g": 0.0}
+    assert content["starts"]["count"] == 3
+    assert content["quality"]["regenerated"]["delta_A_noise"] > 0
+    assert list(Path("out/.photons/seed-1/n1.45").glob("batch-*"))
+    law = catalogue.albedo_law("rational", setting=Setting(n=1.45), folder=Path("out"))
+    assert law.reflectance(1.0) == pytest.approx(4 * 1.45 / 2.45**2)
+    assert command("report", "--fits", "out")[0] == 0
 
 
 def test_one_seed_gives_identical_records_and_another_does_not(command, recipe):
@@ -134,7 +161,7 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ('law = "liang"|law = "lang"', "law must be one of liang, rational, got 'lang'"),
+        ('law = "liang"|law = "lang"', "law must be one of liang, rational, van_de_hulst, chiang, got 'lang'"),
         ("low = 0.1|low = 1.1", "albedos must have 0 < low < high <= 1, got low = 1.1"),
         ("count = 9|count = 1", "albedos.count must be between 3 and 1000, got 1"),
         ("count = 9|cuont = 9", "unknown key 'cuont'"),

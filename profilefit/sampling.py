@@ -1,0 +1,322 @@
+"""How good a sampler is: judged by the density that it has itself, against the light that it should carry.
+
+A point gathers light with radii r = sample(xi) and the weights w = f(r) / pdf(r), f the density in r of the light that
+leaves (2 pi r R_d / A). Then, xi uniform:
+
+    E[w E(r)] with the sampler's own pdf misses only what the sampler never reaches;
+    with the law's density in place of pdf, as shaders do that take an approximate inverse for an exact one, the whole
+    error of the inverse remains: even light comes out right if f is the law's too, an edge does not;
+    Var[w] is the chi-square divergence of f from pdf.
+
+A clip, r = min(g, r_max), draws r_max itself with a finite chance: an atom. No light leaves from a circle, so these
+samples weigh nothing, and the light beyond r_max is lost.
+
+All of it is integrated over xi by Gauss's rule between the places where r(xi) turns, stops or crosses a radius at which
+the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to 1 - 2^-24: an
+exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a renderer meets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import NamedTuple, Protocol
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw, Sampler
+
+Floats = NDArray[np.float64]
+SEARCHLIGHT = Setting()
+# The integrals run over t = -ln(1 - xi), where tails are exponential: to the last of a float's 2^24 steps.
+LAST = 24.0 * np.log(2.0)
+SCAN = np.concatenate([[0.0], np.geomspace(1e-9, LAST, 4000)])
+SPLITS = np.concatenate([[0.0], np.geomspace(1e-6, LAST, 32)])
+NODES = 16
+ZOOM, ZOOMS = 65, 8  # a bracket shrinks by 32 each time: to rounding
+BATCH = 512  # calls have one shape, so that a compiled sampler compiles once
+LAST_SHARE = 0.999
+
+
+@dataclass(frozen=True)
+class SamplerQuality:
+    """Measures of a sampler at each albedo (m,).
+
+    inversion_error  max over xi in [0, 0.999] of |cdf(sample(xi)) - xi|, the target's cdf [-]
+    missing          1 less the integral of pdf less the atom [-]: 0 if pdf is the sampler's
+    atom             share of the samples at radii that are drawn with a finite chance [-]
+    bias             relative error of even light (m,), and of light beyond a straight edge, `edge_bias`, with pdf
+    bias_by_law_pdf  the same with the law's density in place of pdf; infinite where that is 0 and samples fall
+    variance         of the weight f / pdf of one sample [-]
+    """
+
+    alpha: Floats
+    inversion_error: Floats
+    missing: Floats
+    atom: Floats
+    bias: Floats
+    edge_bias: Floats
+    bias_by_law_pdf: Floats
+    edge_bias_by_law_pdf: Floats
+    variance: Floats
+
+
+class Target(Protocol):
+    """The light that is to be gathered; x = r/l."""
+
+    def density(self, x: Floats, alpha: float) -> Floats:
+        """2 pi x R_d / A [1/mfp]."""
+
+    def cdf(self, x: Floats, alpha: float) -> Floats:
+        """Share of the light within x [-]."""
+
+
+@dataclass(frozen=True)
+class LawTarget:
+    """The light of a law."""
+
+    law: ProfileLaw
+
+    def density(self, x: Floats, alpha: float) -> Floats:
+        """The slope of the law's cdf: whatever the law scales its profile to."""
+        return _called(_slope, self.law, x, alpha)
+
+    def cdf(self, x: Floats, alpha: float) -> Floats:
+        return _called(_share, self.law, x, alpha)
+
+
+@dataclass(frozen=True)
+class ExactTarget:
+    """The light of the exact half space."""
+
+    setting: Setting = SEARCHLIGHT
+
+    def density(self, x: Floats, alpha: float) -> Floats:
+        profile = np.asarray(exact.profile(x, alpha, setting=self.setting))
+        return 2.0 * np.pi * x * profile / exact.reflectance(alpha, self.setting)
+
+    def cdf(self, x: Floats, alpha: float) -> Floats:
+        return np.asarray(exact.cdf(x, alpha, setting=self.setting))
+
+
+def sampler_quality(
+    sampler: Sampler, alpha: ArrayLike, target: Target | None = None, edge: float = 1.0
+) -> SamplerQuality:
+    """Measure a sampler at each albedo in `alpha` (m,), all in (0, 1].
+
+    target  the light it gathers, by default its own law's
+    edge    distance of the straight edge beyond which there is light [mfp], > 0
+    Raises InputError.
+    """
+    albedos = np.atleast_1d(np.asarray(alpha, float))
+    if not np.all((albedos > 0) & (albedos <= 1)):
+        raise InputError(f"alpha must be in (0, 1], got {albedos[~((albedos > 0) & (albedos <= 1))][0]:g}")
+    if not (np.isfinite(edge) and edge > 0):
+        raise InputError(f"edge must be a distance > 0, got {edge!r}")
+    light = target or LawTarget(sampler.law)
+    rows = [_at(sampler, float(value), light, edge) for value in albedos]
+    names = [field.name for field in fields(SamplerQuality)]
+    return SamplerQuality(**{name: np.array([row[name] for row in rows]) for name in names})
+
+
+def lit_beyond_edge(x: Floats, edge: float) -> Floats:
+    """Share of the circle of radius x that is lit where light falls beyond a straight edge at this distance [-]."""
+    return np.arccos(np.minimum(edge / np.maximum(x, edge), 1.0)) / np.pi
+
+
+def edge_light(target: Target, alpha: float, edge: float) -> float:
+    """Light gathered from beyond the edge, of that from everywhere [-]: (1/pi) int_0^(pi/2) (1 - cdf(edge/cos t)) dt.
+
+    By parts from int f(x) arccos(edge/x)/pi dx: no density enters, so that it can judge one.
+    """
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    angle = 0.25 * np.pi * (nodes + 1.0)
+    return float(0.25 * np.sum(weights * (1.0 - target.cdf(edge / np.cos(angle), alpha))))
+
+
+class _Map(NamedTuple):
+    """Where t -> x = r/l of a sampler is smooth: `breaks` in t, `levels` in x where it turns, ends or stops.
+
+    flats  (low, high, x) of the stretches where x stands still
+    """
+
+    breaks: Floats
+    levels: Floats
+    flats: list[tuple[float, float, float]]
+
+
+def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str, float]:
+    def radius(t: Floats) -> Floats:
+        return _called(_sample, sampler, -np.expm1(-t), alpha)
+
+    def own(x: Floats) -> Floats:
+        return _called(_pdf, sampler, x, alpha)
+
+    shape = _map(radius, edge)
+    t, dt = _rule(shape.breaks)
+    share = np.exp(-t) * dt
+    x = radius(t)
+    light = target.density(x, alpha)
+    lit = lit_beyond_edge(x, edge)
+    moving = ~np.any([np.zeros(t.size, bool), *((t > low) & (t < high) for low, high, _ in shape.flats)], axis=0)
+    weight = np.where(moving, _ratio(light, own(x)), 0.0)
+    by_law = np.where(moving, _ratio(light, LawTarget(sampler.law).density(x, alpha)), 0.0)
+    lost = _at_atoms(sampler, alpha, target, shape.flats, edge)
+    atom = float(sum(_mass(low, high) for low, high, _ in shape.flats))
+    beyond = edge_light(target, alpha, edge)
+    mean = float(share @ weight)
+    xi = np.linspace(0.0, LAST_SHARE, BATCH)
+    return {
+        "alpha": alpha,
+        "inversion_error": float(np.max(np.abs(target.cdf(_called(_sample, sampler, xi, alpha), alpha) - xi))),
+        "missing": 1.0 - atom - _integral(own, shape.levels),
+        "atom": atom,
+        "bias": mean - 1.0,
+        "edge_bias": float(share @ (weight * lit)) / beyond - 1.0,
+        "bias_by_law_pdf": float(share @ by_law) + lost[0] - 1.0,
+        "edge_bias_by_law_pdf": (float(share @ (by_law * lit)) + lost[1]) / beyond - 1.0,
+        "variance": float(share @ weight**2) - mean**2,
+    }
+
+
+def _at_atoms(
+    sampler: Sampler, alpha: float, target: Target, flats: list[tuple[float, float, float]], edge: float
+) -> tuple[float, float]:
+    """What samples at atoms add to the means of f / law's density, of even light and of light beyond the edge.
+
+    Densities are those just outside: where a law ends in a zero, rounding decides whether it is one.
+    """
+    total, beyond = 0.0, 0.0
+    for low, high, x in flats:
+        outside = np.array([x * (1.0 + 1e-12)])
+        ratio = 1.0  # of the law's light to the law's density, even where both end
+        if not (isinstance(target, LawTarget) and target.law is sampler.law):
+            ratio = float(_ratio(target.density(outside, alpha), LawTarget(sampler.law).density(outside, alpha))[0])
+        total += _mass(low, high) * ratio
+        beyond += _mass(low, high) * ratio * float(lit_beyond_edge(outside, edge)[0])
+    return total, beyond
+
+
+def _mass(low: float, high: float) -> float:
+    """Chance of xi between -ln(1 - xi) = low and high; what lies beyond the last step counts as lying there."""
+    return float(np.exp(-low) - (np.exp(-high) if high < LAST else 0.0))
+
+
+def _ratio(above: Floats, below: Floats) -> Floats:
+    """0 where nothing is above, infinite where something is and nothing below."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(above > 0, above / np.maximum(below, 0.0), 0.0)
+
+
+def _map(radius: Callable[[Floats], Floats], edge: float) -> _Map:
+    x = radius(SCAN)
+    still = np.diff(x) == 0
+    flats = _flats(radius, x, still)
+    step = np.sign(np.diff(x))
+    turns = np.flatnonzero(step[1:] * step[:-1] < 0) + 1
+    places = [_turn(radius, SCAN[i - 1], SCAN[i + 1], float(step[i - 1])) for i in turns]
+    extremes = [float(radius(np.array([place]))[0]) for place in places]
+    levels = [float(x[0]), float(x[-1]), *extremes, *(flat[2] for flat in flats)]
+    crossings = [
+        _crossing(radius, SCAN[i], SCAN[i + 1], level)
+        for level in {*extremes, edge}
+        for i in np.flatnonzero(np.diff(np.sign(x - level)) != 0)
+    ]
+    ends = [end for low, high, _ in flats for end in (low, high)]
+    breaks = np.unique(np.concatenate([SPLITS, places, crossings, ends]))
+    return _Map(breaks, np.unique([0.0, *levels]), flats)
+
+
+def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> list[tuple[float, float, float]]:
+    """Runs of equal radii on the scan, their ends found to rounding."""
+    edges = np.diff(np.concatenate([[0], still.astype(int), [0]]))
+    found = []
+    for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
+        value = float(x[first])
+        low, high = float(SCAN[first]), float(SCAN[last])
+        if first > 0:
+            low = _boundary(radius, SCAN[first - 1], low, value)
+        if last < SCAN.size - 1:
+            high = _boundary(radius, SCAN[last + 1], high, value)
+        found.append((low, high, value))
+    return found
+
+
+def _boundary(radius: Callable[[Floats], Floats], outside: float, inside: float, value: float) -> float:
+    """Where between the two the radius begins to be `value`."""
+    for _ in range(ZOOMS):
+        t = np.linspace(outside, inside, ZOOM)
+        first = max(int(np.argmax(radius(t) == value)), 1)
+        outside, inside = float(t[first - 1]), float(t[first])
+    return inside
+
+
+def _turn(radius: Callable[[Floats], Floats], low: float, high: float, rising: float) -> float:
+    """Where between the two the radius is largest, if it rises first, or smallest."""
+    for _ in range(ZOOMS):
+        t = np.linspace(low, high, ZOOM)
+        best = int(np.argmax(rising * radius(t)))
+        low, high = float(t[max(best - 1, 0)]), float(t[min(best + 1, ZOOM - 1)])
+    return 0.5 * (low + high)
+
+
+def _crossing(radius: Callable[[Floats], Floats], low: float, high: float, level: float) -> float:
+    """Where between the two the radius passes `level`."""
+    for _ in range(ZOOMS):
+        t = np.linspace(low, high, ZOOM)
+        above = radius(t) > level
+        first = int(np.argmax(above != above[0])) or ZOOM - 1
+        low, high = float(t[first - 1]), float(t[first])
+    return 0.5 * (low + high)
+
+
+def _rule(breaks: Floats) -> tuple[Floats, Floats]:
+    """Nodes and weights over every interval; t = low + width sin^2 does no harm to roots at either end."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    angle = 0.25 * np.pi * (nodes + 1.0)
+    low, width = breaks[:-1, None], np.diff(breaks)[:, None]
+    t = low + width * np.sin(angle) ** 2
+    dt = width * np.sin(2.0 * angle) * 0.25 * np.pi * weights
+    return t.ravel(), dt.ravel()
+
+
+def _integral(density: Callable[[Floats], Floats], levels: Floats) -> float:
+    """Of a density whose only jumps and infinities are at `levels`."""
+    x, dx = _rule(np.unique(np.concatenate([levels, levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
+    return float(dx @ density(x))
+
+
+def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
+    """A compiled function of every value, BATCH of them at a time."""
+    padded = np.pad(values, (0, -values.size % BATCH), mode="edge").reshape(-1, BATCH)
+    with jax.enable_x64(True):
+        at = jnp.asarray(alpha)
+        parts = [np.asarray(function(owner, jnp.asarray(part), at)) for part in padded]
+    return np.concatenate(parts)[: values.size]
+
+
+@eqx.filter_jit
+def _sample(sampler: Sampler, xi: Array, alpha: Array) -> Array:
+    return sampler.scaled_sample(xi, alpha)
+
+
+@eqx.filter_jit
+def _pdf(sampler: Sampler, x: Array, alpha: Array) -> Array:
+    return sampler.scaled_pdf(x, alpha)
+
+
+@eqx.filter_jit
+def _share(law: ProfileLaw, x: Array, alpha: Array) -> Array:
+    return law.scaled_cdf(x, alpha)
+
+
+@eqx.filter_jit
+def _slope(law: ProfileLaw, x: Array, alpha: Array) -> Array:
+    return jax.jvp(lambda y: law.scaled_cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]

@@ -1,0 +1,149 @@
+"""`profilefit convert` as a user meets it: what it prints, what it refuses, and in how many lines."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+
+from profilefit.cli import main
+from profilefit.convert import BY_NAME, Optical, alpha_of
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """Run `profilefit convert WORDS`; the exit status and what it printed on stdout and stderr."""
+
+    def run(*words: str) -> tuple[int, str, str]:
+        monkeypatch.setattr(sys, "argv", ["profilefit", "convert", *words])
+        with pytest.raises(SystemExit) as stop:
+            main()
+        printed = capsys.readouterr()
+        return int(stop.value.code or 0), printed.out, printed.err
+
+    return run
+
+
+@pytest.fixture
+def table(command):
+    """What --json says."""
+
+    def run(*words: str) -> dict:
+        status, out, err = command(*words, "--json")
+        assert status == 0, err
+        return json.loads(out)
+
+    return run
+
+
+def test_a_table_of_every_convention(command):
+    words = ("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
+    status, out, err = command(*words)
+    assert status == 0, err
+    assert err == ""
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert "…" not in out
+    row = {line[:26].strip(): line[26:].split() for line in lines}
+    assert row["Cycles radius x scale"][:5] == ["15.080", "15.080", "15.080", "mm", "diffuse"]
+    assert row["absorption mu_a"][3] == "1/mm"
+    assert row["diffuse mean free path"][2:4] == ["none", "mm"]
+    assert ["0.90000", "0.70000", "1.0000", "diffuse"] in [line[26:].split()[:4] for line in lines]
+    assert "none: light that nothing absorbs" in out
+
+
+def test_what_every_channel_has_is_not_explained_away(command):
+    _, out, _ = command("--alpha", "0.5", "--mfp", "1")
+    assert "none" not in out
+    assert "1/length" in out
+
+
+def test_json_has_every_convention_and_null_for_none(table):
+    found = table("--alpha", "0.5,1", "--mfp", "2cm")
+    assert set(BY_NAME) | {"unit", "alpha", "reflectance_searchlight", "reflectance_diffuse", "mu_a", "mu_s"} == set(
+        found
+    )
+    assert found["unit"] == "cm"
+    assert found["mfp"] == [2.0, 2.0]
+    assert found["mu_a"] == [0.25, 0.0]
+    assert found["dmfp"][1] is None
+    assert found["dmfp"][0] == pytest.approx(2.0)  # sqrt(1.5 / 1.5) l
+    assert table("--alpha", "0.5", "--mfp", "2")["unit"] is None
+
+
+@pytest.mark.parametrize("name", list(BY_NAME))
+def test_every_length_is_an_option(table, name):
+    """The falloffs share one, whose light --illumination says."""
+    light = name.removeprefix("falloff_")
+    option = "falloff" if light in ("searchlight", "diffuse") else name.replace("_", "-")
+    more = ("--illumination", light) if option == "falloff" else ()
+    found = table("--alpha", "0.5,0.9", f"--{option}", "0.3um", *more)
+    assert found[name] == pytest.approx([0.3, 0.3], rel=1e-12)
+    np.testing.assert_allclose(found["mfp"], Optical.from_length(name, 0.3, [0.5, 0.9]).mfp, rtol=1e-14)
+
+
+def test_there_and_back_through_an_engine(table):
+    first = table("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
+    again = table("--alpha", repr(first["alpha"][0]), "--unreal-mfp", f"{first['unreal_mfp'][0]!r}mm")
+    for name, value in first.items():
+        assert again[name] == (value if name == "unit" else pytest.approx(value, rel=1e-12))
+
+
+def test_coefficients_are_a_colour_and_a_length(table):
+    found = table("--mu-a", "0.032,0.17,0.48/mm", "--mu-s", "0.74/mm,0.88/mm,1.01/mm")
+    np.testing.assert_allclose(found["mu_s"], [0.74, 0.88, 1.01], rtol=1e-14)
+    assert found["unit"] == "mm"
+    assert found["mfp"][0] == pytest.approx(1 / 0.772, rel=1e-14)
+
+
+def test_a_falloff_is_a_pencil_beam_s_unless_said(table):
+    assert table("--alpha", ".95", "--falloff", "0.3")["falloff_searchlight"] == pytest.approx([0.3], rel=1e-12)
+
+
+def test_the_light_of_a_colour_matters(table):
+    found = [
+        table("--reflectance", "0.5", "--illumination", light, "--mfp", "1")["alpha"][0]
+        for light in ("searchlight", "diffuse")
+    ]
+    np.testing.assert_allclose(found, [alpha_of(0.5, "searchlight"), alpha_of(0.5, "diffuse")], rtol=1e-14)
+    assert found[0] - found[1] > 0.02
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            "--mfp 1",
+            "colour must be one of --alpha, --reflectance with --illumination, or --mu-a with --mu-s, got none",
+        ),
+        ("--alpha .5 --reflectance .5 --mfp 1", "got --alpha and --reflectance"),
+        ("--mu-a 1", "got --mu-a"),
+        ("--alpha .5 --mu-s 1", "got --alpha and --mu-s"),
+        ("--alpha .5", "length must be one, such as --mfp 1.2mm, got none"),
+        ("--alpha .5 --mfp 1 --falloff 2", "got --mfp and --falloff"),
+        ("--alpha .5 --mfp 1 --cycles-skin-radius 2", "got --mfp and --cycles-skin-radius"),
+        ("--mu-a 1 --mu-s 1 --mfp 1", "length must be left out, as --mu-a and --mu-s have one, got --mfp"),
+        ("--reflectance .5 --mfp 1", "--illumination must be one of searchlight, diffuse with --reflectance, got none"),
+        ("--alpha .5 --mfp 1 --illumination sun", "--illumination must be one of searchlight, diffuse, got 'sun'"),
+        ("--alpha .5 --mfp one", "--mfp must be numbers, with a unit of um,"),
+        ("--alpha .5 --mfp 1furlong", "got '1furlong'"),
+        ("--alpha .5 --mfp 1mm,2cm", "--mfp must have one unit, got cm, mm"),
+        ("--alpha .5mm --mfp 1", "--alpha must be numbers, between commas, got '.5mm'"),
+        ("--alpha nan --mfp 1", "got 'nan'"),
+        ("--alpha .5, --mfp 1", "got '.5,'"),
+        ("--alpha 1.5 --mfp 1", "alpha must be in [0, 1], got 1.5"),
+        ("--alpha .5 --mfp -1", "mfp must be >= 0 and finite, got -1"),
+        ("--alpha .5 --mfp 0", "mfp must be > 0 and finite, got 0"),
+        ("--alpha 1 --dmfp 1", "dmfp must be another length at alpha = 1"),
+        ("--alpha .5,.6 --mfp 1,2,3", "alpha and mfp must have one value or equally many, got 2 and 3"),
+        ("--mu-a 1/mm --mu-s 1/cm", "--mu-a and --mu-s must have one unit, got /mm and /cm"),
+        ("--mu-a 1mm --mu-s 1mm", "--mu-a must be numbers, with a unit of /um,"),
+        ("--mu-a 0 --mu-s 0", "mu_a + mu_s must be > 0"),
+    ],
+)
+def test_bad_words_are_one_line(command, words, said):
+    status, out, err = command(*words.split())
+    assert status == 2
+    assert said in err
+    assert err.count("\n") == 1
+    assert out == ""

@@ -1,0 +1,213 @@
+"""Samplers: by hand where a hand can, by random numbers where it cannot, and wrong where they are made wrong."""
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.sampling import (
+    BATCH,
+    LAST,
+    ExactTarget,
+    LawTarget,
+    edge_light,
+    lit_beyond_edge,
+    sampler_quality,
+)
+
+ALPHA = 0.9
+STEP = 2.0**-24  # what the last step of xi leaves out
+
+
+def integral(function, low, high):
+    """By Gauss's rule in ln x with BATCH nodes, a shape for which everything is compiled."""
+    nodes, weights = np.polynomial.legendre.leggauss(BATCH)
+    half = 0.5 * np.log(high / low)
+    x = low * np.exp(half * (nodes + 1.0))
+    return float(half * np.sum(weights * x * function(x)))
+
+
+def in_batches(function, values):
+    return np.concatenate([np.asarray(function(part)) for part in values.reshape(-1, BATCH)])
+
+
+class Stretched(Sampler):
+    """The exact inverse of its law's cdf, its radii stretched, with the density that they then have."""
+
+    law: ProfileLaw
+    stretch: float = eqx.field(static=True)
+    wrong: float = eqx.field(static=True, default=1.0)  # what its density is multiplied by
+
+    def scaled_sample(self, xi, alpha):
+        return self.stretch * self.law.sampler.scaled_sample(xi, alpha)
+
+    def scaled_pdf(self, x, alpha):
+        return self.wrong * self.law.sampler.scaled_pdf(x / self.stretch, alpha) / self.stretch
+
+
+class Clipped(Sampler):
+    """The exact inverse of its law's cdf, clipped."""
+
+    law: ProfileLaw
+    farthest: float = eqx.field(static=True)
+
+    def scaled_sample(self, xi, alpha):
+        return jnp.minimum(self.law.sampler.scaled_sample(xi, alpha), self.farthest)
+
+    def scaled_pdf(self, x, alpha):
+        return jnp.where(x < self.farthest, self.law.sampler.scaled_pdf(x, alpha), 0.0)
+
+
+def test_an_exact_inverse_has_no_error(burley):
+    found = sampler_quality(burley.sampler, [0.3, ALPHA])
+    np.testing.assert_array_equal(found.alpha, [0.3, ALPHA])
+    assert np.all(found.inversion_error < 1e-14)
+    assert np.all(found.atom == 0.0)
+    for measure in (found.missing, found.bias, found.bias_by_law_pdf, found.variance):
+        assert np.max(np.abs(measure)) < 1.01 * STEP
+    for measure in (found.edge_bias, found.edge_bias_by_law_pdf):
+        assert np.max(np.abs(measure)) < 20 * STEP  # the last step is all beyond the edge
+
+
+def test_light_beyond_an_edge(burley):
+    """Against the plain integral of the density, of a law and of the exact profile."""
+    for target in (LawTarget(burley), ExactTarget()):
+        light = integral(lambda x, t=target: t.density(x, ALPHA) * lit_beyond_edge(x, 0.7), 0.7, 90.0)
+        assert edge_light(target, ALPHA, 0.7) == pytest.approx(light, abs=1e-7)  # a root at the edge
+    assert edge_light(LawTarget(burley), ALPHA, 1e-9) == pytest.approx(0.5, abs=1e-6)
+
+
+def test_a_circle_beyond_an_edge_by_hand():
+    """A circle of twice the distance shows the edge 120 degrees of its 360."""
+    np.testing.assert_allclose(lit_beyond_edge(np.array([0.0, 0.5, 1.0, 2.0, 1e12]), 1.0), [0, 0, 0, 1 / 3, 0.5])
+
+
+def test_a_stretch_costs_nothing_with_its_own_density(burley):
+    """With the law's it moves the light: what lies beyond the edge is what was beyond edge / 1.1."""
+    found = sampler_quality(Stretched(burley, 1.1), ALPHA)
+    assert abs(found.bias[0]) < 1e-6
+    assert abs(found.edge_bias[0]) < 1e-5
+    assert abs(found.bias_by_law_pdf[0]) < 1e-6, "even light shows nothing"
+    moved = edge_light(LawTarget(burley), ALPHA, 1 / 1.1) / edge_light(LawTarget(burley), ALPHA, 1.0) - 1
+    assert moved > 0.05
+    assert found.edge_bias_by_law_pdf[0] == pytest.approx(moved, abs=1e-5)
+    x = np.geomspace(0.01, 20, 20_000)
+    assert found.inversion_error[0] == pytest.approx(
+        np.max(np.abs(burley.cdf(1.1 * x, ALPHA) - burley.cdf(x, ALPHA))), rel=1e-4
+    )
+
+
+def test_variance_is_the_chi_square_divergence(burley):
+    """int f^2 / pdf dr - 1, by another quadrature in another variable."""
+    sampler = Stretched(burley, 1.3)
+    for target in (LawTarget(burley), ExactTarget()):
+        square = integral(lambda x, t=target: t.density(x, ALPHA) ** 2 / sampler.pdf(x, ALPHA), 1e-8, 60.0)
+        found = sampler_quality(sampler, ALPHA, target)
+        assert found.variance[0] == pytest.approx(square - 1, abs=1e-5)
+
+
+def test_a_density_that_is_not_the_sampler_s_is_seen(burley):
+    """Negative control: 1.1 times too dense, so 1/1.1 of the light."""
+    found = sampler_quality(Stretched(burley, 1.0, wrong=1.1), ALPHA)
+    assert found.missing[0] == pytest.approx(-0.1, abs=1e-6)
+    assert found.bias[0] == pytest.approx(1 / 1.1 - 1, abs=1e-6)
+
+
+# Clips
+
+
+def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
+    found = sampler_quality(Clipped(burley, 2.0), ALPHA)
+    beyond = 1 - burley.cdf(2.0, ALPHA)
+    assert found.atom[0] == pytest.approx(beyond, rel=1e-10)
+    assert found.missing[0] == pytest.approx(0.0, abs=1e-10)
+    assert found.bias[0] == pytest.approx(-beyond, rel=1e-9)
+    assert found.inversion_error[0] == pytest.approx(0.999 - burley.cdf(2.0, ALPHA), rel=1e-10)
+    # Divided by the law's density every sample weighs 1, those of the atom too: even light hides it.
+    assert found.bias_by_law_pdf[0] == pytest.approx(0.0, abs=1e-6)
+    within = integral(lambda x: burley.sampler.pdf(x, ALPHA) * lit_beyond_edge(x, 1.0), 1.0, 2.0)
+    light = edge_light(LawTarget(burley), ALPHA, 1.0)
+    assert found.edge_bias[0] == pytest.approx(within / light - 1, abs=1e-6)
+    assert found.edge_bias_by_law_pdf[0] == pytest.approx((within + beyond / 3) / light - 1, abs=1e-6)
+
+
+def test_the_paper_s_clip_is_an_atom(liang):
+    """r = min(|g|, r_max) of (21), found from its radii alone; at 0.5 the law ends beyond the sampler's reach."""
+    found = sampler_quality(liang.sampler, [0.1, 0.5, ALPHA])
+    np.testing.assert_allclose(found.atom, liang.sampler.atom([0.1, 0.5, ALPHA]), rtol=0, atol=1e-12)
+    assert found.atom[0] > 0.01
+    assert found.atom[1] == 0.0
+    assert np.max(np.abs(found.missing)) < 1.01 * STEP
+    # Its own law's light ends at r_max too: nothing is lost at 0.1 and 0.9, at 0.5 what lies beyond xi = 1.
+    reach = liang.sampler.sample(1 - STEP, 0.5)
+    np.testing.assert_allclose(found.bias, [0.0, liang.cdf(reach, 0.5) - 1, 0.0], atol=1e-6)
+    assert found.bias[1] < -0.01
+    assert np.all(np.abs(found.edge_bias_by_law_pdf) > 0.1), "an approximate inverse is no sampler of its law"
+
+
+def test_light_that_the_paper_s_clip_loses(liang):
+    """Of the exact profile: what lies beyond r_max, and a division by zero where the law's density is used."""
+    found = sampler_quality(liang.sampler, ALPHA, ExactTarget())
+    beyond = 1 - exact.cdf(float(liang.largest_radius(ALPHA)), ALPHA)
+    assert found.bias[0] == pytest.approx(-beyond, abs=1e-6)
+    assert found.bias_by_law_pdf[0] == np.inf
+    assert found.edge_bias_by_law_pdf[0] == np.inf
+
+
+# By random numbers
+
+
+def weights(sampler, target, number, seed):
+    """Weights by the sampler's own density and by the law's, and the share of each circle beyond the edge."""
+    xi = np.random.default_rng(seed).random(number) * -np.expm1(-LAST)
+    x = in_batches(lambda part: sampler.sample(part, ALPHA), xi)
+    light, density = target.density(x, ALPHA), in_batches(lambda part: sampler.pdf(part, ALPHA), x)
+    own = np.divide(light, density, out=np.zeros_like(x), where=density > 0)  # an atom has no density
+    law = LawTarget(sampler.law).density(x, ALPHA)
+    return own, np.divide(light, law, out=np.ones_like(x), where=density > 0), lit_beyond_edge(x, 1.0)
+
+
+@pytest.mark.parametrize("name", ["approximate", "paper"])
+def test_means_and_variance_against_random_numbers(name, burley, liang, sidak):
+    """Twenty thousand draws, seed 5; three means and a variance to 1e-3 together, by Sidak."""
+    sampler = Stretched(burley, 1.2) if name == "approximate" else liang.sampler
+    target = LawTarget(sampler.law)
+    found = sampler_quality(sampler, ALPHA)
+    own, by_law, lit = weights(sampler, target, 40 * BATCH, 5)
+    light = edge_light(target, ALPHA, 1.0)
+    squares = (own - own.mean()) ** 2
+    pairs = [
+        (own, 1 + found.bias[0]),
+        (own * lit, light * (1 + found.edge_bias[0])),
+        (by_law * lit, light * (1 + found.edge_bias_by_law_pdf[0])),
+        (squares, found.variance[0]),
+    ]
+    z = [(sample.mean() - mean) / (sample.std() / np.sqrt(sample.size)) for sample, mean in pairs]
+    assert np.max(np.abs(z)) < sidak(len(pairs))
+    # Negative control: the law's density in the place of the sampler's is plainly another estimator.
+    error = (by_law * lit).std() / np.sqrt(lit.size)
+    assert abs((by_law * lit).mean() - light * (1 + found.edge_bias[0])) > 10 * error
+
+
+def test_targets_are_of_their_setting(burley):
+    """Negative control: diffuse light is another target."""
+    one, other = (
+        sampler_quality(burley.sampler, ALPHA, ExactTarget(Setting(light))).variance[0]
+        for light in ("searchlight", "diffuse")
+    )
+    assert other != pytest.approx(one, rel=0.1)
+    density = ExactTarget(Setting("diffuse")).density(np.array([1.0]), ALPHA)
+    step = np.diff(exact.cdf([0.999, 1.001], ALPHA, setting=Setting("diffuse"))) / 0.002
+    np.testing.assert_allclose(density, step, rtol=1e-5)
+
+
+def test_bad_numbers_are_named(burley):
+    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got 0"):
+        sampler_quality(burley.sampler, [0.5, 0.0])
+    with pytest.raises(InputError, match=r"alpha must be in \(0, 1\], got nan"):
+        sampler_quality(burley.sampler, np.nan)
+    with pytest.raises(InputError, match="edge must be a distance > 0, got 0"):
+        sampler_quality(burley.sampler, 0.5, edge=0.0)
