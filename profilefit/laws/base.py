@@ -65,7 +65,7 @@ class ProfileLaw(Constants):
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
-        return cls.constant_names() if objective == "energy" else ()
+        return cls.constant_names() if objective in ("energy", "relative") else ()
 
     @abc.abstractmethod
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
@@ -87,6 +87,11 @@ class ProfileLaw(Constants):
     @abc.abstractmethod
     def sampler(self) -> Sampler:
         """Draws radii for this law."""
+
+    @property
+    def samplers(self) -> dict[str, Sampler]:
+        """Every way to draw radii for this law; "exact" inverts its cdf, to rounding."""
+        return {"exact": self.sampler}
 
     @evaluated
     def profile(self, r, alpha, mfp=1.0) -> Array:

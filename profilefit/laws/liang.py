@@ -62,7 +62,7 @@ class Liang(ProfileLaw):
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
         """The profile and the inverse cdf share no constant: a fit of one leaves the other alone."""
-        if objective in ("energy", "radial"):
+        if objective in ("energy", "relative", "radial"):
             return PROFILE_CONSTANTS
         return INVERSE_CONSTANTS if objective in QUANTILES else ()
 
@@ -102,6 +102,11 @@ class Liang(ProfileLaw):
     def sampler(self) -> LiangSampler:
         """The inverse cdf of (19)-(21), fitted to quantiles and not to this profile."""
         return LiangSampler(self)
+
+    @property
+    def samplers(self) -> dict[str, Sampler]:
+        """Not the inverse of this law's cdf, but one that was fitted beside it."""
+        return {"fitted": self.sampler}
 
 
 def rational_energy(x, a, b, c) -> Array:

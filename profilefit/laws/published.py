@@ -8,7 +8,11 @@ from dataclasses import dataclass
 
 from mcml_sim.setting import Setting
 
-SEARCHLIGHT = Setting()
+SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")
+MEMO = (
+    "P. Christensen and B. Burley, Approximate reflectance profiles for efficient subsurface scattering, Pixar "
+    "Technical Memo 15-04 (2015)"
+)
 LIANG = "Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile, J. of Software"
 
 
@@ -45,10 +49,38 @@ SETS = (
         "published",
         SEARCHLIGHT,
         {"s0": 1.85, "s1": 1.0, "s2": 7.0, "s3": 0.8},
-        "P. Christensen and B. Burley, Approximate reflectance profiles for efficient subsurface scattering, Pixar "
-        "Technical Memo 15-04 (2015), searchlight configuration",
+        f"{MEMO}, searchlight configuration, equation 5",
+    ),
+    Published(
+        "burley",
+        "diffuse",
+        DIFFUSE,
+        {"s0": 1.9, "s1": 1.0, "s2": 3.5, "s3": 0.8},
+        f"{MEMO}, diffuse surface transmission",
+    ),
+    Published(
+        "burley_diffuse_mfp",
+        "published",
+        SEARCHLIGHT,
+        {"s0": 3.5, "s1": 100.0, "s2": 0.33},
+        f"{MEMO}, diffuse mean free path, equation 8",
     ),
     Published("liang_albedo", "published", SEARCHLIGHT, {"p": 5.67, "q": 3.84, "w": 0.84}, f"{LIANG}, equation (8)"),
+    Published(
+        "van_de_hulst_albedo",
+        "published",
+        DIFFUSE,
+        {"p0": 4.09712, "p1": 4.20863, "q0": 9.59217, "q1": 41.6808, "q2": 17.7126},
+        "C. Kulla and A. Conty, Revisiting physically based shading at Imageworks, SIGGRAPH 2017 course",
+    ),
+    Published(
+        "chiang_albedo",
+        "published",
+        DIFFUSE,
+        {"e1": -5.09406, "e2": 2.61188, "e3": -4.31805},
+        "M. Chiang, P. Kutz and B. Burley, Practical and controllable subsurface scattering for production path "
+        "tracing, SIGGRAPH 2016 Talks",
+    ),
 )
 
 
