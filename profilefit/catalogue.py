@@ -5,23 +5,58 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
 from mcml_sim.setting import Setting
 from profilefit import record
 from profilefit.errors import InputError, RecordError, SettingError
-from profilefit.laws import published
+from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.laws.burley import Burley
+from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.better_dipole import BetterDipole
+from profilefit.laws.burley import Burley, BurleyDiffuseMfp
+from profilefit.laws.chiang import Chiang
+from profilefit.laws.diffusion import DiffusionLaw
+from profilefit.laws.dipole import Dipole
+from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.quantile import Quantile
 from profilefit.laws.rational import Rational
+from profilefit.laws.van_de_hulst import VanDeHulst
 
 Law = TypeVar("Law", bound=Constants)
-PROFILE_LAWS: dict[str, type[ProfileLaw]] = {"liang": Liang, "burley": Burley}
-ALBEDO_LAWS: dict[str, type[AlbedoLaw]] = {"liang": LiangAlbedo, "rational": Rational}
-# Which records make up the regenerated constants of a law; a later one adds to an earlier one.
+SEARCHLIGHT = Setting()
+PROFILE_LAWS: dict[str, type[ProfileLaw]] = {
+    "liang": Liang,
+    "burley": Burley,
+    "burley_diffuse_mfp": BurleyDiffuseMfp,
+    "dipole": Dipole,
+    "better_dipole": BetterDipole,
+    "beam_diffusion": BeamDiffusion,
+    "gaussians": gaussians.law_class(),
+    **{f"gaussians:{count}": gaussians.law_class(count) for count in range(1, gaussians.MOST + 1)},
+    "hazard": Hazard,
+    "quantile": Quantile,
+}
+# A name for short, and what it stands for.
+SHORT = {"gaussians": f"gaussians:{gaussians.DEFAULT}"}
+ALBEDO_LAWS: dict[str, type[AlbedoLaw]] = {
+    "liang": LiangAlbedo,
+    "rational": Rational,
+    "van_de_hulst": VanDeHulst,
+    "chiang": Chiang,
+}
+# Which records make up the regenerated constants of a law; a later one adds to an earlier one. These are the names for
+# Setting(); see `record_name` for those of others.
 REGENERATED = {
     "liang": ("liang-whole", "liang-inverse-whole"),
     "burley": ("burley-whole",),
+    "gaussians:2": ("gaussians-2",),
+    "gaussians:4": ("gaussians-4",),
+    "gaussians:6": ("gaussians-6",),
+    "hazard": ("hazard",),
+    "quantile": ("quantile",),
     "albedo liang": ("albedo-liang",),
     "albedo rational": ("albedo-rational",),
 }
@@ -37,26 +72,27 @@ def fits_folder() -> Path:
 
 
 def names() -> tuple[str, ...]:
-    """The names of the profile laws."""
-    return tuple(PROFILE_LAWS)
+    """The names of the profile laws; `gaussians:N` is a sum of N = 1 ... 8 Gaussians, `gaussians` one of six."""
+    return tuple(name for name in PROFILE_LAWS if ":" not in name)
 
 
 def load(
     name: str, constants: str = "regenerated", setting: Setting | None = None, folder: Path | None = None
 ) -> ProfileLaw:
-    """A profile law by name.
+    """A profile law by name, one of `names()` or gaussians:1 ... gaussians:8.
 
     constants  "regenerated" (this project's records), "published", "published:<set>" or "<set>" (see
-               `laws.published`), or the path of a record (.json)
-    setting    the light and surface the constants must belong to, by default Setting()
+               `laws.published`), or the path of a record (.json); a law without constants has but one form
+    setting    the light and surface the constants must belong to; by default that of the set or record that was named,
+               and Setting() of regenerated ones
     folder     where the regenerated records lie, by default those of this installation
     Raises InputError on an unknown law or set, SettingError where no such constants exist for the setting.
     """
-    if name not in PROFILE_LAWS:
-        raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
-    where = setting or Setting()
-    values = _constants(name, name, constants, where, folder or fits_folder())
-    return _made(PROFILE_LAWS[name], values, constants, setting=where, albedo=normalisation(where, folder))
+    kind, key = _profile_law(name), SHORT.get(name, name)
+    values, where = _constants(kind, key, key, constants, _checked(setting), folder or fits_folder())
+    if issubclass(kind, DiffusionLaw):  # it has a reflectance of its own
+        return _made(kind, values, constants, setting=where)
+    return _made(kind, values, constants, setting=where, albedo=normalisation(where, folder))
 
 
 def albedo_law(
@@ -65,15 +101,37 @@ def albedo_law(
     """A map between alpha and A by name; arguments as for `load`."""
     if name not in ALBEDO_LAWS:
         raise InputError(f"albedo law must be one of {', '.join(ALBEDO_LAWS)}, got {name!r}")
-    where = setting or Setting()
-    values = _constants(f"albedo {name}", f"{name}_albedo", constants, where, folder or fits_folder())
-    return _made(ALBEDO_LAWS[name], values, constants, setting=where)
+    kind, places = ALBEDO_LAWS[name], folder or fits_folder()
+    values, where = _constants(kind, f"albedo {name}", f"{name}_albedo", constants, _checked(setting), places)
+    return _made(kind, values, constants, setting=where)
 
 
 def normalisation(setting: Setting, folder: Path | None = None) -> Rational:
-    """The map that scales profile laws to their reflectance."""
-    content = _record(ALBEDO_RECORD, folder or fits_folder())
-    return _made(Rational, _of_record(content, setting, ALBEDO_RECORD), ALBEDO_RECORD, setting=setting)
+    """The map that scales profile laws to their reflectance; SettingError where the setting has none."""
+    name, content = _regenerated(ALBEDO_RECORD, setting, folder or fits_folder())
+    return _made(Rational, _of_record(content, setting, name), name, setting=setting)
+
+
+def record_name(base: str, setting: Setting) -> str:
+    """The record of another setting than Setting(): albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
+    parts = [base]
+    if setting.illumination != SEARCHLIGHT.illumination:
+        parts.append(setting.illumination)
+    if setting.n != SEARCHLIGHT.n:
+        parts.append(f"n{_shortest(setting.n)}")
+    if setting.g != SEARCHLIGHT.g:
+        parts.append(f"g{_shortest(setting.g)}")
+    return "-".join(parts)
+
+
+def regenerated_settings(base: str, folder: Path | None = None) -> tuple[Setting, ...]:
+    """The settings that a record was regenerated for, by its name for Setting()."""
+    found = {}
+    for place in (folder or fits_folder(), fits_folder()):
+        for name, path in record.available(place).items():
+            if name.startswith(base) and record_name(base, setting := record_setting(record.read(path))) == name:
+                found[name] = setting
+    return tuple(found[name] for name in sorted(found))
 
 
 def record_setting(content: dict[str, Any]) -> Setting:
@@ -84,39 +142,84 @@ def record_setting(content: dict[str, Any]) -> Setting:
         raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
 
 
-def _constants(key: str, law: str, which: str, setting: Setting, folder: Path) -> dict[str, float]:
-    if which == "regenerated":
-        values: dict[str, float] = {}
-        for name in REGENERATED[key]:
-            values |= _of_record(_record(name, folder), setting, name)
-        return values
+def _profile_law(name: str) -> type[ProfileLaw]:
+    if name in PROFILE_LAWS:
+        return PROFILE_LAWS[name]
+    if name.startswith("gaussians:"):
+        raise InputError(f"law must be gaussians:N with N a whole number in 1 ... {gaussians.MOST}, got {name!r}")
+    raise InputError(f"law must be one of {', '.join(names())}, got {name!r}")
+
+
+def _checked(setting: Setting | None) -> Setting | None:
+    if setting is not None and not isinstance(setting, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
+    return setting
+
+
+def _shortest(value: float) -> str:
+    """The fewest digits that are this number: 1.4, 2."""
+    return np.format_float_positional(value, trim="-")
+
+
+def _constants(
+    kind: type[Constants], key: str, law: str, which: str, asked: Setting | None, folder: Path
+) -> tuple[dict[str, float], Setting]:
+    """The constants of a law, and the setting that they belong to."""
+    if which == "regenerated" or (which == "published" and not kind.constant_names()):
+        where = asked or SEARCHLIGHT
+        return _all_regenerated(kind, key, law, where, folder), where
     if which.endswith(".json"):
         content = record.read(Path(which))
-        owner = f"albedo {content.get('law')}" if content.get("pipeline") == "albedo" else content.get("law")
+        owner = content.get("law")
+        owner = f"albedo {owner}" if content.get("pipeline") == "albedo" else SHORT.get(str(owner), owner)
         if owner != key:
             raise RecordError(f"{which}: holds constants of law {owner!r}, got a request for {key!r}")
-        return {**published.constants(law), **_of_record(content, setting, which)}
-    return _printed(law, which, setting)
+        where = asked or record_setting(content)
+        return {**published.constants(law), **_of_record(content, where, which)}, where
+    return _printed(law, which, asked)
 
 
-def _printed(law: str, which: str, setting: Setting) -> dict[str, float]:
+def _all_regenerated(kind: type[Constants], key: str, law: str, setting: Setting, folder: Path) -> dict[str, float]:
+    """The constants of every record that a law is made of; none for a law that has none."""
+    if not kind.constant_names():
+        return {}
+    if key not in REGENERATED:
+        raise RecordError(
+            f"constants of {key} must be one of {_accepted(law)}: none were regenerated, got 'regenerated'"
+        )
+    values: dict[str, float] = {}
+    for base in REGENERATED[key]:
+        name, content = _regenerated(base, setting, folder)
+        values |= _of_record(content, setting, name)
+    return values
+
+
+def _printed(law: str, which: str, asked: Setting | None) -> tuple[dict[str, float], Setting]:
     wanted = which.removeprefix("published:")
     sets = [s for s in published.SETS if s.law == law]
     chosen = next((s for s in sets if s.name == wanted), None)
     if chosen is None:
-        accepted = ["regenerated", *(s.name for s in sets), "the path of a record (.json)"]
-        raise InputError(f"constants must be one of {', '.join(accepted)}, got {which!r}")
-    if chosen.setting != setting:
-        raise SettingError(f"the {which} constants of {law} belong to {chosen.setting}, got a request for {setting}")
-    return dict(chosen.constants)
+        raise InputError(f"constants must be one of regenerated, {_accepted(law)}, got {which!r}")
+    if asked not in (None, chosen.setting):
+        raise SettingError(f"the {which} constants of {law} belong to {chosen.setting}, got a request for {asked}")
+    return dict(chosen.constants), chosen.setting
 
 
-def _record(name: str, folder: Path) -> dict[str, Any]:
-    """A record from `folder`, or else from this installation: a folder may hold only what was made there."""
+def _accepted(law: str) -> str:
+    return ", ".join([*(s.name for s in published.SETS if s.law == law), "the path of a record (.json)"])
+
+
+def _regenerated(base: str, setting: Setting, folder: Path) -> tuple[str, dict[str, Any]]:
+    """The record of a setting: its name and what it says. SettingError that lists the settings there are."""
+    name = record_name(base, setting)
     for place in (folder, fits_folder()):
-        if (place / f"{name}.json").exists():
-            return record.read(place / f"{name}.json")
-    return record.read(folder / f"{name}.json")
+        if (path := place / f"{name}.json").exists():
+            return name, record.read(path)
+    known = regenerated_settings(base, folder)
+    if not known:
+        return name, record.read(folder / f"{name}.json")  # a RecordError that says what to do
+    there = "; ".join(str(one) for one in known)
+    raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
 
 
 def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str, float]:

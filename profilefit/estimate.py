@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError, SettingError
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.liang import QUANTILES
-from profilefit.objectives import OBJECTIVES, Rings, rings_of
+from profilefit.objectives import NO_LIMITS, OBJECTIVES, Rings, rings_of
 from profilefit.profiles import Profiles
 from profilefit.solver import Solution, solve, solve_batch
 
@@ -45,7 +45,7 @@ class Fit:
     statistical  (p, p) covariance from photon noise; None where the truth has none
     discrepancy  (p, p) covariance from the law's misfit, taken for independent noise
     jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other; NaN with fewer
-                 than six albedos, or where a refit fails
+                 than six albedos, where a refit fails, or where none was asked for
     Covariances are NaN where the fit failed.
     structure    measures of what is left in the residuals
     """
@@ -98,14 +98,18 @@ def fit(
     objective: str | None = None,
     free: Sequence[str] | None = None,
     used: NDArray[np.bool_] | None = None,
-    limits: tuple[float, float] = (0.0, 0.0),
+    limits: tuple[float, ...] = NO_LIMITS,
     xi: Sequence[float] = (),
+    counted: NDArray[np.bool_] | None = None,
+    jackknife: bool = True,
 ) -> Fit:
     """Fit the constants named in `free` (all, if None) of `law` to `profiles`.
 
     objective  a name in `objectives.OBJECTIVES`: it fixes the weighting; by default "energy" for a profile law and
                "albedo" for a map between alpha and A
-    used       (m, n) rings that count; limits the weights of the energy and source limits; xi shares for quantiles
+    used       (m, n) rings that count, counted (m,) albedos that do, as far as they rest on enough photons
+    limits     the weights of the energy limit, the source limit and of rising with alpha; xi shares for quantiles
+    jackknife  whether to refit for the jackknife, which takes longer than the fit itself
     A fit that does not converge is returned with the reason in `result`. Raises InputError on an unknown objective or
     constant, SettingError if the law and the profiles belong to different light or surface.
     """
@@ -125,7 +129,9 @@ def fit(
         raise InputError(f"free must name constants of the law ({', '.join(law.constant_names())}), got {unknown[0]!r}")
     problem = Problem(target, names)
     rings = rings_of(profiles, used, limits, xi)
-    solution = _judged(solve(problem, law.vector(names), (law, rings)), names)
+    if counted is not None:
+        rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
+    solution = judged(solve(problem, law.vector(names), (law, rings)), names)
     return Fit(
         law.with_vector(names, [float(value) for value in solution.parameters]),
         names,
@@ -134,7 +140,7 @@ def fit(
         solution,
         _statistical(problem, solution, law, rings, profiles),
         discrepancy_covariance(solution),
-        _jackknife(problem, solution, law, rings),
+        _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan),
         residual_structure(solution.residuals.reshape(profiles.alpha.size, -1)),
     )
 
@@ -175,10 +181,9 @@ def scaled_inverse(matrix: Floats) -> Floats:
     return np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
 
 
-def _judged(solution: Solution, names: tuple[str, ...]) -> Solution:
+def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
     """A solution whose constants the data cannot tell apart has failed, however small its misfit."""
-    condition = solution.condition_number
-    if not solution.converged or condition <= DEGENERATE:
+    if not solution.converged or (condition := solution.condition_number) <= DEGENERATE:
         return solution
     blind = [name for name, column in zip(names, solution.jacobian.T, strict=True) if not np.any(column)]
     what = f"{', '.join(blind)} moves nothing" if blind else "constants trade against each other"
@@ -205,7 +210,7 @@ def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Ring
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
     data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
     refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data)
-    if not all(_judged(refit, problem.free).converged for refit in refits):
+    if not all(judged(refit, problem.free).converged for refit in refits):
         return np.full(solution.parameters.size, np.nan)
     moved = np.stack([refit.parameters for refit in refits])
     spread = np.sum((moved - moved.mean(axis=0)) ** 2, axis=0)

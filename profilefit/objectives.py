@@ -17,17 +17,26 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from profilefit.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
+from profilefit.quality import ENERGY_WITHIN, NEAREST
 
 Values = Array | NDArray[np.float64]
 # A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
 EVERYWHERE = 1e9
+# An error of the cdf weighs as much as a relative error of the profile twenty times its size.
+SHARE_WEIGHT = 20.0
+NO_LIMITS = (0.0, 0.0, 0.0)
+# Near white the profile close to its source changes with 1 - alpha only, while A and kappa go with its root: two
+# albedos this near to white see the sign of the root's term, and their rise must be more than this (relative).
+WHITEST, LEAST_RISE = (1.0 - 1e-5, 1.0), 4e-5
+DARK = 1e-12  # energy of a ring that holds none
 
 
 class Rings(eqx.Module):
     """The part of `Profiles` that residuals read, as one pytree.
 
     alpha (m,); r_edges (n + 1,) [mfp]; energy (m, n) [-]; beyond (m,) [-]; used (m, n) 1 where a ring counts, else 0
-    weight (m,) 1 where an albedo counts, else 0; limits (2,) weights of the energy limit and of the source limit
+    weight (m,) 1 where an albedo counts, else 0; limits (3,) weights of the energy limit, of the source limit
+    and of rising with alpha
     xi (k,) shares of energy for quantiles
     """
 
@@ -60,11 +69,44 @@ def energy(law, rings: Rings) -> Array:
     """
     alpha = rings.alpha[:, None]
     inside = law.unscaled_energy(rings.r_edges, alpha)
-    weight = rings.used / jnp.sqrt(jnp.where(rings.energy > 0, rings.energy, 1.0) * rings.reflectance[:, None])
+    data = jnp.where((rings.used > 0) & (rings.energy > 0), rings.energy, 1.0)
+    weight = rings.used / jnp.sqrt(data * rings.reflectance[:, None])
     misfit = weight * (jnp.diff(inside, axis=-1) - rings.energy)
     total = law.unscaled_energy(EVERYWHERE, rings.alpha) / rings.reflectance - 1.0
     source = law.source_strength(rings.alpha) / (0.5 * rings.alpha) - 1.0
     return jnp.concatenate([misfit, (rings.limits[0] * total)[:, None], (rings.limits[1] * source)[:, None]], axis=1)
+
+
+def relative(law, rings: Rings) -> Array:
+    """Whole profile on a log-spaced eye: relative errors of ring energies, even in ln r; and of the cumulated energy.
+
+    The rings from `NEAREST` to the radius of `ENERGY_WITHIN` weigh as much as they are wide in ln r, so that their sum
+    of squares is the mean square of (law/data - 1), the `rel` of `quality`. The rows after them hold the errors of the
+    cdf at all edges, `SHARE_WEIGHT` times as heavy, since `ks` must be that much smaller than `rel`. The
+    last rows resist a law that falls with alpha next to white, ring by ring: absorption must not add light.
+    """
+    alpha = rings.alpha[:, None]
+    inside = law.unscaled_energy(rings.r_edges, alpha)
+    widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
+    judged = (rings.r_edges[:-1] >= NEAREST * (1.0 - 1e-9)) & (rings.cdf[:, 1:] <= ENERGY_WITHIN)
+    weight = jnp.where(judged, rings.used * widths, 0.0)
+    weight = jnp.sqrt(weight / jnp.maximum(weight.sum(axis=-1, keepdims=True), 1e-300))
+    data = jnp.where(
+        (weight > 0) & (rings.energy > 0), rings.energy, 1.0
+    )  # also where nothing counts: E^2 in a derivative must not underflow
+    misfit = weight * (jnp.diff(inside, axis=-1) / data - 1.0)
+    shares = inside / law.unscaled_energy(EVERYWHERE, alpha) - rings.cdf
+    falling = rings.limits[2] / np.sqrt(rings.alpha.size) * jnp.broadcast_to(_fall(law, rings), misfit.shape)
+    return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, falling], axis=1)
+
+
+def _fall(law, rings: Rings) -> Array:
+    """(n,) how far the energy of each ring falls short of rising with alpha next to white; 0 where it rises."""
+    inside = law.unscaled_energy(rings.r_edges, jnp.array(WHITEST)[:, None])
+    darker, white = jnp.diff(inside, axis=-1)
+    lit = (darker > DARK) & (white > DARK)
+    ratio = jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)
+    return jnp.where(lit, jnp.maximum(jnp.log(ratio) + LEAST_RISE, 0.0), 0.0)
 
 
 def radial(law, rings: Rings) -> Array:
@@ -102,11 +144,11 @@ def share(law, rings: Rings) -> Array:
     return inner - rings.xi
 
 
-_ALL = (energy, radial, albedo, reflectance, radius, relative_radius, share)
+_ALL = (energy, relative, radial, albedo, reflectance, radius, relative_radius, share)
 OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective in _ALL}
 
 
-def rings_of(profiles: Profiles, used=None, limits=(0.0, 0.0), xi=()) -> Rings:
+def rings_of(profiles: Profiles, used=None, limits=NO_LIMITS, xi=()) -> Rings:
     """The residuals' view of `profiles`.
 
     Rings with too few effective photons, or outside `used`, do not count, and neither do albedos whose reflectance,

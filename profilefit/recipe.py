@@ -9,19 +9,25 @@ from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
-from profilefit.errors import RecipeError
+from mcml_sim.setting import Setting
+from profilefit.errors import InputError, RecipeError
 
 # Each pipeline and the objectives it can make small.
 PIPELINES = {
     "albedo": ("albedo", "reflectance"),
-    "profile": ("energy",),
+    "profile": ("energy", "relative"),
     "as-published": ("radial",),
     "inverse": ("radius", "relative_radius", "share"),
     "evidence": (),
 }
 # Pipelines that know the equations of these laws only.
-PIPELINE_LAWS = {"as-published": ("liang",), "inverse": ("liang",)}
+PIPELINE_LAWS = {"as-published": ("liang",), "inverse": ("liang", "quantile")}
 TRUTHS = ("orders", "exact")
+SEARCHLIGHT = Setting()
+# Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
+PAPERS = ("as-published", "evidence")
+CHECKS = ("", "orders")
+MOST_STARTS = 1000
 SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
 TRIMMED = ("r R_d", "R_d", "none")
 MFP = (1e-3, 1e3)  # beyond three decades a length is a slip of the pen
@@ -95,12 +101,14 @@ class Weighting:
     objective: str
     energy_limit: float = 0.0
     source_limit: float = 0.0
+    rising: float = 0.0
     shares: int = 0
     last_share: float = 1.0
 
     def problems(self) -> str | None:
-        if not all(0 <= limit <= MAX_LIMIT for limit in (self.energy_limit, self.source_limit)):
-            got = f"{self.energy_limit!r}, {self.source_limit!r}"
+        limits = (self.energy_limit, self.source_limit, self.rising)
+        if not all(0 <= limit <= MAX_LIMIT for limit in limits):
+            got = ", ".join(map(repr, limits))
             return f"weighting limits must be between 0 and {MAX_LIMIT:g}, got {got}"
         if not (0 <= self.shares <= 10_000 and 0 < self.last_share <= 1):
             got = f"{self.shares!r}, {self.last_share!r}"
@@ -110,7 +118,12 @@ class Weighting:
 
 @dataclass(frozen=True)
 class Recipe:
-    """One fit, from its truth to its record. `held` are constants that stay at their starting value, and why."""
+    """One fit, from its truth to its record. `held` are constants that stay at their starting value, and why.
+
+    setting        the light and the surface; the constants belong to it and to no other
+    check          "orders": fit the tracer's photons too, and compare with the fit to the exact half space
+    random_starts  how many fits begin at random constants, to see whether one ends better
+    """
 
     name: str
     title: str
@@ -119,6 +132,9 @@ class Recipe:
     pipeline: str
     truth: str
     start: str = "published"
+    setting: Setting = SEARCHLIGHT
+    check: str = ""
+    random_starts: int = 0
     albedos: Albedos = Albedos(0.05, 0.995, 24)
     weighting: Weighting = Weighting("")
     rings: Rings | None = None
@@ -133,6 +149,8 @@ class Recipe:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {self.pipeline!r}"
         if self.truth not in TRUTHS:
             return f"truth must be one of {', '.join(TRUTHS)}, got {self.truth!r}"
+        if text := self._problems_of_setting() or self._problems_of_tests():
+            return text
         laws = PIPELINE_LAWS.get(self.pipeline, (self.law,))
         if self.law not in laws:
             return f"law of pipeline {self.pipeline!r} must be {' or '.join(laws)}, got {self.law!r}"
@@ -156,6 +174,31 @@ class Recipe:
             return text
         lengths = self.mfp if self.pipeline == "as-published" else (1.0,)
         return next((text for mfp in lengths if self.rings and (text := self.rings.problems_at(mfp))), None)
+
+    def _problems_of_setting(self) -> str | None:
+        where = self.setting
+        if where.g != 0:
+            return f"setting.g must be 0: profiles are fitted to isotropic scattering, got {where.g!r}"
+        if self.truth == "exact" and not where.is_matched_isotropic:
+            return f"setting.n must be 1 where truth is 'exact' (use truth = \"orders\"), got {where.n!r}"
+        if self.pipeline in PAPERS and where != SEARCHLIGHT:
+            return f"setting of pipeline {self.pipeline!r} must be {SEARCHLIGHT}, got {where}"
+        if self.pipeline == "inverse" and not where.is_matched_isotropic:
+            return f"setting.n of pipeline 'inverse' must be 1, got {where.n!r}"
+        if self.albedos.spacing == "reflectance" and not where.is_matched_isotropic:
+            return f"albedos.spacing must be 'alpha' or 'sqrt(1-alpha)' where setting.n is not 1, got {where.n!r}"
+        return None
+
+    def _problems_of_tests(self) -> str | None:
+        if self.check not in CHECKS:
+            return f"check must be 'orders' or absent, got {self.check!r}"
+        if self.check and self.truth != "exact":
+            return f'check needs truth = "exact": it compares the photons with it, got truth = {self.truth!r}'
+        if not 0 <= self.random_starts <= MOST_STARTS:
+            return f"random_starts must be between 0 and {MOST_STARTS}, got {self.random_starts!r}"
+        if self.pipeline in PAPERS and (self.check or self.random_starts):
+            return f"pipeline {self.pipeline!r} takes neither check nor random_starts"
+        return None
 
 
 def read(path: Path) -> Recipe:
@@ -206,12 +249,15 @@ def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[st
     if missing:
         raise RecipeError(f"{where}: missing {', '.join(missing)}")
     typed = {key: value if key in given else _typed(known[key].type, key, value, where) for key, value in table.items()}
-    return kind(**typed)
+    try:
+        return kind(**typed)
+    except InputError as error:  # a Setting checks itself
+        raise RecipeError(f"{where}: {error}") from None
 
 
 def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
     """A TOML value as the type its field declares, or RecipeError."""
-    tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting}
+    tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting, "Setting": Setting}
     if annotation in tables:
         if not isinstance(value, dict):
             raise RecipeError(f"{where}: [{key}] must be a table, got {_shown(value)}")

@@ -78,6 +78,37 @@ STAGED: Kinds = {
     "stages.coefficient_laws.*.result": str,
     "stages.coefficient_laws.*.condition_number": MEASURE,
 }
+# What a recipe may ask for besides; checked where it is there.
+OPTIONAL: Mapping[str, Kinds] = {
+    "crosscheck": {
+        "crosscheck": dict,
+        "crosscheck.constants": dict,
+        "crosscheck.constants.*": dict,
+        "crosscheck.constants.*.exact": MEASURE,
+        "crosscheck.constants.*.photons": MEASURE,
+        "crosscheck.constants.*.statistical_error": MEASURE,
+        "crosscheck.constants.*.z": MEASURE,
+        "crosscheck.chi2": MEASURE,
+        "crosscheck.rank": int,
+        "crosscheck.chance": MEASURE,
+        "crosscheck.photons": int,
+        "crosscheck.result": str,
+    },
+    "starts": {
+        "starts": dict,
+        "starts.count": int,
+        "starts.share_best": NUMBER,
+        "starts.result": str,
+        "starts.rule": str,
+        "starts.others": int,
+        "starts.outcomes": list,
+        "starts.outcomes.*": dict,
+        "starts.outcomes.*.count": int,
+        "starts.outcomes.*.cost_ratio": MEASURE,
+        "starts.outcomes.*.result": str,
+        "starts.outcomes.*.constants": dict,
+    },
+}
 EVIDENCE: Kinds = {"readings": list, "readings.*": dict, "table1": list, "table1.*": dict}
 SHOWN = {"albedo": FIT, "profile": PROFILE, "inverse": PROFILE, "as-published": STAGED, "evidence": EVIDENCE}
 ABSENT = object()
@@ -148,6 +179,8 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
         if pipeline not in SHOWN:
             raise RecordError(f"{path}: is damaged: pipeline must be one of {', '.join(SHOWN)}, got {pipeline!r}")
         _require(path, content, {**TOLD, **SHOWN[pipeline]})
+        for part in (part for part in OPTIONAL if part in content):
+            _require(path, content, OPTIONAL[part])
     return content
 
 

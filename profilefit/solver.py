@@ -12,6 +12,7 @@ from typing import Any
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import lineax as lx
 import numpy as np
 import optimistix as optx
 from numpy.typing import ArrayLike, NDArray
@@ -20,7 +21,10 @@ Floats = NDArray[np.float64]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
-MAX_STEPS = 500
+MAX_STEPS = 200
+# A dozen constants against thousands of residuals: ten times as fast as QR. It squares the condition number, which is
+# harmless up to the 1e7 at which a fit counts as degenerate, since the damping of each step bounds it.
+LINEAR_SOLVER = lx.Normal(lx.Cholesky())
 
 
 @dataclass(frozen=True)
@@ -51,6 +55,8 @@ class Solution:
     @property
     def condition_number(self) -> float:
         """Of the Jacobian with its columns scaled to unit length: above 1e7 constants trade against each other."""
+        if not np.all(np.isfinite(self.jacobian)):
+            return float("inf")
         lengths = np.linalg.norm(self.jacobian, axis=0)
         return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
 
@@ -76,7 +82,7 @@ def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> t
 
 @eqx.filter_jit
 def _levenberg_marquardt(residual, starts, data):
-    solver: Any = optx.LevenbergMarquardt(rtol=RELATIVE_TOLERANCE, atol=RELATIVE_TOLERANCE)
+    solver: Any = optx.LevenbergMarquardt(RELATIVE_TOLERANCE, RELATIVE_TOLERANCE, linear_solver=LINEAR_SOLVER)
 
     def one(start, item):
         scale = jnp.where(start == 0, 1.0, jnp.abs(start))  # constants span four decades; LM damps them alike

@@ -5,26 +5,27 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Orders, exact
-from profilefit.errors import RecipeError
+from mcml_sim import Orders, Setting, exact
+from profilefit.errors import RecipeError, SettingError
 from profilefit.profiles import Profiles
 from profilefit.recipe import Albedos, Recipe, Rings
 
 Floats = NDArray[np.float64]
+SEARCHLIGHT = Setting()
 # Even rings for the paper's protocol, log-spaced ones beyond it; every recipe's rings are unions of these [mfp].
 RUN_EDGES = np.concatenate(
     [[0.0, 0.0025, 0.005], np.round(np.arange(1, 4001) * 0.01, 2), np.geomspace(40, 1000, 41)[1:]]
 )
 
 
-def albedo_values(albedos: Albedos) -> Floats:
-    """The albedos (count,) of a recipe, rising, even in its spacing."""
+def albedo_values(albedos: Albedos, setting: Setting = SEARCHLIGHT) -> Floats:
+    """The albedos (count,) of a recipe, rising, even in its spacing; `setting` is whose reflectance that may be."""
     if albedos.spacing == "alpha":
         return np.linspace(albedos.low, albedos.high, albedos.count)
     if albedos.spacing == "reflectance":
         dense = 1.0 - np.linspace(1.0, 0.0, 4001) ** 2
-        low, high = np.asarray(exact.reflectance([albedos.low, albedos.high]))
-        return np.interp(np.linspace(low, high, albedos.count), exact.reflectance(dense), dense)
+        low, high = np.asarray(exact.reflectance([albedos.low, albedos.high], setting=setting))
+        return np.interp(np.linspace(low, high, albedos.count), exact.reflectance(dense, setting=setting), dense)
     s = np.linspace(np.sqrt(1.0 - albedos.low), np.sqrt(1.0 - albedos.high), albedos.count)
     return 1.0 - s**2
 
@@ -46,10 +47,12 @@ def ring_edges(rings: Rings | None, mfp: float = 1.0) -> Floats:
 
 
 def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles:
-    """The profiles that a recipe fits."""
-    alpha, edges = albedo_values(recipe.albedos), ring_edges(recipe.rings, mfp)
+    """The profiles that a recipe fits; `light` is of its setting."""
+    alpha, edges = albedo_values(recipe.albedos, recipe.setting), ring_edges(recipe.rings, mfp)
     if recipe.truth == "exact":
-        return Profiles.from_exact(alpha, edges)
+        return Profiles.from_exact(alpha, edges, recipe.setting)
     if light is None:
         raise ValueError(f"recipe {recipe.name} needs photons, got none")
+    if light.setting != recipe.setting:
+        raise SettingError(f"recipe {recipe.name} belongs to {recipe.setting}, its photons to {light.setting}")
     return Profiles.from_orders(light.merged(edges), alpha, correlated=mfp == 1.0)

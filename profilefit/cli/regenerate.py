@@ -13,9 +13,11 @@ from rich.console import Console
 
 from profilefit import calibrate, catalogue, recipe, record
 from profilefit.errors import InputError, RecipeError
+from profilefit.run import Run
 
 OUT = Path("fits")
 PHOTON_STORE = ".photons"
+PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
 
 
@@ -30,10 +32,12 @@ def regenerate(
     recipes: Annotated[
         list[str] | None, typer.Argument(help="Names of recipes, or .toml files; all of them if none is named.")
     ] = None,
-    preset: Annotated[Preset, typer.Option(help="quick: 2.1e7 photons, minutes. full: 4.2e8 photons.")] = Preset.QUICK,
+    preset: Annotated[Preset, typer.Option(help=PRESETS)] = Preset.QUICK,
     out: Annotated[Path, typer.Option(help="Folder for the records, and for the photons that a rerun resumes.")] = OUT,
     seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, 0 to 4294967295.")] = 1,
-    photons: Annotated[int | None, typer.Option(help="Number of photons instead of the preset's.")] = None,
+    photons: Annotated[
+        int | None, typer.Option(help="Number of photons in each setting instead of the preset's.")
+    ] = None,
     quiet: Annotated[bool, typer.Option("--quiet", help="Print nothing but errors.")] = False,
 ) -> None:
     """Simulate the light, refit the recipes' laws to it, and write one record a recipe.
@@ -50,12 +54,12 @@ def regenerate(
     _require_one_record_each(chosen)
     record.require_writable(out)
     begin = time.perf_counter()
-    run = calibrate.Run(
+    run = Run(
         preset=preset.value,
         seed=seed,
         out=out,
         store=out / PHOTON_STORE / f"seed-{seed}",
-        photons=calibrate.PHOTONS[preset.value] if photons is None else photons,
+        photons=photons,
         say=lambda text: console.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=None if sys.stderr.isatty() and not quiet else False,
     )

@@ -25,8 +25,10 @@ from profilefit.laws.rational import Rational
 
 MOST, DEFAULT = 8, 6
 """d'Eon and Luebke's skin has six."""
-# Radii [mfp] of the narrowest and the widest Gaussian that a fit starts from: those that fits look at.
-START_SPAN = 0.05, 5.0
+# Radii [mfp] of the narrowest and the widest Gaussian that a fit starts from at alpha = 1, and f1, f2 that shrink both
+# tenfold towards alpha = 0: what fits of two to six Gaussians end at, roughly.
+START_SPAN = 0.05, 8.0
+START_FALL = -6.0, 2.0
 EXTRA_STEPS = 12
 
 
@@ -55,11 +57,12 @@ class Gaussians(ProfileLaw):
 
     @classmethod
     def start(cls) -> dict[str, float]:
-        """Constants to fit from: at any albedo equal weights, and variances in equal ratios over START_SPAN."""
+        """Constants to fit from: equal weights, and variances in equal ratios over START_SPAN, which fall as all do."""
         low, high = (2.0 * np.log(radius) for radius in START_SPAN)
         ratio = (high - low) / max(cls.count() - 1, 1)
         values = dict.fromkeys(cls.constant_names(), 0.0)
         values |= {f"v{i}": float(np.log(np.expm1(ratio))) for i in range(2, cls.count() + 1)}
+        values |= dict(zip(("f1", "f2"), START_FALL, strict=True))
         return values | {"v1": float(low if cls.count() > 1 else 0.5 * (low + high))}
 
     def variances(self, alpha) -> Array:

@@ -53,8 +53,9 @@ class Quantile(ProfileLaw):
     a = w (a0 + a1 y + a2 y^2)     b = b0 + b1 y + b2 w y^3     c = y^3 (c0 + c1 w) + c2 w^3 y^2     [y in mfp]
 
     Cdf and profile follow from the map: cdf = 1 - e^{-t(x)} by Newton's method, R_d = A e^{-t} / (2 pi x dx/dt). Only
-    the map was fitted, so the profile is as good as its slope. Valid for alpha in [0, 1] and xi in [0, 1]. `albedo` is
-    the map to A (held fixed). One logarithm a radius.
+    the map was fitted, so the profile is as good as its slope. Finite for alpha in [0, 1] and xi in [0, 1]. Error in
+    xi up to 0.999: below 1e-3 for alpha from 0.05 to 0.995, nearer to white more, 2e-2 at 1. `albedo` is the map to A
+    (held fixed). One logarithm a radius.
     """
 
     setting: Setting = eqx.field(static=True)

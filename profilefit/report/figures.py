@@ -12,6 +12,7 @@ from profilefit.report.coefficient_figures import a_figure, b_figure, c_figure
 from profilefit.report.content import measures
 from profilefit.report.corner_figure import corner_figure
 from profilefit.report.inverse_figure import inverse_figure
+from profilefit.report.inversion_figure import inversion_figure
 from profilefit.report.profile_figures import error_figure, profile_figure
 from profilefit.report.quality_figure import quality_figure
 from profilefit.report.source import Source
@@ -44,6 +45,12 @@ PAPER = (
     Plan("liang-13-b", ("liang-as-published",), ("liang-whole",), b_figure),
     Plan("liang-15-c", ("liang-as-published",), ("liang-whole",), c_figure),
     Plan("liang-19-inverse", ("liang-inverse-whole",), ("liang-inverse-as-published", "liang-whole"), inverse_figure),
+    Plan(
+        "inversion-error",
+        ("liang-inverse-whole",),
+        ("quantile", "quantile-diffuse", "hazard", "hazard-diffuse"),
+        inversion_figure,
+    ),
 )
 
 

@@ -29,7 +29,7 @@ from profilefit.report.profile_figures import PANELS
 from profilefit.report.source import Fitted, Source
 
 Floats = NDArray[np.float64]
-LAST_SHARE = 0.999  # as calibrate.inversion_error
+LAST_SHARE = 0.999  # as pipelines.inversion_error
 LABELS = {
     "liang-inverse-as-published": ("(19) by the paper's protocol", AS_PUBLISHED),
     "liang-inverse-whole": ("(19) regenerated, in shares of energy", WHOLE),

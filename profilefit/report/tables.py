@@ -29,7 +29,7 @@ def summary(records: Mapping[str, Content]) -> Table:
     table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
     table.title, table.title_justify = "Records", "left"
     table.add_column("record", overflow="fold", min_width=max(map(len, records), default=0))
-    for header in ("truth", "objective", "fit", "worst error over α"):
+    for header in ("truth", "objective, fit", "worst error over α"):
         table.add_column(header, no_wrap=True)
     for name, content in records.items():
         table.add_row(*(_summary_evidence(name, content) if _is_evidence(content) else _summary_fit(name, content)))
@@ -44,12 +44,13 @@ def _summary_fit(name: str, content: Content) -> tuple[Text, ...]:
         label.append(f"\n{content['fit']['result']}", style="red")
     objective = content["protocol"]["weighting"]["objective"].replace("_", "\n")
     verdict = Text("converged", style="green") if converged(content) else Text("FAILED", style="bold red")
-    return label, Text(truth(content)), Text(objective), verdict, Text("\n".join(worst_lines(content)))
+    how = Text.assemble(objective, "\n", verdict)  # below it: names of records need the width
+    return label, Text(truth(content)), how, Text("\n".join(worst_lines(content)))
 
 
 def _summary_evidence(name: str, content: Content) -> tuple[Text, ...]:
     label = Text.assemble((name, "bold"), "\n", (str(content.get("equations", "")), "dim"))
-    return label, Text(truth(content)), Text(ABSENT), Text(ABSENT), Text(evidence_line(content))
+    return label, Text(truth(content)), Text(ABSENT), Text(evidence_line(content))
 
 
 def _is_evidence(content: Content) -> bool:

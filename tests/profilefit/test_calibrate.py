@@ -1,36 +1,57 @@
-"""What running a recipe checks before it starts, and how an inverse cdf is judged."""
+"""Running recipes: what is checked before it starts, what is traced, and in which order records are made."""
 
+from dataclasses import replace
 from pathlib import Path
 
-import numpy as np
 import pytest
 
-from mcml_sim import exact
-from profilefit import calibrate, catalogue, recipe
-from profilefit.calibrate import inversion_error
+from mcml_sim import Setting
+from profilefit import calibrate, catalogue, pipelines, recipe
 from profilefit.errors import RecipeError
+from profilefit.run import Run
 
 FITS = catalogue.fits_folder()
-
-
-def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
-    class Exactly:
-        setting = exact.SEARCHLIGHT
-
-        class sampler:
-            sample = staticmethod(lambda xi, alpha: exact.quantile(xi, alpha))
-
-    alpha = np.array([0.3, 0.9])
-    assert inversion_error(Exactly(), alpha) == pytest.approx([0, 0], abs=1e-8)
-    assert np.all(inversion_error(catalogue.load("liang", "published"), alpha) > 0.03)
 
 
 def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     bad = tmp_path / "bad.toml"
     bad.write_text((FITS / "liang-whole.toml").read_text().replace('"corrected"', '"improved"'))
     said: list[str] = []
-    run = calibrate.Run("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
+    run = Run("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
     with pytest.raises(RecipeError, match="start must be one of published, corrected, got 'improved'"):
         calibrate.regenerate((recipe.find("albedo-liang", FITS), recipe.read(bad)), run)
     assert not said
     assert not Path(tmp_path / "store").exists()
+
+
+def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path, monkeypatch):
+    made = []
+
+    def pipeline(chosen, run, light):
+        made.append((chosen.name, light and light.setting))
+        return {"constants": {}}, {}
+
+    for name in ("albedo", "profile"):
+        monkeypatch.setitem(pipelines.PIPELINES, name, pipeline)
+    said: list[str] = []
+    run = Run("quick", 0, tmp_path / "out", None, 1000, said.append, False)
+    refracted, diffuse = Setting(n=1.4), Setting("diffuse")
+    profile = recipe.find("burley-whole", FITS)
+    exactly = replace(recipe.find("albedo-rational", FITS), check="")
+    recipes = (
+        replace(profile, name="profile-n1.4", setting=refracted),
+        replace(profile, name="profile-diffuse", truth="exact", setting=diffuse),
+        recipe.find("albedo-rational-n1.4", FITS),
+        exactly,
+        replace(exactly, name="checked", setting=diffuse, check="orders"),
+    )
+    written = calibrate.regenerate(recipes, run)
+    assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
+    assert made == [
+        ("albedo-rational-n1.4", refracted),
+        ("albedo-rational", None),
+        ("checked", diffuse),
+        ("profile-n1.4", refracted),
+        ("profile-diffuse", None),
+    ]
+    assert [path.stem for path in written] == [name for name, _ in made]

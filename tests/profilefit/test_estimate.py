@@ -185,6 +185,17 @@ def test_a_constant_that_is_held_stays(line):
     assert one.statistical is None
 
 
+def test_only_albedos_that_are_counted_count(line):
+    alpha, reflectance, design = line
+    counted = np.arange(12) % 3 > 0
+    spoilt = np.where(counted, reflectance, 0.9)
+    one = fit(line_profiles(spoilt, alpha), Line(Setting()), "reflectance", counted=counted)
+    expected = np.linalg.lstsq(design[counted], reflectance[counted])[0]
+    np.testing.assert_allclose(list(one.constants.values()), expected, rtol=1e-8)
+    misfit = reflectance[counted] - design[counted] @ expected
+    np.testing.assert_allclose(one.variance, misfit @ misfit / (8 - 2), rtol=1e-8)
+
+
 def test_only_rings_that_are_used_count(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     used = np.ones(profiles.energy.shape, bool)
@@ -304,7 +315,7 @@ def test_a_jackknife_without_enough_albedos_is_no_number(line):
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        ({"objective": "depth"}, "objective must be one of energy, radial,"),
+        ({"objective": "depth"}, "objective must be one of energy, relative, radial,"),
         ({"objective": "radial"}, "objective 'radial' does not apply to Burley"),
         ({"free": ()}, "free must name at least one constant, each once, got \\(none\\)"),
         ({"free": ("s0", "s0")}, "free must name at least one constant, each once, got s0, s0"),

@@ -17,7 +17,7 @@ EDGES = np.concatenate([[0.0], np.geomspace(0.05, 6.0, 20)])
 
 def made(energy, beyond, edges=EDGES, alpha=ALPHAS, **extra):
     """Rings with these energies, every one of them used."""
-    parts = {"used": np.ones(energy.shape), "weight": np.ones(alpha.size), "limits": np.zeros(2), "xi": np.zeros(0)}
+    parts = {"used": np.ones(energy.shape), "weight": np.ones(alpha.size), "limits": np.zeros(3), "xi": np.zeros(0)}
     return Rings(**{"alpha": alpha, "r_edges": edges, "energy": energy, "beyond": beyond, **parts, **extra})
 
 
@@ -133,7 +133,7 @@ def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
 def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisation, x64):
     """The Jacobian in a constant that is not seen is zero, and in one that is seen it is not."""
     law = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}.get(name, liang)
-    rings = of_law(liang, xi=np.linspace(0.1, 0.9, 5), limits=np.ones(2))
+    rings = of_law(liang, xi=np.linspace(0.1, 0.9, 5), limits=np.ones(3))
     # At alpha near 1 the term of a that a3 governs is not zero.
     rings = made(rings.energy, rings.beyond, alpha=np.array([0.3, 0.6, 0.97]), xi=rings.xi, limits=rings.limits)
     names = law.constant_names()
@@ -146,7 +146,7 @@ def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisat
 def test_every_objective_has_a_derivative_in_its_data(name, liang, normalisation, x64):
     """Photon noise goes to the constants through it: finite everywhere, and the finite difference."""
     law = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}.get(name, liang)
-    base = of_law(liang, xi=np.linspace(0.13, 0.91, 5), limits=np.ones(2))
+    base = of_law(liang, xi=np.linspace(0.13, 0.91, 5), limits=np.ones(3))
 
     def cost(energy):
         return jnp.sum(OBJECTIVES[name](law, made(energy, base.beyond, xi=base.xi, limits=base.limits)) ** 2)
@@ -181,3 +181,45 @@ def test_rings_know_reflectance_and_cdf():
     rings = made(np.array([[0.1, 0.2]]), np.array([0.1]), edges=np.arange(3.0), alpha=ALPHAS[:1])
     np.testing.assert_allclose(np.asarray(rings.reflectance), [0.4], rtol=1e-6)
     np.testing.assert_allclose(np.asarray(rings.cdf), [[0.0, 0.25, 0.75]], rtol=1e-6)
+
+
+def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
+    """A law that is 10 % off in every ring has rows of 0.1 whose squares add up to 0.01, however the rings are cut."""
+    rings = of_law(burley)
+    off = made(rings.energy / 1.1, rings.beyond / 1.1)
+    table = np.asarray(objectives.relative(burley, off))
+    n = EDGES.size - 1
+    misfit, shares = table[:, :n], table[:, n : 2 * n + 1]
+    np.testing.assert_allclose(np.sum(misfit**2, axis=1), 0.01, rtol=1e-10)
+    assert np.all(misfit[:, 0] == 0)  # from 0 to the first edge: no stretch of ln r
+    np.testing.assert_allclose(shares, 0.0, atol=1e-12)  # the energy is where it should be
+    assert np.all(table[:, 2 * n + 1 :] == 0)
+
+
+def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, x64):
+    rings = of_law(burley)
+    moved = made(np.roll(rings.energy, 1, axis=1), rings.beyond)
+    table = np.asarray(objectives.relative(burley, moved))
+    n = EDGES.size - 1
+    cdf = np.asarray(moved.cdf)
+    expected = objectives.SHARE_WEIGHT / np.sqrt(EDGES.size) * (np.asarray(rings.cdf) - cdf)
+    np.testing.assert_allclose(table[:, n : 2 * n + 1], expected, atol=1e-12)
+    beyond = cdf[:, 1:] > objectives.ENERGY_WITHIN
+    assert np.any(beyond)
+    assert np.all(table[:, :n][beyond] == 0)
+
+
+def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
+    """A law whose energy is (2 - alpha) times another's falls by 1e-5 over the last 1e-5 of albedo."""
+
+    class Falling:
+        def unscaled_energy(self, x, alpha):
+            return burley.unscaled_energy(x, 0.9 + 0 * alpha) * (2 - alpha)
+
+    limits = np.array([0.0, 0.0, 7.0])
+    n = EDGES.size - 1
+    rows = np.asarray(objectives.relative(Falling(), of_law(burley, limits=limits)))[:, 2 * n + 1 :]
+    fall = np.log1p(1e-5) + objectives.LEAST_RISE
+    np.testing.assert_allclose(rows, 7 * fall / np.sqrt(ALPHAS.size), rtol=1e-6)
+    rises = np.asarray(objectives.relative(burley, of_law(burley, limits=limits)))[:, 2 * n + 1 :]
+    assert np.any(rises == 0)

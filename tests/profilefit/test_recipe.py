@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from profilefit.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder
+from mcml_sim import Setting
+from profilefit.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder, record_name
 from profilefit.errors import InputError, RecipeError
 from profilefit.objectives import OBJECTIVES
 from profilefit.recipe import PIPELINES, available, find, read
@@ -136,8 +137,8 @@ def test_types_must_be_right(refuse, old, new, words):
     [
         ('pipeline = "profile"', 'pipeline = "magic"', "pipeline must be one of albedo, profile, as-published"),
         ('truth = "exact"', 'truth = "hearsay"', "truth must be one of orders, exact, got 'hearsay'"),
-        ('objective = "energy"', 'objective = "beauty"', "must be one of energy, got 'beauty'"),
-        ('objective = "energy"', 'objective = "radius"', "must be one of energy, got 'radius'"),
+        ('objective = "energy"', 'objective = "beauty"', "must be one of energy, relative, got 'beauty'"),
+        ('objective = "energy"', 'objective = "radius"', "must be one of energy, relative, got 'radius'"),
         ("high = 0.9", "high = 1.1", "0 < low < high <= 1, got low = 0.1, high = 1.1"),
         ("low = 0.1", "low = 0.0", "0 < low < high <= 1, got low = 0.0"),
         ("low = 0.1", "low = 0.9", "0 < low < high <= 1, got low = 0.9, high = 0.9"),
@@ -195,6 +196,97 @@ def test_values_must_be_possible(refuse, old, new, words):
     refuse(old, new, words)
 
 
+SETTING = "[setting]\n{}\n\n[albedos]"
+
+
+def with_setting(*lines):
+    return GOOD.replace("[albedos]", SETTING.format("\n".join(lines)))
+
+
+def test_a_setting_is_read_and_is_the_searchlight_by_default(write):
+    assert read(write(GOOD)).setting == Setting()
+    assert read(write(with_setting('illumination = "diffuse"'))).setting == Setting("diffuse")
+    refracted = with_setting('illumination = "diffuse"', "n = 1.4").replace('"exact"', '"orders"')
+    assert read(write(refracted)).setting == Setting("diffuse", n=1.4)
+    assert read(write(refracted.replace("n = 1.4", "n = 2"))).setting == Setting("diffuse", n=2.0)
+
+
+@pytest.mark.parametrize(
+    ("lines", "words"),
+    [
+        (['illumination = "lamp"'], "[setting]: illumination must be one of searchlight, diffuse, got 'lamp'"),
+        (["illumination = 1"], "[setting]: illumination must be a text, got 1"),
+        (["n = 0"], "[setting]: n must be a refractive index > 0, got 0.0"),
+        (["n = nan"], "[setting]: n must be a finite number, got nan"),
+        (['n = "glass"'], "[setting]: n must be a finite number, got 'glass'"),
+        (["g = 1.0"], "[setting]: g must be a mean cosine in (-1, 1), got 1.0"),
+        (["g = 0.5"], "setting.g must be 0: profiles are fitted to isotropic scattering, got 0.5"),
+        (["eta = 1.4"], "[setting]: unknown key 'eta', accepted: illumination, n, g"),
+        (["n = 1.4"], "setting.n must be 1 where truth is 'exact' (use truth = \"orders\"), got 1.4"),
+    ],
+    ids=str,
+)
+def test_impossible_settings_are_one_line(write, lines, words):
+    path = write(with_setting(*lines))
+    with pytest.raises(RecipeError, match=re.escape(words)) as caught:
+        read(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_a_setting_must_be_a_table(write):
+    with pytest.raises(RecipeError, match=r"\[setting\] must be a table, got 'diffuse'"):
+        read(write('setting = "diffuse"\n' + GOOD))
+
+
+def test_each_pipeline_takes_the_settings_that_it_can_judge(write):
+    diffuse, refracted = 'illumination = "diffuse"', "n = 1.4"
+    for good, line, words in (
+        (
+            EVEN,
+            diffuse,
+            "setting of pipeline 'as-published' must be searchlight, n = 1, g = 0, got diffuse, n = 1, g = 0",
+        ),
+        (INVERSE.replace('"exact"', '"orders"'), refracted, "setting.n of pipeline 'inverse' must be 1, got 1.4"),
+        (
+            GOOD.replace('"exact"', '"orders"').replace('"alpha"', '"reflectance"'),
+            refracted,
+            "albedos.spacing must be 'alpha' or 'sqrt(1-alpha)' where setting.n is not 1, got 1.4",
+        ),
+    ):
+        with pytest.raises(RecipeError, match=re.escape(words)):
+            read(write(good.replace("[albedos]", SETTING.format(line))))
+    assert read(write(INVERSE.replace("[albedos]", SETTING.format(diffuse)))).setting == Setting("diffuse")
+
+
+@pytest.mark.parametrize("path", available(fits_folder()).values(), ids=lambda path: path.stem)
+def test_shipped_recipes_are_named_after_their_setting(path):
+    """So the catalogue finds their records, and no other."""
+    recipe = read(path)
+    suffix = record_name("", recipe.setting)
+    assert path.stem.endswith(suffix)
+    if not suffix:
+        assert not re.search(r"-diffuse|-n\d", path.stem)
+
+
+def test_checks_and_random_starts(write):
+    asked = GOOD.replace('truth = "exact"', 'truth = "exact"\ncheck = "orders"\nrandom_starts = 50')
+    assert (read(write(asked)).check, read(write(asked)).random_starts) == ("orders", 50)
+    assert (read(write(GOOD)).check, read(write(GOOD)).random_starts) == ("", 0)
+    for old, new, words in (
+        ('check = "orders"', 'check = "exact"', "check must be 'orders' or absent, got 'exact'"),
+        ('truth = "exact"', 'truth = "orders"', 'check needs truth = "exact": it compares the photons with it, got'),
+        ("random_starts = 50", "random_starts = -1", "random_starts must be between 0 and 1000, got -1"),
+        ("random_starts = 50", "random_starts = 1001", "random_starts must be between 0 and 1000, got 1001"),
+        ("random_starts = 50", "random_starts = 5.5", "random_starts must be a whole number, got 5.5"),
+    ):
+        assert asked.count(old) == 1
+        with pytest.raises(RecipeError, match=re.escape(words)):
+            read(write(asked.replace(old, new)))
+    with pytest.raises(RecipeError, match="pipeline 'as-published' takes neither check nor random_starts"):
+        read(write("random_starts = 5\n" + EVEN))
+
+
 EVEN = (
     GOOD.replace('"profile"', '"as-published"').replace('"energy"', '"radial"').replace("first = 0.01", "dr = 0.05")
 ).replace("count = 20\n", "")
@@ -211,7 +303,7 @@ INVERSE = (
         (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [1, 10]', "got last = 30.0, mfp = 10.0, dr = 0.05"),
         (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [0.5, 2]', "must contain 1.0, got [0.5, 2.0]"),
         (EVEN, 'law = "liang"', 'law = "burley"', "law of pipeline 'as-published' must be liang, got 'burley'"),
-        (INVERSE, 'law = "liang"', 'law = "burley"', "law of pipeline 'inverse' must be liang, got 'burley'"),
+        (INVERSE, 'law = "liang"', 'law = "burley"', "of pipeline 'inverse' must be liang or quantile, got 'burley'"),
         (INVERSE, "shares = 64", "shares = 0", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
         (INVERSE, "shares = 64", "", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
     ],

@@ -178,6 +178,27 @@ def test_each_pipeline_has_its_own_needs(tmp_path, name, change, words):
         record.read(path, whole=True)
 
 
+@pytest.mark.parametrize(
+    ("part", "key", "value", "words"),
+    [
+        ("crosscheck", "chi2", "much", r'crosscheck\.chi2 must be a number or null, got "much"'),
+        ("crosscheck", "constants", {"b": 1.0}, r"crosscheck\.constants\.b must be a table, got 1\.0"),
+        ("starts", "share_best", None, r"starts\.share_best must be a number, got null"),
+        ("starts", "outcomes", [{}], r"starts\.outcomes\.0\.count must be a whole number, got nothing"),
+    ],
+)
+def test_what_a_recipe_may_ask_for_is_whole_if_it_is_there(tmp_path, part, key, value, words):
+    content = json.loads((fits_folder() / "albedo-rational-diffuse.json").read_text())
+    path = tmp_path / "mine.json"
+    content[part][key] = value
+    path.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match=rf"mine\.json: is damaged: {words}"):
+        record.read(path, whole=True)
+    del content[part]
+    path.write_text(json.dumps(content))
+    assert record.read(path, whole=True)["law"] == "rational"
+
+
 def test_records_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(RecordError, match=r"gone\.json: there is no such record; `profilefit regenerate` makes them"):
         record.read(tmp_path / "gone.json")

@@ -1,0 +1,127 @@
+"""The same fit to two truths: agreement within the photons' noise, and what a difference looks like."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.stats import chi2, kstest
+
+from mcml_sim import Grid, Setting, exact, simulate_orders
+from profilefit import crosscheck, load
+from profilefit.crosscheck import AGREE, DIFFER, compared, mahalanobis
+from profilefit.estimate import fit
+from profilefit.profiles import Profiles
+
+EDGES = np.concatenate([[0.0], np.geomspace(0.02, 30.0, 25)])
+FREE = ("k", "h")
+
+
+def test_chi2_by_hand():
+    covariance = np.array([[4.0, 0.0], [0.0, 9.0]])
+    assert mahalanobis(np.array([2.0, 3.0]), covariance) == (pytest.approx(2.0), 2)
+    turned = np.array([[2.0, 1.0], [1.0, 2.0]])
+    difference = np.array([1.0, -2.0])
+    assert mahalanobis(difference, turned)[0] == pytest.approx(difference @ np.linalg.inv(turned) @ difference)
+
+
+def test_chi2_does_not_see_what_the_covariance_does_not_know():
+    """Two constants that photons move together, in any units, are one direction."""
+    lengths = np.array([1e-3, 1.0, 1e3])
+    covariance = np.outer(lengths, lengths) * np.array([[1, 1, 0], [1, 1, 0], [0, 0, 1]])
+    distance, rank = mahalanobis(lengths * np.array([1.0, 1.0, 2.0]), covariance)
+    assert rank == 2
+    assert distance == pytest.approx(1 + 4)
+
+
+@pytest.fixture(scope="module")
+def exactly(toy, tallies):
+    """The toy's energies without noise, and a fit to them that is no truth: h alone, k 2 % too large."""
+    energy = tallies.energy(tallies.chance.reshape(tallies.edges.size - 1, -1) * tallies.photons)
+    none = np.zeros_like(energy)
+    profiles = replace(
+        tallies.profiles(tallies.draw(1, 1)[0]), energy=energy, standard_error=none, source="exact", covariance=None
+    )
+    return fit(profiles, replace(toy, q=0.52), free=FREE)
+
+
+def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
+    """chi2 of 60 runs of photons is chi2 of two degrees of freedom, for a law that is not the truth too."""
+    counts = tallies.draw(7, 60)
+    checks = [
+        compared(exactly, fit(tallies.profiles(one), exactly.law, free=FREE), tallies.photons, 0, 0) for one in counts
+    ]
+    distances = np.array([check.chi2 for check in checks])
+    assert {check.rank for check in checks} == {2}
+    assert kstest(distances, chi2(2).cdf).pvalue > 1e-3
+    assert kstest(1.5 * distances, chi2(2).cdf).pvalue < kstest(distances, chi2(2).cdf).pvalue
+    assert sum(check.result == AGREE for check in checks) >= 58
+    np.testing.assert_allclose(checks[0].chance, chi2.sf(distances[0], 2))
+
+
+def test_photons_of_another_truth_differ(toy, tallies, exactly):
+    profiles = tallies.profiles(tallies.draw(7, 1)[0])
+    louder = replace(profiles, energy=1.02 * profiles.energy)  # the tally's error of A is 0.2 %
+    check = compared(exactly, fit(louder, exactly.law, free=FREE), tallies.photons, 0, 0)
+    assert check.result == DIFFER
+    assert check.z[0] > 5
+    content = check.content()
+    assert list(content["constants"]) == ["k", "h"]
+    assert content["constants"]["k"]["z"] == check.z[0]
+    assert content["photons"] == tallies.photons
+
+
+def test_a_failed_fit_is_told(tallies, exactly):
+    good = fit(tallies.profiles(tallies.draw(7, 1)[0]), exactly.law, free=FREE)
+    failed = replace(good, solution=replace(good.solution, result="no convergence"))
+    for pair, which in (((failed, good), "exact"), ((exactly, failed), "photon")):
+        check = compared(*pair, tallies.photons, 0, 0)
+        assert check.result == f"the {which} fit failed: no convergence"
+        assert np.isnan(check.chi2)
+    for statistical in (None, np.full((2, 2), np.nan)):
+        check = compared(exactly, replace(good, statistical=statistical), tallies.photons, 0, 0)
+        assert check.result.startswith("the photon fit has no finite errors")
+        assert np.isnan(check.chi2)
+
+
+ALPHA = np.array([0.2, 0.5, 0.8, 0.9, 0.97, 0.99999])
+
+
+@pytest.fixture(scope="module")
+def map_pair(normalisation):
+    """A fit of the map to the exact reflectance, and that reflectance."""
+    none, total = np.zeros((ALPHA.size, 1)), np.asarray(exact.reflectance(ALPHA))
+    profiles = Profiles(
+        ALPHA, np.array([0.0, 30.0]), total[:, None], none, none + np.inf, none[:, 0], "exact", Setting()
+    )
+    return fit(profiles, normalisation, "reflectance", free=("b", "c")), profiles
+
+
+def test_exact_light_and_a_million_photons_agree(map_pair, white_run):
+    check = crosscheck.crosscheck(*map_pair, white_run)
+    assert check.result == AGREE
+    assert check.rank == 2
+    assert check.names == ("b", "c")
+    assert check.traced == white_run.photons
+    assert (check.albedos_left_out, check.rings_left_out) == (1, 0), "at .99999 light is lost after 8192 scatterings"
+
+
+def test_a_tally_that_counts_one_photon_in_fifty_twice_is_caught(map_pair, white_run):
+    wrong = replace(white_run, photons=int(white_run.photons / 1.02))
+    assert crosscheck.crosscheck(*map_pair, wrong).result == DIFFER
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=str)
+def test_profiles_agree_ring_by_ring(setting):
+    """The whole of a recipe's fit, a law that is 5 % off, on two million photons."""
+    light = simulate_orders(Grid.from_edges(r=EDGES), 2**21, seed=6, setting=setting, progress=False)
+    profiles = Profiles.from_exact(ALPHA, EDGES, setting)
+    law = load("burley", "published" if setting == Setting() else "published:diffuse")
+    free = ("s0", "s1", "s2")  # a square in A has no fourth
+    own = fit(profiles, law, free=free)
+    check = crosscheck.crosscheck(own, profiles, light)
+    assert check.result == AGREE
+    assert check.rank == 3
+    assert check.albedos_left_out == 1
+    assert check.rings_left_out > 0
+    assert crosscheck.crosscheck(own, profiles, replace(light, photons=int(light.photons / 1.02))).result == DIFFER

@@ -1,0 +1,40 @@
+"""How much light each setting gets, and where it is kept."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting
+from profilefit.run import PHOTONS, REFRACTED_PHOTONS, Run
+
+SETTINGS = {
+    Setting(): "",
+    Setting("diffuse"): "diffuse",
+    Setting(n=1.4): "n1.4",
+    Setting("diffuse", n=1.4): "diffuse-n1.4",
+}
+
+
+@pytest.fixture
+def run(tmp_path):
+    said: list[str] = []
+    return Run("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
+
+
+def test_every_setting_has_its_own_store_and_resumes(run):
+    for setting, folder in SETTINGS.items():
+        light = run.light(setting)
+        assert (light.setting, light.photons, light.seed) == (setting, 2000, 3)
+        batches = sorted((run.store / folder).glob("batch-*"))
+        assert len(batches) == 1
+        before = batches[0].stat().st_mtime_ns
+        assert np.array_equal(run.light(setting).counts.exits, light.counts.exits)
+        assert batches[0].stat().st_mtime_ns == before
+    assert len(list(run.store.rglob("batch-*"))) == len(SETTINGS)
+
+
+def test_presets_give_surfaces_that_refract_fewer_photons(tmp_path):
+    for preset in ("quick", "full"):
+        traced = [Run(preset, 0, tmp_path, None, None, print).number(setting) for setting in SETTINGS]
+        assert traced == [PHOTONS[preset]] * 2 + [REFRACTED_PHOTONS[preset]] * 2
+        assert REFRACTED_PHOTONS[preset] < PHOTONS[preset]
+    assert Run("full", 0, tmp_path, None, 7, print).number(Setting(n=1.4)) == 7
