@@ -37,6 +37,7 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
+from profilefit.laws import published
 
 Floats = NDArray[np.float64]
 # Below this A the root is sought in alpha, above it in sqrt(1 - alpha): each is where A has a finite slope.
@@ -85,20 +86,23 @@ def _alpha(reflectance: float, setting: Setting) -> float:
 
 def scale_searchlight(reflectance: ArrayLike) -> Floats:
     """s = l / d for A under a normal pencil beam [-]: the memo's eq. (5), 5.5 % mean error reported."""
-    a = np.asarray(reflectance, float)
-    return 1.85 - a + 7.0 * np.abs(a - 0.8) ** 3
+    return _scale("published", 3, reflectance)
 
 
 def scale_diffuse(reflectance: ArrayLike) -> Floats:
     """s = l / d for A under diffuse light [-]: the memo's eq. (6), 3.9 %."""
-    a = np.asarray(reflectance, float)
-    return 1.9 - a + 3.5 * (a - 0.8) ** 2
+    return _scale("diffuse", 2, reflectance)
+
+
+def _scale(printed: str, power: int, reflectance: ArrayLike) -> Floats:
+    a, s = np.asarray(reflectance, float), published.constants("burley", printed)
+    return s["s0"] - s["s1"] * a + s["s2"] * np.abs(a - s["s3"]) ** power
 
 
 def scale_dmfp(reflectance: ArrayLike) -> Floats:
-    """s = l_d / d for A under a normal pencil beam [-]: the memo's third, 7.7 %."""
-    a = np.asarray(reflectance, float)
-    return 3.5 + 100.0 * (a - 0.33) ** 4
+    """s = l_d / d for A under a normal pencil beam [-]: the memo's eq. (8), 7.7 %."""
+    a, s = np.asarray(reflectance, float), published.constants("burley_diffuse_mfp")
+    return s["s0"] + s["s1"] * (a - s["s2"]) ** 4
 
 
 def _classical(alpha: Floats) -> Floats:

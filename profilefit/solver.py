@@ -22,6 +22,9 @@ CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
 MAX_STEPS = 200
+# Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
+# are orthogonal to what the constants can do, unless there is no misfit but rounding.
+STALLED, NO_MISFIT = 0.03, 1e-8
 # A dozen constants against thousands of residuals: ten times as fast as QR. It squares the condition number, which is
 # harmless up to the 1e7 at which a fit counts as degenerate, since the damping of each step bounds it.
 LINEAR_SOLVER = lx.Normal(lx.Cholesky())
@@ -75,7 +78,7 @@ def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> t
         found, steps, codes = _levenberg_marquardt(residual, begin, arrays)
         values, jacobians = _linearise(residual, found, arrays)
     return tuple(
-        Solution(np.asarray(p), np.asarray(v), np.asarray(j), int(n), _explain(int(c), p, v))
+        Solution(np.asarray(p), np.asarray(v), np.asarray(j), int(n), _explain(int(c), p, np.asarray(v), np.asarray(j)))
         for p, v, j, n, c in zip(found, values, jacobians, steps, codes, strict=True)
     )
 
@@ -102,9 +105,19 @@ def _linearise(residual, parameters, data):
     return jax.vmap(residual)(parameters, data), jax.vmap(jax.jacfwd(residual))(parameters, data)
 
 
-def _explain(code: int, parameters: jax.Array, values: jax.Array) -> str:
+def _explain(code: int, parameters: jax.Array, values: Floats, jacobian: Floats) -> str:
     if not np.all(np.isfinite(parameters)) or not np.all(np.isfinite(values)):
         return "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
     if code:
         return f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
+    if _steepness(values, jacobian) > STALLED:
+        return "stalled beside an optimum, at the edge of where the law is defined: start elsewhere"
     return CONVERGED
+
+
+def _steepness(values: Floats, jacobian: Floats) -> float:
+    """The largest cosine between the residuals and a column of the Jacobian: none is left at an optimum."""
+    lengths = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(values)
+    if not np.all(np.isfinite(lengths)) or np.linalg.norm(values) < NO_MISFIT:
+        return 0.0
+    return float(np.max(np.abs(jacobian.T @ values) / np.where(lengths > 0, lengths, 1.0)))

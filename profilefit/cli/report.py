@@ -11,7 +11,7 @@ from rich.console import Console
 
 from profilefit import catalogue, record
 from profilefit.errors import InputError, RecordError
-from profilefit.report import figures, fill, sections, tables
+from profilefit.report import every_law, figures, fill, markdown_sections, sections, tables
 
 LOCAL = Path("fits")
 WIDTH = 100
@@ -30,9 +30,13 @@ def report(
     markdown: Annotated[
         Path | None, typer.Option(help="Fill the tables between the marks <!-- name --> of this file instead.")
     ] = None,
+    quality: Annotated[
+        bool, typer.Option("--quality", help="Measure every law against the exact half space instead (a minute).")
+    ] = False,
 ) -> None:
     """Print what was fitted: constants with their errors, quality by albedo, the state of fits and chains.
 
+    --quality prints instead how good every law, map and sampler is, printed ones too; or those of the records named.
     Example: profilefit report liang-whole --figures figures
     """
     # Tables are laid out for 100 columns; what is piped into a file has no width of its own.
@@ -40,7 +44,12 @@ def report(
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
     contents = _contents(folder, names)
     if markdown is not None:
-        _fill(markdown, contents)
+        _fill(markdown, contents, folder)
+        return
+    if quality:
+        for part in every_law(folder, names or None):
+            console.print(part)
+            console.print()
         return
     if not names:
         console.print(tables.summary(contents))
@@ -55,12 +64,14 @@ def report(
             console.print(f"left out: {line}", markup=False)
 
 
-def _fill(path: Path, contents: dict[str, dict]) -> None:
+def _fill(path: Path, contents: dict[str, dict], folder: Path) -> None:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    record.write_text(path, fill(text, sections(contents)))
+    # What is measured takes a minute, so only where the file has a place for it.
+    measured = {name: make() for name, make in markdown_sections(folder).items() if f"<!-- {name} -->" in text}
+    record.write_text(path, fill(text, sections(contents) | measured))
 
 
 def _contents(folder: Path, names: list[str] | None) -> dict[str, dict]:

@@ -25,10 +25,20 @@ from profilefit.laws.rational import Rational
 
 MOST, DEFAULT = 8, 6
 """d'Eon and Luebke's skin has six."""
-# Radii [mfp] of the narrowest and the widest Gaussian that a fit starts from at alpha = 1, and f1, f2 that shrink both
-# tenfold towards alpha = 0: what fits of two to six Gaussians end at, roughly.
+# Radii [mfp] of the narrowest and the widest Gaussian that other fits start from at alpha = 1, and f1, f2, which shrink
+# both sevenfold towards alpha = 0.
 START_SPAN = 0.05, 8.0
 START_FALL = -6.0, 2.0
+# Where fits to the exact searchlight begin that would else creep to their end for 200 steps and more: constants in the
+# order of the class, rounded.
+STARTS = {
+    2: (-6.2, 2.3, -1.5, 3.9, 0.5, 0.0),
+    4: (-6.0, 2.4, -5.0, 3.4, 2.7, 2.1, 1.1, 0.4, 1.8, 0.2, 1.6, -0.1),
+    6: (
+        *(-3.94, 1.17, -6.92, 2.96, 2.55, 2.09, 1.68, 1.93),
+        *(1.30, 0.09, 2.21, 0.03, 2.77, -0.28, 2.63, -0.95, 2.25, -10.67),
+    ),
+}
 EXTRA_STEPS = 12
 
 
@@ -57,7 +67,9 @@ class Gaussians(ProfileLaw):
 
     @classmethod
     def start(cls) -> dict[str, float]:
-        """Constants to fit from: equal weights, and variances in equal ratios over START_SPAN, which fall as all do."""
+        """Constants to fit from: those of `STARTS`, or equal weights and variances in equal ratios over START_SPAN."""
+        if cls.count() in STARTS:
+            return dict(zip(cls.constant_names(), STARTS[cls.count()], strict=True))
         low, high = (2.0 * np.log(radius) for radius in START_SPAN)
         ratio = (high - low) / max(cls.count() - 1, 1)
         values = dict.fromkeys(cls.constant_names(), 0.0)
@@ -132,11 +144,15 @@ class GaussiansSampler(Sampler):
         return jnp.sum(jnp.exp(self.law.log_weights(alpha) - 0.5 * r**2 / variance) * r / variance, axis=-1)
 
 
-@cache
 def law_class(count: int = DEFAULT) -> type[Gaussians]:
     """The class of sums of `count` Gaussians, 1 to 8; InputError otherwise."""
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
         raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
+    return _law_class(count)
+
+
+@cache
+def _law_class(count: int) -> type[Gaussians]:
     names = ["f1", "f2", *(f"v{i}" for i in range(1, count + 1))]
     names += [f"w{i}{power}" for i in range(2, count + 1) for power in range(2)]
     body: dict[str, Any] = {

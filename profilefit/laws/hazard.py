@@ -16,6 +16,8 @@ from profilefit.laws.rational import Rational
 
 # Closer to the source [mfp] than this the density is that at the source, to 1e-8.
 NEAR_SOURCE = 1e-9
+# 1 + a x + b x^2 must have no zero, which a parabola through small b would give it somewhere [1/mfp^2].
+LEAST_B = 1e-4
 
 
 class Hazard(ProfileLaw):
@@ -59,7 +61,7 @@ class Hazard(ProfileLaw):
         kappa = decay_rate(alpha)
         h = jnp.exp(self.h0 + self.h1 * source + self.h2 * kappa)
         a = self.a0 + source * (self.a1 + source * self.a2)
-        b = self.b0 + source * (self.b1 + source * self.b2)
+        b = jnp.maximum(self.b0 + source * (self.b1 + source * self.b2), LEAST_B)
         c = (self.c0 + self.c1 * source + self.c2 * kappa) ** 2
         return Shape(self.albedo.reflectance(alpha), kappa, source, source - kappa - a + c, h, a, b, c)
 

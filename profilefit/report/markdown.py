@@ -16,6 +16,10 @@ PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
 
+# Headers of columns that stand to the left.
+NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
+NAMES |= {"verdict", "law", "light", "sampler"}
+
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
     """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
@@ -44,7 +48,24 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
     note = (
         "Digits end where the largest error does; constants trade against each other, so compute with the record's own."
     )
-    return "\n\n".join([_table(header, rows), *failures, note])
+    return "\n\n".join([markdown_table(header, rows), *failures, note])
+
+
+def markdown_hazard(records: Mapping[str, Content]) -> str:
+    """The constants of the hazard law in every setting, a record a column, and its worst errors there."""
+    fitted = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and converged(c)}
+    if not fitted:
+        return ""
+    names = next(iter(fitted.values()))["constants"]
+    rows = [
+        (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
+        for columns in [list(fitted.values())]
+        for name in names
+    ]
+    for measure in ("rel", "ks"):
+        worst_of = (worst(measure, c["quality"]["regenerated"][measure]) for c in fitted.values())
+        rows.append((f"{measure}, worst", *map(significant, worst_of)))
+    return markdown_table(("constant", *fitted), rows)
 
 
 def markdown_quality(records: Mapping[str, Content]) -> str:
@@ -76,14 +97,16 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
         )
         for equation in dict.fromkeys(reading["equation"] for reading in readings)
     ]
-    return _table(header, rows) if rows else ""
+    return markdown_table(header, rows) if rows else ""
 
 
 def sections(records: Mapping[str, Content]) -> dict[str, str]:
     """The tables of a README by the names of their marks."""
+    paper = {name: content for name, content in records.items() if _is_of_the_paper(content)}
     found = {
-        "quality": _profile_quality(records),
-        "constants": markdown_constants(records),
+        "quality": _profile_quality(paper),
+        "constants": markdown_constants(paper),
+        "hazard": markdown_hazard(records),
         "readings": markdown_readings(records),
         "inversion": _inversion_quality(records),
         "maps": _albedo_quality(records),
@@ -107,7 +130,7 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
         (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values[key])))
         for owner, which, values in _measured(records, "rel")
     ]
-    return _table(header, rows) if rows else ""
+    return markdown_table(header, rows) if rows else ""
 
 
 def _inversion_quality(records: Mapping[str, Content]) -> str:
@@ -116,7 +139,7 @@ def _inversion_quality(records: Mapping[str, Content]) -> str:
         (owner, which, *_mean_and_worst("inversion_error", values["inversion_error"]))
         for owner, which, values in _measured(records, "inversion_error")
     ]
-    return _table(header, rows) if rows else ""
+    return markdown_table(header, rows) if rows else ""
 
 
 def _albedo_quality(records: Mapping[str, Content]) -> str:
@@ -125,7 +148,7 @@ def _albedo_quality(records: Mapping[str, Content]) -> str:
         (owner, which, *(albedo_number(measure, values[measure]) for measure in ALBEDO_MEASURES))
         for owner, which, values in _measured(records, "delta_A")
     ]
-    return _table(header, rows) if rows else ""
+    return markdown_table(header, rows) if rows else ""
 
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
@@ -150,14 +173,20 @@ def _number(measure: str, value: float) -> str:
     return f"{value:.4f}" if measure == "r2" else significant(value)
 
 
+def _is_of_the_paper(content: Content) -> bool:
+    """Its own laws, and those it is compared with, under its own light."""
+    setting = content.get("setting") or {}
+    same_light = (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
+    return same_light and content["law"] in ("liang", "burley", "rational")
+
+
 def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
     return {name: content for name, content in records.items() if "constants" in content}
 
 
-def _table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A GitHub table, names to the left and numbers to the right, every line filled to the same width."""
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
-    names = {"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed", "verdict"}
-    rule = [":" + "-" * (w - 1) if h in names else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
+    rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
     lines = [header, rule, *rows]
     return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)

@@ -43,11 +43,12 @@ def _table(name: str, quality: SamplerQuality, caption: str) -> RenderableType:
     for header, measure in COLUMNS.items():
         values: NDArray[np.float64] = getattr(quality, measure)
         worst = values[np.argmax(np.abs(values))]
-        columns[header] = on_the_point([_number(float(value)) for value in [*values, worst]])
+        columns[header] = on_the_point([sampler_number(float(value)) for value in [*values, worst]])
     return column_table(f"Sampler: {name}", columns, caption, left=("α",))
 
 
-def _number(value: float) -> str:
+def sampler_number(value: float) -> str:
+    """A measure of a sampler as text."""
     if abs(value) < NEGLIGIBLE:
         return "0"
     if math.isinf(value):

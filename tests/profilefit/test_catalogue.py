@@ -9,7 +9,7 @@ from mcml_sim import Setting, exact
 from profilefit import catalogue, record
 from profilefit.catalogue import PROFILE_LAWS, REGENERATED, fits_folder, record_name, regenerated_settings
 from profilefit.errors import InputError, RecordError, SettingError
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
+from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
 from profilefit.laws.published import SETS
 
 
@@ -44,6 +44,7 @@ def test_every_law_loads_as_regenerated_and_is_a_law(name):
     # The map it normalises with is the exact one but for a few parts in a million.
     if law.albedo is not None:  # a diffusion model has a reflectance of its own
         assert float(law.albedo.reflectance(0.8)) == pytest.approx(exact.reflectance(0.8), abs=1e-5)
+    assert all(isinstance(sampler, Sampler) and sampler.law == law for sampler in law.samplers.values())
 
 
 @pytest.mark.parametrize("name", ["liang", "rational"])
@@ -232,9 +233,11 @@ def test_a_printed_set_brings_its_own_setting():
 
 
 def test_a_law_without_constants_needs_no_record():
+    """Nor a map: n = 1.35 has none."""
     for constants in ("regenerated", "published"):
-        law = profilefit.load("dipole", constants, REFRACTED)
-        assert (law.constants(), law.setting) == ({}, REFRACTED)
+        law = profilefit.load("dipole", constants, Setting(n=1.35))
+        assert law.constants() == {}
+        assert law.setting == Setting(n=1.35)
     with pytest.raises(InputError, match=r"constants must be one of regenerated, the path of a record .*, got 'old'"):
         profilefit.load("dipole", "old")
 
@@ -242,3 +245,21 @@ def test_a_law_without_constants_needs_no_record():
 def test_a_law_that_was_never_regenerated_says_what_there_is():
     with pytest.raises(RecordError, match=r"of albedo chiang must be one of published, the path .*, got 'regenerated'"):
         profilefit.albedo_law("chiang")
+
+
+def test_a_number_of_gaussians():
+    assert "gaussians" in profilefit.names()
+    assert not [name for name in profilefit.names() if ":" in name]
+    assert profilefit.load("gaussians") == profilefit.load("gaussians:6")
+    assert profilefit.load("gaussians:2").count() == 2
+    for name in ("gaussians", "gaussians:6"):
+        assert profilefit.load(name, str(fits_folder() / "gaussians-6.json")).count() == 6
+    for name in ("gaussians:0", "gaussians:9", "gaussians:two", "gaussians:"):
+        with pytest.raises(
+            InputError, match=rf"law must be gaussians:N with N a whole number in 1 \.\.\. 8, got '{name}'"
+        ):
+            profilefit.load(name)
+    with pytest.raises(RecordError, match=r"of gaussians:3 must be one of the path of a record .*, got 'regenerated'"):
+        profilefit.load("gaussians:3")
+    with pytest.raises(RecordError, match=r"holds constants of law 'gaussians:6', got a request for 'gaussians:4'"):
+        profilefit.load("gaussians:4", str(fits_folder() / "gaussians-6.json"))

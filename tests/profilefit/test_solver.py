@@ -111,3 +111,13 @@ def test_condition_number_of_a_blind_constant_is_infinite():
 
 def test_cost_is_the_sum_of_squares():
     assert solution(np.eye(2)).cost == 25.0
+
+
+def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
+    """The optimum of sqrt(x) = -1 lies beyond x = 0, where the residual is not finite."""
+
+    def residual(p, data):
+        return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
+
+    result = solve(residual, [1.0], np.zeros(2)).result
+    assert "stalled" in result or "not finite" in result

@@ -18,6 +18,10 @@ from profilefit.laws.dipole import Dipole
 LAWS = [(Dipole(Setting()), 1e-12), (BetterDipole(Setting(n=0.8)), 1e-12), (BeamDiffusion(Setting(n=1.4)), 1e-8)]
 NAMES = ["dipole", "better", "beam"]
 EVERY = pytest.mark.parametrize("law", [law for law, _ in LAWS], ids=NAMES)
+# The sampler is one loop over the law's own formulas: the dipole tests it, the others take seconds to compile.
+SAMPLED = pytest.mark.parametrize(
+    "law", [LAWS[0][0], *(pytest.param(law, marks=pytest.mark.slow) for law, _ in LAWS[1:])], ids=NAMES
+)
 
 
 def printed_moments(n):
@@ -82,7 +86,7 @@ def nodes(low, high, power):
     return low + (high - low) * u**power, 0.5 * w * (high - low) * power * u ** (power - 1)
 
 
-@pytest.mark.parametrize(("law", "tolerance"), LAWS, ids=NAMES)
+@pytest.mark.parametrize(("law", "tolerance"), [*LAWS[:2], pytest.param(*LAWS[2], marks=pytest.mark.slow)], ids=NAMES)
 def test_share_is_the_integral_of_the_profile(law, tolerance):
     edges = np.array([0.0, 0.05, 0.7, 0.999, 1.001, 2.5, 7.0, 15.0])
     total, inside = law.reflectance(ALPHA), np.zeros((3, 1))
@@ -105,7 +109,7 @@ def test_both_ends(law):
     assert law.constant_names() == ()
 
 
-@EVERY
+@SAMPLED
 def test_sampler_inverts_the_cdf(law):
     xi = np.concatenate([[0.0], np.geomspace(1e-6, 0.5, 15), 1 - np.geomspace(0.49, 1e-9, 15), [1.0]])
     r = law.sampler.sample(xi, ALPHA)
@@ -114,7 +118,7 @@ def test_sampler_inverts_the_cdf(law):
     np.testing.assert_array_equal(r[:, [0, -1]], [[0.0, np.inf]] * 3)
 
 
-@EVERY
+@SAMPLED
 def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     density = law.sampler.pdf(RADII, ALPHA) * law.reflectance(ALPHA)
     near = (RADII > 0) & (RADII < 1e3)
@@ -125,13 +129,14 @@ def test_sampler_density_is_the_laws_and_ends_in_its_limits(law):
     np.testing.assert_array_equal(density[:, -1], 0.0)
 
 
-@EVERY
+@SAMPLED
 def test_single_precision(law):
     single = law.cdf(jnp.float32(0.7), jnp.float32(0.5))
     assert single.dtype == jnp.float32
     assert float(single) == pytest.approx(law.cdf(np.full(32, 0.7), ALPHA)[1, 0], rel=1e-5)
 
 
+@pytest.mark.slow
 def test_derivatives_are_finite_differences():
     law, step = LAWS[1][0], 1e-5
     with jax.enable_x64(True):

@@ -37,7 +37,7 @@ def test_parts_by_hand(four):
 
 
 def test_profile_is_the_plain_sum(four):
-    alpha, r = 0.6, np.geomspace(0.01, 5, 9)
+    alpha, r = 0.6, np.geomspace(0.01, 5, 3)
     with jax.enable_x64(True):
         variances, weights = np.asarray(four.variances(alpha)), np.exp(four.log_weights(jnp.asarray(alpha)))
     gaussians = [w * np.exp(-(r**2) / (2 * v)) / (2 * np.pi * v) for w, v in zip(weights, variances, strict=True)]
@@ -56,9 +56,9 @@ def test_variances_rise_and_ends_are_finite(four):
     assert float(four.source_strength(jnp.float32(0.5))) == 0.0
 
 
-@pytest.mark.parametrize("count", [2, 6])
+@pytest.mark.parametrize("count", [3, pytest.param(8, marks=pytest.mark.slow)])
 def test_sampler_inverts_the_cdf(count, normalisation):
-    """At the start of a fit, where two Gaussians are a factor 10 000 apart in variance, Newton has the most to do."""
+    """At the start of a fit, where three Gaussians are factors of 160 apart in variance, Newton has the most to do."""
     law = law_class(count)(Setting(), normalisation, **law_class(count).start())
     xi = np.concatenate([[0.0], np.geomspace(1e-9, 0.5, 100), 1 - np.geomspace(0.49, 1e-12, 100)])
     r = law.sampler.sample(xi, 0.5)
@@ -78,21 +78,25 @@ def test_three_constants_a_gaussian(count, normalisation):
     law = kind(Setting(), normalisation, **kind.start())
     assert isinstance(law, Gaussians)
     assert jax.tree.leaves(law) == list(law.constants().values())
-    assert law_class().__name__ == "Gaussians6"
+    assert law_class() is law_class(6)
 
 
 @pytest.mark.parametrize("count", [0, 9, 2.0, True, "6"])
 def test_other_counts_are_refused(count):
+    law_class(1)  # to a dictionary, True is 1 and 2.0 is 2
+    law_class(2)
     with pytest.raises(InputError, match=r"count must be a number of Gaussians in 1 \.\.\. 8, got"):
         law_class(count)
 
 
 def test_start_spans_the_radii_of_use(normalisation):
-    law = law_class(6)(Setting(), normalisation, **law_class(6).start())
+    """At white; the fits that are shipped start at constants of their own."""
+    law = law_class(5)(Setting(), normalisation, **law_class(5).start())
     with jax.enable_x64(True):
-        variances = np.asarray(law.variances(jnp.asarray(0.3)))
-    np.testing.assert_allclose(np.sqrt(variances[[0, -1]]), [0.05, 5.0], rtol=1e-12)
-    np.testing.assert_allclose(np.diff(np.log(variances)), np.log(1e4) / 5, rtol=1e-12)
+        variances = np.asarray(law.variances(jnp.asarray(1.0)))
+    np.testing.assert_allclose(np.sqrt(variances[[0, -1]]), [0.05, 8.0], rtol=1e-12)
+    np.testing.assert_allclose(np.diff(np.log(variances)), np.log(160.0**2) / 4, rtol=1e-12)
+    assert law_class(4).start().items() >= {"f1": -6.0, "v4": 2.1, "w41": -0.1}.items()
 
 
 @pytest.mark.slow

@@ -1,0 +1,174 @@
+"""Every law on one axis: how far each is from the exact half space, by albedo; maps and samplers likewise."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import chain, groupby
+from pathlib import Path
+
+import numpy as np
+from rich.console import RenderableType
+from rich.text import Text
+
+from mcml_sim.setting import Setting
+from profilefit.quality import Quality
+from profilefit.report.all_laws import (
+    ALBEDOS,
+    Floats,
+    MeasuredSampler,
+    Named,
+    Records,
+    albedo_laws,
+    for_each,
+    measured_map,
+    measured_profile,
+    measured_samplers,
+    profile_laws,
+    sampled_laws,
+)
+from profilefit.report.columns import column_table
+from profilefit.report.digits import significant
+from profilefit.report.markdown import markdown_table
+from profilefit.report.quality_tables import ALBEDO_MEASURES, ROWS, albedo_number, worst
+from profilefit.report.sampler_tables import CAPTION, COLUMNS, sampler_number, sampler_tables
+
+PERCENT, BILLIONTHS = 100.0, 1e9
+# Measure: what it is, and in what unit eleven columns of it fit a line.
+MEASURES: Mapping[str, tuple[str, float]] = {
+    "rel": ("mean |law / exact - 1| of R_d [%]", PERCENT),
+    "ks": ("max |cdf - exact cdf| [%]", PERCENT),
+    "l1": ("share of misplaced energy [%]", PERCENT),
+    "mse": ("mean square error of r R_d [1e-9 / mfp²]", BILLIONTHS),
+    "r2": ("of r R_d", 1.0),
+}
+MAP_HEADERS = ("δA", "δα", "√(1-α)", "rises", "α(1)", "fold")
+NOTHING = "None of these records holds a law that can be measured against the exact half space."
+
+
+def every_law(
+    folder: Path, records: Records = None, alpha: Floats = ALBEDOS, sampled_alpha: Sequence[float] | None = None
+) -> Iterator[RenderableType]:
+    """Profiles by setting, a table a measure; then maps; then samplers: as they are measured.
+
+    records  restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
+    """
+    profiles, maps, sampled = (find(folder, records) for find in (profile_laws, albedo_laws, sampled_laws))
+    for setting, laws in _by_setting(profiles):
+        qualities = for_each(lambda one: measured_profile(one, alpha), laws)
+        measured = dict(zip((one.label for one in laws), qualities, strict=True))
+        for measure in MEASURES:
+            yield _profile_table(measure, setting, measured)
+    if maps:
+        yield _map_table(maps)
+    for setting, laws in _by_setting(sampled):
+        samplers = list(chain.from_iterable(for_each(lambda one: measured_samplers(one, sampled_alpha), laws)))
+        yield _sampler_table(setting, samplers)
+        if records is not None:
+            yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
+    if not (profiles or maps or sampled):
+        yield Text(NOTHING)
+
+
+def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
+    """Tables of a README that are measured, not read from records, by the names of their marks."""
+
+    def laws() -> str:
+        found = profile_laws(folder)
+        return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
+
+    def samplers() -> str:
+        return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder)))))
+
+    return {"laws": laws, "samplers": samplers}
+
+
+def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
+    """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
+    header = ("law", "constants", "light", "number", *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")))
+    rows = [
+        (
+            one.name,
+            one.constants or "none",
+            one.setting.illumination,
+            str(len(one.law.constant_names())),
+            *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
+        )
+        for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
+    ]
+    return markdown_table(header, rows)
+
+
+def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
+    """A line a sampler, each measure at its worst albedo."""
+    header = ("law", "constants", "light", "sampler", *_sampler_headers())
+    rows = [
+        (s.of.name, s.of.constants or "none", s.of.setting.illumination, s.name, *_sampler_cells(s))
+        for s in sorted(measured, key=lambda s: _order(s.of.setting))
+    ]
+    return markdown_table(header, rows)
+
+
+def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
+    alpha = next(iter(measured.values())).alpha
+    rows = np.unique(np.linspace(0, alpha.size - 1, ROWS).round().astype(int))
+    values = [getattr(quality, measure) for quality in measured.values()]
+    columns: dict[str, list[str]] = {"law": list(measured)}
+    for i in rows:
+        columns[f"{alpha[i]:.3f}"] = [_number(measure, float(row[i])) for row in values]
+    columns["mean"] = [_number(measure, float(np.mean(row))) for row in values]
+    columns["worst"] = [_number(measure, worst(measure, row)) for row in values]
+    title = f"{measure}: {MEASURES[measure][0]}, by α; {setting}"
+    caption = f"mean and worst over {alpha.size} albedos" if measure == "rel" else ""
+    return column_table(title, columns, caption, fold=("law",))
+
+
+def _map_table(maps: Sequence[Named]) -> RenderableType:
+    qualities = for_each(measured_map, maps)
+    columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
+    for header, measure in zip(MAP_HEADERS, ALBEDO_MEASURES, strict=True):
+        columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
+    columns["α(0)"] = [albedo_number("at_one", one.law.alpha(0.0)) for one in maps]
+    caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
+    return column_table("Maps between A and α", columns, caption, left=("light",), fold=("map",))
+
+
+def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
+    columns: dict[str, list[str]] = {"law: sampler": [_sampler_label(one) for one in samplers]}
+    cells = [_sampler_cells(one) for one in samplers]
+    for i, header in enumerate(_sampler_headers("\n")):
+        columns[header] = [row[i] for row in cells]
+    caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
+    return column_table(f"Samplers, {setting}", columns, caption, fold=("law: sampler",))
+
+
+def _sampler_headers(space: str = " ") -> list[str]:
+    return ["exact", *(header.replace("\n", space) for header in COLUMNS)]
+
+
+def _sampler_cells(one: MeasuredSampler) -> list[str]:
+    measures = [one.exact_error, *(getattr(one.quality, measure) for measure in COLUMNS.values())]
+    return [sampler_number(float(values[np.argmax(np.abs(values))])) for values in measures]
+
+
+def _sampler_label(one: MeasuredSampler) -> str:
+    return f"{one.of.label}: {one.name}"
+
+
+def _number(measure: str, value: float) -> str:
+    """A value in the measure's unit, in few characters."""
+    value *= MEASURES[measure][1]
+    if measure == "r2":
+        return f"{value:.3f}" if value > -1.0 else f"{value:.1f}"
+    if value < 0.1:
+        return f"{value:.3f}" if measure != "mse" else f"{value:.2f}"
+    return f"{value:.0f}" if value >= 100.0 else significant(value)
+
+
+def _by_setting(laws: Sequence[Named]) -> list[tuple[Setting, list[Named]]]:
+    ordered = sorted(laws, key=lambda one: _order(one.setting))
+    return [(setting, list(group)) for setting, group in groupby(ordered, key=lambda one: one.setting)]
+
+
+def _order(setting: Setting) -> tuple[bool, float, float]:
+    """Searchlight first."""
+    return setting.illumination != Setting().illumination, setting.n, setting.g

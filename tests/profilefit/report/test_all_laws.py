@@ -1,0 +1,121 @@
+"""Every law that loads, once, under its own light; and the tables that say how good each is."""
+
+import io
+import json
+import shutil
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from mcml_sim import exact
+from profilefit import catalogue
+from profilefit.quality import profile_quality
+from profilefit.report.all_laws import (
+    albedo_laws,
+    for_each,
+    measured_profile,
+    measured_samplers,
+    profile_laws,
+    sampled_laws,
+)
+from profilefit.report.law_tables import NOTHING, every_law, markdown_laws, markdown_samplers
+
+FITS = catalogue.fits_folder()
+ALPHA = np.array([0.3, 0.9])
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """A folder with two records."""
+    for name in ("burley-whole", "albedo-rational"):
+        shutil.copy(FITS / f"{name}.json", tmp_path)
+    return tmp_path
+
+
+def printed(parts) -> list[str]:
+    console = Console(width=100, file=io.StringIO(), highlight=False, color_system=None)
+    for part in parts:
+        console.print(part)
+    return console.file.getvalue().splitlines()
+
+
+def test_every_law_is_there_once():
+    labels = [one.label for one in profile_laws(FITS)]
+    assert len(set(labels)) == len(labels)
+    assert set(labels) >= {"liang, corrected", "burley, diffuse", "burley_diffuse_mfp, published", "beam_diffusion"}
+    assert set(labels) >= {"liang-whole", "liang-as-published", "gaussians-2", "gaussians-6", "burley-whole-diffuse"}
+    assert "liang-inverse-whole" not in labels, "an inverse has no profile of its own"
+    assert "liang-inverse-as-published" in {one.label for one in sampled_laws(FITS)}
+    maps = {one.label for one in albedo_laws(FITS)}
+    assert maps >= {"liang, published", "van_de_hulst, published", "chiang, published", "albedo-rational-diffuse"}
+    assert not any("-n1" in label for label in (*labels, *maps)), "no exact profile to measure them against"
+
+
+def test_a_law_is_made_of_all_its_records():
+    [law] = [one for one in profile_laws(FITS) if one.label == "liang-whole"]
+    assert law.records == ("liang-whole", "liang-inverse-whole")
+    assert law.law == catalogue.load("liang")
+
+
+def test_records_restrict_and_a_failed_one_has_no_law(folder):
+    assert [one.label for one in profile_laws(folder, ["burley-whole"])] == ["burley-whole"]
+    assert [one.label for one in albedo_laws(folder, ["burley-whole"])] == []
+    assert "gaussians-2" not in {one.label for one in profile_laws(folder)}, "not in this folder"
+    path = folder / "burley-whole.json"
+    content = json.loads(path.read_text())
+    content["fit"]["result"] = "no convergence"
+    path.write_text(json.dumps(content))
+    assert profile_laws(folder, ["burley-whole"]) == []
+    assert printed(every_law(folder, ["burley-whole"])) == [NOTHING]
+
+
+def test_tables_of_one_record(folder):
+    """What is printed is what was measured."""
+    lines = printed(every_law(folder, ["burley-whole"], ALPHA, [0.9]))
+    law = catalogue.load("burley")
+    quality = profile_quality(law, ALPHA)
+    rows = [line.split()[1:] for line in lines if line.startswith("burley-whole ")]
+    expected = [100 * quality.rel, 100 * quality.ks, 100 * quality.l1, 1e9 * quality.mse, quality.r2]
+    assert len(rows) == len(expected)
+    for row, values in zip(rows, expected, strict=True):
+        last = values.min() if values is quality.r2 else values.max()
+        np.testing.assert_allclose(np.array(row, float), [*values, values.mean(), last], rtol=0.06)
+    assert max(map(len, lines)) <= 100
+    assert sum(line.startswith("burley-whole: ") for line in lines) == 3  # its samplers
+    assert "Sampler: burley-whole: xie" in lines
+
+
+def test_samplers_are_held_against_the_exact_cdf(folder):
+    [one] = profile_laws(folder, ["burley-whole"])
+    exactly, xie, _ = measured_samplers(one, [0.9])
+    assert (exactly.name, xie.name) == ("exact", "xie")
+    r = np.geomspace(1e-3, 40, 4000)
+    error = np.max(np.abs(exact.cdf(r, 0.9) - one.law.cdf(r, 0.9)))
+    assert exactly.exact_error[0] == pytest.approx(error, rel=1e-3)
+    assert xie.quality.inversion_error[0] > 100 * exactly.quality.inversion_error[0]
+
+
+def test_markdown_has_a_line_a_law(folder):
+    laws = profile_laws(folder, ["burley-whole"])
+    [quality] = for_each(lambda one: measured_profile(one, ALPHA), laws)
+    header, _, row = (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in markdown_laws([(laws[0], quality)]).splitlines()
+    )
+    cells = dict(zip(header, row, strict=True))
+    assert (cells["law"], cells["constants"], cells["light"], cells["number"]) == (
+        *("burley", "burley-whole", "searchlight", "4"),
+    )
+    assert float(cells["rel mean"]) == pytest.approx(quality.rel.mean(), rel=0.06)
+    assert float(cells["ks worst"]) == pytest.approx(quality.ks.max(), rel=0.06)
+    table = markdown_samplers(measured_samplers(laws[0], [0.9])).splitlines()
+    assert [line.split("|")[4].strip() for line in table[2:]] == ["exact", "xie", "unreal"]
+
+
+def test_maps_under_their_own_light(folder):
+    lines = printed(every_law(folder, ["albedo-rational"]))
+    [row] = [line.split() for line in lines if line.startswith("albedo-rational ")]
+    assert row[1] == "searchlight"
+    assert float(row[2]) < 5e-6
+    assert row[5:] == ["yes", "1", "nowhere", "0"]
