@@ -7,10 +7,10 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim import single
 from mcml_sim.setting import Setting
-from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.base import Sampler
 from profilefit.laws.decay import decay_rate
+from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.hazard_curve import Shape, cumulative, density, radius, radius_at
 from profilefit.laws.rational import Rational
 
@@ -20,7 +20,7 @@ NEAR_SOURCE = 1e-9
 LEAST_B = 1e-4
 
 
-class Hazard(ProfileLaw):
+class Hazard(EscapeLaw):
     """2 pi x R_d = A S lambda,   S = 1 - cdf = e^{-kappa x - w h V(x/h)} (1 + c x) / (1 + a x + b x^2),   x = r/l
 
     V(z) = z - z^2 ln(1 + 1/z)
@@ -57,7 +57,7 @@ class Hazard(ProfileLaw):
 
     def shape(self, alpha) -> Shape:
         """Everything that depends on alpha only: once a material, or once a pixel where A is a texture."""
-        source = single.source_strength(self.setting) * self.albedo.albedo_over_reflectance(alpha)
+        source = self.source_hazard(alpha)
         kappa = decay_rate(alpha)
         h = jnp.exp(self.h0 + self.h1 * source + self.h2 * kappa)
         a = self.a0 + source * (self.a1 + source * self.a2)
@@ -65,24 +65,12 @@ class Hazard(ProfileLaw):
         c = (self.c0 + self.c1 * source + self.c2 * kappa) ** 2
         return Shape(self.albedo.reflectance(alpha), kappa, source, source - kappa - a + c, h, a, b, c)
 
-    def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        shape = self.shape(alpha)
-        near = jnp.maximum(x, jnp.finfo(jnp.result_type(x, float)).tiny)
-        value = shape.reflectance * density(near, shape) / (2.0 * jnp.pi * near)
-        return jnp.where((x > 0) | (alpha == 0), value, jnp.inf)
-
     def scaled_density(self, x: Array, alpha: Array) -> Array:
-        """2 pi x R_d / A [1/mfp], finite at x = 0."""
         return density(x, self.shape(alpha))
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        return jnp.where(x < jnp.inf, -jnp.expm1(-cumulative(x, self.shape(alpha))), 1.0)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.albedo.reflectance(alpha) * self.scaled_cdf(x, alpha)
-
-    def source_strength(self, alpha: Array) -> Array:
-        return single.source_strength(self.setting) * alpha
+        share = -jnp.expm1(-cumulative(x, self.shape(alpha)))
+        return jnp.where(x > 0, jnp.where(x < jnp.inf, share, 1.0), 0.0)
 
     @property
     def sampler(self) -> HazardSampler:

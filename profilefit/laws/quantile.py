@@ -12,10 +12,10 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim import single
 from mcml_sim.setting import Setting
-from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.base import Sampler
 from profilefit.laws.decay import decay_rate
+from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.rational import Rational
@@ -41,7 +41,7 @@ class Curve(NamedTuple):
     c: Array
 
 
-class Quantile(ProfileLaw):
+class Quantile(EscapeLaw):
     """r/l at the share xi of the energy: a rational function of t = -ln(1 - xi)
 
     x = t M / (kappa M + lambda_0 - kappa),   M = 1 + a t + b t / (1 + 2.5 t) + c t^2 / (1 + 0.7 kappa t)
@@ -76,7 +76,7 @@ class Quantile(ProfileLaw):
 
     def curve(self, alpha) -> Curve:
         """Everything that depends on alpha only: once a material, or once a pixel where A is a texture."""
-        source = single.source_strength(self.setting) * self.albedo.albedo_over_reflectance(alpha)
+        source = self.source_hazard(alpha)
         kappa = decay_rate(alpha)
         y = 1.0 / source
         w = (1.0 - kappa * y) ** -2
@@ -88,21 +88,13 @@ class Quantile(ProfileLaw):
             y * y * (y * (self.c0 + self.c1 * w) + self.c2 * w**3),
         )
 
-    def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        near = jnp.maximum(x, jnp.finfo(jnp.result_type(x, float)).tiny)
-        value = self.albedo.reflectance(alpha) * self.sampler.scaled_pdf(near, alpha) / (2.0 * jnp.pi * near)
-        return jnp.where((x > 0) | (alpha == 0), value, jnp.inf)
+    def scaled_density(self, x: Array, alpha: Array) -> Array:
+        return self.sampler.scaled_pdf(x, alpha)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = jnp.broadcast_arrays(x, alpha)
         share = -jnp.expm1(-depth(x, self.curve(alpha)))
         return jnp.where(x > 0, jnp.where(x < jnp.inf, share, 1.0), 0.0)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.albedo.reflectance(alpha) * self.scaled_cdf(x, alpha)
-
-    def source_strength(self, alpha: Array) -> Array:
-        return single.source_strength(self.setting) * alpha
 
     @property
     def sampler(self) -> QuantileSampler:

@@ -103,6 +103,7 @@ ORDER = {
         "base",
         "rational",
         "decay",
+        "escape",
         "hazard_curve",
         "hazard",
         "liang_albedo",

@@ -48,7 +48,7 @@ def test_decay_rate_holds_for_any_constants():
 
 
 def test_the_profile_is_the_slope_of_the_cdf(law):
-    r = np.geomspace(1e-3, 20, 60)
+    r = np.geomspace(1e-3, 5, 60)  # farther out the cdf has no digits left to take differences of
     step = 1e-5 * r
     for alpha in (0.2, 0.9, 1.0):
         slope = (law.cdf(r + step, alpha) - law.cdf(r - step, alpha)) / (2 * step)
@@ -57,8 +57,8 @@ def test_the_profile_is_the_slope_of_the_cdf(law):
 
 
 def test_scales_with_the_mean_free_path(law):
-    np.testing.assert_allclose(law.profile(R, 0.8, 2.5), law.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-12)
-    np.testing.assert_allclose(law.cdf(R, 0.8, 2.5), law.cdf(R / 2.5, 0.8), rtol=1e-12)
+    np.testing.assert_allclose(law.profile(R, 0.8, 2.5), law.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-10)
+    np.testing.assert_allclose(law.cdf(R, 0.8, 2.5), law.cdf(R / 2.5, 0.8), rtol=1e-10)
 
 
 def test_ends_are_finite_and_right(law):
@@ -76,14 +76,14 @@ def test_ends_are_finite_and_right(law):
 
 
 def test_monotone_in_radius_and_albedo(law):
-    """Up to alpha = 1 - 1e-6: nearer to white it may fall by a few parts in a million."""
-    alpha = np.unique(np.concatenate([ALPHA, 1 - np.geomspace(1e-6, 0.1, 30)]))
-    alpha = alpha[alpha <= 1 - 1e-6]
+    """In alpha up to 1 - 1e-5: nearer to white it may fall by a millionth."""
+    alpha = np.unique(np.concatenate([ALPHA, 1 - np.geomspace(1e-5, 0.1, 30)]))
+    alpha = alpha[alpha <= 1 - 1e-5]
     profile = law.profile(R, alpha[:, None])
     assert np.all(np.diff(profile[1:], axis=1) < 0)
     assert np.all(np.diff(profile, axis=0) > 0)
     to_white = np.log(law.profile(R, 1.0) / law.profile(R, alpha[-1]))
-    assert np.min(to_white) > -1e-5
+    assert np.min(to_white) > -1e-6
     cdf = law.cdf(R, alpha[:, None])
     assert np.all(np.diff(cdf, axis=1) >= 0)
     assert np.all(np.diff(cdf, axis=0) <= 0)
