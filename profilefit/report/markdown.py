@@ -127,7 +127,7 @@ def fill(text: str, tables: Mapping[str, str]) -> str:
 def _profile_quality(records: Mapping[str, Content]) -> str:
     header = ("record", "constants", *(f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst")))
     rows = [
-        (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values[key])))
+        (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values.get(key))))
         for owner, which, values in _measured(records, "rel")
     ]
     return markdown_table(header, rows) if rows else ""
@@ -166,6 +166,8 @@ def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, s
 
 
 def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
+    if values is None:  # photons do not say it
+        return ABSENT, ABSENT
     return _number(measure, float(np.mean(values))), _number(measure, worst(measure, values))
 
 
