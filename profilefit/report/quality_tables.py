@@ -12,6 +12,7 @@ from profilefit.report.content import Content, converged, measured_sets, measure
 from profilefit.report.digits import on_the_point, significant
 
 SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
+FEW_DIGITS = 0.01  # below it three decimals say too little
 ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
 # Measures by the table they stand in; for r2 the smallest is the worst.
 TABLES = (
@@ -113,7 +114,9 @@ def albedo_number(measure: str, value: Any) -> str:
 def _number(measure: str, value: float) -> str:
     if measure.startswith("mse"):
         return f"{value:.1e}"
-    return f"{value:.4f}" if measure.startswith("r2") else f"{value:.3f}"
+    if measure.startswith("r2"):
+        return f"{value:.4f}"
+    return f"{value:.3f}" if value >= FEW_DIGITS else significant(value)
 
 
 def _failed(content: Content) -> str:
