@@ -24,6 +24,10 @@ Line = tuple[str, RenderableType]
 KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
 
 
+# Relative: two misfits no further apart are one optimum's.
+SAME_COST = 1e-6
+
+
 def summary(records: Mapping[str, Content]) -> Table:
     """One line a record: what was fitted to what, whether it worked, and the worst error before and after."""
     table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
@@ -131,7 +135,27 @@ def fit_facts(content: Content) -> RenderableType:
             f"{left['rings']} rings and {left['albedos']} albedos left out: too few photons for an error of their own"
         )
         lines.append(("data", told))
-    return _facts("Fit", lines)
+    return _facts("Fit", lines + _second_opinions(content))
+
+
+def _second_opinions(content: Content) -> list[Line]:
+    """What random starts found, and whether photons give the same constants as the exact profile."""
+    lines: list[Line] = []
+    if tried := content.get("starts"):
+        best = round(tried["share_best"] * tried["count"])
+        lines.append(("random starts", f"{best} of {tried['count']} reach the best optimum"))
+        for other in tried["outcomes"]:
+            ratio = other["cost_ratio"]
+            if ratio is None or ratio > 1 + SAME_COST:
+                cost = "" if ratio is None else f"misfit {significant(ratio)} times the best: "
+                lines.append(("", f"{other['count']}: {cost}{other['result'].split(':')[0]}"))
+    if check := content.get("crosscheck"):
+        lines.append(("photons", check["result"]))
+        facts = (
+            f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions, chance {significant(check['chance'])}"
+        )
+        lines.append(("", f"{facts}, {check['photons']:.2g} photons"))
+    return lines
 
 
 def stage_tables(stages: Content) -> list[RenderableType]:

@@ -172,3 +172,18 @@ def test_decimal_points_stand_in_one_column():
 def test_an_interval_has_two_digits_of_its_half_width():
     assert digits.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
     assert digits.interval(None) == "–"
+
+
+def test_second_opinions_are_told():
+    """How many random starts reach the best optimum, and whether photons agree with the exact profile."""
+    content = RECORDS["hazard"]
+    text = " ".join(rendered([tables.fit_facts(content)], 100).split())
+    tried, check = content["starts"], content["crosscheck"]
+    best = round(tried["share_best"] * tried["count"])
+    assert f"{best} of {tried['count']} reach the best optimum" in text
+    others = [o["count"] for o in tried["outcomes"] if o["cost_ratio"] is None or o["cost_ratio"] > 1 + 1e-6]
+    assert sum(others) == tried["count"] - best
+    assert all(f"{count}: " in text for count in others)
+    assert f"photons {check['result']}" in text
+    assert f"in {check['rank']} directions" in text
+    assert "random starts" not in rendered([tables.fit_facts(RECORDS["hazard-n1.4"])], 100)
