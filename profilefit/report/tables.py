@@ -17,15 +17,12 @@ from profilefit.report.content import ERRORS, Content, converged, largest_error
 from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
 from profilefit.report.evidence_tables import evidence_line, evidence_tables
 from profilefit.report.quality_tables import quality_tables, worst_lines
+from profilefit.starts import SAME_COST
 
 __all__ = ["constants_table", "record_tables", "summary"]
 
 Line = tuple[str, RenderableType]
 KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
-
-
-# Relative: two misfits no further apart are one optimum's.
-SAME_COST = 1e-6
 
 
 def summary(records: Mapping[str, Content]) -> Table:

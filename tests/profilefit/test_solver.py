@@ -119,5 +119,4 @@ def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
     def residual(p, data):
         return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
 
-    result = solve(residual, [1.0], np.zeros(2)).result
-    assert "stalled" in result or "not finite" in result
+    assert "stalled beside an optimum" in solve(residual, [1.0], np.zeros(2)).result
