@@ -9,7 +9,7 @@ PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile
 ARGS ?=
 
 .DEFAULT_GOAL := help
-.PHONY: help fits readme test test-all benchmark lint format wheel clean
+.PHONY: help fits readme test test-all benchmark opengl lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
@@ -21,15 +21,18 @@ fits: $(VENV)/.installed  ## simulate, fit every recipe, write the records and t
 readme: fits  ## make fits, and put its tables into the README
 	$(VENV)/bin/profilefit report --fits fits --markdown README.md
 
-test: lint  ## what CI runs: lint, and all tests but the slow ones
+test: lint opengl  ## what CI runs: lint, and all tests but the slow ones
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-all: lint  ## lint, and all tests
+test-all: lint opengl  ## lint, and all tests
 	$(PYTEST) $(ARGS)
 
 benchmark: $(VENV)/.installed-test  ## speed and accuracy of the tracer, over scalar tracers, in one run
 	@$(PIP) install --editable '.[benchmark]'
 	$(PY) benchmarks/tracer.py $(ARGS)
+
+opengl: $(VENV)/.installed  ## a software OpenGL and an HLSL compiler, as root on Debian; elsewhere tests that need them are skipped
+	@sh -c "$$FIND_OPENGL"
 
 lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
 	$(PY) -m ruff check
@@ -88,3 +91,24 @@ echo "creating $(VENV) with $$python"
 "$$python" -m venv --clear $(VENV)
 endef
 export CREATE_VENV
+
+# libEGL with a rasteriser behind it, without which the shader's tests are skipped by name, as is HLSL's without a compiler.
+define FIND_OPENGL
+set -eu
+packages=
+if ! $(PY) -c 'import moderngl; moderngl.create_context(standalone=True, backend="egl", require=330)' >/dev/null 2>&1; then
+    packages=" libegl1 libgl1 libgl1-mesa-dri"
+fi
+if ! command -v glslangValidator >/dev/null; then packages="$$packages glslang-tools"; fi
+if [ -z "$$packages" ]; then exit 0; fi
+if [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
+    echo "tests of the shader will be skipped where they need what is missing (Debian:$$packages)" >&2
+    exit 0
+fi
+echo "installing with apt-get, for the tests of the shader:$$packages"
+export DEBIAN_FRONTEND=noninteractive
+if ! { apt-get -qq update && apt-get -qq -y --no-install-recommends install $$packages >/dev/null; }; then
+    echo "apt-get failed: tests of the shader will be skipped where they need what is missing" >&2
+fi
+endef
+export FIND_OPENGL

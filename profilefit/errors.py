@@ -2,7 +2,7 @@
 
 from mcml_sim.errors import InputError, OutputError, SettingError, StoreError
 
-__all__ = ["InputError", "OutputError", "RecipeError", "RecordError", "SettingError", "StoreError"]
+__all__ = ["InputError", "OutputError", "RecipeError", "RecordError", "SettingError", "ShaderError", "StoreError"]
 
 
 class RecipeError(InputError):
@@ -11,3 +11,7 @@ class RecipeError(InputError):
 
 class RecordError(InputError):
     """A record that is missing, malformed or belongs to something else."""
+
+
+class ShaderError(Exception):
+    """A shader that does not compile, an OpenGL error, or no OpenGL at all."""

@@ -1,4 +1,4 @@
-"""profilefit on the command line: `regenerate` makes records, `report` shows them, `convert` changes conventions."""
+"""profilefit on the command line: one file a subcommand, and what any of them says when it fails."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from rich.console import Console
 
 from mcml_sim import __version__
 from profilefit.cli.convert import convert
+from profilefit.cli.export import export
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
 from profilefit.errors import InputError, OutputError, StoreError
@@ -29,6 +30,7 @@ app = typer.Typer(
 app.command()(regenerate)
 app.command()(report)
 app.command()(convert)
+app.command()(export)
 
 
 def _show_version(wanted: bool) -> None:

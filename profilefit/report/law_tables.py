@@ -11,20 +11,16 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.setting import Setting
+from profilefit.inventory import Named, Records, albedo_laws, profile_laws, sampled_laws
 from profilefit.quality import Quality
 from profilefit.report.all_laws import (
     ALBEDOS,
     Floats,
     MeasuredSampler,
-    Named,
-    Records,
-    albedo_laws,
     for_each,
     measured_map,
     measured_profile,
     measured_samplers,
-    profile_laws,
-    sampled_laws,
 )
 from profilefit.report.columns import column_table
 from profilefit.report.digits import significant

@@ -3,8 +3,9 @@
 from pathlib import Path
 
 from profilefit import record
+from profilefit.inventory import profile_laws
 from profilefit.report import fill, sections
-from profilefit.report.all_laws import measured_profile, profile_laws
+from profilefit.report.all_laws import measured_profile
 from profilefit.report.law_tables import markdown_laws
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -12,7 +12,6 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit import catalogue
-from profilefit.cli import main
 
 RECIPE = """
 title = "A small one"
@@ -29,21 +28,6 @@ count = 9
 [weighting]
 objective = "albedo"
 """
-
-
-@pytest.fixture
-def command(monkeypatch, capsys, tmp_path):
-    """Run `profilefit WORDS` in an empty folder; the exit status and what it printed on stdout and stderr."""
-    monkeypatch.chdir(tmp_path)
-
-    def run(*words: str) -> tuple[int, str, str]:
-        monkeypatch.setattr(sys, "argv", ["profilefit", *words])
-        with pytest.raises(SystemExit) as stop:
-            main()
-        printed = capsys.readouterr()
-        return int(stop.value.code or 0), printed.out, printed.err
-
-    return run
 
 
 @pytest.fixture

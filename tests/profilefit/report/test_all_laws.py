@@ -10,15 +10,9 @@ from rich.console import Console
 
 from mcml_sim import exact
 from profilefit import catalogue
+from profilefit.inventory import albedo_laws, profile_laws, sampled_laws
 from profilefit.quality import profile_quality
-from profilefit.report.all_laws import (
-    albedo_laws,
-    for_each,
-    measured_profile,
-    measured_samplers,
-    profile_laws,
-    sampled_laws,
-)
+from profilefit.report.all_laws import for_each, measured_profile, measured_samplers
 from profilefit.report.law_tables import NOTHING, every_law, markdown_laws, markdown_samplers
 
 FITS = catalogue.fits_folder()

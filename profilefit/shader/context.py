@@ -1,0 +1,83 @@
+"""Headless OpenGL: a context without a window, programs whose errors can be read, and no silent OpenGL error."""
+
+from __future__ import annotations
+
+import re
+import sys
+from typing import Any
+
+import moderngl
+
+from profilefit.errors import ShaderError
+
+OPENGL = 330  # 3.3 core, of 2010: float targets, many of them at once, and nothing more is needed
+# Through a window-less EGL on Linux; elsewhere what the system itself offers without a window.
+BACKEND: dict[str, Any] = {"backend": "egl"} if sys.platform == "linux" else {}
+PACKAGES = "libegl1 libgl1 libgl1-mesa-dri"  # Debian's: the libraries, and a software rasteriser behind them
+FULL_SCREEN = """
+out vec2 where;
+void main() {
+    where = vec2(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0);
+    gl_Position = vec4(where, 0.0, 1.0);
+}
+"""
+# Where a driver names a line: "0:12(5): error" (Mesa), "0(12) : error" (NVIDIA), "ERROR: 0:12:" (Apple, ANGLE).
+PLACE = re.compile(r"\b0[:(](\d+)")
+
+
+def open_context() -> moderngl.Context:
+    """A context of its own that draws into textures. ShaderError, one line, where a library or a driver is missing."""
+    try:
+        return moderngl.create_context(standalone=True, require=OPENGL, **BACKEND)
+    except Exception as error:  # glcontext and moderngl raise bare Exceptions
+        raise ShaderError(_missing(str(error))) from None
+
+
+def program(
+    context: moderngl.Context, name: str, fragment: str, vertex: str | None = None, **more: Any
+) -> moderngl.Program:
+    """A compiled program; ShaderError with the shader's name, the offending line and the driver's message.
+
+    vertex  by default a triangle over the whole target, with `where` in [-1, 1]^2, in the fragment's own version
+    """
+    vertex = vertex or fragment.partition("\n")[0] + FULL_SCREEN
+    try:
+        return context.program(vertex_shader=vertex, fragment_shader=fragment, **more)
+    except moderngl.Error as error:
+        message = str(error)
+        source = vertex if "vertex_shader" in message else fragment
+        raise ShaderError(_located(name, source, message)) from None
+
+
+def full_screen(context: moderngl.Context, program: moderngl.Program) -> moderngl.VertexArray:
+    """One triangle over the whole target: `.render(moderngl.TRIANGLES, vertices=3)`."""
+    return context.vertex_array(program, [])
+
+
+def check_errors(context: moderngl.Context, where: str) -> None:
+    """ShaderError if OpenGL has an error to tell; asking forgets it."""
+    error = context.error
+    if error != "GL_NO_ERROR":
+        raise ShaderError(f"OpenGL error {error} in {where} ({renderer(context)})")
+
+
+def renderer(context: moderngl.Context) -> str:
+    """The device and its driver, in words."""
+    return f"{context.info['GL_RENDERER']}, OpenGL {context.info['GL_VERSION']}"
+
+
+def _missing(message: str) -> str:
+    library = re.search(r"lib[\w-]+\.so[.\d]*", message)
+    what = f"{library.group()} is missing" if library else "no driver answers"
+    needed = f"{OPENGL // 100}.{OPENGL // 10 % 10}"
+    return f"no OpenGL {needed} without a window: {what} ({message.strip()}); on Debian apt-get install {PACKAGES}"
+
+
+def _located(name: str, source: str, message: str) -> str:
+    told = [line.strip() for line in message.splitlines() if PLACE.search(line)] or [message.strip().splitlines()[-1]]
+    number = PLACE.search(told[0])
+    lines = source.splitlines()
+    if number is None or not 0 < int(number.group(1)) <= len(lines):
+        return f"shader {name!r} does not compile: {told[0]}"
+    line = int(number.group(1))
+    return f"shader {name!r} does not compile, line {line}, `{lines[line - 1].strip()}`: {told[0]}"

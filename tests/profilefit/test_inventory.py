@@ -1,0 +1,52 @@
+"""A law by the name that a user has for it."""
+
+import pytest
+
+from mcml_sim import Setting
+from profilefit import catalogue
+from profilefit.errors import InputError, RecordError
+from profilefit.inventory import albedo_laws, find, profile_laws, sampled_laws
+from profilefit.laws.base import AlbedoLaw
+
+FITS = catalogue.fits_folder()
+
+
+@pytest.mark.parametrize(
+    ("name", "constants", "law", "setting", "records"),
+    [
+        ("hazard-diffuse-n1.4", None, "hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-n1.4",)),
+        ("liang-whole", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
+        ("liang-as-published", None, "liang", Setting(), ("liang-as-published",)),
+        ("albedo-rational-n1.3", None, "rational", Setting(n=1.3), ("albedo-rational-n1.3",)),
+        ("liang", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
+        ("gaussians", None, "gaussians:6", Setting(), ("gaussians-6",)),
+        ("burley", "published:diffuse", "burley", Setting("diffuse"), ()),
+        ("dipole", None, "dipole", Setting(), ()),
+    ],
+)
+def test_a_record_or_a_law_by_its_name(name, constants, law, setting, records):
+    found = find(name, FITS, constants)
+    assert (found.name, found.setting, found.records) == (law, setting, records)
+
+
+def test_every_record_of_a_fit_is_found_and_is_what_it_says():
+    for one in [*profile_laws(FITS, matched=False), *sampled_laws(FITS), *albedo_laws(FITS, matched=False)]:
+        for name in one.records:
+            again = find(name, FITS)
+            assert isinstance(again.law, AlbedoLaw) == isinstance(one.law, AlbedoLaw)
+            assert again.setting == one.setting
+
+
+def test_refracting_surfaces_are_left_out_where_the_exact_profile_is_needed():
+    settings = {one.setting for one in profile_laws(FITS)}
+    assert settings == {Setting(), Setting("diffuse")}
+    assert Setting(n=1.4) in {one.setting for one in profile_laws(FITS, matched=False)}
+
+
+def test_what_is_not_there_is_named(tmp_path):
+    with pytest.raises(InputError, match=r"name must be a law or a record, one of liang, .*reproduction, got 'no'"):
+        find("no", FITS)
+    with pytest.raises(RecordError, match=r"'reproduction' holds no law"):
+        find("reproduction", FITS)
+    with pytest.raises(InputError, match=r"constants must be one of regenerated, published, .* got 'mine'"):
+        find("liang", FITS, "mine")
