@@ -7,6 +7,7 @@ that several laws live in one shader. What every law gives is listed in `glsl/RE
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -18,10 +19,20 @@ import numpy as np
 
 from mcml_sim import single
 from profilefit.errors import InputError
+from profilefit.laws import diffusion
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.laws.burley import Burley
+from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.better_dipole import BetterDipole
+from profilefit.laws.burley import Burley, BurleyDiffuseMfp
+from profilefit.laws.chiang import Chiang
+from profilefit.laws.dipole import Dipole
+from profilefit.laws.gaussians import Gaussians
 from profilefit.laws.hazard import Hazard
+from profilefit.laws.liang import Liang
+from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.quantile import Quantile
 from profilefit.laws.rational import Rational
+from profilefit.laws.van_de_hulst import VanDeHulst
 from profilefit.shader.languages import translated
 
 Numbers = dict[str, float]
@@ -29,6 +40,8 @@ TEXTS = "profilefit.shader.glsl"
 PLACEHOLDER = "LAW_"
 # A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before.
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
+# A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
+PREFIX = re.compile(r"(?!gl_|PF_|pf_|LAW\b)[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*")
 DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them, a float32 drops what it cannot hold
 
 
@@ -37,11 +50,13 @@ class Form:
     """How a class of laws becomes text.
 
     file    in `glsl/`; name its prefix, of the instance
-    parts   files that it rests on, in order; extra constants that are not the law's own; count of its `//% for` blocks
+    parts   files that it rests on, before it in order; ends files that rest on it
+    extra   constants that are not the law's own; count of its `//% for` blocks
     """
 
     file: str
     parts: tuple[str, ...] = ("rational",)
+    ends: tuple[str, ...] = ("wrappers",)
     extra: Callable[[Any], Numbers] = lambda law: {}
     count: Callable[[Any], int] = lambda law: 0
 
@@ -51,16 +66,51 @@ def _source(law: Any) -> Numbers:
     return {"source": single.source_strength(law.setting)}
 
 
-FORMS: dict[type[ProfileLaw], Form] = {
-    Hazard: Form("hazard", ("rational", "decay"), _source),
-    Burley: Form("burley", extra=lambda law: {"power": law.power}),
+def _liang(law: Any) -> Numbers:
+    """eps of the inverse [-], its root, and the largest -ln(1 + eps - xi)."""
+    return {"eps": law.eps, "root": law.eps**0.5, "depth": -math.log(law.eps)}
+
+
+def _gaussians(law: Any) -> Numbers:
+    """ln (v_i / v_{i-1}) [-]."""
+    own = law.constants()
+    return {f"rise{i}": math.log1p(math.exp(own[f"v{i}"])) for i in range(2, law.count() + 1)}
+
+
+def _dipole(law: Any) -> Numbers:
+    """The share of the light that enters [-], and the height of the image [mfp]."""
+    return {"entered": law.entered, "image": law.image}
+
+
+def _better_dipole(law: Any) -> Numbers:
+    """The share of the light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
+    c_phi, c_e, mismatch = diffusion.exitance_factors(law.setting.n)
+    return {"entered": law.entered, "c_phi": c_phi, "c_e": c_e, "lift": 4.0 * mismatch}
+
+
+NORMALIZED = ("normalized_diffusion", "wrappers")
+NUMERIC = ("numeric_inverse", "wrappers")
+FORMS: dict[type[Any], Form] = {
+    Hazard: Form("hazard", ("rational", "decay"), extra=_source),
+    Quantile: Form("quantile", ("rational", "decay"), extra=_source),
+    Liang: Form("liang", ("rational", "near_zero"), extra=_liang),
+    Burley: Form("burley", ends=NORMALIZED, extra=lambda law: {"power": law.power}),
+    BurleyDiffuseMfp: Form("burley_diffuse_mfp", ends=NORMALIZED),
+    Gaussians: Form("gaussians", extra=_gaussians, count=lambda law: law.count()),
+    Dipole: Form("dipole", ("near_zero", "diffusion"), NUMERIC, _dipole),
+    BetterDipole: Form("better_dipole", ("near_zero", "diffusion"), NUMERIC, _better_dipole),
 }
-MAPS: dict[type[AlbedoLaw], Form] = {Rational: Form("rational", ())}
+MAPS: dict[type[Any], Form] = {
+    Rational: Form("rational", (), extra=lambda law: {"entered": law.entered}),
+    LiangAlbedo: Form("liang_albedo", (), extra=lambda law: {"fold": law.fold}),
+    VanDeHulst: Form("van_de_hulst", ()),
+    Chiang: Form("chiang", ("near_zero",)),
+}
 
 
 def prefix(law: Constants) -> str:
     """What the names of a law's text begin with, less the underscore."""
-    form = _form(law)
+    form = _form(law, {**FORMS, **MAPS})
     count = form.count(law)
     return f"{form.file}{count}" if count else form.file
 
@@ -75,20 +125,20 @@ def law_text(
     told  a remark for each constant, which stands behind it
     InputError for a law that has no text.
     """
-    form = _form(law)
-    constants = {**_map_constants(law), **form.extra(law), **law.constants()}
-    text = [_read("common"), *(_read(part) for part in form.parts), _read(form.file), _read("wrappers")]
+    form = _form(law, FORMS)
+    map_constants = _map_constants(law) if "rational" in form.parts else {}
+    constants = {**map_constants, **form.extra(law), **law.constants()}
+    text = [_read(part) for part in ("common", *form.parts, form.file, *form.ends)]
     return _filled(text, name or prefix(law), constants, form.count(law), lang, told or {})
 
 
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
     """The map between alpha and A: NAME_alpha(A) and NAME_map_reflectance(alpha); arguments as for `law_text`."""
-    form = _form(law)
+    form = _form(law, MAPS)
     constants = {f"map_{key}": value for key, value in {**form.extra(law), **law.constants()}.items()}
-    if isinstance(law, Rational):
-        constants["map_entered"] = law.entered
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
-    return _filled([_read("common"), _read(form.file)], name or prefix(law), constants, 0, lang, remarks)
+    text = [_read(part) for part in ("common", *form.parts, form.file)]
+    return _filled(text, name or prefix(law), constants, 0, lang, remarks)
 
 
 def stage_text(file: str) -> str:
@@ -96,11 +146,16 @@ def stage_text(file: str) -> str:
     return (resources.files(TEXTS) / "stage" / file).read_text(encoding="utf-8")
 
 
-def _form(law: Constants) -> Form:
-    for kind, form in (*FORMS.items(), *MAPS.items()):
+def _form(law: Constants, known: Mapping[Any, Form]) -> Form:
+    for kind, form in known.items():
         if isinstance(law, kind):
             return form
-    has = ", ".join(kind.__name__ for kind in (*FORMS, *MAPS))
+    if isinstance(law, BeamDiffusion):
+        raise InputError(
+            "law must have a closed form to become a shader, got beam_diffusion: its share within r is a quadrature "
+            "of 20 by 48 nodes; better_dipole is its near relative"
+        )
+    has = ", ".join(kind.__name__ for kind in known)
     raise InputError(f"law must be one that has a shader text ({has}), got {type(law).__name__}")
 
 
@@ -108,7 +163,7 @@ def _map_constants(law: Any) -> Numbers:
     """The constants of the map that normalises the law."""
     albedo = getattr(law, "albedo", None)
     if not isinstance(albedo, Rational):
-        return {}
+        raise InputError(f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}")
     return {"map_entered": albedo.entered, **{f"map_{key}": value for key, value in albedo.constants().items()}}
 
 
@@ -118,6 +173,8 @@ def _read(file: str) -> str:
 
 
 def _filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:
+    if not PREFIX.fullmatch(name):
+        raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
     lines = [_declared(name, key, value, told.get(key, "")) for key, value in constants.items()]
     body = "\n".join([common, "\n".join(lines) + "\n", *rest])
@@ -130,6 +187,8 @@ def _declared(name: str, key: str, value: float, remark: str) -> str:
 
 def literal(value: float) -> str:
     """A number as every shading language reads it: with a point, without a suffix."""
+    if not math.isfinite(value):
+        raise InputError(f"constants of a shader must be finite, got {value!r}")
     return np.format_float_scientific(value, DIGITS - 1, unique=True, trim="0") if _is_extreme(value) else _plain(value)
 
 

@@ -2,7 +2,8 @@
 
 What the text may use, besides comments: `const float NAME = ...;`, structures of floats, functions of floats and
 structures, declarations with a value, assignments, `for (int i = 0; i < N; ++i) {`, return at the end, the functions in
-`NUMPY`, and PF_SELECT for a choice. A line that is none of these is an error here, not a surprise in somebody's engine.
+`NUMPY`, and PF_SELECT for a choice. Numbers have a point, and a condition is one comparison. A line that is
+none of these is an error here, not a surprise in somebody's engine.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ NUMPY = {
     "cos": "np.cos",
     "PF_SELECT": "np.where",
 }
+COMMON = "shader text must keep to what GLSL, HLSL and numpy share"
 PYTHON_HEAD = "import numpy as np\nfrom types import SimpleNamespace\n"
 CALL = re.compile(r"\b(" + "|".join(NUMPY) + r")\(")
 NAME, TYPE = r"[A-Za-z_]\w*", r"(?:float|bool|int)"
@@ -35,7 +37,13 @@ STRUCTURE = re.compile(rf"({NAME}_{NAME}|Pf\w+) ({NAME});$")
 VALUE = re.compile(rf"(?:{NAME} )?({NAME}(?:\.{NAME})?) ([+*/-]?=) (.+);$")
 RETURN = re.compile(r"return (.+);$")
 DEFINE = re.compile(rf"#define ({NAME}) ([\d.e+-]+)$")
-OPERATORS = (("&&", "&"), ("||", "|"))
+# What the three languages read each in its own way, or not at all: whole numbers in a quotient, say.
+FOREIGN = re.compile(r"&&|\|\||[?%!\[\]^~]|(?<![\w.])(?<![\d.]e-)\d+(?![\w.])|\d[fF]\b")
+# Words that HLSL keeps for itself and GLSL does not: a variable of that name gets an underscore.
+HLSL_WORDS = re.compile(
+    r"\b(linear|line|point|sample|triangle|half|texture|pass|matrix|vector|string|register|shared|precise|double)\b"
+)
+CALLED = re.compile(rf"({NAME})\(")
 
 
 def translated(text: str, lang: str) -> str:
@@ -44,9 +52,17 @@ def translated(text: str, lang: str) -> str:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
     if lang == "glsl":
         return text
-    if lang == "hlsl":  # a global constant there would else be a parameter that the application sets
-        return re.sub(r"^const ", "static const ", text, flags=re.MULTILINE)
+    if lang == "hlsl":
+        return "\n".join(_hlsl_line(line) for line in text.split("\n"))
     return PYTHON_HEAD + _python(text)
+
+
+def _hlsl_line(line: str) -> str:
+    code, slashes, comment = line.partition("//")
+    code = HLSL_WORDS.sub(r"\1_", code)
+    if code.startswith("const "):  # would else be a parameter that the application sets
+        code = f"static {code}"
+    return code + slashes + comment
 
 
 def _python(text: str) -> str:
@@ -98,10 +114,12 @@ def _python_line(code: str) -> str:
         return f"{found.group(2)} = SimpleNamespace()"
     if found := VALUE.match(code):
         return f"{found.group(1)} {found.group(2)} {_expression(found.group(3))}"
-    raise InputError(f"shader text must keep to what GLSL, HLSL and numpy share, got {code!r}")
+    raise InputError(f"{COMMON}, got {code!r}")
 
 
 def _expression(code: str) -> str:
-    for common, python in OPERATORS:
-        code = code.replace(common, python)
+    foreign = {found.group() for found in FOREIGN.finditer(code)}
+    foreign |= {name for name in CALLED.findall(code) if name not in NUMPY and "_" not in name}
+    if foreign:
+        raise InputError(f"{COMMON}, got {min(foreign)!r} in {code!r}")
     return CALL.sub(lambda found: NUMPY[found.group(1)] + "(", code)

@@ -100,7 +100,7 @@ float LAW_radius(float xi, LAW_Shape s) {
     return x;
 }
 
-// Density in x of LAW_radius [1/mfp]: the law's own, to 1e-8 after two steps
+// Density in x of LAW_radius [1/mfp]: the law's own, which two steps follow to 1e-5 (relative)
 float LAW_radius_density(float x, LAW_Shape s) {
     return LAW_density(x, s);
 }

@@ -3,7 +3,7 @@
 // R_d [1/length^2]: 2 pi r R_d integrates to A
 float LAW_profile(float r, float alpha, float mfp) {
     LAW_Shape s = LAW_shape(alpha);
-    float x = max(r / mfp, PF_LEAST_X);
+    float x = clamp(r / mfp, PF_LEAST_X, PF_FARTHEST);
     return LAW_reflectance(s) * LAW_density(x, s) / (PF_TWO_PI * x * mfp * mfp);
 }
 

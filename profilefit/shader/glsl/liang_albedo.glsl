@@ -1,0 +1,11 @@
+// alpha = p A / (A^2 + q A + w) (Liang et al., equation 8). It rises up to A = sqrt(w) only; its inverse stops there.
+float LAW_map_reflectance(float alpha) {
+    float lean = 0.5 * (LAW_map_p - LAW_map_q * alpha);
+    float rest = sqrt(max(lean * lean - LAW_map_w * alpha * alpha, 0.0));
+    return min(alpha * LAW_map_w / (lean + rest), LAW_map_fold);
+}
+
+// Single-scattering albedo alpha [-] for a total reflectance A [-]
+float LAW_alpha(float reflectance) {
+    return min(LAW_map_p * reflectance / (LAW_map_w + reflectance * (reflectance + LAW_map_q)), 1.0);
+}

@@ -1,0 +1,63 @@
+"""Every text compiles: on this machine's OpenGL as GLSL 3.30 and GLSL ES 3.00, and as HLSL where a compiler is."""
+
+import shutil
+import subprocess
+
+import pytest
+
+from profilefit import catalogue, inventory
+from profilefit.errors import ShaderError
+from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.shader import emit
+from profilefit.shader.context import program
+
+FITS = catalogue.fits_folder()
+ALL = [*inventory.profile_laws(FITS), *inventory.albedo_laws(FITS)]
+LAWS = {emit.prefix(one.law): one.law for one in ALL if not isinstance(one.law, BeamDiffusion)}
+HEADS = {"glsl": "#version 330\n", "glsl-es": "#version 300 es\nprecision highp float;\n"}
+VERTEX = "void main() { gl_Position = vec4(gl_VertexID == 1 ? 3.0 : -1.0, gl_VertexID == 2 ? 3.0 : -1.0, 0.0, 1.0); }"
+MAIN = "uniform vec3 u;\nout vec4 made;\nvoid main() {{ made = vec4({calls}); }}\n"
+HLSL_MAIN = "float4 main(float3 u : TEXCOORD0) : SV_TARGET {{ float y = {calls}; return float4(y, y, y, y); }}\n"
+HLSL_COMPILER = "glslangValidator"  # Debian's glslang-tools
+
+
+def text(name, lang="glsl"):
+    law = LAWS[name]
+    return emit.map_text(law, lang) if isinstance(law, AlbedoLaw) else emit.law_text(law, lang)
+
+
+def calls(name):
+    """Every function that the contract of the texts names."""
+    if isinstance(LAWS[name], AlbedoLaw):
+        return f"{name}_alpha(u.x) + {name}_map_reflectance(u.y)"
+    lengths = [f"{name}_{one}(u.x, u.y, u.z)" for one in ("profile", "cdf", "sample", "pdf")]
+    shape = f"{name}_shape(u.y)"
+    scaled = [f"{name}_{one}(u.x, {shape})" for one in ("density", "cumulated", "radius", "radius_density")]
+    return " + ".join([*lengths, *scaled, f"{name}_reflectance({shape})", f"{name}_alpha(u.x)"])
+
+
+@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("name", LAWS)
+def test_glsl(context, name, head):
+    fragment = HEADS[head] + text(name) + MAIN.format(calls=calls(name))
+    program(context, name, fragment, HEADS[head] + VERTEX).release()
+
+
+def test_glsl_refuses_the_same_law_twice_and_takes_two_laws(context):
+    both = text("burley") + text("hazard") + MAIN.format(calls=f"{calls('burley')} + {calls('hazard')}")
+    program(context, "both", HEADS["glsl"] + both).release()
+    with pytest.raises(ShaderError, match=r"shader 'twice' does not compile, line \d+, .*burley_map_entered"):
+        program(context, "twice", HEADS["glsl"] + text("burley") + both)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_hlsl(tmp_path, name):
+    compiler = shutil.which(HLSL_COMPILER)
+    if compiler is None:
+        pytest.skip(f"{HLSL_COMPILER} is missing, which compiles HLSL; on Debian apt-get install glslang-tools")
+    source = tmp_path / f"{name}.hlsl"
+    source.write_text(text(name, "hlsl") + HLSL_MAIN.format(calls=calls(name)))
+    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(tmp_path / "made.spv"), str(source)]
+    ran = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ran.returncode == 0, ran.stdout

@@ -1,0 +1,106 @@
+"""From a law to its text: constants, prefixes, repeated blocks, and laws that have none."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import profilefit
+from profilefit import catalogue
+from profilefit.errors import InputError
+from profilefit.laws.gaussians import law_class
+from profilefit.shader import emit
+
+BURLEY = profilefit.load("burley", "published")
+DECLARED = re.compile(r"^const float (\w+) = (\S+);", re.MULTILINE)
+
+
+def gaussians(count):
+    kind = law_class(count)
+    return kind(setting=BURLEY.setting, albedo=BURLEY.albedo, **kind.start())
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (0.0, "0.0"),
+        (2, "2.0"),
+        (-1.5, "-1.5"),
+        (1 / 3, "0.333333333333"),
+        (1234567.0, "1234567.0"),
+        (1e-25, "1.0e-25"),
+        (-2.5e8, "-2.5e+08"),
+    ],
+)
+def test_a_literal_has_a_point_and_twelve_digits(value, text):
+    assert emit.literal(value) == text
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_constant_is_a_number(value):
+    with pytest.raises(InputError, match=f"constants of a shader must be finite, got {value}"):
+        emit.law_text(replace(BURLEY, s0=value))
+
+
+def test_every_constant_of_a_law_stands_in_its_text_once():
+    told = {"s0": "a remark"}
+    declared = DECLARED.findall(emit.law_text(BURLEY, told=told))
+    names = [name for name, _ in declared if name.startswith("burley_")]
+    own = [*(f"map_{name}" for name in ("entered", *BURLEY.albedo.constants())), "power", *BURLEY.constants()]
+    assert names == [f"burley_{name}" for name in own]
+    assert dict(declared)["burley_s0"] == "1.85"
+    assert "const float burley_s0 = 1.85; // a remark\n" in emit.law_text(BURLEY, told=told)
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 8])
+def test_a_block_stands_once_for_each_number(count):
+    text, name = emit.law_text(gaussians(count)), f"gaussians{count}"
+    assert emit.prefix(gaussians(count)) == name
+    assert re.findall(r"float rate(\d+);", text) == [str(i) for i in range(1, count + 1)]
+    assert re.findall(r"float level(\d+) = level(\d+)", text) == [(str(i), str(i - 1)) for i in range(2, count + 1)]
+    assert "//%" not in text
+    assert "@" not in text
+
+
+@pytest.mark.parametrize("lang", ["glsl", "hlsl", "python"])
+def test_a_prefix_replaces_every_placeholder(lang):
+    for text in (emit.law_text(BURLEY, lang, "skin_2"), emit.map_text(BURLEY.albedo, lang, "skin_2")):
+        assert "LAW_" not in text
+        assert "burley_" not in text
+        assert "rational_" not in text
+        assert "skin_2_alpha(" in text
+
+
+@pytest.mark.parametrize("name", ["", "my law", "2nd", "a__b", "a_", "gl_skin", "PF_skin", "LAW"])
+def test_a_prefix_is_part_of_a_name(name):
+    with pytest.raises(InputError, match="name must be letters, digits and single underscores"):
+        emit.law_text(BURLEY, name=name or " ")
+
+
+def test_laws_of_other_prefixes_live_in_one_text():
+    laws = {"first": BURLEY, "second": replace(BURLEY, s0=3.0), "third": gaussians(2)}
+    together, alone = {}, {}
+    exec("".join(emit.law_text(law, "python", name) for name, law in laws.items()), together)
+    for name, law in laws.items():
+        exec(emit.law_text(law, "python", name), alone)
+        assert together[f"{name}_profile"](0.3, 0.8, 1.0) == alone[f"{name}_profile"](0.3, 0.8, 1.0)
+    assert together["first_profile"](0.3, 0.8, 1.0) != together["second_profile"](0.3, 0.8, 1.0)
+
+
+def test_a_law_without_a_closed_form_is_named():
+    with pytest.raises(InputError, match="must have a closed form to become a shader, got beam_diffusion"):
+        emit.law_text(profilefit.load("beam_diffusion"))
+
+
+def test_a_map_is_no_profile_law_and_the_other_way_round():
+    with pytest.raises(InputError, match=r"law must be one that has a shader text \(Hazard.*got Rational"):
+        emit.law_text(BURLEY.albedo)
+    with pytest.raises(InputError, match=r"law must be one that has a shader text \(Rational.*got Burley"):
+        emit.map_text(BURLEY)
+
+
+def test_the_map_that_normalises_is_the_rational_one():
+    other = catalogue.albedo_law("chiang", "published")
+    with pytest.raises(InputError, match="albedo of Burley must be a Rational map to become a shader, got Chiang"):
+        emit.law_text(replace(BURLEY, albedo=other))
