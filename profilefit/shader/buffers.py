@@ -1,0 +1,94 @@
+"""The G-buffer: what the camera sees of a scene, pixel by pixel, as numpy arrays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from profilefit.errors import InputError
+
+Singles = NDArray[np.float32]
+VECTORS = ("irradiance", "reflectance", "position", "normal")
+NUMBERS = ("mask", "thickness", "visibility", "roughness")
+
+
+@dataclass(frozen=True)
+class Buffers:
+    """Float32 arrays, row 0 at the bottom; (h, w, 3) or (h, w).
+
+    irradiance   E, all light that arrives [-];  reflectance  A [-], both red, green, blue
+    position     in view space [mm]: x right, y up, z < 0 before the camera;  normal  in view space, unit length
+    mask         1 where light scatters inside, 0 elsewhere
+    thickness    way of the light through the part [mm]
+    pixel        side of a pixel [mm]; in perspective at a depth of 1 mm
+    visibility   share of the light that no shadow takes [-];  roughness  of GGX [-]
+    """
+
+    irradiance: Singles
+    reflectance: Singles
+    position: Singles
+    normal: Singles
+    mask: Singles
+    thickness: Singles
+    pixel: float
+    is_perspective: bool = False
+    visibility: Singles | None = None
+    roughness: Singles | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.pixel < np.inf:
+            raise InputError(f"pixel must be a length > 0 [mm], got {self.pixel!r}")
+        rows, columns = np.shape(self.mask)[:2]
+        for name in VECTORS + NUMBERS:
+            array = getattr(self, name)
+            accepted = (rows, columns, 3) if name in VECTORS else (rows, columns)
+            if array is not None and np.shape(array) != accepted:
+                raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows."""
+        rows, columns = self.mask.shape
+        return columns, rows
+
+    def targets(self) -> tuple[Singles, Singles, Singles, Singles]:
+        """The four float targets, (h, w, 4) each."""
+        ones = np.ones_like(self.mask)
+        fourth = (
+            self.thickness,
+            ones if self.visibility is None else self.visibility,
+            self.mask,
+            0.42 * ones if self.roughness is None else self.roughness,
+        )
+        irradiance, reflectance, position, normal = (
+            np.concatenate([getattr(self, name), last[..., None]], axis=-1).astype(np.float32)
+            for name, last in zip(VECTORS, fourth, strict=True)
+        )
+        return irradiance, reflectance, position, normal
+
+
+def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:
+    """A plane that faces an orthographic camera and fills its view.
+
+    size  columns, rows;  pixel [mm];  reflectance, irradiance  broadcast to (rows, columns, 3)
+    """
+    columns, rows = size
+    x = (np.arange(columns) + 0.5 - 0.5 * columns) * pixel
+    y = (np.arange(rows) + 0.5 - 0.5 * rows) * pixel
+    position = np.stack([*np.meshgrid(x, y), np.full((rows, columns), -100.0)], axis=-1)
+    normal = np.broadcast_to(np.array([0.0, 0.0, 1.0]), position.shape)
+    mask = np.ones((rows, columns), np.float32)
+    colours = (np.broadcast_to(np.asarray(value, float), position.shape) for value in (irradiance, reflectance))
+    light, skin, place, upright = (value.astype(np.float32) for value in (*colours, position, normal))
+    return Buffers(light, skin, place, upright, mask, np.zeros_like(mask), pixel)
+
+
+def step_edge(size: tuple[int, int], pixel: float, reflectance: ArrayLike) -> Buffers:
+    """`flat`, lit where x > 0 only: the edge is a border of pixels, so `size` has an even number of columns."""
+    columns, rows = size
+    if columns % 2:
+        raise InputError(f"size must have an even number of columns, so that a border is at x = 0, got {columns}")
+    lit = np.broadcast_to((np.arange(columns) >= columns // 2).astype(float)[None, :, None], (rows, columns, 3))
+    return flat(size, pixel, reflectance, lit)

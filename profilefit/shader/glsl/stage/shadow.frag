@@ -1,0 +1,7 @@
+#version 330
+in float depth;
+out float nearest;
+
+void main() {
+    nearest = depth;
+}

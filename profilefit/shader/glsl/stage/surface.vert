@@ -1,0 +1,17 @@
+#version 330
+// The scene as the camera sees it.
+in vec3 position;
+in vec3 normal;
+in vec2 uv;
+uniform mat4 view;
+uniform mat4 projection;
+out vec3 world_position;
+out vec3 world_normal;
+out vec2 texture_place;
+
+void main() {
+    world_position = position;
+    world_normal = normal;
+    texture_place = uv;
+    gl_Position = projection * view * vec4(position, 1.0);
+}
