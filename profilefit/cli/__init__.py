@@ -9,11 +9,12 @@ import typer
 from rich.console import Console
 
 from mcml_sim import __version__
+from profilefit.cli.check import check
 from profilefit.cli.convert import convert
 from profilefit.cli.export import export
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
-from profilefit.errors import InputError, OutputError, StoreError
+from profilefit.errors import InputError, OutputError, ShaderError, StoreError
 
 __all__ = ["app", "main"]
 
@@ -31,6 +32,7 @@ app.command()(regenerate)
 app.command()(report)
 app.command()(convert)
 app.command()(export)
+app.command()(check)
 
 
 def _show_version(wanted: bool) -> None:
@@ -62,7 +64,7 @@ def _status(errors: Console) -> int:
     try:
         # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
         return int(app(standalone_mode=False) or 0)
-    except (InputError, OutputError, StoreError) as error:
+    except (InputError, OutputError, ShaderError, StoreError) as error:
         errors.print(f"profilefit: {error}", markup=False)
         return BAD_INPUT
     except typer.TyperException as error:

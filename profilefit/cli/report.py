@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 
 from profilefit import catalogue, record
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError, RecordError, ShaderError
 from profilefit.report import every_law, figures, fill, markdown_sections, sections, tables
 
 LOCAL = Path("fits")
@@ -44,7 +44,7 @@ def report(
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
     contents = _contents(folder, names)
     if markdown is not None:
-        _fill(markdown, contents, folder)
+        _fill(markdown, contents, folder, console)
         return
     if quality:
         for part in every_law(folder, names or None):
@@ -64,13 +64,18 @@ def report(
             console.print(f"left out: {line}", markup=False)
 
 
-def _fill(path: Path, contents: dict[str, dict], folder: Path) -> None:
+def _fill(path: Path, contents: dict[str, dict], folder: Path, console: Console) -> None:
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
-    # What is measured takes a minute, so only where the file has a place for it.
-    measured = {name: make() for name, make in markdown_sections(folder).items() if f"<!-- {name} -->" in text}
+    measured = {}
+    for name, make in markdown_sections(folder).items():
+        if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
+            try:
+                measured[name] = make()
+            except ShaderError as error:
+                console.print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
     record.write_text(path, fill(text, sections(contents) | measured))
 
 

@@ -22,6 +22,7 @@ from profilefit.report.all_laws import (
     measured_profile,
     measured_samplers,
 )
+from profilefit.report.check_tables import markdown_check
 from profilefit.report.columns import column_table
 from profilefit.report.digits import significant
 from profilefit.report.markdown import markdown_table
@@ -66,7 +67,10 @@ def every_law(
 
 
 def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
-    """Tables of a README that are measured, not read from records, by the names of their marks."""
+    """Tables of a README that are measured, not read from records, by the names of their marks.
+
+    "check" needs OpenGL, and raises ShaderError where there is none.
+    """
 
     def laws() -> str:
         found = profile_laws(folder)
@@ -75,7 +79,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     def samplers() -> str:
         return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder)))))
 
-    return {"laws": laws, "samplers": samplers}
+    return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder)}
 
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:

@@ -1,0 +1,95 @@
+"""What a law in float32 may cost: a tenth of the model's own error, which its record tells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from profilefit import record
+from profilefit.errors import RecordError
+from profilefit.inventory import Named, albedo_laws, profile_laws
+from profilefit.laws.quantile import Quantile
+from profilefit.pipelines import QUALITY_ALBEDOS
+from profilefit.quality import albedo_quality, profile_quality
+from profilefit.targets import albedo_values
+
+ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted
+# Rounding shall not show beside the model's error, nor change it.
+ROUNDING_SHARE, MODEL_FACTOR = 0.1, 1.1
+PROFILE_MEASURES, MAP_MEASURES = ("rel", "ks", "inversion_error"), ("delta_A", "delta_alpha")
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A number and the largest that it may be; where it is found, in words. NaN breaks every bound."""
+
+    name: str
+    value: float
+    limit: float
+    where: str = ""
+
+    @property
+    def broken(self) -> bool:
+        return not self.value <= self.limit
+
+    def __str__(self) -> str:
+        over = f", {self.value / self.limit:.3g} times that" if self.limit > 0 and np.isfinite(self.value) else ""
+        place = f" at {self.where}" if self.where else ""
+        return f"{self.name}: {self.value:.4g}{place}; bound {self.limit:.4g}{over}"
+
+
+@dataclass(frozen=True)
+class ModelError:
+    """A law's errors [-], worst over albedos, by the names of `quality`; `source` says which record tells them."""
+
+    values: dict[str, float]
+    source: str
+
+    def get(self, measure: str) -> float | None:
+        return self.values.get(measure)
+
+
+def of_profile(one: Named, folder: Path) -> ModelError:
+    """The errors of a profile law, from its records, or those of the regenerated law of its name and setting.
+
+    What no record tells is measured on the float64 law, where the setting has an exact profile.
+    """
+    owner = one if one.records else _regenerated(one, profile_laws(folder, matched=False))
+    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, folder)
+    source = " + ".join(owner.records) if owner and found else "measured here"
+    whole = not one.records or isinstance(one.law, Quantile)
+    if whole and "rel" not in found and one.setting.is_matched_isotropic:
+        quality = profile_quality(one.law, ALBEDOS)
+        found |= {"rel": float(np.max(quality.rel)), "ks": float(np.max(quality.ks))}
+    if not found:
+        raise RecordError(f"{one.label} cannot be judged: no record tells its errors; regenerate it")
+    return ModelError(found, source)
+
+
+def of_map(one: Named, folder: Path) -> ModelError:
+    """The errors of a map, likewise."""
+    owner = one if one.records else _regenerated(one, albedo_laws(folder, matched=False))
+    if owner is not None:
+        return ModelError(_recorded(owner.records, MAP_MEASURES, folder), " + ".join(owner.records))
+    quality = albedo_quality(one.law)
+    return ModelError({name: getattr(quality, name) for name in MAP_MEASURES}, "measured here")
+
+
+def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
+    same = (law for law in laws if law.records and (law.name, law.setting) == (one.name, one.setting))
+    return next(same, None)
+
+
+def _recorded(names: Sequence[str], measures: Sequence[str], folder: Path) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for name in names:
+        quality: dict[str, Any] = record.read(folder / f"{name}.json").get("quality", {}).get("regenerated", {})
+        try:
+            found |= {measure: float(np.max(quality[measure])) for measure in measures if measure in quality}
+        except (TypeError, ValueError):
+            raise RecordError(f"record {name} is damaged: its quality has no numbers; regenerate it") from None
+    return found

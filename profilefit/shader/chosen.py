@@ -1,0 +1,74 @@
+"""Which laws and maps a check is of: by name, by record, by constants, or all that were regenerated."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from profilefit import catalogue, inventory, record
+from profilefit.errors import InputError, RecordError
+from profilefit.inventory import Named
+from profilefit.shader import emit
+
+REGENERATED = "regenerated"
+Chosen = tuple[list[Named], list[Named]]
+"""Profile laws, and maps between A and alpha."""
+
+
+def chosen(names: Sequence[str], constants: str, folder: Path) -> Chosen:
+    """Profile laws and maps under these names, or all of them; a name may be a law's, a map's or a record's.
+
+    A law's name means all its settings.
+
+    constants  "regenerated" or a printed set, as in `catalogue.load`
+    InputError, RecordError, SettingError where there are none.
+    """
+    if constants.endswith(".json"):
+        raise InputError(f"constants must be regenerated or a printed set; name the record itself, got {constants!r}")
+    known = regenerated(folder) if constants == REGENERATED else printed(constants, folder)
+    if not names:
+        if not any(known):
+            raise InputError(f"constants must be regenerated or a printed set, got {constants!r} and no law's name")
+        return known
+    found: Chosen = ([], [])
+    for name in names:
+        laws, maps = (_under(name, group) for group in known)
+        if not laws and not maps:
+            laws, maps = _loaded(name, constants, folder)
+        found[0].extend(laws)
+        found[1].extend(maps)
+    return found
+
+
+def regenerated(folder: Path) -> Chosen:
+    """All laws and maps made of records, in every setting."""
+    whole = [one for one in inventory.profile_laws(folder, matched=False) if one.records]
+    there = {name for one in whole for name in one.records}
+    inverses = [one for one in inventory.sampled_laws(folder) if one.records and not set(one.records) & there]
+    return [*whole, *inverses], [one for one in inventory.albedo_laws(folder, matched=False) if one.records]
+
+
+def printed(constants: str, folder: Path) -> Chosen:
+    """All laws and maps of one printed set that have a text."""
+    wanted = constants.removeprefix("published:")
+    laws, maps = (
+        [one for one in group if not one.records and one.constants == wanted]
+        for group in (inventory.profile_laws(folder), inventory.albedo_laws(folder))
+    )
+    return [one for one in laws if isinstance(one.law, tuple(emit.FORMS))], maps
+
+
+def _under(name: str, group: Sequence[Named]) -> list[Named]:
+    full = catalogue.SHORT.get(name, name)
+    return [one for one in group if full == one.name or name in one.records]
+
+
+def _loaded(name: str, constants: str, folder: Path) -> Chosen:
+    """A law that is in no list: one without constants, or a mistake."""
+    if name in record.available(folder) and name not in catalogue.PROFILE_LAWS:
+        if constants != REGENERATED:
+            raise InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
+        raise RecordError(f"record {name!r} holds no law of a fit that converged")
+    if name in catalogue.ALBEDO_LAWS and name not in catalogue.PROFILE_LAWS:
+        return [], [Named(name, constants, catalogue.albedo_law(name, constants, folder=folder))]
+    return [inventory.find(name, folder, constants)], []

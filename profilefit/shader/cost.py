@@ -1,0 +1,119 @@
+"""What a law costs on the device at hand: ns per evaluation, and its ratio to normalized diffusion in the same turns.
+
+A pixel loops over many evaluations, so that the loop and not the drawing takes the time; what depends on alpha only is
+computed once before the loop, as a renderer does per pixel, but in `material`. The laws take turns, and ratios are
+medians over turns: machines are shared, and their clocks change.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit import catalogue
+from profilefit.inventory import Named
+from profilefit.laws.base import ProfileLaw
+from profilefit.shader import emit
+from profilefit.shader.context import check_errors, full_screen, program
+
+Floats = NDArray[np.float64]
+YARDSTICK = "burley"
+SIZE = 256, 128
+TURNS = 7
+ENOUGH = 0.01  # s that a work takes in one turn, at least: the clock and the driver's calls then tell little
+MOST_ROUNDS = 2**16
+# What one evaluation is: x = r/l and xi change at each, s is the law's shape.
+WORKS = {
+    "profile": "float x = 10.0 * u + 0.001; sum += P_density(x, s) / x;",
+    "sample": "sum += P_radius(u, s);",
+    "both": "float x = P_radius(u, s) + 1e-6; sum += P_density(x, s) / x;",
+    "material": "s = P_shape(0.05 + 0.9 * u); float x = P_radius(u, s) + 1e-6; sum += P_density(x, s) / x;",
+}
+LOOP = """#version 330
+{text}
+uniform int rounds;
+layout(location = 0) out vec4 found;
+void main() {{
+    float start = fract(dot(gl_FragCoord.xy, vec2(0.7548776662, 0.5698402910)));
+    {name}_Shape s = {name}_shape(0.05 + 0.9 * start);
+    float sum = 0.0;
+    for (int i = 0; i < rounds; ++i) {{
+        float u = fract(start + 0.6180339887 * float(i));
+        {work}
+    }}
+    found = vec4(sum);
+}}
+"""
+
+
+@dataclass(frozen=True)
+class Cost:
+    """By the names of `WORKS`: ns of one evaluation in the fastest turn, and the median ratio to the yardstick."""
+
+    ns: dict[str, float]
+    ratio: dict[str, float]
+
+
+def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Path) -> dict[str, Cost]:
+    """What the laws' texts cost beside printed normalized diffusion; nothing if there is no law."""
+    yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
+    return costs(context, [one.law for one in laws], yardstick) if laws else {}
+
+
+def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: ProfileLaw) -> dict[str, Cost]:
+    """The costs of each law's text, by `emit.prefix`: constants do not change them.
+
+    yardstick  the law that is counted as 1
+    """
+    texts = {emit.prefix(law): law for law in (yardstick, *laws)}
+    board = context.framebuffer(color_attachments=[context.texture(SIZE, 4, dtype="f4")])
+    board.use()
+    context.viewport = (0, 0, *SIZE)
+    loops = {(name, work): _Loop(context, name, law, work) for name, law in texts.items() for work in WORKS}
+    own = {work: loops[emit.prefix(yardstick), work] for work in WORKS}
+    timed = {(name, work): loop.beside(own[work]) for (name, work), loop in loops.items()}
+    check_errors(context, "the loops that are timed")
+    return {
+        name: Cost(
+            {work: 1e9 * float(np.min(timed[name, work][0])) for work in WORKS},
+            {work: float(np.median(timed[name, work][0] / timed[name, work][1])) for work in WORKS},
+        )
+        for name in texts
+    }
+
+
+class _Loop:
+    """One work of one law."""
+
+    def __init__(self, context: moderngl.Context, name: str, law: ProfileLaw, work: str) -> None:
+        source = LOOP.format(text=emit.law_text(law), name=name, work=WORKS[work].replace("P_", f"{name}_"))
+        self._context = context
+        self._program = program(context, f"{name}: {work}", source)
+        self._triangle = full_screen(context, self._program)
+
+        self._rounds = 4
+        self._seconds()  # compiles
+        while self._seconds() < ENOUGH and self._rounds < MOST_ROUNDS:
+            self._rounds *= 2
+
+    def beside(self, other: _Loop) -> tuple[Floats, Floats]:
+        """Seconds of one evaluation of this one, and of the other, in turns (TURNS,)."""
+        turns = np.array([(self._each(), other._each() if other is not self else 0.0) for _ in range(TURNS)])
+        return turns[:, 0], turns[:, 1 if other is not self else 0]
+
+    def _each(self) -> float:
+        return self._seconds() / (SIZE[0] * SIZE[1] * self._rounds)
+
+    def _seconds(self) -> float:
+        self._program["rounds"] = self._rounds
+        self._context.finish()
+        begin = time.perf_counter()
+        self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        self._context.finish()
+        return time.perf_counter() - begin

@@ -1,0 +1,131 @@
+"""`profilefit check` as a user meets it: what passes, what fails and where, and what is no machine for it."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+
+import pytest
+
+from profilefit import catalogue
+from profilefit.errors import ShaderError
+from profilefit.shader.context import open_context
+
+FITS = catalogue.fits_folder()
+
+
+@pytest.fixture(scope="module")
+def opengl():
+    """Skips where there is none, by the name of what is missing."""
+    try:
+        open_context().release()
+    except ShaderError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def folder(tmp_path):
+    """Records of one surface, to be changed."""
+    for name in ("hazard-n1.4", "albedo-rational-n1.4"):
+        shutil.copy(FITS / f"{name}.json", tmp_path)
+    return tmp_path
+
+
+def test_a_good_law_passes_in_100_columns(command, opengl):
+    status, out, err = command("check", "hazard-n1.4", "albedo-rational-n1.4", "--precision", "float16")
+    assert status == 0, err
+    assert err == ""
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert sum(line.split()[:1] == ["hazard-n1.4"] and line.split()[-1] == "pass" for line in lines) == 1
+    assert sum(line.split()[:1] == ["albedo-rational-n1.4"] and line.split()[-1] == "pass" for line in lines) == 1
+    assert lines[-1] == "2 laws or maps: all pass"
+    assert "burley" in out  # what costs are counted in
+    assert "float16 arithmetic: not offered by" in out or "arithmetic" in out
+
+
+def test_json_has_all_of_it(command, opengl):
+    status, out, _ = command("check", "albedo-rational-n1.4", "hazard-n1.4", "--json")
+    found = json.loads(out)
+    assert status == 0
+    assert found["passed"] is True
+    (law,), (mapped,) = found["laws"], found["maps"]
+    assert (law["constants"], mapped["constants"]) == ("hazard-n1.4", "albedo-rational-n1.4")
+    assert set(law["spreads"]["R_d"]) == {"half", "most", "largest", "where"}
+    assert all(bound["value"] <= bound["limit"] for bound in law["bounds"])
+    assert set(found["costs"]) == {"burley", "hazard"}
+
+
+def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
+    """A record that claims a model a million times as good as it is."""
+    path = folder / "hazard-n1.4.json"
+    content = json.loads(path.read_text())
+    content["quality"]["regenerated"]["rel"] = [1e-8 * value for value in content["quality"]["regenerated"]["rel"]]
+    path.write_text(json.dumps(content))
+    status, out, _ = command("check", "hazard-n1.4", "--fits", str(folder))
+    assert status == 1
+    assert "FAIL hazard-n1.4: float32 rel: " in out
+    assert out.splitlines()[-1] == "1 law or map: 1 fail"
+
+
+def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
+    status, out, _ = command("check", "liang", "--constants", "published")
+    text = " ".join(out.split())
+    assert status == 1
+    for wrong in (
+        "FAIL liang, published: rel against the exact half space",
+        "cdf(r_max) is 13.6 to 15.5",
+        "negative; the text takes |g|: 0.009766 at ξ < 0.01",
+        "the law is 0/0",
+        "FAIL map liang, published: bad numbers: 164 at A 0.9185 (164 not monotone)",
+        "beyond its fold at A = 0.9165",
+        "α is 0.99824",
+    ):
+        assert wrong in text
+    assert "FAIL liang, published: float32" not in text  # the text itself is right
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("nothing",), "name must be a law or a record"),
+        (("hazard", "--constants", "nothing"), "constants must be one of regenerated"),
+        (("--constants", "nothing"), "constants must be regenerated or a printed set, got 'nothing'"),
+        (("reproduction",), "record 'reproduction' holds no law"),
+        (("hazard", "--precision", "float8"), "float8"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(command, words, told):
+    status, out, err = command("check", *words)
+    assert (status, out) == (2, "")
+    assert told in err
+    assert err.count("\n") == 1
+
+
+@pytest.fixture
+def blind(tmp_path):
+    """Run `profilefit WORDS` in a process of its own, which finds no driver."""
+    environment = {**os.environ, "__EGL_VENDOR_LIBRARY_DIRS": str(tmp_path), "__EGL_VENDOR_LIBRARY_FILENAMES": ""}
+
+    def run(*words):
+        command = [sys.executable, "-m", "profilefit", *words]
+        return subprocess.run(command, capture_output=True, text=True, env=environment, check=False, cwd=tmp_path)
+
+    return run
+
+
+def test_no_opengl_is_one_line_and_status_2(blind):
+    done = blind("check", "hazard-n1.4")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr.startswith("profilefit: no OpenGL 3.3 without a window")
+    assert done.stderr.count("\n") == 1
+
+
+def test_without_opengl_a_readme_keeps_its_table(blind, folder):
+    page = folder / "page.md"
+    page.write_text("<!-- check -->\nas it was\n<!-- /check -->\n")
+    done = blind("report", "--markdown", str(page), "--fits", str(folder))
+    assert done.returncode == 0, done.stderr
+    assert "the table 'check' stays as it was: no OpenGL 3.3" in " ".join(done.stdout.split())
+    assert page.read_text() == "<!-- check -->\nas it was\n<!-- /check -->\n"

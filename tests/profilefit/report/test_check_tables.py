@@ -1,0 +1,82 @@
+"""What checks found, as tables: who passes, what is broken and where."""
+
+import io
+
+from rich.console import Console
+
+from profilefit import catalogue, inventory
+from profilefit.report import check_tables
+from profilefit.shader.bounds import Bound, ModelError
+from profilefit.shader.check import CDF, OWN, PROFILE, SAMPLE, LawCheck
+from profilefit.shader.check_map import MapCheck
+from profilefit.shader.cost import WORKS, Cost
+from profilefit.shader.grid import Count, Spread
+
+FITS = catalogue.fits_folder()
+NONE = Count(0, 0, 0, 0)
+GOOD, BAD = Bound("float32 rel", 1e-6, 1e-4), Bound("float32 ks", 0.02, 0.001, "r/l 2, α 0.5")
+COSTS = {"hazard": Cost(dict.fromkeys(WORKS, 3.0), dict.fromkeys(WORKS, 2.5))}
+
+
+def law(*bounds, name="hazard-n1.4"):
+    spread = Spread(1e-7, 2e-7, 3e-7, "r/l 2, α 0.5")
+    rounding = {"rel": 1e-6, "ks": 2e-7, "inversion_error": 4e-7}
+    spreads = {PROFILE: spread, CDF: spread, SAMPLE: spread, OWN: spread}
+    model = ModelError({"rel": 0.049, "ks": 0.0096}, name)
+    return LawCheck(inventory.find(name, FITS), model, spreads, rounding, {"rel": 0.05}, NONE, NONE, bounds)
+
+
+def mapped(*bounds):
+    one = inventory.find("albedo-rational-n1.4", FITS)
+    errors = {"delta_A": 1e-7, "delta_alpha": 2e-7}
+    return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, {}, NONE, Count(0, 0, 0, 7), bounds)
+
+
+def shown(parts):
+    console = Console(width=100, file=io.StringIO())
+    for part in parts:
+        console.print(part)
+    return console.file.getvalue()
+
+
+def test_a_line_a_law_says_whether_it_passes():
+    text = shown(check_tables.check_tables([law(GOOD), law(GOOD, BAD)], [mapped(GOOD)], "a device"))
+    rows = [line.split() for line in text.splitlines() if "-n1.4" in line]
+    assert rows[0] == ["hazard-n1.4", "0.049", "1.0e-06", "0.0096", "2.0e-07", "4.0e-07", "2.0e-07", "0", "0", "pass"]
+    assert rows[1][-1] == "FAIL"
+    assert rows[2] == ["albedo-rational-n1.4", "0.00040", "1.0e-07", "–", "2.0e-07", "0", "7", "pass"]
+    assert "a device" in text
+
+
+def test_a_record_that_says_nothing_of_the_sampler_shows_nothing_of_it():
+    one = law(GOOD)
+    del one.spreads[SAMPLE], one.spreads[OWN]
+    text = shown(check_tables.check_tables([one], [], "a device"))
+    assert next(line for line in text.splitlines() if "-n1.4" in line).split()[5:7] == ["–", "–"]
+
+
+def test_broken_bounds_are_lines_that_say_where_and_by_how_much():
+    lines = [line.plain for line in check_tables.verdict_lines([law(GOOD, BAD), law(GOOD), mapped(GOOD)])]
+    assert lines == [
+        "FAIL hazard-n1.4: float32 ks: 0.02 at r/l 2, α 0.5; bound 0.001, 20 times that",
+        "3 laws or maps: 1 fail",
+    ]
+    assert [line.plain for line in check_tables.verdict_lines([law(GOOD)])] == ["1 law or map: all pass"]
+
+
+def test_the_readme_has_laws_maps_broken_bounds_and_costs():
+    text = check_tables.markdown_checks([law(GOOD, BAD)], [mapped(GOOD)], COSTS, "a device")
+    laws, maps, broken, costs, device = text.split("\n\n")
+    assert laws.splitlines()[2].split()[1:6] == ["hazard-n1.4", "|", "searchlight", "|", "1.4"]
+    assert maps.splitlines()[2].split()[-2:] == ["pass", "|"]
+    assert broken.startswith("- `hazard-n1.4`: float32 ks: 0.02")
+    assert costs.splitlines()[2].split("|")[1:3] == [" hazard ", " 3.0 (2.50)  "]
+    assert device.startswith("On a device. model: the record's error")
+
+
+def test_json_takes_numbers_and_text_only():
+    found = check_tables.content([law(BAD)], [mapped(GOOD)], COSTS, [], "a device")
+    assert found["passed"] is False
+    assert found["laws"][0]["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
+    assert found["laws"][0]["broken"] == [str(BAD)]
+    assert found["costs"]["hazard"]["ratio"]["both"] == 2.5
