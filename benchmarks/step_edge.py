@@ -25,7 +25,7 @@ from benchmarks.table import show
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.base import ProfileLaw
-from profilefit.shader.edge_estimate import (
+from profilefit.shader.truth.edge_estimate import (
     Gather,
     by_law,
     by_quantile,
@@ -34,7 +34,7 @@ from profilefit.shader.edge_estimate import (
     random_points,
     shifted_points,
 )
-from profilefit.shader.step_edge import step_response
+from profilefit.shader.truth.step_edge import step_response
 
 Floats = NDArray[np.float64]
 

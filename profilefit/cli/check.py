@@ -22,13 +22,13 @@ from profilefit.report.check_tables import (
     place_tables,
     verdict_lines,
 )
-from profilefit.shader.check import LawCheck, check_laws
-from profilefit.shader.check_map import MapCheck, check_map
-from profilefit.shader.chosen import REGENERATED, chosen
+from profilefit.shader.check.chosen import REGENERATED, chosen
+from profilefit.shader.check.cost import law_costs
+from profilefit.shader.check.evaluate import half_extension, no_half
+from profilefit.shader.check.half import check_half
+from profilefit.shader.check.laws import LawCheck, check_laws
+from profilefit.shader.check.maps import MapCheck, check_map
 from profilefit.shader.context import open_context, renderer
-from profilefit.shader.cost import law_costs
-from profilefit.shader.evaluate import half_extension, no_half
-from profilefit.shader.half import check_half
 
 LOCAL = Path("fits")
 WIDTH = 100

@@ -14,13 +14,13 @@ from profilefit.record import plain
 from profilefit.report.columns import column_table
 from profilefit.report.digits import ABSENT, significant
 from profilefit.report.markdown import markdown_table
-from profilefit.shader import half
-from profilefit.shader.check import JUDGED, OWN, LawCheck, check_laws
-from profilefit.shader.check_map import MapCheck, check_map
-from profilefit.shader.chosen import REGENERATED, chosen
+from profilefit.shader.check import half
+from profilefit.shader.check.chosen import REGENERATED, chosen
+from profilefit.shader.check.cost import WORKS, Cost, law_costs
+from profilefit.shader.check.half import HalfCheck
+from profilefit.shader.check.laws import JUDGED, OWN, LawCheck, check_laws
+from profilefit.shader.check.maps import MapCheck, check_map
 from profilefit.shader.context import open_context, renderer
-from profilefit.shader.cost import WORKS, Cost, law_costs
-from profilefit.shader.half import HalfCheck
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")

@@ -6,11 +6,11 @@ from rich.console import Console
 
 from profilefit import catalogue, inventory
 from profilefit.report import check_tables
-from profilefit.shader.bounds import Bound, ModelError
-from profilefit.shader.check import CDF, OWN, PROFILE, SAMPLE, LawCheck
-from profilefit.shader.check_map import MapCheck
-from profilefit.shader.cost import WORKS, Cost
-from profilefit.shader.grid import Count, Spread
+from profilefit.shader.check.bounds import Bound, ModelError
+from profilefit.shader.check.cost import WORKS, Cost
+from profilefit.shader.check.grid import Count, Spread
+from profilefit.shader.check.laws import CDF, OWN, PROFILE, SAMPLE, LawCheck
+from profilefit.shader.check.maps import MapCheck
 
 FITS = catalogue.fits_folder()
 NONE = Count(0, 0, 0, 0)

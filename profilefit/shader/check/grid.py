@@ -1,0 +1,181 @@
+"""The dense grid that laws are evaluated on, both ends included, and what is found on it: errors, and counts of what
+must not be.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.shader.check.bounds import Bound
+from profilefit.shader.check.evaluate import Values
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+ULP = 2.0**-24  # half a step of float32 below 1: what rounding a share costs
+SMALLEST = 2.0**-126  # below it a float32 loses digits, or is 0 on many GPUs
+DIMMEST = 1e-30  # R_d l^2 below which products of small factors leave float32
+LEAST_X = 1e-6  # R_d is taken here where x = r/l is less: at the source itself it is infinite
+# Steps the wrong way are counted beyond this many ULP: of R_d and the cdf, sums of a few rounded terms; of x and
+# its median for radii x, since 1 - xi is rounded before its logarithm is taken.
+STEPS_OF_PROFILE, STEPS_OF_CDF, STEPS_OF_SAMPLE = 16, 4, 16
+
+
+def _rounded(values: Sequence[float] | Floats) -> Floats:
+    return np.unique(np.asarray(values, np.float32)).astype(np.float64)
+
+
+ALPHA = _rounded(
+    np.concatenate([1.0 - np.linspace(0.0, 1.0, 56) ** 2, [1e-6, 1e-4], 1.0 - np.geomspace(2.0 * ULP, 1e-4, 6)])
+)
+X = _rounded(np.concatenate([[0.0, 1e-8], np.geomspace(LEAST_X, 1e4, 251), [1e6, 1e9, 1e30]]))
+XI = _rounded(
+    np.concatenate([[0.0], np.geomspace(ULP, 0.02, 40), np.linspace(0.03, 0.97, 175), 1 - np.geomspace(0.02, ULP, 40)])
+)
+XI = np.append(XI, 1.0)
+MFP = np.array([1.0, 1e-3, 1e3], np.float32).astype(np.float64)
+
+
+@dataclass(frozen=True)
+class Arguments:
+    """Arguments that broadcast to (alphas, radii or shares, lengths), each a float32: what the GPU sees."""
+
+    alpha: Floats
+    r: Floats
+    xi: Floats
+    mfp: Floats
+
+    @property
+    def x(self) -> Floats:
+        """r/l of the rounded r and l [mfp]."""
+        return np.broadcast_to(self.r / self.mfp, self.shape)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        return np.broadcast_shapes(self.alpha.shape, self.r.shape, self.xi.shape, self.mfp.shape)
+
+    def place(self, index: int, of_share: bool = False) -> str:
+        """Where a flat index lies, in words."""
+        at = np.unravel_index(index, self.shape)
+        alpha, mfp = (float(np.broadcast_to(one, self.shape)[at]) for one in (self.alpha, self.mfp))
+        xi = float(np.broadcast_to(self.xi, self.shape)[at])
+        first = f"ξ {_shown(xi)}" if of_share else f"r/l {float(self.x[at]):.3g}"
+        return f"{first}, α {_shown(alpha)}" + (f", l {mfp:g}" if mfp != 1.0 else "")
+
+
+def _shown(share: float) -> str:
+    return f"{share:.4g}" if share < 0.9995 or share == 1.0 else f"1 - {1.0 - share:.2g}"
+
+
+def arguments() -> Arguments:
+    """The whole grid."""
+    r = (X[:, None] * MFP).astype(np.float32).astype(np.float64)
+    return Arguments(ALPHA[:, None, None], r[None], XI[None, :, None], MFP)
+
+
+def reference(law: ProfileLaw, at: Arguments) -> Values:
+    """The law in float64; xi = 1 is taken for the largest float below, as the text does."""
+    r = np.maximum(at.r, LEAST_X * at.mfp)
+    xi = np.minimum(at.xi, 1.0 - ULP)
+    sampler = drawn_by(law)
+    with np.errstate(all="ignore"):
+        found = (
+            law.profile(r, at.alpha, at.mfp),
+            law.cdf(at.r, at.alpha, at.mfp),
+            sampler.sample(xi, at.alpha, at.mfp),
+            sampler.pdf(r, at.alpha, at.mfp),
+        )
+    return Values(*(np.broadcast_to(np.asarray(value, float), at.shape) for value in found))
+
+
+def drawn_by(law: ProfileLaw) -> Sampler:
+    """The sampler that the text has: of several the one of two steps."""
+    return law.samplers.get("two steps", law.sampler)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Errors at many places: the median, what 99 % do not exceed, the largest and where."""
+
+    half: float
+    most: float
+    largest: float
+    where: str
+
+
+def spread(error: Floats, used: Mask, at: Arguments, of_share: bool = False) -> Spread | None:
+    """Of the errors that are used; one that is not a number counts as infinite. None if none is used."""
+    if not np.any(used):
+        return None
+    judged = np.where(used, np.nan_to_num(error, nan=np.inf), -1.0)
+    worst = int(np.argmax(judged))
+    half, most = np.quantile(judged[used], [0.5, 0.99], method="higher")
+    return Spread(float(half), float(most), float(judged.flat[worst]), at.place(worst, of_share))
+
+
+@dataclass(frozen=True)
+class Count:
+    """How many results are no number, infinite, negative, or go the wrong way from the one before; where the first."""
+
+    nan: int
+    infinite: int
+    negative: int
+    wrong_way: int
+    where: str = ""
+
+    @property
+    def total(self) -> int:
+        return self.nan + self.infinite + self.negative + self.wrong_way
+
+    def less(self, other: Count) -> Count:
+        """What is here and not there."""
+        names = ("nan", "infinite", "negative", "wrong_way")
+        return Count(*(getattr(self, name) - getattr(other, name) for name in names))
+
+    @property
+    def kinds(self) -> str:
+        """What is there, in words."""
+        kinds = {"NaN": self.nan, "Inf": self.infinite, "negative": self.negative, "not monotone": self.wrong_way}
+        return ", ".join(f"{count} {kind}" for kind, count in kinds.items() if count) or "none"
+
+
+def bad_numbers(count: Count) -> Bound:
+    """None may be there."""
+    return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
+
+
+def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask) -> Count:
+    """What must not be: R_d falls with r, the cdf rises, and so does the radius with xi.
+
+    profiled  where profile and cdf count, drawn where radii and their pdf do; both as `Arguments.shape`
+    """
+    numbers, first = np.zeros(4, int), ""
+    for name in ("profile", "cdf", "sample", "pdf"):
+        kinds = _faults(name, getattr(values, name), at)
+        among = drawn if name in ("sample", "pdf") else profiled
+        kinds[3][:, 1:] &= among[:, :-1]  # of two neighbours both count
+        numbers += [int(np.sum(kind & among)) for kind in kinds]
+        bad = np.any(kinds, axis=0) & among
+        if np.any(bad) and not first:
+            first = f"{name}, {at.place(int(np.argmax(bad)), name == 'sample')}"
+    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
+    return Count(nan, infinite, negative, wrong_way, first)
+
+
+def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
+    """Where a value is no number, infinite, negative, or goes the wrong way."""
+    wrong = np.zeros(value.shape, bool)
+    with np.errstate(invalid="ignore"):
+        step, before = np.diff(value, axis=1), value[:, :-1]
+        if name == "profile":
+            wrong[:, 1:] = step > STEPS_OF_PROFILE * ULP * np.abs(before) + SMALLEST
+        elif name == "cdf":
+            wrong[:, 1:] = step < -STEPS_OF_CDF * ULP
+        elif name == "sample":
+            median = np.abs(value[:, value.shape[1] // 2, None])
+            wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (np.abs(before) + median)
+        return [np.isnan(value), np.isinf(value), value < 0, wrong]

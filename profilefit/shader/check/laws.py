@@ -1,0 +1,157 @@
+"""Is a law's text right where it runs? Its float32 against the float64 law and against the exact half space.
+
+Every law is held to its own model error: rounding below a tenth of it, the errors of the record met by the GPU's own
+numbers, and nothing that is no number, infinite, negative or goes the wrong way where the law says that it holds.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.inventory import Named
+from profilefit.laws.base import ProfileLaw
+from profilefit.pipelines import inversion_error
+from profilefit.quality import ENERGY_WITHIN, NEAREST, profile_quality
+from profilefit.shader.check import bounds, claims, grid, validity
+from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
+from profilefit.shader.check.evaluate import ShaderLaw, Values
+from profilefit.shader.check.grid import Arguments, Count, Spread, bad_numbers
+from profilefit.shader.check.twin import Twin
+
+Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+PROFILE, EVERYWHERE, CDF, SAMPLE, PDF, OWN = "R_d", "R_d everywhere", "cdf", "sample", "pdf", "pdf of the map"
+JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
+
+
+@dataclass(frozen=True)
+class LawCheck:
+    """What was found of one law.
+
+    spreads   float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
+              cdf; sample as the share between the radii of float32 and float64; pdf of the map against the pdf's text
+    rounding  the same as `rel`, `ks` and `inversion_error`, worst over albedos [-]; measured of the GPU and exact
+    inside    what must not be, where the law says that it holds; outside elsewhere
+    """
+
+    of: Named
+    model: ModelError
+    spreads: dict[str, Spread]
+    rounding: dict[str, float]
+    measured: dict[str, float]
+    inside: Count
+    outside: Count
+    bounds: tuple[Bound, ...]
+
+    @property
+    def broken(self) -> tuple[Bound, ...]:
+        return tuple(bound for bound in self.bounds if bound.broken)
+
+
+def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Path) -> Iterator[LawCheck]:
+    """Check one law after the other, while other threads evaluate the next ones in float64."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        references = pool.map(lambda one: grid.reference(one.law, grid.arguments()), laws)
+        for one, exact in zip(laws, references, strict=True):
+            yield check_law(context, one, folder, exact=exact)
+
+
+def check_law(
+    context: moderngl.Context, one: Named, folder: Path, text: str = "", exact: Values | None = None
+) -> LawCheck:
+    """Check a profile law with its constants. ShaderError if it does not compile.
+
+    text   in place of its own; exact  the law in float64 on the grid, where that is known already
+    """
+    model, valid = bounds.of_profile(one, folder), validity.of_profile(one, folder)
+    shader, at = ShaderLaw(context, one.law, text), grid.arguments()
+    found = shader.values(at.r, at.xi, at.alpha, at.mfp)
+    with np.errstate(all="ignore"):  # what is no number is counted, not warned of
+        exact = exact or grid.reference(one.law, at)
+        profiled, drawn = (np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, grid.ALPHA, grid.XI))
+        spreads, rounding = _rounding(one.law, found, exact, at, profiled, drawn)
+        judged = grid.ALPHA[drawn.any(axis=(1, 2))]
+        own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
+    if own is not None:
+        spreads[OWN] = own
+    inside = grid.counted(found, at, profiled, drawn)
+    everywhere = np.ones(at.shape, bool)
+    outside = grid.counted(found, at, everywhere, everywhere).less(inside)
+    measured = _measured(shader, one, model)
+    limits = _limits(model, rounding, measured, spreads)
+    limits += [bad_numbers(inside), *claims.of_profile(one, folder)]
+    return LawCheck(one, model, spreads, rounding, measured, inside, outside, tuple(limits))
+
+
+def _rounding(
+    law: ProfileLaw, found: Values, exact: Values, at: Arguments, profiled: Mask, drawn: Mask
+) -> tuple[dict[str, Spread], dict[str, float]]:
+    """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
+    seen = _of_quality(exact, at)
+    tells = profiled & (exact.profile * at.mfp**2 > grid.DIMMEST) & np.isfinite(exact.profile)
+    dense = drawn.any(axis=1, keepdims=True) & (exact.pdf * at.mfp > grid.DIMMEST) & np.isfinite(exact.pdf)
+    profile = np.abs(found.profile / exact.profile - 1.0)
+    cdf = np.abs(found.cdf - exact.cdf)
+    sample = _misplaced(law, found, exact, at)
+    spreads = {
+        PROFILE: grid.spread(profile, tells & seen, at),
+        EVERYWHERE: grid.spread(profile, tells, at),
+        CDF: grid.spread(cdf, profiled, at),
+        SAMPLE: grid.spread(sample, drawn, at, of_share=True),
+        PDF: grid.spread(np.abs(found.pdf / exact.pdf - 1.0), dense & seen, at),
+    }
+    used = tells & seen
+    means = np.sum(np.where(used, profile, 0.0), axis=1) / np.maximum(np.sum(used, axis=1), 1)
+    worst = (means, np.where(profiled, cdf, 0.0), np.where(drawn, sample, 0.0))
+    rounding = {name: float(np.max(values)) for name, values in zip(bounds.PROFILE_MEASURES, worst, strict=True)}
+    return {name: one for name, one in spreads.items() if one is not None}, rounding
+
+
+def _of_quality(exact: Values, at: Arguments) -> Mask:
+    """Where `rel` looks: from 0.01 mfp to 99.5 % of the energy."""
+    return (at.x >= NEAREST) & (exact.cdf <= ENERGY_WITHIN)
+
+
+def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> Floats:
+    """Share of the energy between the radius of float32 and that of float64 [-]."""
+    drawn = np.where(found.sample >= 0, found.sample, np.inf)
+    return np.abs(np.asarray(law.cdf(drawn, at.alpha, at.mfp)) - np.asarray(law.cdf(exact.sample, at.alpha, at.mfp)))
+
+
+def _measured(shader: ShaderLaw, one: Named, model: ModelError) -> dict[str, float]:
+    """The errors of the GPU's own numbers against the exact half space, of what the model error is known of."""
+    found: dict[str, float] = {}
+    if not one.setting.is_matched_isotropic:
+        return found
+    if model.get("rel") is not None:
+        quality = profile_quality(shader, ALBEDOS)  # type: ignore[arg-type]  # it asks for no more than there is
+        found |= {"rel": float(np.max(quality.rel)), "ks": float(np.max(quality.ks))}
+    if model.get("inversion_error") is not None:
+        found["inversion_error"] = float(np.max(inversion_error(shader, ALBEDOS)))
+    return found
+
+
+def _limits(
+    model: ModelError, rounding: dict[str, float], measured: dict[str, float], spreads: dict[str, Spread]
+) -> list[Bound]:
+    found = []
+    for name, value in model.values.items():
+        place = spreads[JUDGED[name]].where if JUDGED[name] in spreads else ""
+        found.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, place))
+        if name in measured:
+            found.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
+    rel, ks = model.get("rel"), model.get("ks")
+    if SAMPLE in spreads and ks is not None and model.get("inversion_error") is None:  # as good as the cdf it inverts
+        name = "float32 inversion_error"
+        found.append(Bound(name, rounding["inversion_error"], ROUNDING_SHARE * ks, spreads[SAMPLE].where))
+    if OWN in spreads and rel is not None:
+        found.append(Bound(f"{OWN}, 99 % of it", spreads[OWN].most, ROUNDING_SHARE * rel, spreads[OWN].where))
+    return found

@@ -1,0 +1,105 @@
+"""Is the text of a map between A and alpha right where it runs? Judged like a profile law, by its own model error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import exact
+from profilefit.inventory import Named
+from profilefit.shader.check import bounds, claims, validity
+from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
+from profilefit.shader.check.evaluate import ShaderMap
+from profilefit.shader.check.grid import ULP, Count, bad_numbers
+from profilefit.shader.check.validity import Range
+
+Floats = NDArray[np.float64]
+# Even in A, and even in sqrt(1 - alpha) as `quality.albedo_quality`: both as the GPU sees them.
+REFLECTANCE = np.linspace(0.0, 1.0, 2001).astype(np.float32).astype(np.float64)
+ALPHA = (1.0 - np.linspace(1.0, 0.0, 1001) ** 2).astype(np.float32).astype(np.float64)
+STEPS = 4  # of ULP that a falling alpha or A may be rounding
+
+
+@dataclass(frozen=True)
+class MapCheck:
+    """What was found of one map.
+
+    rounding  largest float32 error of A, `delta_A`, and of alpha, `delta_alpha`, where the map holds [-]
+    measured  the same of the GPU's numbers against the exact half space; the rest as in `check.LawCheck`
+    """
+
+    of: Named
+    model: ModelError
+    rounding: dict[str, float]
+    measured: dict[str, float]
+    places: dict[str, str]
+    inside: Count
+    outside: Count
+    bounds: tuple[Bound, ...]
+
+    @property
+    def broken(self) -> tuple[Bound, ...]:
+        return tuple(bound for bound in self.bounds if bound.broken)
+
+
+def check_map(context: moderngl.Context, one: Named, folder: Path, text: str = "") -> MapCheck:
+    """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
+    model = bounds.of_map(one, folder)
+    of_reflectance, of_alpha = validity.of_map(one, folder)
+    shader = ShaderMap(context, one.law, text)
+    alpha, reflectance = shader.alpha(REFLECTANCE), shader.reflectance(ALPHA)
+    with np.errstate(all="ignore"):  # what is no number is counted, not warned of
+        errors = {
+            "delta_A": np.abs(reflectance - one.law.reflectance(ALPHA))[of_alpha.holds(ALPHA)],
+            "delta_alpha": np.abs(alpha - one.law.alpha(REFLECTANCE))[of_reflectance.holds(REFLECTANCE)],
+        }
+    rounding = {name: float(np.max(values)) for name, values in errors.items()}
+    places = {
+        "delta_A": f"α {ALPHA[of_alpha.holds(ALPHA)][np.argmax(errors['delta_A'])]:.4g}",
+        "delta_alpha": f"A {REFLECTANCE[of_reflectance.holds(REFLECTANCE)][np.argmax(errors['delta_alpha'])]:.4g}",
+    }
+    measured = _measured(shader, of_alpha)
+    inside = _counted(alpha, reflectance, of_reflectance, of_alpha)
+    outside = _counted(alpha, reflectance, Range(), Range()).less(inside)
+    limits = []
+    for name, value in model.values.items():
+        limits.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places[name]))
+        if name in measured:
+            limits.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
+    limits += [bad_numbers(inside), *claims.of_map(one)]
+    return MapCheck(one, model, rounding, measured, places, inside, outside, tuple(limits))
+
+
+def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
+    """Largest errors against the exact half space, for albedos below 1 where the map holds [-]."""
+    if not shader.setting.is_matched_isotropic:
+        return {}
+    alpha = ALPHA[of_alpha.holds(ALPHA)]
+    truth = np.asarray(exact.reflectance(alpha, setting=shader.setting))
+    return {
+        "delta_A": float(np.max(np.abs(shader.reflectance(alpha) - truth))),
+        "delta_alpha": float(np.max(np.abs(shader.alpha(truth) - alpha))),
+    }
+
+
+def _counted(alpha: Floats, reflectance: Floats, of_reflectance: Range, of_alpha: Range) -> Count:
+    """What must not be: both directions rise."""
+    numbers, first = np.zeros(4, int), ""
+    for given, value, span, sign in (
+        (REFLECTANCE, alpha, of_reflectance, "A"),
+        (ALPHA, reflectance, of_alpha, "α"),
+    ):
+        held = span.holds(given)
+        with np.errstate(invalid="ignore"):
+            falls = np.append(False, np.diff(value) < -STEPS * ULP) & held & np.append(False, held[:-1])
+            kinds = [np.isnan(value) & held, np.isinf(value) & held, (value < 0) & held, falls]
+        numbers += [int(np.sum(kind)) for kind in kinds]
+        bad = np.any(kinds, axis=0)
+        if np.any(bad) and not first:
+            first = f"{sign} {given[np.argmax(bad)]:.4g}"
+    nan, infinite, negative, wrong_way = (int(number) for number in numbers)
+    return Count(nan, infinite, negative, wrong_way, first)

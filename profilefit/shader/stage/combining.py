@@ -1,0 +1,63 @@
+"""Pass 4: what scattered, what the surface mirrors and what shines through, as radiance; and as a picture."""
+
+from __future__ import annotations
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw
+from profilefit.shader.emit import stage_text
+from profilefit.shader.stage.camera import unit
+from profilefit.shader.stage.exact_law import ExactLaw
+from profilefit.shader.stage.full_screen import FullScreen
+from profilefit.shader.stage.scattering import LAW, View, name_of, tables_of, text_of
+from profilefit.shader.stage.scene import Scene
+from profilefit.shader.stage.separable_kernel import Separable, transmitted_text
+from profilefit.shader.stage.targets import Targets
+
+Floats = NDArray[np.float64]
+
+
+class Combining:
+    """The last pass, with a law for the light that shines through."""
+
+    def __init__(self, context: moderngl.Context, law: ProfileLaw | ExactLaw | Separable):
+        text = transmitted_text(LAW) if isinstance(law, Separable) else text_of(law)
+        name = "separable" if isinstance(law, Separable) else name_of(law)
+        self._pass = FullScreen(context, f"combine {name}", f"#version 330\n{text}\n{stage_text('combine.frag')}")
+        self.name, self.milliseconds = self._pass.name, self._pass.milliseconds
+        self._tables = tables_of(context, law)
+
+    def run(self, targets: Targets, view: View, scene: Scene | None, mfp: Floats, fixed_alpha: Floats) -> None:
+        """Without a scene there is no light to mirror or to shine through."""
+        values = {
+            **view.values(),
+            "mfp": tuple(mfp),
+            "fixed_alpha": tuple(fixed_alpha),
+            **_lit(scene),
+        }
+        textures = {**targets.maps, "exitance_map": targets.exitance, **self._tables}
+        self._pass.run(targets.into[targets.radiance], textures, values)
+
+    def release(self) -> None:
+        self._pass.release()
+        for table in self._tables.values():
+            table.release()
+
+
+def _lit(scene: Scene | None) -> dict[str, object]:
+    if scene is None:
+        return {"toward_light": (0.0, 0.0, 1.0), "light": (0.0, 0.0, 0.0), "f0": 0.0}
+    toward = scene.camera.view()[:3, :3] @ unit(scene.light.direction)
+    return {"toward_light": tuple(toward), "light": scene.light.irradiance, "f0": scene.f0}
+
+
+def to_srgb(image: ArrayLike, exposure: float = 1.0) -> NDArray[np.uint8]:
+    """Linear (h, w, 3) times `exposure`, as 8-bit values for a screen (IEC 61966-2-1); same order of rows."""
+    if not exposure > 0:
+        raise InputError(f"exposure must be a factor > 0, got {exposure!r}")
+    linear = np.clip(np.asarray(image, float) * exposure, 0.0, 1.0)
+    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    return np.round(255.0 * curved).astype(np.uint8)

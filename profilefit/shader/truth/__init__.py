@@ -1,0 +1,1 @@
+"""What the render should show, by float64 integrals that share no code with it."""

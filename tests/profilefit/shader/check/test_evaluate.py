@@ -1,0 +1,69 @@
+"""Texts on the GPU give the numbers of the float64 laws, in any shape and number; what does not compile says why."""
+
+import re
+
+import numpy as np
+import pytest
+
+import profilefit
+from profilefit import catalogue
+from profilefit.errors import ShaderError
+from profilefit.shader import emit
+from profilefit.shader.check.evaluate import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half
+
+BURLEY = profilefit.load("burley", "published")
+RATIONAL = catalogue.albedo_law("rational")
+FLOAT32 = 5e-6  # some ten operations, and an exponential of up to ten
+
+
+def test_all_four_functions_are_the_laws(context):
+    r, alpha, mfp = np.geomspace(0.01, 5.0, 7)[:, None], np.array([0.1, 0.6, 0.95]), 2.0
+    xi = np.linspace(0.05, 0.95, 7)[:, None]
+    found = ShaderLaw(context, BURLEY).values(r, xi, alpha, mfp)
+    assert found.profile.shape == (7, 3)
+    np.testing.assert_allclose(found.profile, BURLEY.profile(r, alpha, mfp), rtol=FLOAT32)
+    np.testing.assert_allclose(found.cdf, BURLEY.cdf(r, alpha, mfp), atol=FLOAT32)
+    np.testing.assert_allclose(found.sample, BURLEY.sampler.sample(xi, alpha, mfp), rtol=FLOAT32)
+    np.testing.assert_allclose(found.pdf, BURLEY.sampler.pdf(r, alpha, mfp), rtol=FLOAT32)
+
+
+def test_a_map_goes_both_ways(context):
+    there, values = ShaderMap(context, RATIONAL), np.linspace(0.0, 1.0, 33)
+    np.testing.assert_allclose(there.alpha(values), RATIONAL.alpha(values), atol=FLOAT32)
+    np.testing.assert_allclose(there.reflectance(values[:-1]), RATIONAL.reflectance(values[:-1]), atol=FLOAT32)
+
+
+def test_more_arguments_than_a_texture_holds(context):
+    """Each in its own place, the last alone in a row."""
+    alpha = np.linspace(0.1, 0.9, WIDTH * ROWS + 1)
+    found = ShaderLaw(context, BURLEY).cdf(0.7, alpha)
+    picked = np.array([0, WIDTH - 1, WIDTH, alpha.size - 2, alpha.size - 1])
+    np.testing.assert_allclose(found[picked], BURLEY.cdf(0.7, alpha[picked]), atol=FLOAT32)
+
+
+def test_results_may_be_stored_in_half_precision(context):
+    r = np.geomspace(0.01, 1.0, 50)
+    error = np.abs(ShaderLaw(context, BURLEY, results="f2").profile(r, 0.5) / BURLEY.profile(r, 0.5) - 1.0)
+    assert 1e-4 < np.max(error) <= 2.0**-10  # eleven bits, rounded or cut
+
+
+def test_a_broken_text_names_law_line_and_the_drivers_message(context):
+    text = emit.law_text(BURLEY).replace("float third = exp(", "float third = expo(")
+    with pytest.raises(ShaderError, match=r"'burley'.*line \d+.*float third = expo\(.*expo"):
+        ShaderLaw(context, BURLEY, text)
+
+
+def test_a_text_in_half_precision_has_no_other_number_left():
+    text = in_half(emit.law_text(profilefit.load("hazard")))
+    assert not re.search(r"\bfloat\b", text)
+    code = "\n".join(line.partition("//")[0] for line in text.splitlines())
+    bare = re.sub(r"float16_t\([\d.eE+-]+\)", "", code)
+    assert not re.search(r"(?<![\w.])(\d+\.\d*|\d+e-?\d+)", bare)
+    assert "float16_t(1e-6)" in code
+    assert "i < HAZARD_STEPS" in code
+
+
+def test_what_offers_no_half_precision_says_so_in_one_line(context):
+    line = no_half(context)
+    assert line.startswith("float16 arithmetic: not offered by ")
+    assert "\n" not in line

@@ -1,0 +1,168 @@
+"""Right texts pass; a wrong constant, sign or density, or a number that is none, does not."""
+
+import numpy as np
+import pytest
+
+from profilefit import catalogue, inventory
+from profilefit.errors import InputError, RecordError
+from profilefit.shader import emit
+from profilefit.shader.check import bounds, grid, validity
+from profilefit.shader.check.bounds import Bound
+from profilefit.shader.check.chosen import chosen, printed, regenerated
+from profilefit.shader.check.cost import WORKS, costs
+from profilefit.shader.check.evaluate import Values
+from profilefit.shader.check.half import ALPHA, REFLECTANCE, check_half
+from profilefit.shader.check.laws import OWN, check_law, check_laws
+from profilefit.shader.check.maps import check_map
+
+FITS = catalogue.fits_folder()
+HAZARD = inventory.find("hazard-n1.4", FITS)  # photons judge it: no exact profile is computed
+RATIONAL = inventory.find("albedo-rational-n1.4", FITS)
+
+
+@pytest.fixture(scope="module")
+def exact():
+    """The law in float64 on the whole grid."""
+    return grid.reference(HAZARD.law, grid.arguments())
+
+
+def names(found):
+    return [bound.name for bound in found.broken]
+
+
+def test_a_regenerated_law_passes_with_room(context, exact):
+    found = check_law(context, HAZARD, FITS, exact=exact)
+    assert names(found) == []
+    assert found.model.source == "hazard-n1.4"
+    assert found.inside.total == found.outside.total == 0
+    assert 0 < found.rounding["rel"] < 1e-5
+    assert 0 < found.spreads[OWN].half < 1e-6
+    assert {bound.name for bound in found.bounds} >= {"float32 rel", "float32 ks", "bad numbers"}
+
+
+def test_the_gpus_numbers_have_the_records_errors(context):
+    """Of a law that has an exact profile, measured anew."""
+    (found,) = check_laws(context, [inventory.find("burley-whole", FITS)], FITS)
+    assert names(found) == []
+    assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-5)
+    assert found.measured["ks"] == pytest.approx(found.model.values["ks"], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "broken"),
+    [
+        ("s.h = exp(hazard_h0", "s.h = exp(1.02 * hazard_h0", "float32 rel"),
+        ("s.w = s.source - s.kappa", "s.w = s.source + s.kappa", "float32 ks"),
+        ("float t = -log(1.0 - share);", "float t = -log(share - 1.0);", "float32 inversion_error"),
+        ("return exp(-here.exponent) * here.ratio * here.hazard;", "return sqrt(-1.0 - x);", "bad numbers"),
+        ("here.exponent + log(here.ratio)) * flight", "here.exponent) * flight", "float32 inversion_error"),
+        ("return hazard_density(x, s);", "return 1.01 * hazard_density(x, s);", f"{OWN}, 99 % of it"),
+    ],
+)
+def test_an_error_in_the_text_breaks_its_bound(context, exact, old, new, broken):
+    text = emit.law_text(HAZARD.law)
+    assert text.count(old) == 1
+    found = check_law(context, HAZARD, FITS, text.replace(old, new), exact)
+    assert broken in names(found)
+
+
+def test_a_map_passes_and_a_wrong_sign_does_not(context):
+    assert names(check_map(context, RATIONAL, FITS)) == []
+    text = emit.map_text(RATIONAL.law)
+    wrong = text.replace("1.0 + rational_map_b * s", "1.0 - rational_map_b * s")
+    assert wrong != text
+    assert "float32 delta_A" in names(check_map(context, RATIONAL, FITS, wrong))
+
+
+def test_what_the_paper_promises_is_judged_of_its_constants_alone():
+    laws, maps = chosen(["liang"], "published", FITS)
+    valid = validity.of_profile(laws[0], FITS)
+    assert str(valid.alpha) == "[1e-06, 1]"
+    assert str(valid.xi) == "[0, 1]"
+    assert str(validity.of_map(maps[0], FITS)[0]) == "[0, 1]"
+    whole = inventory.find("liang-whole", FITS)
+    assert str(validity.of_profile(whole, FITS).xi) == "[0.01, 1]"
+    fitted, _ = validity.of_map(inventory.find("albedo-liang", FITS), FITS)
+    assert (fitted.low, fitted.high) == pytest.approx((0.05, 0.9), abs=1e-4)
+    inverse = next(one for one in inventory.sampled_laws(FITS) if one.label == "liang-inverse-as-published")
+    assert validity.of_profile(inverse, FITS).alpha is None
+    assert set(bounds.of_profile(inverse, FITS).values) == {"inversion_error"}
+
+
+def test_names_choose_laws_and_maps():
+    laws, maps = regenerated(FITS)
+    assert {"hazard", "hazard-diffuse-n1.5", "liang-whole", "liang-inverse-as-published"} <= {o.label for o in laws}
+    assert len({one.label for one in (*laws, *maps)}) == len(laws) + len(maps)
+    assert {one.setting.n for one in chosen(["hazard"], "regenerated", FITS)[0]} == {1.0, 1.3, 1.4, 1.5}
+    assert [one.label for one in chosen(["gaussians"], "regenerated", FITS)[0]] == ["gaussians-6"]
+    assert len(chosen(["rational"], "regenerated", FITS)[1]) == 8
+    assert {one.name for one in printed("published", FITS)[0]} == {"liang", "burley", "burley_diffuse_mfp"}
+    with pytest.raises(InputError, match="name must be a law or a record"):
+        chosen(["nothing"], "regenerated", FITS)
+    with pytest.raises(InputError, match="constants must be regenerated or a printed set"):
+        chosen([], "nothing", FITS)
+    with pytest.raises(InputError, match="name the record itself"):
+        chosen(["liang"], "liang.json", FITS)
+    with pytest.raises(RecordError, match="holds no law"):
+        chosen(["reproduction"], "regenerated", FITS)
+
+
+def test_bad_numbers_are_counted_by_kind():
+    """On a grid of two albedos, four radii and shares, one length."""
+    at = grid.Arguments(
+        np.array([0.2, 0.8])[:, None, None],
+        np.array([0.0, 1.0, 2.0, 3.0])[None, :, None],
+        np.array([0.0, 0.2, 0.4, 0.6])[None, :, None],
+        np.array([1.0]),
+    )
+    falling = np.broadcast_to(np.array([4.0, 3.0, 2.0, 1.0])[None, :, None], (2, 4, 1)).copy()
+    rising = falling[:, ::-1].copy()
+    profile, cdf, sample = falling.copy(), rising / 4.0, rising.copy()
+    profile[0, 2, 0] = 3.5  # up by a half
+    profile[1, 3, 0] = np.inf  # not a step up besides
+    cdf[0, 1, 0] = cdf[0, 0, 0] - 2.0 * grid.ULP  # rounding
+    cdf[1, 2, 0] = np.nan
+    sample[0, 0, 0] = -1.0
+    everywhere = np.ones((2, 4, 1), bool)
+    found = grid.counted(Values(profile, cdf, sample, rising), at, everywhere, everywhere)
+    assert (found.nan, found.infinite, found.negative, found.wrong_way) == (1, 1, 1, 2)
+    assert found.where == "profile, r/l 2, α 0.2"
+    bright = everywhere & (at.alpha > 0.5)
+    inside = grid.counted(Values(profile, cdf, sample, rising), at, bright, bright)
+    assert (inside.nan, inside.infinite, inside.negative) == (1, 1, 0)
+    assert found.less(inside).negative == 1
+
+
+def test_errors_that_are_no_number_are_the_largest():
+    at = grid.Arguments(np.full((3, 1, 1), 0.5), np.array([[[1.0]]]), np.array([[[0.5]]]), np.array([1.0]))
+    error = np.array([0.1, np.nan, 0.2]).reshape(3, 1, 1)
+    found = grid.spread(error, np.ones((3, 1, 1), bool), at)
+    assert found.largest == np.inf
+    assert found.half == 0.2
+    assert grid.spread(error, np.zeros((3, 1, 1), bool), at) is None
+    assert Bound("x", float("nan"), 1.0).broken
+    assert not Bound("x", 1.0, 1.0).broken
+    assert str(Bound("x", 3.0, 1.5, "r 2")) == "x: 3 at r 2; bound 1.5, 2 times that"
+
+
+def test_the_grid_has_both_ends():
+    assert (grid.ALPHA[0], grid.ALPHA[-1]) == (0.0, 1.0)
+    assert (grid.X[0], grid.XI[0], grid.XI[-1]) == (0.0, 0.0, 1.0)
+    assert grid.X[-1] >= 1e29
+    assert grid.X.size == grid.XI.size
+    for values in (grid.ALPHA, grid.X, grid.XI):
+        assert np.all(np.diff(values) > 0)
+        assert np.array_equal(values, values.astype(np.float32))
+
+
+def test_costs_are_counted_in_normalized_diffusion(context):
+    yardstick = catalogue.load("burley", "published")
+    found = costs(context, [HAZARD.law], yardstick)
+    assert set(found) == {"burley", "hazard"}
+    assert found["burley"].ratio == dict.fromkeys(WORKS, 1.0)
+    assert all(value > 0 for cost in found.values() for value in (*cost.ns.values(), *cost.ratio.values()))
+
+
+def test_a_stored_reflectance_loses_less_than_a_stored_albedo(context):
+    found = check_half(context, HAZARD)
+    assert 1e-5 < found.rel[REFLECTANCE] < 0.5 * found.rel[ALPHA] < 0.01

@@ -1,0 +1,85 @@
+"""Geometry, textures, materials and cameras of the render, before any GPU sees them."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
+from profilefit.shader.stage import head, skin_texture
+from profilefit.shader.stage.camera import Camera
+from profilefit.shader.stage.material import translucent
+from profilefit.shader.stage.mesh import parameters, sheet
+from profilefit.shader.stage.scene import head_scene
+
+
+@pytest.fixture(scope="module")
+def scene():
+    return head_scene(columns=256)
+
+
+def test_normals_of_a_ball_point_outwards():
+    u, v = parameters(40, 60)
+    mesh = sheet(10.0 * head.ball(u, v), u, v, closed=True)
+    np.testing.assert_allclose(mesh.normal, mesh.position / 10.0, atol=0.02)  # facets of 6 degrees; measured 0.0195
+
+
+def test_triangles_turn_as_their_normals(scene):
+    for part in scene.parts:
+        a, b, c = (part.mesh.position[part.mesh.triangles[:, i]] for i in range(3))
+        face = np.cross(b - a, c - a)
+        agree = np.einsum("ij,ij->i", face, part.mesh.normal[part.mesh.triangles[:, 0]])
+        assert np.mean(agree[np.linalg.norm(face, axis=1) > 1e-6] > 0) > 0.98
+
+
+def test_vertices_are_sound(scene):
+    for part in scene.parts:
+        vertices = part.mesh.vertices()
+        assert np.all(np.isfinite(vertices))
+        np.testing.assert_allclose(np.linalg.norm(part.mesh.normal, axis=1), 1.0, atol=1e-6)
+        assert part.mesh.triangles.max() < len(vertices)
+
+
+def test_the_band_floats_before_the_brow(scene):
+    face, band = scene.parts[0].mesh.position, scene.parts[-1].mesh.position
+    brow = face[np.abs(face - [0, 50, 0])[:, :2].max(axis=1) < 6][:, 2].max()
+    assert band[np.abs(band[:, 0]) < 6][:, 2].max() - brow > 10 * max(scene.material.mfp)
+
+
+def test_texture_is_skin_with_fine_detail():
+    reflectance = translucent("skin1").reflectance
+    texture = skin_texture.skin(reflectance, columns=512)
+    assert texture.shape == (256, 512, 3)
+    assert 0 < texture.min() < texture.max() < 1
+    np.testing.assert_allclose(np.median(texture, axis=(0, 1)), reflectance, rtol=0.05)
+    np.testing.assert_array_equal(texture, skin_texture.skin(reflectance, columns=512))
+    cheek = texture[115:125, 200:300]
+    assert np.ptp(cheek[..., 1]) > 0.3 * reflectance[1]
+
+
+def test_material_has_the_exact_reflectance():
+    skin = translucent("skin1")
+    np.testing.assert_allclose(skin.mfp, [1 / 0.772, 1 / 1.05, 1 / 1.49])
+    np.testing.assert_allclose(skin.reflectance, exact.reflectance(np.array(skin.alpha), Setting("diffuse")))
+
+
+@pytest.mark.parametrize("kind", ["perspective", "orthographic"])
+def test_pixel_is_that_of_the_projection(kind):
+    """A point a pixel aside at the target moves by 2 / rows in clip space."""
+    camera = Camera(eye=(10.0, 5.0, 400.0), target=(0.0, 2.0, 0.0), height=80.0, kind=kind)
+    view = camera.view()
+    depth = camera.distance
+    aside = camera.pixel(100) * (depth if kind == "perspective" else 1.0)
+    at = camera.projection(1.5, 10.0, 900.0) @ np.array([0.0, aside, -depth, 1.0])
+    np.testing.assert_allclose((view @ [0.0, 2.0, 0.0, 1.0])[:3], [0, 0, -depth], atol=1e-9)
+    np.testing.assert_allclose(at[1] / at[3], 2 / 100)
+
+
+def test_bad_input_is_named():
+    with pytest.raises(InputError, match=r"material must be one of apple.*got 'skin9'"):
+        translucent("skin9")
+    with pytest.raises(InputError, match="kind must be one of perspective, orthographic, got 'fisheye'"):
+        Camera(kind="fisheye")
+    with pytest.raises(InputError, match=r"height must be a length > 0 .* got -1"):
+        Camera(height=-1)
+    with pytest.raises(InputError, match="detail must be a whole number >= 1, got 0"):
+        head_scene(detail=0)
