@@ -3,8 +3,8 @@
 // R_d [1/length^2]: 2 pi r R_d integrates to A
 float LAW_profile(float r, float alpha, float mfp) {
     LAW_Shape s = LAW_shape(alpha);
-    float x = clamp(r / mfp, PF_LEAST_X, PF_FARTHEST);
-    return LAW_reflectance(s) * LAW_density(x, s) / (PF_TWO_PI * x * mfp * mfp);
+    float x = max(r / mfp, PF_LEAST_X);
+    return LAW_reflectance(s) * LAW_density(x, s) / (PF_TWO_PI * x) / (mfp * mfp);
 }
 
 // Share of the reflected energy within r [-]
