@@ -14,7 +14,7 @@ pytest.importorskip("flip_evaluator", reason="FLIP needs the package flip-evalua
 
 from benchmarks import render, render_errors, render_pictures, render_table2, render_variance
 from benchmarks.render_laws import contenders
-from benchmarks.render_pictures import shot
+from benchmarks.render_pictures import shots
 from benchmarks.render_view import CLOSE, Judged
 
 
@@ -47,7 +47,7 @@ def test_errors_fall_with_samples_and_are_drawn(opened, scene, few, tmp_path, ca
         truth = stage.scatter(few["hazard"].law, mfp, few["hazard"].drawn(256, seed=9)).astype(float)
         judge = Judged(stage, mfp, truth, stage.buffers().mask > 0.5, None)
         found = render_errors.measured(judge, few, (1, 16), 2, 2)
-        rows = [[shot(judge, few["hazard"], 4, 1)]]
+        rows = [shots(judge, [(few["hazard"], 4)], 1)]
         render_pictures.draw(judge, rows, tmp_path / "picture.png", ("four",), "this")
     assert np.all(found["hazard"].rmse[1] < 0.5 * found["hazard"].rmse[0])
     assert np.all(found["hazard"].flip[1] < found["hazard"].flip[0])

@@ -1,0 +1,153 @@
+"""What the render shows: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
+
+    python -m benchmarks.render errors|table2|fig14|variance|pictures|choices [--quick] [--size WxH]
+                                [--figure FILE] [--json FILE] [--reference FILE]
+
+Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. The exact picture takes
+minutes: `--reference FILE` keeps it there for the next time. README.md beside this file says what the numbers mean.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import moderngl
+
+from benchmarks import render_errors, render_pictures, render_table2, render_variance
+from benchmarks.render_laws import contenders, variants
+from benchmarks.render_view import judged
+from profilefit.errors import ShaderError
+from profilefit.shader.context import open_context, renderer
+from profilefit.shader.stage.scene import head_scene
+
+SAMPLES, QUICK_SAMPLES = (1, 4, 16, 64, 256), (1, 4, 16)
+SEEDS, QUICK_SEEDS = 4, 2
+TURNS, QUICK_TURNS = 5, 1
+VIEW, SCREEN = (192, 192), (1920, 1080)
+SIDES = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
+
+
+def errors(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """Every law over samples and over time, and two laws with every way to draw radii."""
+    works, varied = contenders(), variants()
+    samples = QUICK_SAMPLES if options.quick else SAMPLES
+    seeds, turns = (QUICK_SEEDS, QUICK_TURNS) if options.quick else (SEEDS, TURNS)
+    with _judged(context, options) as judge:
+        found = render_errors.measured(judge, works, samples, seeds, turns)
+        render_errors.report("Laws", works, found, "separable")
+        other = render_errors.measured(judge, varied, samples, seeds, turns)
+        render_errors.report("Radii", varied, other, "burley, importance blue, longest")
+        own = judge.truth_error
+        if own:
+            print("the reference's own error, median, 90 %, RMS:", *(f"{value:.1e}" for value in own))
+    if options.figure:
+        render_errors.draw(works, found, options.figure, _device(context))
+    return {"reference_error": own, "laws": render_errors.as_json(found), "radii": render_errors.as_json(other)}
+
+
+def table2(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """The paper's Table 2."""
+    laws, size = contenders(), options.size or SCREEN
+    works = {key: laws[key] for key in render_table2.KEYS}
+    found = render_table2.timed(context, head_scene(), works, size, QUICK_TURNS if options.quick else 3)
+    title = f"{size[0]} x {size[1]}, {render_table2.SAMPLES} samples, over separable"
+    render_table2.report(title, works, found)
+    return {"size": size, "samples": render_table2.SAMPLES, "shares": render_table2.as_json(found)}
+
+
+def variance(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """Squared bias and variance of the estimator at a step edge."""
+    found = render_variance.measured(context, QUICK_SAMPLES if options.quick else SAMPLES, 2 if options.quick else 24)
+    render_variance.report(found)
+    return render_variance.as_json(found)
+
+
+def pictures(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """Laws with equal samples and in equal time."""
+    titles = (
+        f"{render_pictures.EQUAL} samples\neach\n\nbelow: their\ndifference from\nthe exact picture",
+        f"in the time of\nhazard with\n{render_pictures.RICH} samples",
+    )
+    return _drawn(context, options, render_pictures.laws, titles)
+
+
+def fig14(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """17 samples, uniform against importance."""
+    return _drawn(context, options, render_pictures.seventeen, ("the hazard law,\n17 samples",))
+
+
+def choices(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """A law for diffuse light against one for searchlights, one channel's radii against a mixture's."""
+    return _drawn(context, options, render_pictures.choices, ("the hazard law",))
+
+
+WHAT: dict[str, Callable[[moderngl.Context, argparse.Namespace], dict]] = {
+    one.__name__: one for one in (errors, table2, fig14, variance, pictures, choices)
+}
+
+
+def _judged(context: moderngl.Context, options: argparse.Namespace):
+    return judged(context, options.size or VIEW, options.reference, options.quick)
+
+
+def _drawn(
+    context: moderngl.Context,
+    options: argparse.Namespace,
+    taken: Callable[..., list[list[render_pictures.Shot]]],
+    titles: Sequence[str],
+) -> dict:
+    with _judged(context, options) as judge:
+        rows = taken(judge, contenders(), QUICK_TURNS if options.quick else TURNS)
+        render_pictures.report(judge, rows)
+        if options.figure:
+            render_pictures.draw(judge, rows, options.figure, titles, _device(context))
+        return {"reference_error": judge.truth_error, "pictures": render_pictures.as_json(judge, rows)}
+
+
+def _device(context: moderngl.Context) -> str:
+    return str(context.info["GL_RENDERER"])
+
+
+def _size(text: str) -> tuple[int, int]:
+    match = SIDES.fullmatch(text)
+    if not match:
+        raise argparse.ArgumentTypeError(f"size must be WxH in pixels, as 320x256, got {text!r}")
+    return int(match.group(1)), int(match.group(2))
+
+
+def _png(text: str) -> Path:
+    if not text.endswith(".png"):
+        raise argparse.ArgumentTypeError(f"figure must be a .png file, got {text!r}")
+    return Path(text)
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("what", choices=tuple(WHAT))
+    parser.add_argument("--quick", action="store_true", help="fewer samples, seeds and turns: a first look")
+    parser.add_argument("--size", type=_size, metavar="WxH", help="of the picture [pixels]")
+    parser.add_argument("--figure", type=_png, metavar="FILE", help="draw a chart or picture there, .png")
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers there too")
+    parser.add_argument("--reference", type=Path, metavar="FILE", help="keep the exact picture there, .npz")
+    options = parser.parse_args(arguments)
+    try:
+        context = open_context()
+    except ShaderError as error:
+        sys.exit(str(error))
+    try:
+        print(f"on {renderer(context)}")
+        numbers = {"device": renderer(context), **WHAT[options.what](context, options)}
+    finally:
+        context.release()
+    if options.json:
+        options.json.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,100 @@
+"""Table 2 of Liang et al.: a frame at 1920 x 1080 with a face that covers a quarter, a half, three quarters of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.render_laws import Contender
+from benchmarks.stopwatch import Ratio
+from benchmarks.table import show
+from profilefit.shader.stage.coverage import covered, covering
+from profilefit.shader.stage.scene import Scene
+from profilefit.shader.stage.stage import PASSES, Stage
+
+Floats = NDArray[np.float64]
+COVERED = (0.25, 0.50, 0.75)
+SAMPLES = 17  # of their Figure 14; Table 2 itself does not say
+YARDSTICK = "separable"
+# ms a frame of their Table 2, on a GTX 1050: the paper's own law is `liang`, normalized diffusion inverts by Golubev.
+PUBLISHED = {"separable": (3.5, 5.9, 8.6), "burley": (4.2, 6.9, 10.6), "liang": (3.9, 6.6, 9.8)}
+KEYS = ("separable", "burley", "liang", "hazard", "quantile")
+
+
+@dataclass(frozen=True)
+class Timed:
+    """covered  share of the screen [-];  milliseconds  by passes, "scatter" or "frame", and law, (turns,)."""
+
+    covered: float
+    milliseconds: dict[str, dict[str, Floats]]
+
+    def ratio(self, passes: str, key: str) -> Ratio:
+        """Over the yardstick, turn by turn."""
+        ratios = self.milliseconds[passes][key] / self.milliseconds[passes][YARDSTICK]
+        return Ratio(float(np.median(ratios)), float(ratios.min()), float(ratios.max()))
+
+
+def timed(
+    context: moderngl.Context,
+    scene: Scene,
+    works: Mapping[str, Contender],
+    size: tuple[int, int],
+    turns: int,
+    shares: Sequence[float] = COVERED,
+) -> list[Timed]:
+    """All laws in turns; the scene from as near as it must be to cover each share of the screen."""
+    return [_timed(context, covering(context, scene, share, size), works, size, turns) for share in shares]
+
+
+def _timed(
+    context: moderngl.Context, scene: Scene, works: Mapping[str, Contender], size: tuple[int, int], turns: int
+) -> Timed:
+    mfp = scene.material.mfp
+    found = {passes: {key: np.empty(turns) for key in works} for passes in PASSES}
+    with Stage(context, size) as stage:
+        stage.draw(scene)
+        reached = covered(stage, scene)
+        for turn in range(turns):
+            for passes, by_law in found.items():
+                for key, values in by_law.items():
+                    one = works[key]
+                    values[turn] = stage.time(one.law, mfp, one.drawn(SAMPLES), repeats=1, passes=passes)[0]
+    return Timed(reached, found)
+
+
+def report(title: str, works: Mapping[str, Contender], found: list[Timed]) -> None:
+    """Milliseconds, and ratios to the separable filter beside those of the paper."""
+    shares = [f"{100 * one.covered:.1f} %" for one in found]
+    for passes in PASSES:
+        rows = []
+        for key in found[0].milliseconds[passes]:
+            cells = [f"{one.milliseconds[passes][key].min():.0f}" for one in found]
+            cells += [str(one.ratio(passes, key)) for one in found]
+            rows.append((works[key].label, *cells, *_published(key)))
+        columns = (
+            "law",
+            *(f"ms, {s}" for s in shares),
+            *(f"ratio, {s}" for s in shares),
+            *(["paper"] * len(shares)),
+        )
+        show(f"{title}: {passes}, least ms, median ratio", columns, rows)
+
+
+def _published(key: str) -> list[str]:
+    if key not in PUBLISHED:
+        return ["-"] * len(COVERED)
+    return [f"{ms / base:.2f}" for ms, base in zip(PUBLISHED[key], PUBLISHED[YARDSTICK], strict=True)]
+
+
+def as_json(found: list[Timed]) -> list[dict]:
+    return [
+        {
+            "covered": one.covered,
+            "milliseconds": {p: {k: v.tolist() for k, v in laws.items()} for p, laws in one.milliseconds.items()},
+        }
+        for one in found
+    ]

@@ -1,0 +1,109 @@
+"""The picture that the render is judged by: a close view of the head, the exact answer, two measures of error."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import flip_evaluator
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.shader.stage.buffers import Buffers
+from profilefit.shader.stage.material import Rgb
+from profilefit.shader.stage.scene import FACE, Scene, head_scene
+from profilefit.shader.stage.stage import Stage
+from profilefit.shader.truth.reference import gathered, refined
+from profilefit.shader.truth.surface import seen
+
+Floats = NDArray[np.float64]
+OwnError = tuple[float, float, float]
+# Brow, nose, its shadow, freckles and the band before it: 60 mm of the head, so that of 192 rows one shows 0.29 mm, and
+# the shortest mean free path is 2.2 pixels: below two the stage fades to Lambert, which the truth does not.
+CLOSE = replace(FACE, target=(14.0, 24.0, 50.0), height=60.0)
+EXPOSURE = 1.1  # of every picture; 1 in a thousand of the view's pixels is clipped by it
+CHECKED = 60  # pixels at which the reference is compared with one of half the pixel
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A stage that has drawn the view, and the exact answer; row 0 at the bottom.
+
+    truth  (h, w, 3) radiant exitance, light that scattered only;  mask  (h, w), where light scatters
+    truth_error  what half the pixel's side changes in the truth, over its mean [-]: half of the pixels and nine in ten
+                 are below the first two, the third is the root mean square, which outlines set; None if not measured
+    """
+
+    stage: Stage
+    mfp: Rgb
+    truth: Floats
+    mask: NDArray[np.bool_]
+    truth_error: OwnError | None
+
+    def rmse(self, exitance: NDArray[np.floating]) -> float:
+        """Root mean square error over the translucent pixels and channels, over the mean of the truth there [-]."""
+        difference = exitance[self.mask] - self.truth[self.mask]
+        return float(np.sqrt(np.mean(difference**2)) / np.mean(self.truth[self.mask]))
+
+    def flip(self, exitance: NDArray[np.floating]) -> float:
+        """Mean over the translucent pixels of FLIP (Andersson et al. 2020) [0, 1], seen at 67 pixels a degree."""
+        pair = (np.ascontiguousarray(shown(image), np.float32) for image in (self.truth, exitance))
+        difference, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)
+        return float(np.mean(difference[::-1][self.mask]))  # `shown` has row 0 at the top
+
+
+@contextmanager
+def judged(context: moderngl.Context, size: tuple[int, int], kept: Path | None, quick: bool) -> Iterator[Judged]:
+    """The view at a size [pixels]. The reference takes minutes: `kept` is where it lies, or will.
+
+    quick  leaves out the error of the reference itself
+    """
+    scene = head_scene(camera=CLOSE)
+    with Stage(context, size) as stage:
+        stage.draw(scene)
+        buffers = stage.buffers()
+        error = None if quick else _own_error(context, scene, size)
+        truth = _kept(kept, buffers, scene.material.mfp)
+        yield Judged(stage, scene.material.mfp, truth, buffers.mask > 0.5, error)
+
+
+def shown(exitance: NDArray[np.floating]) -> Floats:
+    """sRGB in [0, 1] of the radiance, row 0 at the top."""
+    linear = np.clip(EXPOSURE / np.pi * np.asarray(exitance, float)[::-1], 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
+
+
+def reference(buffers: Buffers, mfp: Rgb) -> Floats:
+    """(h, w, 3) exact exitance where light scatters, and Lambert's elsewhere, as in the stage."""
+    light = gathered(*seen(buffers), mfp, "diffuse").light
+    inside = (buffers.mask > 0.5)[..., None]
+    return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
+
+
+def _kept(path: Path | None, buffers: Buffers, mfp: Rgb) -> Floats:
+    parts = (buffers.irradiance, buffers.reflectance, buffers.position, buffers.mask, np.array(mfp))
+    digest = hashlib.sha256(b"".join(part.tobytes() for part in parts)).hexdigest()
+    if path is not None and path.exists():
+        with np.load(path) as content:
+            if str(content["digest"]) == digest:
+                return content["truth"]
+    truth = reference(buffers, mfp)
+    if path is not None:
+        np.savez_compressed(path, truth=truth, digest=digest)
+    return truth
+
+
+def _own_error(context: moderngl.Context, scene: Scene, size: tuple[int, int]) -> OwnError:
+    with Stage(context, (2 * size[0], 2 * size[1])) as fine:
+        fine.draw(scene)
+        surface, view = seen(fine.buffers())
+    inside = np.argwhere(surface.coarsened(2).mask)
+    chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
+    mean, difference = refined(surface, view, scene.material.mfp, "diffuse", chosen)
+    share = np.abs(difference) / np.mean(mean)
+    half, most = np.quantile(share, (0.5, 0.9)).tolist()
+    return half, most, float(np.sqrt(np.mean(share**2)))
