@@ -26,6 +26,7 @@ STEPS = colormaps["RdBu_r"].resampled(LEVELS)
 COLUMNS = ("hazard", "burley", "liang corrected", "liang", "separable")
 EQUAL = 16  # samples of the pictures with as many each
 RICH = 64  # samples of the hazard law whose time the others get
+NEARLY, ROUNDS = 0.05, 8  # how equal a time is, and how often counts are mended for it
 
 
 @dataclass(frozen=True)
@@ -59,14 +60,23 @@ def _least(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) -
 
 
 def laws(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[list[Shot]]:
-    """Rows of shots: with equal samples, and in the time of RICH samples of the first, which is linear in them."""
+    """Rows of shots: with equal samples, and in the time of RICH samples of the first."""
     chosen = [works[key] for key in COLUMNS]
-    many = _least(judge, [(one, RICH) for one in chosen], 2 * turns)
-    few = _least(judge, [(one, EQUAL) for one in chosen], 2 * turns)
-    slopes = np.maximum(np.subtract(many, few) / (RICH - EQUAL), 1e-9)
-    fitting = np.clip(np.rint(RICH + (many[0] - np.array(many)) / slopes), 1, MOST_SAMPLES).astype(int).tolist()
-    equal, rich = (list(zip(chosen, counts, strict=True)) for counts in ([EQUAL] * len(chosen), fitting))
-    return [shots(judge, equal, 2 * turns), shots(judge, rich, 2 * turns)]
+    equal = [(one, EQUAL) for one in chosen]
+    return [shots(judge, equal, 2 * turns), shots(judge, _in_equal_time(judge, chosen, turns), 2 * turns)]
+
+
+def _in_equal_time(judge: Judged, chosen: Sequence[Contender], turns: int) -> list[tuple[Contender, int]]:
+    """Each law with as many samples as take the time of the first with RICH, to NEARLY, or the most there are."""
+    counts = np.full(len(chosen), RICH)
+    for _ in range(ROUNDS):
+        times = np.array(_least(judge, list(zip(chosen, counts.tolist(), strict=True)), turns))
+        better = np.clip(np.rint(counts * times[0] / times), 1, MOST_SAMPLES).astype(int)
+        better[0] = RICH
+        if np.all((np.abs(times / times[0] - 1.0) < NEARLY) | (better == counts)):
+            break
+        counts = better
+    return list(zip(chosen, counts.tolist(), strict=True))
 
 
 def seventeen(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[list[Shot]]:

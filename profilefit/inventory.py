@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +14,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws import published
 
 Records = Sequence[str] | None
+NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 # What tells a map's name in `published.SETS` and in `catalogue.REGENERATED` from a profile law's.
 PRINTED_MAP, REGENERATED_MAP = "_albedo", "albedo "
 
@@ -69,12 +71,15 @@ def albedo_laws(folder: Path, records: Records = None, matched: bool = True) -> 
 
 
 def find(name: str, folder: Path, constants: str | None = None) -> Named:
-    """A law by the name of one of its records, or by its own name, with those constants: see `catalogue.load`.
+    """A law or map by the name of one of its records, or by its own name.
 
-    InputError, which names what there is, for any other name.
+    A name of both is the profile law's; "albedo liang" is the map's.
+
+    constants  as in `catalogue.load`; None takes the regenerated ones or, where there are none, the only printed set
+    InputError, with the nearest names that there are, for any other name.
     """
     known = record.available(folder)
-    if name in known and constants is None:
+    if name in known and constants in (None, "regenerated"):
         laws = [
             *profile_laws(folder, (name,), False),
             *sampled_laws(folder, (name,)),
@@ -83,21 +88,52 @@ def find(name: str, folder: Path, constants: str | None = None) -> Named:
         if laws:
             return laws[0]
         raise RecordError(f"record {name!r} holds no law of a fit that converged")
+    map_name = name.removeprefix(REGENERATED_MAP)
     if name in catalogue.PROFILE_LAWS:
-        which = constants or "regenerated"
-        return _by_name(name, which, folder)
-    if constants is None and name.removeprefix(REGENERATED_MAP) in catalogue.ALBEDO_LAWS:
-        raise InputError(f"name of a map must be that of its record, got {name!r}")
-    accepted = ", ".join([*catalogue.names(), *known])
-    raise InputError(f"name must be a law or a record, one of {accepted}, got {name!r}")
+        return _profile_by_name(name, constants, folder)
+    if map_name in catalogue.ALBEDO_LAWS:
+        return _map_by_name(map_name, constants, folder)
+    if name in known:
+        raise InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
+    raise InputError(_unknown(name, [*known, *catalogue.names(), *catalogue.ALBEDO_LAWS]))
 
 
-def _by_name(name: str, constants: str, folder: Path) -> Named:
-    law = catalogue.load(name, constants, folder=folder)
+def _unknown(name: str, there: Sequence[str]) -> str:
+    near = get_close_matches(name.lower(), sorted(set(there)), n=2, cutoff=NEAR)
+    told = f"did you mean {', '.join(near)}?" if near else f"laws: {', '.join(catalogue.names())};"
+    return f"name must be a law, map or record, got {name!r}; {told} `profilefit report` lists records"
+
+
+def _profile_by_name(name: str, constants: str | None, folder: Path) -> Named:
     key = catalogue.SHORT.get(name, name)
-    records = catalogue.REGENERATED.get(key, ()) if constants == "regenerated" else ()
-    told = " + ".join(records) or (constants.removeprefix("published:") if law.constant_names() else "")
-    return Named(key, told, law, records)
+    which = constants or _default(key, key, bool(catalogue.PROFILE_LAWS[name].constant_names()))
+    law = catalogue.load(name, which, folder=folder)
+    return _named(key, key, which, law)
+
+
+def _map_by_name(name: str, constants: str | None, folder: Path) -> Named:
+    key = REGENERATED_MAP + name
+    which = constants or _default(key, name + PRINTED_MAP, True)
+    return _named(name, key, which, catalogue.albedo_law(name, which, folder=folder))
+
+
+def _named(name: str, key: str, which: str, law: Any) -> Named:
+    """Under the key of `catalogue.REGENERATED`."""
+    records = catalogue.REGENERATED.get(key, ()) if which == "regenerated" else ()
+    told = " + ".join(records) or (which.removeprefix("published:") if law.constant_names() else "")
+    return Named(name, told, law, records)
+
+
+def _default(key: str, printed_as: str, has_constants: bool) -> str:
+    """The regenerated constants, or the only ones printed where none were regenerated."""
+    if key in catalogue.REGENERATED or not has_constants:
+        return "regenerated"
+    printed = [s.name for s in published.SETS if s.law == printed_as]
+    if len(printed) == 1:
+        return printed[0]
+    accepted = ", ".join([*printed, "the path of a record (.json)"])
+    several = "one of " if printed else ""
+    raise InputError(f"--constants must be {several}{accepted}: {key} was not regenerated, got none")
 
 
 def _whole_laws(folder: Path, records: Records, matched: bool) -> list[Named]:

@@ -22,7 +22,7 @@ from profilefit.report.check_tables import (
     place_tables,
     verdict_lines,
 )
-from profilefit.shader.check.chosen import REGENERATED, chosen
+from profilefit.shader.check.chosen import chosen
 from profilefit.shader.check.cost import law_costs
 from profilefit.shader.check.evaluate import half_extension, no_half
 from profilefit.shader.check.half import check_half
@@ -47,8 +47,9 @@ def check(
         list[str] | None, typer.Argument(help="Names of laws, maps or records; all that were regenerated if none is.")
     ] = None,
     constants: Annotated[
-        str, typer.Option(help="regenerated, or a printed set (published, corrected, diffuse).")
-    ] = REGENERATED,
+        str | None,
+        typer.Option(help="regenerated (the default, where there are any) or a printed set (published, diffuse)."),
+    ] = None,
     fits: Annotated[
         Path | None, typer.Option(help="Folder of the records: ./fits if it has any, else the ones shipped.")
     ] = None,

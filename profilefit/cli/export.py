@@ -16,11 +16,18 @@ LOCAL = Path("fits")
 
 
 def export(
-    name: Annotated[str, typer.Argument(help="A record (hazard-diffuse, albedo-rational, ...) or a law (burley).")],
+    what: Annotated[
+        str,
+        typer.Argument(metavar="NAME", help="A record (hazard-diffuse), a law (burley) or a map (chiang)."),
+    ],
     lang: Annotated[str, typer.Option(help=f"One of {', '.join(LANGUAGES)}.")] = "glsl",
     constants: Annotated[
         str | None,
         typer.Option(help="Of a law: regenerated, a printed set (published, corrected), or a record's path."),
+    ] = None,
+    name: Annotated[
+        str | None,
+        typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File to write; without it the text is printed.")] = None,
     fits: Annotated[
@@ -29,10 +36,11 @@ def export(
 ) -> None:
     """Write a law as one file: its functions, every constant with its errors, units, light, range and digests.
 
-    Example: profilefit export hazard-diffuse --lang hlsl --out hazard.hlsl
+    Without --constants a law or map that was not regenerated has its printed ones.
+    Example: profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
     """
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
-    text = exported(find(name, folder, constants), folder, lang)
+    text = exported(find(what, folder, constants), folder, lang, name)
     if out is None:
         typer.echo(text, nl=False)
     else:

@@ -33,8 +33,9 @@ CAPTION = (
     "law holds"
 )
 COST_CAPTION = (
-    "ns and, in brackets, times normalized diffusion; both: a radius and R_d there; material: both, with another α at "
-    "each. The texts as exported; constants do not change it"
+    "ns and, in brackets, times normalized diffusion. profile: R_d; sample: a radius; both: a radius and R_d there; "
+    "estimate: a sample of (22), that is a radius, its density and R_d at another distance; material: both, with "
+    "another α at each. The texts as exported; constants do not change it"
 )
 HALF_CAPTION = (
     "mean relative error of R_d / largest error of the cdf that float16 alone makes, worst of 24 albedos, l = 1"
@@ -143,7 +144,8 @@ def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: M
             for name, cost in costs.items()
         ]
         parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), rows))
-    return "\n\n".join([*parts, f"On {device}. {CAPTION}."])
+    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if costs else [])]
+    return "\n\n".join([*parts, f"On {device}. {'. '.join(captions)}."])
 
 
 def content(

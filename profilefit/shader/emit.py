@@ -7,6 +7,7 @@ that several laws live in one shader. What every law gives is listed in `glsl/RE
 
 from __future__ import annotations
 
+import hashlib
 import math
 import re
 from collections.abc import Callable, Mapping
@@ -42,6 +43,15 @@ PLACEHOLDER = "LAW_"
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
 # A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
 PREFIX = re.compile(r"(?!gl_|PF_|pf_|LAW\b)[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*")
+# A second include of the same text is skipped; one of other constants under the same names would be so in silence.
+GUARD = """\
+#ifndef {name}_INCLUDED
+#define {name}_INCLUDED {digest}
+{text}
+#elif {name}_INCLUDED != {digest}
+#error {name} is included already, with other constants: export one of them under another name
+#endif
+"""
 DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them, a float32 drops what it cannot hold
 
 
@@ -118,7 +128,7 @@ def prefix(law: Constants) -> str:
 def law_text(
     law: ProfileLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None
 ) -> str:
-    """The law with its constants, ready to include once: no version line, no precision line, no main.
+    """The law with its constants, ready to include: no version line, no precision line, no main.
 
     lang  "glsl" (also for GLSL ES, which differs only in what a shader says before it), "hlsl" or "python"
     name  the prefix of its names, `prefix(law)` by default
@@ -177,8 +187,10 @@ def _filled(texts: list[str], name: str, constants: Numbers, count: int, lang: s
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
     lines = [_declared(name, key, value, told.get(key, "")) for key, value in constants.items()]
-    body = "\n".join([common, "\n".join(lines) + "\n", *rest])
-    return translated(_repeated(body, count).replace(PLACEHOLDER, f"{name}_"), lang)
+    own = _repeated("\n".join(["\n".join(lines) + "\n", *rest]), count).replace(PLACEHOLDER, f"{name}_")
+    digest = f"0x{hashlib.sha256(own.encode()).hexdigest()[:7]}"  # a positive int in every language
+    guarded = own if lang == "python" else GUARD.format(name=name, digest=digest, text=own)
+    return translated(f"{common}\n{guarded}", lang)
 
 
 def _declared(name: str, key: str, value: float, remark: str) -> str:

@@ -12,7 +12,7 @@ from mcml_sim import __version__
 from mcml_sim.setting import Setting
 from profilefit import catalogue, record
 from profilefit.errors import InputError, RecordError
-from profilefit.inventory import Named
+from profilefit.inventory import PRINTED_MAP, Named
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.shader import emit
@@ -20,6 +20,12 @@ from profilefit.shader import emit
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 ENDINGS = {"glsl": "glsl", "hlsl": "hlsl", "glsl-es": "glsl", "python": "py", "json": "json"}
 MARKS = {"python": "#"}
+TARGETS = {
+    "glsl": "GLSL, for after #version 330 or later",
+    "glsl-es": "GLSL ES, for after #version 300 es or later",
+    "hlsl": "HLSL, for shader model 4 or later",
+    "python": "Python, which needs numpy",
+}
 TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
 ERRORS = {"statistical_error": "photons", "discrepancy_error": "misfit", "jackknife_error": "jackknife"}
@@ -46,20 +52,23 @@ alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s'
 A the total diffuse reflectance (the colour) under that light."""
 
 
-def export(named: Named, folder: Path, lang: str = "glsl") -> str:
+def export(named: Named, folder: Path, lang: str = "glsl", name: str | None = None) -> str:
     """The whole file of a law or map in one of `LANGUAGES`; `folder` holds its records.
 
-    InputError for another language, or for a law that has no shader text.
+    name  what the names in it begin with, by default `emit.prefix`: two media in one shader need two
+    InputError for another language, for a name that is none, or for a law that has no shader text.
     """
     if lang not in LANGUAGES:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
     contents = _records(named, folder)
     if lang == "json":
+        if name is not None:
+            raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
         return json.dumps(_plain(named, contents, folder), indent=1, sort_keys=True, allow_nan=False) + "\n"
     make, start = (emit.map_text, "") if isinstance(named.law, AlbedoLaw) else (emit.law_text, "map_")
-    body = make(named.law, TRANSLATED.get(lang, lang), told=_remarks(contents, start))
+    body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(contents, start))
     mark = MARKS.get(lang, "//")
-    head = "".join(f"{mark} {line}".rstrip() + "\n" for line in _head(named, contents, folder))
+    head = "".join(f"{mark} {line}".rstrip() + "\n" for line in _head(named, contents, folder, lang, name))
     return head + "\n" + (ES_HEAD if lang == "glsl-es" else "") + body
 
 
@@ -78,19 +87,19 @@ def _place(folder: Path, name: str) -> Path:
     raise RecordError(f"{folder}: there is no record {name!r}; `profilefit regenerate` makes them")
 
 
-def _head(named: Named, contents: Mapping[str, dict[str, Any]], folder: Path) -> list[str]:
+def _head(named: Named, contents: Mapping[str, dict[str, Any]], folder: Path, lang: str, name: str | None) -> list[str]:
     """What a reader of the file must know, a line each."""
     is_map = isinstance(named.law, AlbedoLaw)
     kind = "map between alpha and A" if is_map else "reflectance profile of a half space"
     what = f"{named.name}, {named.constants or 'no constants'}: {kind}"
-    lines = [what, f"by profilefit {__version__}; generated, do not edit", ""]
-    start = emit.prefix(named.law)
-    lines += [f"{start}_{name:30}{text}" for name, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
+    lines = [what, TARGETS[lang], f"by profilefit {__version__}; generated, do not edit", ""]
+    start = name or emit.prefix(named.law)
+    lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
     lines += ["", *_setting_lines(named.setting), ""]
-    for name, content in contents.items():
-        lines += [f"record {name}: {content['title']}", f"  {content['equations']}", *_told_of(content)]
+    for of, content in contents.items():
+        lines += [f"record {of}: {content['title']}", f"  {content['equations']}", *_told_of(content)]
         lines += [f"  sha256 of the data {content['data_digest']}"] if content.get("data_digest") else []
-        lines += [f"  sha256 of the record {_digest(_place(folder, name))}"]
+        lines += [f"  sha256 of the record {_digest(_place(folder, of))}"]
     printed = _printed(named)
     return [*lines, f"constants as printed: {printed.source}"] if printed else lines
 
@@ -125,9 +134,8 @@ def _remarks(contents: Mapping[str, dict[str, Any]], start: str) -> dict[str, st
 
 def _printed(named: Named) -> Any:
     """The printed set that a law's constants are, or None."""
-    return next(
-        (s for s in published.SETS if not named.records and (s.law, s.name) == (named.name, named.constants)), None
-    )
+    law = named.name + (PRINTED_MAP if isinstance(named.law, AlbedoLaw) else "")
+    return next((s for s in published.SETS if not named.records and (s.law, s.name) == (law, named.constants)), None)
 
 
 def _digest(path: Path) -> str:

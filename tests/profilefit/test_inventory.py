@@ -22,6 +22,11 @@ FITS = catalogue.fits_folder()
         ("gaussians", None, "gaussians:6", Setting(), ("gaussians-6",)),
         ("burley", "published:diffuse", "burley", Setting("diffuse"), ()),
         ("dipole", None, "dipole", Setting(), ()),
+        ("burley_diffuse_mfp", None, "burley_diffuse_mfp", Setting(), ()),
+        ("rational", None, "rational", Setting(), ("albedo-rational",)),
+        ("albedo liang", None, "liang", Setting(), ("albedo-liang",)),
+        ("van_de_hulst", None, "van_de_hulst", Setting("diffuse"), ()),
+        ("chiang", "published", "chiang", Setting("diffuse"), ()),
     ],
 )
 def test_a_record_or_a_law_by_its_name(name, constants, law, setting, records):
@@ -44,9 +49,31 @@ def test_refracting_surfaces_are_left_out_where_the_exact_profile_is_needed():
 
 
 def test_what_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"name must be a law or a record, one of liang, .*reproduction, got 'no'"):
-        find("no", FITS)
+    with pytest.raises(InputError, match=r"'hazzard-n1.4'; did you mean hazard-n1.4, .*\? `profilefit report` lists"):
+        find("hazzard-n1.4", FITS)
+    with pytest.raises(InputError, match=r"got 'Chiang'; did you mean chiang, "):
+        find("Chiang", FITS)
+    with pytest.raises(InputError, match=r"map or record, got 'zzz'; laws: liang, .* `profilefit report` lists"):
+        find("zzz", FITS)
     with pytest.raises(RecordError, match=r"'reproduction' holds no law"):
         find("reproduction", FITS)
     with pytest.raises(InputError, match=r"constants must be one of regenerated, published, .* got 'mine'"):
         find("liang", FITS, "mine")
+    with pytest.raises(InputError, match=r"constants of a record are its own: .* published, got 'hazard-n1.4'"):
+        find("hazard-n1.4", FITS, "published")
+
+
+def test_what_was_not_regenerated_has_its_only_printed_constants_unless_others_are_asked_for():
+    assert find("burley_diffuse_mfp", FITS).constants == find("van_de_hulst", FITS).constants == "published"
+    with pytest.raises(InputError, match=r"--constants must be the path of a record .*gaussians:3 was not regenerated"):
+        find("gaussians:3", FITS)
+    with pytest.raises(RecordError, match=r"none were regenerated, got 'regenerated'"):
+        find("burley_diffuse_mfp", FITS, "regenerated")
+
+
+@pytest.mark.parametrize("name", ["hazzard", "burleyy", "gaussians:99", "albedo-rational-difuse-n1.35", "zzz", ""])
+def test_a_name_that_is_not_there_is_told_in_one_short_line(name):
+    with pytest.raises(InputError) as told:
+        find(name, FITS)
+    assert len(str(told.value)) < 200
+    assert "\n" not in str(told.value)

@@ -58,5 +58,16 @@ def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
     assert value > 0
 
 
+def test_wheel_holds_every_shader_text(wheel):
+    names = set(zipfile.ZipFile(wheel).namelist())
+    texts = {path.relative_to(ROOT).as_posix() for path in (ROOT / "profilefit" / "shader" / "glsl").rglob("*.*")}
+    assert {path for path in texts if not path.endswith(".pyc")} <= names
+
+
+def test_installed_command_exports_a_law(scripts, tmp_path):
+    text = run(scripts / "profilefit", "export", "hazard-diffuse", "--lang", "hlsl", cwd=tmp_path)
+    assert "hazard_profile" in text
+
+
 def test_installed_command_shows_its_help(scripts, tmp_path):
     assert "regenerate" in run(scripts / "profilefit", "--help", cwd=tmp_path)

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from profilefit import catalogue, inventory, record
-from profilefit.errors import InputError, RecordError
+from profilefit import catalogue, inventory
+from profilefit.errors import InputError
 from profilefit.inventory import Named
+from profilefit.laws.base import AlbedoLaw
 from profilefit.shader import emit
 
 REGENERATED = "regenerated"
@@ -15,17 +16,18 @@ Chosen = tuple[list[Named], list[Named]]
 """Profile laws, and maps between A and alpha."""
 
 
-def chosen(names: Sequence[str], constants: str, folder: Path) -> Chosen:
+def chosen(names: Sequence[str], constants: str | None, folder: Path) -> Chosen:
     """Profile laws and maps under these names, or all of them; a name may be a law's, a map's or a record's.
 
     A law's name means all its settings.
 
-    constants  "regenerated" or a printed set, as in `catalogue.load`
+    constants  "regenerated" or a printed set, as in `catalogue.load`; None takes the regenerated ones, or the only
+               printed set of a law that was not regenerated
     InputError, RecordError, SettingError where there are none.
     """
-    if constants.endswith(".json"):
+    if constants is not None and constants.endswith(".json"):
         raise InputError(f"constants must be regenerated or a printed set; name the record itself, got {constants!r}")
-    known = regenerated(folder) if constants == REGENERATED else printed(constants, folder)
+    known = regenerated(folder) if constants in (None, REGENERATED) else printed(constants, folder)
     if not names:
         if not any(known):
             raise InputError(f"constants must be regenerated or a printed set, got {constants!r} and no law's name")
@@ -63,12 +65,7 @@ def _under(name: str, group: Sequence[Named]) -> list[Named]:
     return [one for one in group if full == one.name or name in one.records]
 
 
-def _loaded(name: str, constants: str, folder: Path) -> Chosen:
-    """A law that is in no list: one without constants, or a mistake."""
-    if name in record.available(folder) and name not in catalogue.PROFILE_LAWS:
-        if constants != REGENERATED:
-            raise InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
-        raise RecordError(f"record {name!r} holds no law of a fit that converged")
-    if name in catalogue.ALBEDO_LAWS and name not in catalogue.PROFILE_LAWS:
-        return [], [Named(name, constants, catalogue.albedo_law(name, constants, folder=folder))]
-    return [inventory.find(name, folder, constants)], []
+def _loaded(name: str, constants: str | None, folder: Path) -> Chosen:
+    """A law or map that is in no list: one without constants, one that was not regenerated, or a mistake."""
+    one = inventory.find(name, folder, constants)
+    return ([], [one]) if isinstance(one.law, AlbedoLaw) else ([one], [])

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,6 +21,7 @@ from profilefit import catalogue
 from profilefit.inventory import Named
 from profilefit.laws.base import ProfileLaw
 from profilefit.shader import emit
+from profilefit.shader.check.evaluate import Board
 from profilefit.shader.context import check_errors, full_screen, program
 
 Floats = NDArray[np.float64]
@@ -28,11 +30,14 @@ SIZE = 256, 128
 TURNS = 7
 ENOUGH = 0.01  # s that a work takes in one turn, at least: the clock and the driver's calls then tell little
 MOST_ROUNDS = 2**16
-# What one evaluation is: x = r/l and xi change at each, s is the law's shape.
+# What one evaluation is: x = r/l and xi change at each, s is the law's shape. "estimate" is a sample of (22): a radius
+# r, its density, and the law's at the distance d of a surface that is not flat.
 WORKS = {
     "profile": "float x = 10.0 * u + 0.001; sum += P_density(x, s) / x;",
     "sample": "sum += P_radius(u, s);",
     "both": "float x = P_radius(u, s) + 1e-6; sum += P_density(x, s) / x;",
+    "estimate": """float r = P_radius(u, s) + 1e-6; float d = sqrt(r * r + 0.01);
+        sum += r * P_density(d, s) / (d * max(P_radius_density(r, s), 1e-9));""",
     "material": "s = P_shape(0.05 + 0.9 * u); float x = P_radius(u, s) + 1e-6; sum += P_density(x, s) / x;",
 }
 LOOP = """#version 330
@@ -72,13 +77,18 @@ def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: Prof
     yardstick  the law that is counted as 1
     """
     texts = {emit.prefix(law): law for law in (yardstick, *laws)}
-    board = context.framebuffer(color_attachments=[context.texture(SIZE, 4, dtype="f4")])
-    board.use()
-    context.viewport = (0, 0, *SIZE)
-    loops = {(name, work): _Loop(context, name, law, work) for name, law in texts.items() for work in WORKS}
-    own = {work: loops[emit.prefix(yardstick), work] for work in WORKS}
-    timed = {(name, work): loop.beside(own[work]) for (name, work), loop in loops.items()}
-    check_errors(context, "the loops that are timed")
+    timed: dict[tuple[str, str], tuple[Floats, Floats]] = {}
+    with ExitStack() as held:
+        board = Board(context, SIZE)
+        held.callback(board.release)
+        held.enter_context(board.bound())
+        for work in WORKS:
+            loops = {name: _Loop(context, name, law, work) for name, law in texts.items()}
+            for loop in loops.values():
+                held.callback(loop.release)
+            own = loops[emit.prefix(yardstick)]
+            timed |= {(name, work): loop.beside(own) for name, loop in loops.items()}
+        check_errors(context, "the loops that are timed")
     return {
         name: Cost(
             {work: 1e9 * float(np.min(timed[name, work][0])) for work in WORKS},
@@ -106,6 +116,10 @@ class _Loop:
         """Seconds of one evaluation of this one, and of the other, in turns (TURNS,)."""
         turns = np.array([(self._each(), other._each() if other is not self else 0.0) for _ in range(TURNS)])
         return turns[:, 0], turns[:, 1 if other is not self else 0]
+
+    def release(self) -> None:
+        self._triangle.release()
+        self._program.release()
 
     def _each(self) -> float:
         return self._seconds() / (SIZE[0] * SIZE[1] * self._rounds)

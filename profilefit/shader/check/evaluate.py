@@ -1,12 +1,17 @@
 """A law as its text runs on the GPU: many arguments at once, one a pixel, results as numbers.
 
-Nothing of the law is computed here: fragment shaders call the text's own functions and write into float textures.
+Nothing of the law is computed here: fragment shaders call the text's own functions and write into float textures. What
+they hold on the GPU is freed when nobody has them any more; what was bound before is bound again after each use.
 """
 
 from __future__ import annotations
 
 import re
+import weakref
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 import moderngl
 import numpy as np
@@ -114,16 +119,40 @@ class ShaderMap:
         return self._pass(0.5, alpha, 0.0, 0.0)[1]
 
 
+class Board:
+    """A float texture of four channels that shaders draw into; release it."""
+
+    def __init__(self, context: moderngl.Context, size: tuple[int, int], dtype: str = "f4") -> None:
+        self._context = context
+        self._texture = context.texture(size, 4, dtype=dtype)
+        self.frame = context.framebuffer(color_attachments=[self._texture])
+
+    @contextmanager
+    def bound(self) -> Iterator[None]:
+        """Draw into it, and bind again what was. moderngl can make no framebuffer while a deleted one is bound."""
+        scope = self._context.scope(self.frame, enable_only=moderngl.NOTHING)  # binds again what is bound now
+        try:
+            with scope:
+                yield
+        finally:
+            scope.release()
+
+    def release(self) -> None:
+        self.frame.release()
+        self._texture.release()
+
+
 class _Pass:
-    """One fragment shader over a texture of arguments, TILE of them at a time."""
+    """One fragment shader over a texture of arguments, WIDTH x ROWS of them at a time."""
 
     def __init__(self, context: moderngl.Context, name: str, source: str, results: str) -> None:
         self._context, self._name, self._results = context, name, results
         self._program = program(context, name, source)
         self._triangle = full_screen(context, self._program)
-        # Kept for good: moderngl binds again what was bound before, and a deleted target cannot be.
         self._given = context.texture((WIDTH, ROWS), 4, dtype="f4")
-        self._frame = context.framebuffer(color_attachments=[context.texture((WIDTH, ROWS), 4, dtype=results)])
+        self._board = Board(context, (WIDTH, ROWS), results)
+        held = (self._triangle, self._program, self._given, self._board)
+        weakref.finalize(self, _free, held).atexit = False  # then the context is gone, and all with it
 
     def __call__(self, *arguments: ArrayLike) -> list[Floats]:
         """Four results of four arguments that broadcast."""
@@ -138,14 +167,19 @@ class _Pass:
         rows = -(-count // WIDTH)
         whole = np.pad(arguments, ((0, rows * WIDTH - count), (0, 0)), mode="edge")
         self._given.write(whole.tobytes(), viewport=(0, 0, WIDTH, rows))
-        self._frame.use()
-        self._context.viewport = (0, 0, WIDTH, rows)
+        self._board.frame.viewport = (0, 0, WIDTH, rows)
         self._given.use(0)
         self._program["arguments"] = 0
-        self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        raw = self._frame.read(viewport=(0, 0, WIDTH, rows), components=4, dtype=self._results)
+        with self._board.bound():
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        raw = self._board.frame.read(viewport=(0, 0, WIDTH, rows), components=4, dtype=self._results)
         check_errors(self._context, f"shader {self._name!r}")
         return np.frombuffer(raw, NUMPY_TYPES[self._results]).reshape(-1, 4)[:count]
+
+
+def _free(held: tuple[Any, ...]) -> None:
+    for one in held:
+        one.release()
 
 
 def half_extension(context: moderngl.Context) -> str:

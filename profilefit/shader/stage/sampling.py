@@ -27,7 +27,7 @@ class Sampling:
     channels  "longest", all radii from the channel of the longest mfp; "mixture", sample i from channel i mod 3 (the
               longest first), weighted by the mean of the three densities
     area      a sample stands for the surface that it shows: it lies where its ray meets the plane of the pixel hit, and
-              weighs 1 / |n.v|, at most 4. Off: it lies at the depth of that pixel, as in Liang et al., (22)
+              weighs 1 / |n.v|, at most 20. Off: it lies at the depth of that pixel, as in Liang et al., (22)
     seed      of the shifts
     """
 

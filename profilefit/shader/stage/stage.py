@@ -26,7 +26,7 @@ from profilefit.shader.stage.combining import Combining
 from profilefit.shader.stage.exact_law import ExactLaw
 from profilefit.shader.stage.geometry import SHADOW_SIDE, Geometry
 from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.scattering import Filtering, Gathering, View
+from profilefit.shader.stage.scattering import Filtering, Gathering, View, text_of
 from profilefit.shader.stage.scene import Scene
 from profilefit.shader.stage.separable_kernel import Separable, albedo_of
 from profilefit.shader.stage.targets import Targets, pixels
@@ -39,6 +39,7 @@ BY_REFLECTANCE = -1.0  # alpha that tells a shader to take it from A
 # Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
 # Mesa's llvmpipe does, and the clock on the wall is right.
 TRUSTED = 0.5
+LONGEST_QUERY = 4.0  # seconds: the query counts nanoseconds in 32 bits
 PASSES = ("scatter", "frame")
 
 
@@ -48,26 +49,30 @@ class Stage:
     def __init__(self, context: moderngl.Context, size: tuple[int, int], shadow_side: int = SHADOW_SIDE):
         """size  width, height [pixels];  shadow_side  of the shadow map [texels]"""
         self.context = context
+        side = checked_whole("shadow_side", shadow_side, 1, MOST_PIXELS)
         self.size = (
             checked_whole("width", size[0], 1, MOST_PIXELS),
             checked_whole("height", size[1], 1, MOST_PIXELS),
         )
         self.compile_milliseconds: dict[str, float] = {}
         self._targets = Targets(context, self.size)
-        self._geometry = Geometry(context, shadow_side)
+        self._geometry = Geometry(context, side)
         self._passes: dict[Hashable, Gathering | Filtering | Combining] = {}
+        self._released = False
         self._view: View | None = None
         self._scene: Scene | None = None
         self._mean_reflectance: Floats | None = None
 
     def draw(self, scene: Scene) -> None:
         """Passes 1 and 2: the G-buffer of a scene."""
+        self._alive()
         self._geometry.draw(scene, self._targets.surface)
         camera = scene.camera
         self._seen(View(self.size, camera.pixel(self.size[1]), camera.is_perspective), scene)
 
     def upload(self, buffers: Buffers) -> None:
         """A G-buffer of numpy arrays in place of a scene; there is no light then, so `render` has no highlights."""
+        self._alive()
         if buffers.size != self.size:
             raise InputError(f"buffers must be {self.size} pixels, as the stage is, got {buffers.size}")
         self._targets.upload(buffers)
@@ -117,6 +122,7 @@ class Stage:
         for one in (*self._passes.values(), self._geometry, self._targets):
             one.release()
         self._passes.clear()
+        self._released = True
 
     def __enter__(self) -> Self:
         return self
@@ -127,7 +133,12 @@ class Stage:
     def _seen(self, view: View, scene: Scene | None) -> None:
         self._view, self._scene, self._mean_reflectance = view, scene, None
 
+    def _alive(self) -> None:
+        if self._released:
+            raise InputError("stage must not be used after it was released: make another one")
+
     def _ready(self) -> View:
+        self._alive()
         if self._view is None:
             raise InputError("stage must have a scene or buffers: draw or upload comes first")
         return self._view
@@ -165,7 +176,7 @@ class Stage:
         self.context.finish()
         wall = time.perf_counter() - start
         by_driver = query.elapsed / 1e9
-        return 1e3 * (by_driver if by_driver > TRUSTED * wall else wall)
+        return 1e3 * (by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall)
 
     def _stretches(self, law: Separable, mfp: Floats, alpha: Floats) -> Floats:
         """One kernel serves the whole picture: that of its mean A, where none is fixed."""
@@ -176,7 +187,7 @@ class Stage:
 
     def _compiled(self, law: Law, what: Hashable, make: Callable[[], Any]) -> Any:
         """A pass of a law, made once; how long that took is in `compile_milliseconds`."""
-        key = (repr(law), what)  # class, setting and constants
+        key = (text_of(law) if isinstance(law, ProfileLaw) else law, what)
         if key not in self._passes:
             self._passes[key] = made = make()
             self.compile_milliseconds[made.name] = made.milliseconds

@@ -1,1 +1,1 @@
-"""What the render should show, by float64 integrals that share no code with it."""
+"""What the render should show: float64 integrals that share the G-buffer with it, and no sum."""

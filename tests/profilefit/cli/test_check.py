@@ -89,7 +89,8 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
 @pytest.mark.parametrize(
     ("words", "told"),
     [
-        (("nothing",), "name must be a law or a record"),
+        (("nothing",), "name must be a law, map or record, got 'nothing'; laws: liang, "),
+        (("hazzard",), "did you mean hazard"),
         (("hazard", "--constants", "nothing"), "constants must be one of regenerated"),
         (("--constants", "nothing"), "constants must be regenerated or a printed set, got 'nothing'"),
         (("reproduction",), "record 'reproduction' holds no law"),

@@ -71,7 +71,17 @@ def test_the_readme_has_laws_maps_broken_bounds_and_costs():
     assert maps.splitlines()[2].split()[-2:] == ["pass", "|"]
     assert broken.startswith("- `hazard-n1.4`: float32 ks: 0.02")
     assert costs.splitlines()[2].split("|")[1:3] == [" hazard ", " 3.0 (2.50)  "]
+    assert [name.strip() for name in costs.splitlines()[0].split("|")[2:-1]] == [f"{work}, ns" for work in WORKS]
     assert device.startswith("On a device. model: the record's error")
+    assert "estimate: a sample of (22)" in device
+
+
+def test_costs_fit_into_100_columns():
+    """Of the longest name, and a ratio as on a software rasteriser."""
+    costs = {"burley_diffuse_mfp": Cost(dict.fromkeys(WORKS, 123.0), dict.fromkeys(WORKS, 12.25))}
+    text = shown([check_tables.cost_table(costs, "a device")])
+    (row,) = (line.split() for line in text.splitlines() if line.startswith("burley_diffuse_mfp"))
+    assert row == ["burley_diffuse_mfp", *["123", "(12.25)"] * len(WORKS)]
 
 
 def test_json_takes_numbers_and_text_only():

@@ -2,6 +2,7 @@
 
 import shutil
 import subprocess
+from dataclasses import replace
 
 import pytest
 
@@ -44,11 +45,14 @@ def test_glsl(context, name, head):
     program(context, name, fragment, HEADS[head] + VERTEX).release()
 
 
-def test_glsl_refuses_the_same_law_twice_and_takes_two_laws(context):
+@pytest.mark.parametrize("head", HEADS)
+def test_glsl_takes_two_laws_and_each_twice_but_no_prefix_for_two(context, head):
     both = text("burley") + text("hazard") + MAIN.format(calls=f"{calls('burley')} + {calls('hazard')}")
-    program(context, "both", HEADS["glsl"] + both).release()
-    with pytest.raises(ShaderError, match=r"shader 'twice' does not compile, line \d+, .*burley_map_entered"):
-        program(context, "twice", HEADS["glsl"] + text("burley") + both)
+    vertex = HEADS[head] + VERTEX
+    program(context, "twice", HEADS[head] + text("burley") + text("hazard") + both, vertex).release()
+    other = emit.law_text(replace(LAWS["burley"], s0=3.0))
+    with pytest.raises(ShaderError, match=r"shader 'mixed' does not compile, .*burley is included already"):
+        program(context, "mixed", HEADS[head] + other + both, vertex)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -57,7 +61,7 @@ def test_hlsl(tmp_path, name):
     if compiler is None:
         pytest.skip(f"{HLSL_COMPILER} is missing, which compiles HLSL; on Debian apt-get install glslang-tools")
     source = tmp_path / f"{name}.hlsl"
-    source.write_text(text(name, "hlsl") + HLSL_MAIN.format(calls=calls(name)))
+    source.write_text(2 * text(name, "hlsl") + HLSL_MAIN.format(calls=calls(name)))
     command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(tmp_path / "made.spv"), str(source)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout

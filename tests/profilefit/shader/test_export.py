@@ -13,7 +13,7 @@ from profilefit import catalogue
 from profilefit.errors import InputError
 from profilefit.inventory import find
 from profilefit.shader.context import full_screen, program
-from profilefit.shader.export import LANGUAGES, export
+from profilefit.shader.export import LANGUAGES, TARGETS, export
 
 FITS = catalogue.fits_folder()
 MAIN = """
@@ -25,6 +25,14 @@ void main() {
 """
 
 
+def drawn(context, fragment):
+    """The four numbers that a fragment shader makes."""
+    target = context.simple_framebuffer((1, 1), components=4, dtype="f4")
+    target.use()
+    full_screen(context, program(context, "exported", fragment)).render(moderngl.TRIANGLES, vertices=3)
+    return np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
+
+
 def expected(law) -> list[float]:
     sampler = law.samplers["two steps"]
     return [law.profile(0.5, 0.9, 2.0), law.cdf(0.5, 0.9, 2.0), sampler.sample(0.5, 0.9, 2.0), law.albedo.alpha(0.8)]
@@ -33,11 +41,7 @@ def expected(law) -> list[float]:
 @pytest.mark.parametrize(("lang", "head"), [("glsl", "#version 330\n"), ("glsl-es", "#version 300 es\n")])
 def test_an_exported_file_is_all_that_a_shader_needs(context, lang, head):
     named = find("hazard-diffuse", FITS)
-    drawn = program(context, lang, head + export(named, FITS, lang) + MAIN)
-    target = context.simple_framebuffer((1, 1), components=4, dtype="f4")
-    target.use()
-    full_screen(context, drawn).render(moderngl.TRIANGLES, vertices=3)
-    made = np.frombuffer(target.read(components=4, dtype="f4"), np.float32)
+    made = drawn(context, head + export(named, FITS, lang) + MAIN)
     np.testing.assert_allclose(made, expected(named.law), rtol=1e-5)
 
 
@@ -69,6 +73,7 @@ def test_every_constant_stands_there_with_its_errors_and_the_record_is_named(lan
         assert part in text
     assert hashlib.sha256((FITS / "hazard-n1.4.json").read_bytes()).hexdigest() in text
     assert "LAW_" not in text
+    assert TARGETS[lang] in text.splitlines()[1]
     assert text.isascii()
 
 
@@ -101,10 +106,23 @@ def test_a_map_alone_is_a_file_too():
     np.testing.assert_allclose(names["rational_map_reflectance"](0.7), law.reflectance(0.7), rtol=1e-9)
 
 
+def test_a_printed_map_names_its_own_source():
+    assert "equation (8)" in export(find("albedo liang", FITS, "published"), FITS)
+
+
+def test_two_media_share_a_shader_and_each_may_be_included_twice(context):
+    skin, wax = find("hazard-diffuse", FITS), find("hazard-n1.4", FITS)
+    texts = [export(skin, FITS, name="skin"), export(wax, FITS, name="wax"), export(skin, FITS, name="skin")]
+    head = "#version 330\n" + "".join(texts)
+    calls = "skin_profile(0.5, 0.9, 2.0), wax_profile(0.5, 0.9, 2.0)"
+    made = drawn(context, head + f"out vec4 made;\nvoid main() {{ made = vec4({calls}, 0.0, 0.0); }}")
+    np.testing.assert_allclose(made[:2], [one.law.profile(0.5, 0.9, 2.0) for one in (skin, wax)], rtol=1e-5)
+
+
 def test_what_cannot_be_exported_is_named():
     with pytest.raises(InputError, match=r"lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"):
         export(find("hazard", FITS), FITS, "wgsl")
-    with pytest.raises(InputError, match=r"name must be a law or a record, one of liang, .*, got 'hazzard'"):
+    with pytest.raises(InputError, match=r"map or record, got 'hazzard'; did you mean hazard"):
         find("hazzard", FITS)
     with pytest.raises(InputError, match=r"record 'reproduction' holds no law of a fit that converged"):
         find("reproduction", FITS)

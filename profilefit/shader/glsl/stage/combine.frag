@@ -24,13 +24,14 @@ vec3 through(vec3 reflectance, float thickness) {
 
 // Torrance and Sparrow with GGX, Smith's heights correlated, Fresnel by Schlick: times cosine [1/sr].
 float mirrored(vec3 normal, vec3 view, float roughness) {
-    vec3 middle = normalize(view + toward_light);
+    vec3 between = view + toward_light;
+    vec3 middle = between / max(length(between), 1e-6); // no direction where the light is behind
     float nl = max(dot(normal, toward_light), 0.0), nv = max(dot(normal, view), 1e-3);
     float nh = max(dot(normal, middle), 0.0), vh = max(dot(view, middle), 0.0);
     float a = roughness * roughness, a2 = a * a;
     float spread = nh * nh * (a2 - 1.0) + 1.0;
     float heights = nl * sqrt(nv * nv * (1.0 - a2) + a2) + nv * sqrt(nl * nl * (1.0 - a2) + a2);
-    float fresnel = f0 + (1.0 - f0) * pow(1.0 - vh, 5.0);
+    float fresnel = f0 + (1.0 - f0) * pow(max(1.0 - vh, 0.0), 5.0);
     return a2 / (PI * spread * spread) * 0.5 / max(heights, 1e-6) * fresnel * nl;
 }
 

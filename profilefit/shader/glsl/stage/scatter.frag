@@ -18,7 +18,8 @@ out vec4 exitance;
 
 const float TAU = 6.283185307179586;
 const float NEAR = 1e-6; // least radius [mfp]: p and density are finite there
-const float LEAST_COSINE = 0.25; // of normal and ray: at a silhouette one pixel would stand for any area
+const float LEAST_COSINE = 0.05; // of normal and ray: at a silhouette one pixel would stand for any area
+const vec2 LAMBERT = vec2(0.1, 0.2); // mfp [pixels] below which nothing is blurred, and from which all is
 const float OWN = 1e-4; // weight of the pixel's own light, per sample: where nothing else is seen, Lambert
 const float MOST_UNIFORM = 0.995; // share of the energy that uniform radii reach
 
@@ -104,7 +105,7 @@ vec3 gathered(ivec2 here, float depth, vec3 own) {
         vec2 side = r * vec2(cos(angle), sin(angle));
         vec2 place = vec2(here) + 0.5 + side / per_pixel;
         // Compared as floats: a radius far away does not fit an integer.
-        if (any(lessThan(place, vec2(0.0))) || any(greaterThanEqual(place, size))) continue;
+        if (!(all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size)))) continue; // so that NaN is out, too
         ivec2 there = ivec2(place);
         vec4 hit = texelFetch(position_map, there, 0);
         if (hit.w < 0.5) continue;
@@ -138,12 +139,15 @@ void main() {
     vec3 own = texelFetch(irradiance_map, here, 0).rgb;
     vec3 reflectance = texelFetch(reflectance_map, here, 0).rgb;
     vec3 light = own;
-    // A mean free path below a pixel is Lambert; from one pixel to two the blur sets in.
-    vec3 blurred = clamp(mfp / world_per_pixel(-centre.z) - 1.0, 0.0, 1.0);
+    // So short a mean free path does not leave the pixel: Lambert, to a part in 500.
+    vec3 across = mfp / world_per_pixel(-centre.z);
+    vec3 blurred = clamp((across - LAMBERT.x) / (LAMBERT.y - LAMBERT.x), 0.0, 1.0);
     if (centre.w > 0.5 && any(greaterThan(blurred, vec3(0.0)))) {
         for (int c = 0; c < 3; ++c) {
             shape[c] = law_shape(fixed_alpha[c] < 0.0 ? law_alpha(reflectance[c]) : fixed_alpha[c]);
+#if UNIFORM
             reach[c] = law_radius(MOST_UNIFORM, shape[c]);
+#endif
         }
         light = mix(own, gathered(here, -centre.z, own), blurred);
     }

@@ -15,13 +15,14 @@ void main() {
     vec4 centre = texelFetch(position_map, here, 0);
     vec3 own = texelFetch(light_map, here, 0).rgb;
     float per_pixel = pixel * (perspective > 0.5 ? -centre.z : 1.0);
-    int taps = textureSize(kernel_map, 0).x;
-    vec3 light = vec3(0.0);
+    bool inside = centre.w > 0.5;
+    int taps = inside ? textureSize(kernel_map, 0).x : 0;
+    vec3 light = inside ? vec3(0.0) : own;
     for (int i = 0; i < taps; ++i) {
         vec4 tap = texelFetch(kernel_map, ivec2(i, 0), 0);
         vec2 place = vec2(here) + 0.5 + direction * tap.w / per_pixel;
         vec3 taken = own;
-        if (centre.w > 0.5 && all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size))) {
+        if (all(greaterThanEqual(place, vec2(0.0))) && all(lessThan(place, size))) {
             vec4 hit = texelFetch(position_map, ivec2(place), 0);
             float lost = hit.w < 0.5 ? 1.0 : clamp(follow * abs(hit.z - centre.z), 0.0, 1.0);
             taken = mix(texelFetch(light_map, ivec2(place), 0).rgb, own, lost); // nearest: nothing dark seeps in

@@ -2,6 +2,7 @@
 
 import re
 
+import moderngl
 import numpy as np
 import pytest
 
@@ -9,6 +10,7 @@ import profilefit
 from profilefit import catalogue
 from profilefit.errors import ShaderError
 from profilefit.shader import emit
+from profilefit.shader.check.cost import costs
 from profilefit.shader.check.evaluate import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half
 
 BURLEY = profilefit.load("burley", "published")
@@ -39,6 +41,37 @@ def test_more_arguments_than_a_texture_holds(context):
     found = ShaderLaw(context, BURLEY).cdf(0.7, alpha)
     picked = np.array([0, WIDTH - 1, WIDTH, alpha.size - 2, alpha.size - 1])
     np.testing.assert_allclose(found[picked], BURLEY.cdf(0.7, alpha[picked]), atol=FLOAT32)
+
+
+def test_what_was_bound_is_bound_again_and_nothing_is_left_behind(context):
+    """moderngl keeps in `objects` what is dropped without a release; a texture is dropped so here, to see that."""
+    own = context.simple_framebuffer((4, 4), components=4)
+    own.use()
+    own.viewport = (1, 0, 2, 3)
+    context.gc_mode = "context_gc"
+    try:
+        assert costs(context, [], BURLEY)
+        shader = ShaderLaw(context, BURLEY)
+        before = shader.cdf(0.7, 0.5)
+        del shader
+        own_drops = _unreleased(context)
+        context.texture((1, 1), 4)
+        assert (len(own_drops), len(_unreleased(context))) == (0, 1)
+    finally:
+        context.gc_mode = None
+    assert context.viewport == (1, 0, 2, 3)
+    context.clear(0.75, 0.0, 0.0, 1.0)
+    assert set(own.read(components=1)) == {191}
+    assert ShaderLaw(context, BURLEY).cdf(0.7, 0.5) == before
+
+
+def _unreleased(context):
+    """What was dropped since the last time without a release, which it gets now."""
+    found = [one for one in context.objects if not isinstance(one, moderngl.InvalidObject)]
+    context.objects.clear()
+    for one in found:
+        one.release()
+    return found
 
 
 def test_results_may_be_stored_in_half_precision(context):

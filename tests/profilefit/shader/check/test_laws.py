@@ -97,7 +97,7 @@ def test_names_choose_laws_and_maps():
     assert [one.label for one in chosen(["gaussians"], "regenerated", FITS)[0]] == ["gaussians-6"]
     assert len(chosen(["rational"], "regenerated", FITS)[1]) == 8
     assert {one.name for one in printed("published", FITS)[0]} == {"liang", "burley", "burley_diffuse_mfp"}
-    with pytest.raises(InputError, match="name must be a law or a record"):
+    with pytest.raises(InputError, match="name must be a law, map or record"):
         chosen(["nothing"], "regenerated", FITS)
     with pytest.raises(InputError, match="constants must be regenerated or a printed set"):
         chosen([], "nothing", FITS)
