@@ -1,7 +1,7 @@
 """Squared bias and variance of the self-normalised estimator on the flat step edge, on the GPU, channel by channel.
 
 Every pixel of a column of the edge is an estimate by its own shift of the lattice. Beside it the plain estimator, the
-mean of w E where (22) divides by the sum of w, in float64 with a Fibonacci lattice: it has no bias of its own, and the
+mean of w E where (22) divides by the sum of w, in float64 with the same lattice: it has no bias of its own, and the
 variance of its weights.
 """
 

@@ -5,8 +5,8 @@
 Places are within 4 mfp of the edge. Bias: the largest difference of the law's own integral from the exact one, as a
 share of A; no number of samples takes it away. Noise: root mean square, over places and trials, of one estimate of (22)
 against the exact answer, over that of the exact profile with radii by its exact quantile, from the same points:
-independent ones, or the stage's Fibonacci lattice with a random shift. Uniform radii end at 99.5 % of the energy, and
-miss the rest.
+independent ones, or the stage's lattice with a random shift. Uniform radii end at 99.5 % of the energy, and miss the
+rest.
 """
 
 from __future__ import annotations

@@ -12,6 +12,8 @@ from profilefit.errors import InputError
 Singles = NDArray[np.float32]
 VECTORS = ("irradiance", "reflectance", "position", "normal")
 NUMBERS = ("mask", "thickness", "visibility", "roughness")
+INSIDE = 0.5  # the shaders' threshold of the mask: light scatters inside where it is beyond
+ROUNDING = 1e-6  # a float32 that came from a texture's filter may end so far beyond 1
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,8 @@ class Buffers:
     thickness    way of the light through the part [mm]
     pixel        side of a pixel [mm]; in perspective at a depth of 1 mm
     visibility   share of the light that no shadow takes [-];  roughness  of GGX [-]
+
+    Where mask > 0.5 all are finite and A is in [0, 1]; elsewhere only the mask need be finite. Raises InputError.
     """
 
     irradiance: Singles
@@ -46,6 +50,20 @@ class Buffers:
             accepted = (rows, columns, 3) if name in VECTORS else (rows, columns)
             if array is not None and np.shape(array) != accepted:
                 raise InputError(f"{name} must have shape {accepted}, as mask has, got {np.shape(array)}")
+        self._check_inside()
+
+    def _check_inside(self) -> None:
+        mask = np.asarray(self.mask)
+        _require("mask", mask, np.isfinite(mask), "finite")  # NaN would be neither inside nor outside
+        inside = mask > INSIDE
+        for name in VECTORS + NUMBERS:
+            array = getattr(self, name)
+            if array is not None:
+                value = np.asarray(array)[inside]
+                _require(name, value, np.isfinite(value), f"finite where mask > {INSIDE}")
+        albedo = np.asarray(self.reflectance)[inside]
+        good = (albedo >= 0) & (albedo <= 1 + ROUNDING)
+        _require("reflectance", albedo, good, f"in [0, 1] where mask > {INSIDE}")
 
     @property
     def size(self) -> tuple[int, int]:
@@ -67,6 +85,11 @@ class Buffers:
             for name, last in zip(VECTORS, fourth, strict=True)
         )
         return irradiance, reflectance, position, normal
+
+
+def _require(name: str, values: NDArray[np.floating], good: NDArray[np.bool_], what: str) -> None:
+    if not np.all(good):
+        raise InputError(f"{name} must be {what}, got {values[~good][0]:g}")
 
 
 def flat(size: tuple[int, int], pixel: float, reflectance: ArrayLike, irradiance: ArrayLike = 1.0) -> Buffers:

@@ -21,12 +21,12 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.sampling import LawTarget
+from profilefit.shader.stage import lattice
 from profilefit.shader.truth.step_edge import step_response, target_of
 
 Floats = NDArray[np.float64]
 LAST_XI = 1.0 - 2.0**-24  # the last number below 1 that single-precision generators draw
 UNIFORM_SHARE = 0.995  # of the light within the largest of uniform radii, as the stage has it
-GOLDEN = 0.5 * (1.0 + 5.0**0.5)
 KNOTS = 1500  # of the exact quantile: within 1e-9 of itself, relative
 NEAREST_XI = 1e-9
 
@@ -99,14 +99,15 @@ def random_points(samples: int, trials: int, seed: int) -> Floats:
 def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | None = None) -> Floats:
     """One set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
 
-    points  (samples, 2), by default the stage's Fibonacci lattice: xi = i / golden ratio, angle (i + 1/2) / samples
-    -> (trials, samples, 2)
+    points  (samples, 2), shifted over the whole torus; by default the stage's lattice, shifted within one of its cells,
+            which gives the same sets. -> (trials, samples, 2)
     """
-    i = np.arange(samples)
-    chosen = np.stack([i / GOLDEN, (i + 0.5) / samples], axis=1) if points is None else np.asarray(points, float)
+    shift = np.random.default_rng(seed).random((trials, 1, 2))
+    if points is None:
+        return (lattice.points(samples) + shift @ lattice.best(samples).cell) % 1.0
+    chosen = np.asarray(points, float)
     if chosen.shape != (samples, 2):
         raise InputError(f"points must be {samples} pairs (xi, angle / 2 pi), got an array of shape {chosen.shape}")
-    shift = np.random.default_rng(seed).random((trials, 1, 2))
     return (chosen + shift) % 1.0
 
 

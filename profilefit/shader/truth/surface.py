@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from profilefit.errors import InputError
-from profilefit.shader.stage.buffers import Buffers
+from profilefit.shader.stage.buffers import INSIDE, Buffers
 
 Floats = NDArray[np.float64]
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
@@ -44,7 +44,9 @@ class View:
         if self.eye is not None:
             depth = (position - self.eye) @ forward
             scale = self.pixel * depth
-            ray = (position - self.eye) / np.where(depth > 0, depth, 1.0)[..., None]
+            # The background's positions are the eye's own: any ray will do there, for its footprint is 0.
+            ray = np.where(depth[..., None] > 0, position - self.eye, forward)
+            ray = ray / np.where(depth > 0, depth, 1.0)[..., None]
         facing = -np.sum(normal * ray, axis=-1)
         facing = np.maximum(facing, LEAST_COSINE * np.linalg.norm(ray, axis=-1))
         across, along = (
@@ -117,4 +119,4 @@ def seen(buffers: Buffers) -> tuple[Surface, View]:
     )
     right, up, forward = np.diag([1.0, 1.0, -1.0])
     view = View(right, up, forward, buffers.pixel, np.zeros(3) if buffers.is_perspective else None)
-    return Surface(position, normal, irradiance, reflectance, buffers.mask > 0), view
+    return Surface(position, normal, irradiance, reflectance, buffers.mask > INSIDE), view

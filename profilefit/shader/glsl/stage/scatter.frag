@@ -19,7 +19,7 @@ out vec4 exitance;
 const float TAU = 6.283185307179586;
 const float NEAR = 1e-6; // least radius [mfp]: p and density are finite there
 const float LEAST_COSINE = 0.05; // of normal and ray: at a silhouette one pixel would stand for any area
-const vec2 LAMBERT = vec2(0.1, 0.2); // mfp [pixels] below which nothing is blurred, and from which all is
+const vec2 LAMBERT = vec2(0.05, 0.1); // mfp [pixels] below which nothing is blurred, and from which all is
 const float OWN = 1e-4; // weight of the pixel's own light, per sample: where nothing else is seen, Lambert
 const float MOST_UNIFORM = 0.995; // share of the energy that uniform radii reach
 
@@ -139,7 +139,7 @@ void main() {
     vec3 own = texelFetch(irradiance_map, here, 0).rgb;
     vec3 reflectance = texelFetch(reflectance_map, here, 0).rgb;
     vec3 light = own;
-    // So short a mean free path does not leave the pixel: Lambert, to a part in 500.
+    // So short a mean free path does not leave the pixel: Lambert, to a part in 1000.
     vec3 across = mfp / world_per_pixel(-centre.z);
     vec3 blurred = clamp((across - LAMBERT.x) / (LAMBERT.y - LAMBERT.x), 0.0, 1.0);
     if (centre.w > 0.5 && any(greaterThan(blurred, vec3(0.0)))) {

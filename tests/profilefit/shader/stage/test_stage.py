@@ -7,31 +7,16 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.shader.stage import head, skin_texture
 from profilefit.shader.stage.buffers import flat, step_edge
 from profilefit.shader.stage.camera import Camera
 from profilefit.shader.stage.combining import to_srgb
 from profilefit.shader.stage.coverage import covered, covering
-from profilefit.shader.stage.material import translucent
-from profilefit.shader.stage.mesh import parameters, sheet
 from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.scene import Light, Part, Scene, head_scene
+from profilefit.shader.stage.scene import head_scene
 from profilefit.shader.stage.stage import Stage
+from tests.profilefit.shader.stage.scenes import RADIUS, ball, scene
 
-RADIUS = 10.0
 SIZE = (64, 48)
-
-
-def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
-    u, v = parameters(60, 90)
-    mesh = sheet(radius * head.ball(u, v), u, v, closed=True)
-    return Part(replace(mesh, position=mesh.position + np.array(centre)), skin_texture.plain((0.8, 0.5, 0.3)))
-
-
-def scene(direction, *parts, kind="orthographic"):
-    camera = Camera(eye=(0.0, 0.0, 100.0), height=30.0, kind=kind)
-    light = Light(direction, (1.0, 1.0, 1.0))
-    return Scene(parts or (ball(),), translucent(), light, (0.1, 0.1, 0.1), camera)
 
 
 @pytest.fixture
@@ -153,23 +138,35 @@ def test_times_and_compiles_apart(stage, burley):
 
 
 @pytest.mark.parametrize("share", [0.25, 0.5])
-def test_covering_zooms_to_a_share(context, share):
+def test_covering_zooms_to_a_share(context, burley, share):
+    """And covered pixels gather: one that does not is Lambert's to the last bit, as are those in even shade."""
     found = covering(context, scene((0.0, 1.0, 0.0)), share, size=(160, 90))
     with Stage(context, (160, 90), shadow_side=16) as stage:
         assert abs(covered(stage, found) - share) < 0.02
+        seen = stage.buffers()
+        light = stage.scatter(burley, 3.0 * seen.pixel, Sampling(16))
+    blurred = np.any(light != seen.reflectance * seen.irradiance, axis=-1)
+    assert not np.any(blurred & (seen.mask < 0.5))
+    assert np.mean(blurred[seen.mask > 0.5]) > 0.9
 
 
 def test_head_is_lit_and_covers_what_it_must(context, burley):
+    """With mean free paths eight times as long as skin's: 1.2 to 2.3 pixels."""
     with Stage(context, (64, 64), shadow_side=512) as stage:
         made = head_scene(columns=256)
         stage.draw(made)
-        image = stage.render(burley, made.material.mfp, Sampling(4))
+        mfp = 8.0 * np.array(made.material.mfp)
+        image = stage.render(burley, mfp, Sampling(4))
         assert 0.3 < covered(stage, made) < 0.5
+        seen, blurred = stage.buffers(), stage.scatter(burley, mfp, Sampling(64))
     assert np.all(np.isfinite(image))
     assert image.min() >= 0
     left, right = image[20:40, 18:32].mean(axis=(0, 1)), image[20:40, 36:46].mean(axis=(0, 1))
     assert left[0] > 2 * right[0]  # the light is on the left
     assert left[0] > left[1] > left[2]
+    inside = seen.mask > 0.5
+    moved = np.abs(blurred - seen.reflectance * seen.irradiance)[inside].mean(axis=0)
+    assert np.all(moved > 0.03 * blurred[inside].mean(axis=0))  # of the light, away from where it went in
 
 
 def test_srgb():
@@ -201,6 +198,9 @@ def test_bad_input_is_named(stage, burley):
         replace(flat(SIZE, 1.0, 0.5), normal=np.zeros((4, 4, 3), np.float32))
     with pytest.raises(InputError, match=r"width must be a whole number >= 1.* got 0"):
         Stage(stage.context, (0, 4))
+    for side in (0, 2.5):
+        with pytest.raises(InputError, match=f"shadow_side must be a whole number >= 1.* got {side}"):
+            Stage(stage.context, SIZE, shadow_side=side)
 
 
 def test_release_frees_the_gpu(context, burley):
@@ -213,3 +213,14 @@ def test_release_frees_the_gpu(context, burley):
     textures = [*stage._targets.maps.values(), stage._targets.radiance]
     stage.release()
     assert all(isinstance(texture.mglo, moderngl.InvalidObject) for texture in textures)
+    for use in (
+        lambda: stage.upload(step_edge(SIZE, 1.0, 0.5)),
+        lambda: stage.draw(scene((0.0, 1.0, 0.0))),
+        lambda: stage.scatter(burley, 2.0),
+        lambda: stage.render("separable", 2.0),
+        lambda: stage.time(burley, 2.0),
+        stage.buffers,
+    ):
+        with pytest.raises(InputError, match="stage must not be used after it was released"):
+            use()
+    stage.release()  # twice is once

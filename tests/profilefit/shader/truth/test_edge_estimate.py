@@ -7,6 +7,8 @@ from scipy.stats import chi2
 import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
+from profilefit.shader.stage import lattice
+from profilefit.shader.stage.lattice import WRAPS
 from profilefit.shader.truth.edge_estimate import (
     Gather,
     by_law,
@@ -105,6 +107,23 @@ def test_atoms_weigh_nothing():
     last = gather.sample(np.array([1.0 - 1e-6]))
     np.testing.assert_allclose(last, law.largest_radius(0.95))
     assert gather.weight(last) == 0.0
+
+
+@pytest.mark.parametrize("samples", [1, 17, 64])
+def test_points_by_default_are_the_stage_s(samples):
+    """Its lattice, moved as a whole by less than the edges of a cell; of a shift over the torus none is near enough."""
+    base, edges = lattice.points(samples), lattice.best(samples).cell
+
+    def shares(shifted):
+        moved = (shifted - base + 0.5) % 1.0 - 0.5
+        np.testing.assert_allclose((moved - moved[:, :1] + 0.5) % 1.0, 0.5, atol=1e-9)
+        places = moved[:, 0, None, None] + WRAPS.reshape(1, -1, 2)  # a shift is one modulo 1
+        inside = places @ np.linalg.inv(edges)
+        return np.any(np.all((inside > -1e-9) & (inside < 1.0), axis=-1), axis=(1, 2))
+
+    assert np.all(shares(shifted_points(samples, 200, seed=2)))
+    torus = shares(shifted_points(samples, 200, seed=2, points=base))
+    assert samples == 1 or np.mean(torus) < 0.2
 
 
 def test_points_of_ones_own():

@@ -1,5 +1,7 @@
 """Footprints against rays through the corners of pixels, and what a G-buffer must be."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -36,6 +38,15 @@ def test_an_outline_has_a_bounded_footprint():
     assert np.linalg.norm(np.cross(across, along)) <= 1.01 * 4.0 / LEAST_COSINE
 
 
+def test_background_at_the_eye_has_no_footprint():
+    """A render's positions and normals are 0 there; a 0 / 0 would warn, which is an error here."""
+    position, normal = np.stack([THROUGH, np.zeros(3)]), np.stack([NORMAL, np.zeros(3)])
+    view = View(RIGHT, UP, FORWARD, 0.002, np.zeros(3))
+    across, along = view.footprint(position, normal)
+    np.testing.assert_array_equal(np.stack([across[1], along[1]]), 0.0)
+    np.testing.assert_array_equal(across[0], view.footprint(THROUGH, NORMAL)[0])
+
+
 def _plane(h, w, **changed):
     fields = {name: np.full((h, w, 3), 0.5) for name in ("position", "irradiance", "reflectance")}
     fields["normal"] = np.broadcast_to([0.0, 0.0, 1.0], (h, w, 3))
@@ -59,6 +70,12 @@ def test_seen_is_the_render_in_view_space():
     np.testing.assert_allclose(along[1, 2], surface.position[2, 2] - surface.position[1, 2])
     assert surface.mask.all()
     assert view.eye is None
+
+
+def test_seen_is_what_the_shaders_take_for_inside():
+    plane = buffers.flat((4, 1), 0.5, 0.5)
+    mask = np.array([[0.0, 0.5, np.nextafter(np.float32(0.5), np.float32(1.0)), 1.0]], np.float32)
+    np.testing.assert_array_equal(seen(replace(plane, mask=mask))[0].mask, [[False, False, True, True]])
 
 
 def test_misuse():

@@ -1,0 +1,25 @@
+"""Small scenes: balls under one light."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from profilefit.shader.stage import head, skin_texture
+from profilefit.shader.stage.camera import Camera
+from profilefit.shader.stage.material import translucent
+from profilefit.shader.stage.mesh import parameters, sheet
+from profilefit.shader.stage.scene import Light, Part, Scene
+
+RADIUS = 10.0
+
+
+def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
+    u, v = parameters(60, 90)
+    mesh = sheet(radius * head.ball(u, v), u, v, closed=True)
+    return Part(replace(mesh, position=mesh.position + np.array(centre)), skin_texture.plain((0.8, 0.5, 0.3)))
+
+
+def scene(direction, *parts, kind="orthographic"):
+    camera = Camera(eye=(0.0, 0.0, 100.0), height=30.0, kind=kind)
+    light = Light(direction, (1.0, 1.0, 1.0))
+    return Scene(parts or (ball(),), translucent(), light, (0.1, 0.1, 0.1), camera)
