@@ -17,9 +17,9 @@ MOST_SEED = 2**31 - 1
 class Sampling:
     """How the points of a lattice (`lattice.best`), shifted as a whole in each pixel, become radii and angles.
 
-    Noise on a step edge, alpha 0.8, within 4 mfp, with 16 and 64 points: 0.037 and 0.011; a Fibonacci lattice's 0.035 and
-    0.012, Hammersley's set 0.036 and 0.012, the R2 sequence 0.038 and 0.014, Sobol's 0.050 and 0.014, random points 0.066
-    and 0.032. This one takes any n, one multiplication a point, and only it turns blue shifts into blue errors.
+    Noise on a step edge, alpha 0.8, within 4 mfp, with 16 and 64 points: 0.037 and 0.011; a Fibonacci lattice's 0.035
+    and 0.012, Hammersley's set 0.036 and 0.012, the R2 sequence 0.038 and 0.014, Sobol's 0.050 and 0.014, random points
+    0.066 and 0.032. This one takes any n, one multiplication a point, and only it turns blue shifts into blue errors.
 
     samples   of a pixel, 1 ... 256; of the separable filter, taps of each of its two passes
     kind      "uniform", radius uniform up to 99.5 % of the energy of the longest channel; "importance", the law's own
