@@ -28,7 +28,7 @@ from profilefit.shader.check.evaluate import half_extension, no_half
 from profilefit.shader.check.half import check_half
 from profilefit.shader.check.laws import LawCheck, check_laws
 from profilefit.shader.check.maps import MapCheck, check_map
-from profilefit.shader.context import open_context, renderer
+from profilefit.shader.context import opened, renderer
 
 LOCAL = Path("fits")
 WIDTH = 100
@@ -66,13 +66,13 @@ def check(
     console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
     folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
     laws, maps = chosen(names or [], constants, folder)
-    context = open_context()
-    device = renderer(context)
-    of_laws = list(_tracked(check_laws(context, laws, folder), len(laws)))
-    of_maps = [check_map(context, one, folder) for one in maps]
+    with opened() as context:
+        device, extension, lacking = renderer(context), half_extension(context), no_half(context)
+        of_laws = list(_tracked(check_laws(context, laws, folder), len(laws)))
+        of_maps = [check_map(context, one, folder) for one in maps]
+        timed = law_costs(context, laws, folder)
+        halves = [check_half(context, one) for one in laws] if precision == Precision.HALF else []
     found: list[LawCheck | MapCheck] = [*of_laws, *of_maps]
-    timed = law_costs(context, laws, folder)
-    halves = [check_half(context, one) for one in laws] if precision == Precision.HALF else []
     if as_json:
         print(json.dumps(content(of_laws, of_maps, timed, halves, device), indent=1, ensure_ascii=False))
     else:
@@ -83,8 +83,8 @@ def check(
         for part in parts:
             console.print(part)
             console.print()
-        if precision == Precision.HALF and not half_extension(context):
-            console.print(no_half(context), markup=False)
+        if precision == Precision.HALF and not extension:
+            console.print(lacking, markup=False)
         for line in verdict_lines(found):
             console.print(line)
     if any(one.broken for one in found):

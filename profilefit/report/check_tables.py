@@ -20,7 +20,7 @@ from profilefit.shader.check.cost import WORKS, Cost, law_costs
 from profilefit.shader.check.half import HalfCheck
 from profilefit.shader.check.laws import JUDGED, OWN, LawCheck, check_laws
 from profilefit.shader.check.maps import MapCheck, check_map
-from profilefit.shader.context import open_context, renderer
+from profilefit.shader.context import opened, renderer
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
@@ -111,16 +111,16 @@ def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
 
 def markdown_check(folder: Path) -> str:
     """The README's tables: all that was regenerated, and what Liang et al. printed. ShaderError without OpenGL."""
-    context = open_context()
     laws, maps = (
         [*regenerated, *printed]
         for regenerated, printed in zip(
             chosen((), REGENERATED, folder), chosen(("liang",), "published", folder), strict=True
         )
     )
-    of_laws = list(check_laws(context, laws, folder))
-    of_maps = [check_map(context, one, folder) for one in maps]
-    return markdown_checks(of_laws, of_maps, law_costs(context, laws, folder), renderer(context))
+    with opened() as context:
+        of_laws = list(check_laws(context, laws, folder))
+        of_maps = [check_map(context, one, folder) for one in maps]
+        return markdown_checks(of_laws, of_maps, law_costs(context, laws, folder), renderer(context))
 
 
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import re
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import moderngl
@@ -31,6 +33,16 @@ def open_context() -> moderngl.Context:
         return moderngl.create_context(standalone=True, require=OPENGL, **BACKEND)
     except Exception as error:  # glcontext and moderngl raise bare Exceptions
         raise ShaderError(_missing(str(error))) from None
+
+
+@contextmanager
+def opened() -> Iterator[moderngl.Context]:
+    """The same for the length of a `with`. OpenGL draws into the context that was opened last: one at a time."""
+    context = open_context()
+    try:
+        yield context
+    finally:
+        context.release()
 
 
 def program(

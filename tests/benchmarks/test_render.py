@@ -18,7 +18,7 @@ from benchmarks.render_pictures import shots
 from benchmarks.render_view import CLOSE, Judged
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def opened():
     try:
         context = open_context()

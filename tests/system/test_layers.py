@@ -114,6 +114,7 @@ ORDER = {
         "validity",
         "bounds",
         "grid",
+        "verdict",
         "claims",
         "twin",
         "laws",

@@ -23,8 +23,9 @@ from profilefit.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.shader.check import bounds, claims, grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.evaluate import ShaderLaw, Values
-from profilefit.shader.check.grid import Arguments, Count, Spread, bad_numbers
+from profilefit.shader.check.grid import Arguments, Spread, bad_numbers
 from profilefit.shader.check.twin import Twin
+from profilefit.shader.check.verdict import Verdict
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -33,27 +34,14 @@ JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 
 
 @dataclass(frozen=True)
-class LawCheck:
-    """What was found of one law.
+class LawCheck(Verdict):
+    """What was found of one law: `rel`, `ks` and `inversion_error`, and
 
-    spreads   float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
-              cdf; sample as the share between the radii of float32 and float64; pdf of the map against the pdf's text
-    rounding  the same as `rel`, `ks` and `inversion_error`, worst over albedos [-]; measured of the GPU and exact
-    inside    what must not be, where the law says that it holds; outside elsewhere
+    spreads  float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
+             cdf; sample as the share between the radii of float32 and float64; pdf of the map against the pdf's text
     """
 
-    of: Named
-    model: ModelError
     spreads: dict[str, Spread]
-    rounding: dict[str, float]
-    measured: dict[str, float]
-    inside: Count
-    outside: Count
-    bounds: tuple[Bound, ...]
-
-    @property
-    def broken(self) -> tuple[Bound, ...]:
-        return tuple(bound for bound in self.bounds if bound.broken)
 
 
 def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Path) -> Iterator[LawCheck]:
@@ -88,7 +76,7 @@ def check_law(
     measured = _measured(shader, one, model)
     limits = _limits(model, rounding, measured, spreads)
     limits += [bad_numbers(inside), *claims.of_profile(one, folder)]
-    return LawCheck(one, model, spreads, rounding, measured, inside, outside, tuple(limits))
+    return LawCheck(one, model, rounding, measured, inside, outside, tuple(limits), spreads)
 
 
 def _rounding(

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from profilefit.inventory import Named
 from profilefit.shader.check import bounds, claims, validity
-from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
+from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.evaluate import ShaderMap
 from profilefit.shader.check.grid import ULP, Count, bad_numbers
 from profilefit.shader.check.validity import Range
+from profilefit.shader.check.verdict import Verdict
 
 Floats = NDArray[np.float64]
 # Even in A, and even in sqrt(1 - alpha) as `quality.albedo_quality`: both as the GPU sees them.
@@ -25,25 +26,10 @@ STEPS = 4  # of ULP that a falling alpha or A may be rounding
 
 
 @dataclass(frozen=True)
-class MapCheck:
-    """What was found of one map.
+class MapCheck(Verdict):
+    """What was found of one map: `delta_A` and `delta_alpha`, and where their rounding is largest, in words."""
 
-    rounding  largest float32 error of A, `delta_A`, and of alpha, `delta_alpha`, where the map holds [-]
-    measured  the same of the GPU's numbers against the exact half space; the rest as in `check.LawCheck`
-    """
-
-    of: Named
-    model: ModelError
-    rounding: dict[str, float]
-    measured: dict[str, float]
     places: dict[str, str]
-    inside: Count
-    outside: Count
-    bounds: tuple[Bound, ...]
-
-    @property
-    def broken(self) -> tuple[Bound, ...]:
-        return tuple(bound for bound in self.bounds if bound.broken)
 
 
 def check_map(context: moderngl.Context, one: Named, folder: Path, text: str = "") -> MapCheck:
@@ -71,7 +57,7 @@ def check_map(context: moderngl.Context, one: Named, folder: Path, text: str = "
         if name in measured:
             limits.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
     limits += [bad_numbers(inside), *claims.of_map(one)]
-    return MapCheck(one, model, rounding, measured, places, inside, outside, tuple(limits))
+    return MapCheck(one, model, rounding, measured, inside, outside, tuple(limits), places)
 
 
 def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:

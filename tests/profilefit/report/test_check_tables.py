@@ -23,13 +23,13 @@ def law(*bounds, name="hazard-n1.4"):
     rounding = {"rel": 1e-6, "ks": 2e-7, "inversion_error": 4e-7}
     spreads = {PROFILE: spread, CDF: spread, SAMPLE: spread, OWN: spread}
     model = ModelError({"rel": 0.049, "ks": 0.0096}, name)
-    return LawCheck(inventory.find(name, FITS), model, spreads, rounding, {"rel": 0.05}, NONE, NONE, bounds)
+    return LawCheck(inventory.find(name, FITS), model, rounding, {"rel": 0.05}, NONE, NONE, bounds, spreads)
 
 
 def mapped(*bounds):
     one = inventory.find("albedo-rational-n1.4", FITS)
     errors = {"delta_A": 1e-7, "delta_alpha": 2e-7}
-    return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, {}, NONE, Count(0, 0, 0, 7), bounds)
+    return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, NONE, Count(0, 0, 0, 7), bounds, {})
 
 
 def shown(parts):

@@ -18,5 +18,6 @@ def shared_context():
 
 @pytest.fixture
 def context(shared_context):
-    yield shared_context
-    assert shared_context.error == "GL_NO_ERROR"
+    with shared_context:  # another test of this process may have opened one of its own
+        yield shared_context
+        assert shared_context.error == "GL_NO_ERROR"

@@ -1,8 +1,16 @@
-"""A shader with an error in it, for what a test must not take for right."""
+"""A stage, and a shader with an error in it, for what a test must not take for right."""
 
 import pytest
 
 from profilefit.shader.stage import scattering
+from profilefit.shader.stage.stage import Stage
+
+
+@pytest.fixture
+def stage(context):
+    """128 x 128 pixels."""
+    with Stage(context, (128, 128), shadow_side=16) as stage:
+        yield stage
 
 
 @pytest.fixture

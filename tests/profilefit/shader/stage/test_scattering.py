@@ -20,13 +20,6 @@ EVERY = [(kind, channels) for kind in KINDS for channels in CHANNELS]
 
 
 @pytest.fixture
-def stage(context):
-    """128 x 128 pixels."""
-    with Stage(context, (128, 128), shadow_side=16) as stage:
-        yield stage
-
-
-@pytest.fixture
 def small(context):
     """24 x 24 pixels."""
     with Stage(context, (24, 24), shadow_side=16) as stage:

@@ -27,13 +27,6 @@ def hazard():
 
 
 @pytest.fixture
-def stage(context):
-    """128 x 128 pixels."""
-    with Stage(context, (128, 128), shadow_side=16) as stage:
-        yield stage
-
-
-@pytest.fixture
 def small(context):
     """16 x 128 pixels: enough for paths within a pixel."""
     with Stage(context, (16, 128), shadow_side=16) as stage:
