@@ -2,6 +2,8 @@
 
 import json
 
+import pytest
+
 from benchmarks import contenders, forms, laws
 from benchmarks.survival import FORMS, HAZARD
 
@@ -31,6 +33,7 @@ def test_laws_print_draw_and_write(monkeypatch, tmp_path, capsys):
     assert "profile" not in content["hazard, two steps"]["time_ratio"]
 
 
+@pytest.mark.slow
 def test_forms_print_both_tables(capsys, monkeypatch):
     monkeypatch.setattr(forms, "QUICK", forms.Sizes(3, 1, (FORMS[0], HAZARD), forms.COEFFICIENT_LAWS[:1]))
     forms.main(["--quick"])

@@ -2,9 +2,12 @@
 
 import json
 
+import pytest
+
 from benchmarks import step_edge
 
 
+@pytest.mark.slow
 def test_prints_and_writes(monkeypatch, tmp_path, capsys):
     absent = ("absent", "gaussians", "no-such-set")
     wanted = {"searchlight": (("hazard", "hazard", "regenerated"), ("Liang, printed", "liang", "published"), absent)}

@@ -335,6 +335,7 @@ def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     assert np.all((claimed / d.absorbed[:-1] > 1e-4) & (claimed / d.absorbed[:-1] < 0.01))
 
 
+@pytest.mark.slow
 def test_errors_of_many_layers_are_those_of_few_groups_too():
     """A table so large that there are 8 groups; the same photons give the same errors but for the spread of 8."""
     medium = Medium((Layer(1.4, 1, 9, 0.5, 0.1),) * 9)

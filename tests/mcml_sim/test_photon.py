@@ -195,6 +195,7 @@ def test_many_layers_are_gathered_as_few_are_selected():
     np.testing.assert_array_equal(photon.pick(many, layer), layer - 1)
 
 
+@pytest.mark.slow
 def test_directions_keep_their_length_over_a_thousand_turns():
     endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
 

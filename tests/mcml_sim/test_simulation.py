@@ -165,6 +165,7 @@ def test_one_photon_says_nothing_of_its_error():
         assert np.all(np.isinf(alone.quantity(name).standard_error)), name
 
 
+@pytest.mark.slow
 def test_stopping_early_leaves_the_errors_honest(monkeypatch):
     """30 runs, each of which stops by its own error at 800 to 1600 photons: z of their means against the exact one."""
     monkeypatch.setitem(simulation.BATCH_PHOTONS, matched, 100)

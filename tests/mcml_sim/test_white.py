@@ -112,6 +112,7 @@ def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
     assert np.abs(z).max() < sidak(z.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(n=1.4, g=0.5), Setting(n=1.3)], ids=str)
 def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
     grid = Grid.from_edges(r=EDGES)

@@ -61,6 +61,7 @@ def whitened(values, covariance):
 # Photon noise
 
 
+@pytest.mark.slow
 def test_constants_scatter_as_predicted(tallies, toy, sidak):
     """200 refits of the true law. Halved or doubled covariances have probabilities below 1e-12."""
     one, scattered = refits(tallies, toy, None)

@@ -34,6 +34,7 @@ def test_a_record_or_a_law_by_its_name(name, constants, law, setting, records):
     assert (found.name, found.setting, found.records) == (law, setting, records)
 
 
+@pytest.mark.slow
 def test_every_record_of_a_fit_is_found_and_is_what_it_says():
     for one in [*profile_laws(FITS, matched=False), *sampled_laws(FITS), *albedo_laws(FITS, matched=False)]:
         for name in one.records:

@@ -137,6 +137,7 @@ def test_without_photon_noise_only_the_misfit_is_left(line_fit):
         posterior(replace(line_fit, statistical=None))
 
 
+@pytest.mark.slow
 def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
     """The chain has the sandwich's width although residuals are large and curved: there J^T J is not the curvature."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))

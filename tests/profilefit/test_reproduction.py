@@ -83,12 +83,14 @@ def test_verdict_follows_the_figures(constants, curve, verdict):
     assert judge(constants, curve) == verdict
 
 
+@pytest.mark.slow  # 61 fits
 def test_verdicts_are_those_of_the_distances(found):
     for reading in found:
         assert reading.verdict == judge(reading.constant_distance, reading.curve_distance)
         assert set(reading.constants) == set(reading.published)
 
 
+@pytest.mark.slow  # 61 fits
 def test_a_c_and_the_albedo_map_come_out_of_the_protocol(found):
     plain = "(6) on r R_d, stop at the ring"
     for equation in ("(11)", "(15)"):
@@ -98,6 +100,7 @@ def test_a_c_and_the_albedo_map_come_out_of_the_protocol(found):
     assert _of(found, "(10), (12), (14)", "r R_d fitted")[0].verdict == "reproduced"
 
 
+@pytest.mark.slow  # 61 fits
 def test_printed_b0_does_not_and_its_correction_does(found):
     verdicts = {r.published["b0"]: r.verdict for r in _of(found, "(13) b0")}
     assert verdicts[PUBLISHED["(13)"]["b0"]] == "not reproduced"
@@ -114,12 +117,14 @@ def test_printed_b0_breaks_the_papers_own_energy():
     assert np.all(shares[PUBLISHED["(13)"]["b0"]] > 10.0)
 
 
+@pytest.mark.slow  # 61 fits
 def test_trimming_the_wrong_quantity_is_found_out(found):
     wrong = _of(found, "(11)", "(6) on R_d") + _of(found, "(15)", "(6) on R_d") + _of(found, "(11)", "2 pi r R_d on")
     assert len(wrong) == 3
     assert {r.verdict for r in wrong} == {"not reproduced"}
 
 
+@pytest.mark.slow  # 61 fits
 def test_diffuse_light_is_no_reading_of_the_albedo_map(found):
     diffuse = ExactTruth(setting=Setting("diffuse")).reflectance(np.array([0.1, 0.5, 0.9]))
     printed = np.array(list(PUBLISHED["(8)"].values()))
@@ -128,6 +133,7 @@ def test_diffuse_light_is_no_reading_of_the_albedo_map(found):
     assert all(r.curve_distance < 0.01 for r in _of(found, "(8)"))
 
 
+@pytest.mark.slow  # 61 fits
 def test_readings_are_plain_data(found):
     text = json.dumps([dataclasses.asdict(r) for r in found], allow_nan=False)
     assert len(json.loads(text)) == len(found)

@@ -52,6 +52,7 @@ def test_regenerate_writes_a_record_that_loads(command, recipe):
     assert content["posterior"]["statistical"]["result"] == "converged"
 
 
+@pytest.mark.slow
 def test_a_surface_that_refracts_gets_its_own_record(command, tmp_path):
     """A recipe's table [setting] says which; the record is found by the name that goes with it."""
     path = tmp_path / "albedo-rational-n1.45.toml"

@@ -140,6 +140,7 @@ def test_density_of_the_sampler_is_its_own(law):
         assert 1e-5 < np.max(np.abs(own / law.albedo.reflectance(alpha) / pdf - 1)) < 1e-2
 
 
+@pytest.mark.slow
 def test_single_precision_costs_less_than_a_tenth_of_the_model_error(law):
     """As a shader runs it: everything that depends on r or xi in float32, the material's shape rounded to float32."""
     with jax.enable_x64(True):
