@@ -113,6 +113,7 @@ def test_a_worker_may_come_later(lonely, alone):
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=lonely.scheduler_address), alone)
 
 
+@pytest.mark.slow  # of a clock: a busy machine breaks its second
 def test_a_cluster_without_workers_is_said_once(lonely, alone, monkeypatch):
     monkeypatch.setattr(cluster, "PATIENCE", 1.0)
     threading.Timer(3, lonely.scale, [1]).start()

@@ -46,6 +46,7 @@ def test_control_c_says_what_it_waits_for_and_what_is_kept(mci, tmp_path):
     assert out == "run 1 of 1: first.mco\n"
 
 
+@pytest.mark.slow  # of a clock: a busy machine breaks its second
 def test_a_second_control_c_ends_it_at_once(mci, tmp_path):
     """While it is compiled, which takes seconds and cannot be interrupted."""
     with start("run", mci, cwd=tmp_path, stdout=-1, stderr=-1) as run:
