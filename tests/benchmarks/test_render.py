@@ -39,6 +39,7 @@ def few():
     return {key: laws[key] for key in ("hazard", "separable")}
 
 
+@pytest.mark.slow
 def test_errors_fall_with_samples_and_are_drawn(opened, scene, few, tmp_path, capsys):
     """Judged by 256 samples of the hazard law in place of the exact picture, which takes long."""
     with Stage(opened, (96, 96), shadow_side=64) as stage:
@@ -99,6 +100,7 @@ def test_error_bars_and_ratios_are_those_of_the_numbers():
     assert str(render_table2.Timed(0.5, times).ratio("scatter", "hazard")) == "2.50 (2.00 ... 3.00)"
 
 
+@pytest.mark.slow
 def test_table_2_covers_what_it_says(opened, scene, few, capsys):
     found = render_table2.timed(opened, scene.zoomed(290.0), few, (64, 36), 1, (0.5,))
     assert found[0].covered == pytest.approx(0.5, abs=0.05)  # of so few pixels

@@ -28,7 +28,13 @@ def deviations(tally, answer):
     return np.concatenate([(seen.value - light / solid_angles) / seen.standard_error for seen, light in pairs])
 
 
-@pytest.fixture(scope="module", params=[published.VAN_DE_HULST_SLAB, TWO_LAYERS], ids=["matched slab", "two layers"])
+@pytest.fixture(
+    scope="module",
+    params=[
+        pytest.param(published.VAN_DE_HULST_SLAB, id="matched slab"),
+        pytest.param(TWO_LAYERS, id="two layers", marks=pytest.mark.slow),
+    ],
+)
 def tally(request):
     """Photons through a medium, by exit angle."""
     return simulate(request.param, Grid(1.0, 1, na=ANGLES), PHOTONS, seed=SEED)

@@ -64,6 +64,7 @@ def test_chi_square_tells_another_light_and_another_albedo(lit):
     assert not is_likely(run, other)
 
 
+@pytest.mark.slow
 def test_the_derivative_in_albedo_is_that_of_the_order_series(sidak):
     """sum over n of n alpha^(n-1) R_n, in standard errors, ring by ring."""
     run, setting = run_under(Setting()), Setting()

@@ -379,6 +379,7 @@ def test_mutated_files_on_disk_are_read_alike(tmp_path):
             assert read_mci(path) == parse_mci(content, "a.mci")
 
 
+@pytest.mark.slow
 def test_no_mutant_takes_much_memory():
     draw = random.Random(8)
     started = seeds()

@@ -80,6 +80,7 @@ def wait_for(batches, store, child):
         time.sleep(0.002)
 
 
+@pytest.mark.slow
 def test_runs_killed_at_random_moments_resume_to_the_same_bits(start, tmp_path):
     whole = finish(start())
     store = tmp_path / "store"

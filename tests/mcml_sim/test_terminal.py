@@ -31,6 +31,7 @@ def start(*words: object, cwd: Path, **streams) -> subprocess.Popen:
     return subprocess.Popen([sys.executable, "-c", code, *map(str, words)], cwd=cwd, text=True, **streams)
 
 
+@pytest.mark.slow
 def test_control_c_says_what_it_waits_for_and_what_is_kept(mci, tmp_path):
     with start("run", mci, "--photons", 10**12, cwd=tmp_path, stdout=-1, stderr=-1) as run:
         end = time.monotonic() + 120
@@ -72,6 +73,7 @@ def test_a_full_disk_under_what_is_printed_is_one_line(tmp_path):
     assert (run.returncode, err) == (2, "mcml-sim: cannot print: No space left on device\n")
 
 
+@pytest.mark.slow
 def test_closed_streams_do_no_harm(mci, tmp_path):
     words = f"'{sys.executable}' -m mcml_sim run '{mci}' >&- 2>&-"
     done = subprocess.run(["sh", "-c", words], cwd=tmp_path, capture_output=True, text=True, timeout=120)

@@ -87,19 +87,26 @@ def traced(setting, photons):
     return np.asarray(ends.rho)[:photons], np.asarray(ends.order)[:photons]
 
 
+def nightly(setting):
+    """A setting that `make test` can do without."""
+    return pytest.param(setting, marks=pytest.mark.slow)
+
+
 def deviations(fast, slow):
     enough = fast + slow > 25
     return (fast - slow)[enough] / np.sqrt((fast + slow)[enough])
 
 
-@pytest.mark.parametrize("setting", SETTINGS, ids=str)
+@pytest.mark.parametrize("setting", [*SETTINGS[::2], *map(nightly, SETTINGS[1::2])], ids=str)
 def test_kernel_agrees_with_its_slow_twin_in_every_ring_and_order(setting, sidak):
     z = deviations(table(*traced(setting, PHOTONS)), table(*slow_twin(setting, PHOTONS, LAST_ORDER, seed=3)))
     assert z.size > 25
     assert np.abs(z).max() < sidak(z.size)
 
 
-@pytest.mark.parametrize("wrong", [Setting(n=1.3), Setting(n=1.4, g=0.05), Setting("diffuse", n=1.4)], ids=str)
+@pytest.mark.parametrize(
+    "wrong", [Setting(n=1.4, g=0.05), nightly(Setting(n=1.3)), nightly(Setting("diffuse", n=1.4))], ids=str
+)
 def test_the_comparison_sees_another_setting(wrong, sidak):
     z = deviations(table(*traced(Setting(n=1.4), PHOTONS)), table(*slow_twin(wrong, PHOTONS, LAST_ORDER, seed=3)))
     assert np.abs(z).max() > sidak(z.size)
@@ -168,6 +175,7 @@ def test_another_setting_does_not_compile_again():
     assert tracer.trace._cache_size() == before
 
 
+@pytest.mark.slow
 def test_double_precision_elsewhere_does_not_change_a_bit():
     setting = Setting("diffuse", n=1.4, g=0.7)
     alone = traced(setting, 2000)

@@ -44,6 +44,7 @@ def exactly(toy, tallies):
     return fit(profiles, replace(toy, q=0.52), free=FREE)
 
 
+@pytest.mark.slow
 def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
     """chi2 of 60 runs of photons is chi2 of two degrees of freedom, for a law that is not the truth too."""
     counts = tallies.draw(7, 60)

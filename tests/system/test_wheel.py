@@ -13,7 +13,7 @@ import pytest
 ROOT = Path(__file__).resolve().parents[2]
 
 # Downloads and unpacks jax, scipy and matplotlib: half a minute with a warm pip cache, minutes over a slow line.
-pytestmark = pytest.mark.timeout(900)
+in_an_environment_of_its_own = pytest.mark.timeout(900)
 
 
 def run(*command: str | Path, cwd: Path) -> str:
@@ -51,6 +51,21 @@ def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
     assert {f"profilefit/fits/{name}" for name in fits} <= names
 
 
+def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
+    """The wheel alone, with the libraries of this environment: nothing of it is left behind in the checkout."""
+    zipfile.ZipFile(wheel).extractall(tmp_path / "site")
+    code = "import sys; sys.path.insert(0, 'site'); import profilefit, profilefit.cli as cli; "
+    code += "print(profilefit.__file__, profilefit.load('liang').profile(0.5, 0.9), flush=True); cli.main()"
+    out = run(sys.executable, "-I", "-c", code, "export", "hazard-diffuse", "--lang", "hlsl", cwd=tmp_path)
+    first, text = out.split("\n", 1)
+    place, value = first.split()
+    assert Path(place).resolve().is_relative_to((tmp_path / "site").resolve())
+    assert 0 < float(value) < math.inf
+    assert "hazard_profile" in text
+
+
+@pytest.mark.slow
+@in_an_environment_of_its_own
 def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
     code = "import profilefit; law = profilefit.load('liang'); print(law.profile(0.5, 0.9))"
     value = float(run(scripts / "python", "-I", "-c", code, cwd=tmp_path))
@@ -64,10 +79,14 @@ def test_wheel_holds_every_shader_text(wheel):
     assert {path for path in texts if not path.endswith(".pyc")} <= names
 
 
+@pytest.mark.slow
+@in_an_environment_of_its_own
 def test_installed_command_exports_a_law(scripts, tmp_path):
     text = run(scripts / "profilefit", "export", "hazard-diffuse", "--lang", "hlsl", cwd=tmp_path)
     assert "hazard_profile" in text
 
 
+@pytest.mark.slow
+@in_an_environment_of_its_own
 def test_installed_command_shows_its_help(scripts, tmp_path):
     assert "regenerate" in run(scripts / "profilefit", "--help", cwd=tmp_path)

@@ -88,6 +88,7 @@ def test_one_seed_gives_identical_records_and_another_does_not(command, recipe):
         assert same != other
 
 
+@pytest.mark.slow
 def test_more_photons_resume_the_ones_that_are_there(command, recipe):
     """Two batches and then a third make the record of three at once, and the two are not traced again."""
 
@@ -226,6 +227,7 @@ def test_an_output_that_is_a_file_is_named(command, recipe):
     assert Path("out").read_text() == "in the way"
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix" or not Path("/dev/full").exists(), reason="needs /dev/full, a disk that is full")
 def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeypatch):
     assert command(*small(recipe))[0] == 0
