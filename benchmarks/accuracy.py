@@ -20,9 +20,9 @@ import problems
 import scalar_half_space
 from numpy.typing import NDArray
 from scalar_half_space import ROULETTE_CHANCE, WEIGHT_THRESHOLD
-from stopwatch import take_turns
 
 from mcml_sim import Orders, exact, order_bins, single
+from profilefit.tradeoff.stopwatch import take_turns
 
 Floats = NDArray[np.float64]
 

@@ -24,10 +24,10 @@ from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from benchmarks.counting import count, described
 from benchmarks.survival import FORMS, HAZARD, Form
 from benchmarks.table import show
 from mcml_sim import exact
+from profilefit.tradeoff.counting import count, described
 
 Floats = NDArray[np.float64]
 # Weights of the relative error, of that in the tail, and what more than thrice as bright counts for.

@@ -8,10 +8,10 @@ import jax.numpy as jnp
 import numpy as np
 import scalar_half_space
 import scalar_layered
-from stopwatch import Work
 
 from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, matched, rng, simulate, simulate_orders, tracer
 from mcml_sim.order_bins import LAST_ORDERS
+from profilefit.tradeoff.stopwatch import Work
 
 ALPHA = 0.9
 # Rings and depths of the half space, in mean free paths: the last bins of the yardstick hold what is beyond.

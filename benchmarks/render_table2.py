@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.render_laws import Contender
-from benchmarks.stopwatch import Ratio
 from benchmarks.table import show
 from profilefit.shader.stage.coverage import covered, covering
 from profilefit.shader.stage.scene import Scene
 from profilefit.shader.stage.stage import PASSES, Stage
+from profilefit.tradeoff.stopwatch import Ratio
 
 Floats = NDArray[np.float64]
 COVERED = (0.25, 0.50, 0.75)

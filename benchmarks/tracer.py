@@ -16,24 +16,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
-import stopwatch
+os.environ.setdefault("JAX_PLATFORMS", "cpu")  # read when jax is imported
+
+import accuracy
+import gpu
+import numpy as np
+import problems
+from rich.console import Console
+from rich.table import Table
+from worker import ITEMS, Worker, peak_memory
+
+from mcml_sim import Estimate
+from profilefit.tradeoff import stopwatch
+from profilefit.tradeoff.stopwatch import Rates, Ratio
 
 ALL_CORES = stopwatch.cores()
-# Before jax is imported: it counts the cores it may use when it starts. The last core has the fewest interrupts.
+# Before the first array: jax counts then how many cores it may use. The last core has the fewest interrupts.
 PINNED = stopwatch.pin(ALL_CORES[-1])
-os.environ.setdefault("JAX_PLATFORMS", "cpu")
-
-import accuracy  # noqa: E402
-import gpu  # noqa: E402
-import numpy as np  # noqa: E402
-import problems  # noqa: E402
-from rich.console import Console  # noqa: E402
-from rich.table import Table  # noqa: E402
-from stopwatch import Rates, Ratio  # noqa: E402
-from worker import ITEMS, Worker, peak_memory  # noqa: E402
-
-from mcml_sim import Estimate  # noqa: E402
-
 PARTS = ("speed", "efficiency", "cores", "accuracy", "memory", "gpu")
 MILLION, GIBIBYTE = 1e6, 2.0**30
 # The longest run that `accuracy` makes for proof; what takes longer is extrapolated [s].

@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-import stopwatch
+from profilefit.tradeoff.stopwatch import pin
 
 ITEMS = ("orders", "half space", "half space, r-z", "three layers", "three layers, r-z", "yardstick")
 
@@ -93,7 +93,7 @@ def _peak_memory_here() -> float:
 
 
 def _runner(item: str) -> Callable[[int, int, int], object]:
-    # Imported late: first the process is pinned, for jax counts the cores when it starts.
+    # Imported late: first the process is pinned, for jax counts the cores when it makes its first array.
     import problems
 
     tally_rz = item.endswith("r-z")
@@ -107,5 +107,5 @@ def _runner(item: str) -> Callable[[int, int, int], object]:
 
 
 if __name__ == "__main__":
-    stopwatch.pin(*map(int, sys.argv[1].split(",")))
+    pin(*map(int, sys.argv[1].split(",")))
     serve(sys.argv[2])

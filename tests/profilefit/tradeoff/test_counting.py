@@ -7,9 +7,9 @@ import jax.numpy as jnp
 import pytest
 
 import profilefit
-from benchmarks.contenders import made
-from benchmarks.counting import count, described
 from profilefit.laws.burley import BurleySampler
+from profilefit.tradeoff.contenders import made
+from profilefit.tradeoff.counting import count, described
 
 
 def test_counts_what_the_answer_needs_once_for_each_point_or_material():

@@ -2,28 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
+import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-import profilefit
+from mcml_sim.setting import Setting
+from profilefit import catalogue
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.burley import XIE, Burley, BurleyApproximateSampler
+from profilefit.laws.burley import (
+    XIE,
+    Burley,
+    BurleyApproximateSampler,
+    BurleyDiffuseMfp,
+    BurleySampler,
+    NormalizedDiffusion,
+)
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
+from profilefit.laws.rational import Rational
 
 Setup = Callable[[Array], Any]
+Wanted = tuple[str, str, str]
+"""Label, law, constants."""
 YARDSTICK = "normalized diffusion"
 
 
-class FastBurley(Burley):
+class Fast(NormalizedDiffusion):
     """Normalized diffusion as a shader has it: one exponential, its cube, and no guard at x = 0."""
 
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
@@ -32,14 +44,28 @@ class FastBurley(Burley):
         return self.albedo.reflectance(alpha) * rate / (8.0 * jnp.pi) * (e + e * e * e) / x
 
     @property
-    def sampler(self) -> FastBurleySampler:
+    def sampler(self) -> BurleySampler:
         return FastBurleySampler(self)
 
 
-class FastBurleySampler(Sampler):
+class FastBurley(Fast, Burley):
+    """In units of the mean free path."""
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Rational = eqx.field(static=True)
+
+
+class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
+    """In units of the diffuse mean free path."""
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Rational = eqx.field(static=True)
+
+
+class FastBurleySampler(BurleySampler):
     """Golubev's inverse with its cube root as e^{ln(G) / 3}: on XLA's CPU jnp.cbrt takes ten times as long."""
 
-    law: FastBurley
+    law: Fast
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         u = 1.0 - xi
@@ -63,6 +89,7 @@ class Contender:
 
     constants   fitted, of the profile and besides of the sampler alone; those of A(alpha) not counted
     setup       what depends on alpha only, where the law tells it
+    judged      the sampler in the law's own form, guarded where the fast one is not: errors are of this
     another     whether it is another sampler of the law of the contender before
     """
 
@@ -71,6 +98,7 @@ class Contender:
     sampler: Sampler
     constants: tuple[int, int]
     setup: Setup | None
+    judged: Sampler
     another: bool = False
 
     def profile(self, x: Array, alpha: Array) -> Array:
@@ -84,6 +112,12 @@ class Contender:
         x = self.sample(xi, alpha)
         return x, self.profile(x, alpha)
 
+    @property
+    def parts(self) -> dict[str, Callable[[Array, Array], Any]]:
+        """What can be timed, by name: the profile of a law once, whatever its samplers."""
+        drawn: dict[str, Callable[[Array, Array], Any]] = {"sample": self.sample, "both": self.both}
+        return drawn if self.another else {"profile": self.profile, **drawn}
+
 
 class QuantileContender(Contender):
     """A fitted inverse knows its density where it has drawn; from a radius alone a loop must find it."""
@@ -96,33 +130,41 @@ class QuantileContender(Contender):
         return x, self.law.albedo.reflectance(alpha) * left / (2.0 * jnp.pi * x * slope)
 
 
-# Label, law, constants; what is loaded but cannot be had is left out.
-WANTED = (
+# What cannot be had is left out.
+WANTED: tuple[Wanted, ...] = (
     (YARDSTICK, "burley", "published"),
     ("normalized diffusion, refitted", "burley", "regenerated"),
+    ("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
     ("Liang, printed", "liang", "published"),
     ("Liang, corrected", "liang", "corrected"),
     ("Liang, refitted", "liang", "regenerated"),
     ("dipole", "dipole", "published"),
     ("better dipole", "better_dipole", "published"),
     ("beam diffusion", "beam_diffusion", "published"),
-    ("Gaussians", "gaussians", "regenerated"),
+    ("2 Gaussians", "gaussians:2", "regenerated"),
+    ("4 Gaussians", "gaussians:4", "regenerated"),
+    ("6 Gaussians", "gaussians:6", "regenerated"),
     ("quantile", "quantile", "regenerated"),
     ("hazard", "hazard", "regenerated"),
 )
 
 
-def contenders(folder: Path | None = None) -> tuple[list[Contender], list[str]]:
-    """All that load, with the regenerated constants in `folder`; and a line for each that does not."""
+def contenders(folder: Path | None = None, wanted: Sequence[Wanted] | None = None) -> tuple[list[Contender], list[str]]:
+    """All that load, or those `wanted`, with the regenerated constants in `folder`; and a line for each that does not.
+
+    Raises InputError where the yardstick itself is missing.
+    """
     found: list[Contender] = []
     left_out = []
-    for label, name, constants in WANTED:
+    for label, name, constants in wanted or WANTED:
         try:
-            law = profilefit.load(name, constants, folder=folder)
+            law = catalogue.load(name, constants, folder=folder)
         except (InputError, RecordError) as error:
             left_out.append(f"{label}: {error}")
         else:
             found += made(label, law)
+    if not any(one.name == YARDSTICK for one in found):
+        raise InputError(f"laws must have {YARDSTICK} among them, which all times are over, got {left_out or wanted}")
     return found, left_out
 
 
@@ -130,23 +172,34 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
     """A law with each sampler that costs another time."""
     if isinstance(law, Burley):
         fast = FastBurley(law.setting, law.albedo, **law.constants())
-        yield _contender(label, fast, fast.sampler, partial(_burley_setup, fast))
+        yield _contender(label, fast, fast.sampler, partial(_burley_setup, fast), law.sampler)
         if label == YARDSTICK:
             sampler = FastApproximateSampler(fast, XIE)
-            yield _contender(f"{label}, Xie's sampler", fast, sampler, partial(_burley_setup, fast), another=True)
+            setup = partial(_burley_setup, fast)
+            yield _contender(f"{label}, Xie's sampler", fast, sampler, setup, law.samplers["xie"], another=True)
+    elif isinstance(law, BurleyDiffuseMfp):
+        own = FastBurleyDiffuseMfp(law.setting, law.albedo, **law.constants())
+        yield _contender(label, own, own.sampler, partial(_burley_setup, own), law.sampler)
     elif isinstance(law, Hazard):
         yield _contender(label, law, law.sampler, law.shape)
         yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.shape, another=True)
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):
-        yield QuantileContender(label, law, law.sampler, _constants(law), law.curve)
+        yield QuantileContender(label, law, law.sampler, _constants(law), law.curve, law.sampler)
     else:
         yield _contender(label, law, law.sampler, None)
 
 
-def _contender(label: str, law: ProfileLaw, sampler: Sampler, setup: Setup | None, another: bool = False) -> Contender:
-    return Contender(label, law, sampler, _constants(law), setup, another)
+def _contender(
+    label: str,
+    law: ProfileLaw,
+    sampler: Sampler,
+    setup: Setup | None,
+    judged: Sampler | None = None,
+    another: bool = False,
+) -> Contender:
+    return Contender(label, law, sampler, _constants(law), setup, judged or sampler, another)
 
 
 def _constants(law: ProfileLaw) -> tuple[int, int]:
@@ -154,7 +207,7 @@ def _constants(law: ProfileLaw) -> tuple[int, int]:
     return of_profile, len(law.constant_names()) - of_profile
 
 
-def _burley_setup(law: FastBurley, alpha: Array) -> tuple[Array, Array]:
+def _burley_setup(law: Fast, alpha: Array) -> tuple[Array, Array]:
     return law.albedo.reflectance(alpha), law.falloff_rate(alpha)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import jax
 import jax.numpy as jnp
@@ -54,7 +55,8 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: Counts) -> None:
     for equation in jaxpr.eqns:
         name = equation.primitive.name
         if name in COUNTED:
-            _add_one(name, equation.outvars[0].aval.shape, times, counts)
+            result: Any = equation.outvars[0].aval
+            _add_one(name, result.shape, times, counts)
         if name == "while":
             raise ValueError(f"function must have no loop of unknown length, got {equation}")
         inner = times * (equation.params["length"] if name == "scan" else 1)
