@@ -84,16 +84,28 @@ class Stage:
         return self._targets.read(view.pixel, view.is_perspective)
 
     def scatter(
-        self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None
+        self,
+        law: Law | str,
+        mfp: ArrayLike,
+        sampling: Sampling = DEFAULT,
+        fixed_alpha: ArrayLike | None = None,
+        rows: tuple[int, int] | None = None,
     ) -> Singles:
         """(h, w, 3) radiant exitance, A times the blurred irradiance, in its unit; radiance is that over pi. Pass 3.
 
         law  with a shader text, an `ExactLaw`, a `Separable` or "separable"
         mfp  of red, green and blue, or one for all [mm]
         fixed_alpha  single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
+        rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
         """
-        self._scatter(law, mfp, sampling, fixed_alpha)
-        return pixels(self._targets.exitance)[..., :3]
+        first, last = rows or (0, self.size[1])
+        target = self._targets.into[self._targets.exitance]
+        target.scissor = (0, first, self.size[0], last - first)
+        try:
+            self._scatter(law, mfp, sampling, fixed_alpha)
+        finally:
+            target.scissor = (0, 0, *self.size)
+        return pixels(self._targets.exitance)[first:last, :, :3]
 
     def render(
         self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None

@@ -1,0 +1,76 @@
+"""One view of a material: what an error is predicted and measured for."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+PLACES = 16  # on either side of the edge: their root mean square is within 2 % of that of all pixels
+STEEPEST = math.radians(60.0)  # beyond, a pixel shows twice its own side of the surface, and no edge is looked at
+
+
+@dataclass(frozen=True)
+class Within:
+    """Which places count: those within `mfp` mean free paths of the edge, and at least so many `pixels` of it."""
+
+    mfp: float = 4.0
+    pixels: int = 2
+
+    def __post_init__(self) -> None:
+        if not 0 < self.mfp <= 100:
+            raise InputError(f"within.mfp must be a number of mean free paths in (0, 100], got {self.mfp!r}")
+        if not 1 <= self.pixels <= 100:
+            raise InputError(f"within.pixels must be a whole number in 1 ... 100, got {self.pixels!r}")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A step edge of light along a cylinder that is seen from afar, the edge in the middle, between two pixels.
+
+    reflectance  A of the three channels [-];  mfp  of the same [length]
+    pixel        its side;  radius  of the cylinder, infinite for a plane [length]
+    kernel       A that a filter is made for, of which there is one for a whole picture; by default `reflectance`
+    window       half the width and height of what is seen, the edge in the middle [length]
+    """
+
+    reflectance: tuple[float, float, float]
+    mfp: tuple[float, float, float]
+    pixel: float
+    radius: float = math.inf
+    kernel: tuple[float, float, float] | None = None
+    window: tuple[float, float] = (math.inf, math.inf)
+
+    @property
+    def longest(self) -> int:
+        """The channel whose radii all three gather with: of the longest mean free path."""
+        return int(np.argmax(self.mfp))
+
+    @property
+    def filter_reflectance(self) -> tuple[float, float, float]:
+        return self.reflectance if self.kernel is None else self.kernel
+
+    @property
+    def is_flat(self) -> bool:
+        return math.isinf(self.radius)
+
+    def flat(self) -> Case:
+        """The same on a plane."""
+        return replace(self, radius=math.inf)
+
+    def places(self, channel: int, within: Within) -> Floats:
+        """Middles of the pixels on the lit side that count, distances from the edge on the screen (m,), PLACES at most.
+
+        Those on the dark side are as wrong, with the other sign.
+        """
+        reach = max(within.mfp * self.mfp[channel], within.pixels * self.pixel)
+        if not self.is_flat:
+            reach = self.radius * math.sin(min(reach / self.radius, STEEPEST))
+        count = max(int(reach / self.pixel + 1e-9), 1)
+        chosen = np.unique(np.linspace(0.0, count - 1.0, min(count, PLACES)).round())
+        return (chosen + 0.5) * self.pixel

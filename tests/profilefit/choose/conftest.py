@@ -1,0 +1,34 @@
+"""A law that stands for the truth, quick to have, and a scene."""
+
+import pytest
+
+import profilefit
+from mcml_sim import Setting
+from profilefit.choose.case import Case, Within
+from profilefit.choose.scene import Budget, Scene
+from profilefit.choose.truth import Truth
+
+DIFFUSE = Setting("diffuse")
+COLOUR, MFP = (0.6, 0.4, 0.2), (1.0, 0.7, 0.5)
+
+
+@pytest.fixture(scope="session")
+def hazard():
+    return profilefit.load("hazard", setting=DIFFUSE)
+
+
+@pytest.fixture(scope="session")
+def light(hazard):
+    """Where the truth is the hazard law, so that it has no error of its own."""
+    return Truth(DIFFUSE, hazard, hazard.albedo)
+
+
+@pytest.fixture(scope="session")
+def case():
+    return Case(COLOUR, MFP, pixel=0.25)
+
+
+@pytest.fixture(scope="session")
+def scene():
+    reflectance, mfp = (tuple((value, value) for value in values) for values in (COLOUR, MFP))
+    return Scene("mm", DIFFUSE, reflectance, mfp, (0.25, 0.25), 5.0, 0.02, Within(), Budget(ms=5.0))

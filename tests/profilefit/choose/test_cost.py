@@ -1,0 +1,49 @@
+"""Estimated milliseconds: the published frames come back, and what they scale with."""
+
+import json
+
+import pytest
+
+from profilefit.choose import cost
+from profilefit.choose.cost import COVERED, PUBLISHED, Ratios, milliseconds
+from profilefit.choose.options import NOTHING, Option, sampled
+from profilefit.errors import InputError
+
+SEVENTEEN = Option("separable", 17)
+
+
+def test_published_frames_come_back():
+    """Within 3 %, by which the three are no straight line."""
+    for share, ms in zip(COVERED, PUBLISHED, strict=True):
+        assert milliseconds(SEVENTEEN, cost.shipped(), coverage=share) == pytest.approx(ms, rel=0.03)
+
+
+def test_scales_with_pixels_and_speed():
+    ratios = cost.shipped()
+    own = milliseconds(SEVENTEEN, ratios)
+    assert milliseconds(SEVENTEEN, ratios, pixels=3840 * 2160) == pytest.approx(4.0 * own)
+    assert milliseconds(SEVENTEEN, ratios, "rtx-4090") == pytest.approx(own * 1.862 / 82.6)
+
+
+def test_order(hazard):
+    """Nothing, a filter, two filters; more samples cost more."""
+    ratios = cost.shipped()
+    times = [milliseconds(one, ratios) for one in (NOTHING, SEVENTEEN, Option("gaussians", 17, 2))]
+    assert times == sorted(times)
+    of_samples = [milliseconds(one, ratios) for one in sampled(hazard, "hazard-diffuse")]
+    assert of_samples == sorted(of_samples)
+
+
+def test_what_was_measured_is_kept():
+    made = Ratios("a device", 0.5, {"separable": 0.1}, {"separable": 0.01})
+    assert Ratios(**json.loads(cost.as_json(made))) == made
+    assert made.of(NOTHING) == 0.5
+    assert made.of(Option("gaussians", 10, 3)) == pytest.approx(0.5 + 3 * 0.2)
+
+
+def test_misuse(hazard):
+    with pytest.raises(InputError, match=r"gpu must be one of switch, .* got 'voodoo'"):
+        milliseconds(SEVENTEEN, cost.shipped(), "voodoo")
+    made = Ratios("a device", 0.5, {"separable": 0.1}, {"separable": 0.01})
+    with pytest.raises(InputError, match=r"option must be one whose cost was measured \(separable\), got 'hazard'"):
+        made.of(Option("sampled", 16, law=hazard))

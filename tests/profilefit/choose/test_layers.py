@@ -1,0 +1,56 @@
+"""One layer for a stack: the same medium in two pieces is one, glass over milk is not."""
+
+import math
+
+import numpy as np
+import pytest
+
+from mcml_sim import Layer, Medium
+from profilefit.choose.case import Within
+from profilefit.choose.layers import OneLayer, Rings, one_layer
+from profilefit.errors import InputError
+
+WITHIN = Within()
+
+
+def test_rings_beyond_an_edge():
+    """One ring: the share of its circle beyond the edge."""
+    ring = Rings(np.array([2.0]), np.array([1.0]), np.array([0.0]))
+    np.testing.assert_allclose(ring.beyond(np.array([0.0, 1.0, 3.0])), [0.5, 1.0 / 3.0, 0.0])
+
+
+@pytest.mark.parametrize(("error", "verdict"), [(0.01, "enough"), (0.03, "not enough"), (0.0195, "undecided")])
+def test_verdict(error, verdict):
+    assert OneLayer(0.5, 0.9, 1.0, 1.0, error, 0.001, 1000).verdict(0.02) == verdict
+
+
+@pytest.mark.slow
+def test_two_halves_are_one_layer():
+    """Within three standard errors of nothing, with its own mean free path and albedo."""
+    stack = Medium((Layer(1.0, 0.1, 0.9, 0.0, 0.5), Layer(1.0, 0.1, 0.9, 0.0)))
+    found = one_layer(stack, 0.02, WITHIN)
+    assert found.error < 3.0 * found.standard_error
+    assert found.alpha == pytest.approx(0.9, abs=1e-3)
+    assert found.mfp == pytest.approx(1.0, abs=0.01)
+    assert found.verdict(0.02) == "enough"
+
+
+@pytest.mark.slow
+def test_a_thin_veil_is_not():
+    """Negative control: thin paper far above an ink that is clear and deep."""
+    stack = Medium((Layer(1.0, 0.001, 5.0, 0.0, 0.4), Layer(1.0, 0.0, 0.0, 0.0, 3.0), Layer(1.0, 0.02, 3.0, 0.0)))
+    found = one_layer(stack, 0.02, WITHIN)
+    assert found.error > 10.0 * found.standard_error
+    assert found.verdict(0.02) == "not enough"
+
+
+@pytest.mark.slow
+def test_black_has_no_single_layer():
+    stack = Medium((Layer(1.0, 1.0, 0.0, 0.0, math.inf),))
+    with pytest.raises(InputError, match=r"layers must reflect a share in \(0, .*\) of the light, got 0.000"):
+        one_layer(stack, 0.02, WITHIN, 10_000)
+
+
+def test_glass_is_no_layer():
+    with pytest.raises(InputError, match="layers must scatter or absorb somewhere, got 1 that are clear"):
+        one_layer(Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0),)), 0.02, WITHIN)

@@ -1,0 +1,115 @@
+"""SCENE.toml: what is read, and one line for every mistake."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from mcml_sim import Setting, exact
+from profilefit.choose.scene import read
+from profilefit.errors import InputError
+
+SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
+SMALL = """\
+[view]
+pixel = 0.5
+[material]
+[material.red]
+reflectance = 0.6
+mfp = [1, 2]
+[material.green]
+reflectance = 0.4
+mfp = 0.7
+[material.blue]
+reflectance = 0.2
+mfp = 0.5
+[tolerance]
+error = 0.01
+"""
+
+
+@pytest.fixture
+def written(tmp_path):
+    """The small scene with a line replaced."""
+
+    def write(old="", new=""):
+        assert old in SMALL
+        path = tmp_path / "scene.toml"
+        path.write_text(SMALL.replace(old, new, 1) if old else SMALL + new, encoding="utf-8")
+        return path
+
+    return write
+
+
+def test_example():
+    scene = read(SKIN)
+    assert scene.reflectance[0] == (0.55, 0.75)
+    assert scene.radius == 5.0
+    assert scene.budget.ms == 5.0
+    assert [layer.g for layer in scene.layers.layers] == [0.8, 0.9]
+
+
+def test_defaults(written):
+    scene = read(written())
+    assert scene.mfp == ((1.0, 2.0), (0.7, 0.7), (0.5, 0.5))
+    assert scene.setting == Setting("diffuse")
+    assert math.isinf(scene.radius)
+    assert scene.budget.ms is None
+    assert (scene.unit, scene.resolution, scene.layers) == ("mm", (1920, 1080), None)
+
+
+def test_world_scale_and_materials(tmp_path):
+    path = tmp_path / "milk.toml"
+    path.write_text(
+        '[view]\npixel = [0.001, 0.002]\nradius = 0.1\nworld = 1000\n[material]\nname = "skimmilk"\n'
+        "[tolerance]\nerror = 0.01\n",
+        encoding="utf-8",
+    )
+    scene = read(path)
+    assert scene.pixel == (1.0, 2.0)
+    assert scene.radius == 100.0
+    alpha = 0.70 / 0.7014
+    assert scene.mfp[0][0] == pytest.approx(1.0 / 0.7014)
+    assert scene.reflectance[0][0] == pytest.approx(exact.reflectance(alpha, Setting("diffuse")))
+
+
+WRONG = [
+    ("pixel = 0.5", "pixel = 0", r"\[view\] pixel must be a number > 0 or two of them, the smaller first, got 0"),
+    ("pixel = 0.5", "pixel = [2, 1]", r"\[view\] pixel must be .* got \[2, 1\]"),
+    ("pixel = 0.5", "pixels = 1", r"\[view\] keys must be of pixel, .* got 'pixels'"),
+    ("pixel = 0.5", "pixel = 1\nradius = 1", r"\[view\] radius must be at least 2 times the longest .*, 4, got 1"),
+    ("pixel = 0.5", "pixel = 1\nradius = true", r"\[view\] radius must be a number > 0, got True"),
+    ("pixel = 0.5", "pixel = 1\nresolution = [1]", r"\[view\] resolution must be two whole numbers .* got \[1\]"),
+    ("pixel = 0.5", "pixel = 1\ncoverage = 2", r"\[view\] coverage must be a number > 0 and <= 1, got 2"),
+    ("reflectance = 0.4", "reflectance = 1.4", r"\[material.green\] reflectance must be .*, <= 1, got 1.4"),
+    ("reflectance = 0.4", "", r"\[material.green\] reflectance must be .* got nothing"),
+    ("mfp = 0.5", 'mfp = "0.5"', r"\[material.blue\] mfp must be .* got '0.5'"),
+    ("mfp = 0.5", "mfp = 0.5\ncolour = 1", r"\[material.blue\] keys must be of reflectance, mfp, got 'colour'"),
+    ("[material]", "[material]\nlight = 'sun'", r"\[material\] light must be one of searchlight, diffuse, got 'sun'"),
+    ("[material]", "[material]\nindex = 1.7", r"\[material\] index must be one of 1, 1.3, 1.4, 1.5 .* got 1.7"),
+    ("[material]", "[material]\nname = 'skin1'", r"\[material\] name must be left out where red, green, blue are"),
+    ("[tolerance]\nerror = 0.01", "", r"table \[tolerance\] is missing"),
+    ("error = 0.01", "error = 0.01\nmfp = -1", r"\[tolerance\] within.mfp must be .* got -1"),
+    ("", "[budget]\ngpu = 'voodoo'", r"\[budget\] gpu must be one of switch, .* got 'voodoo'"),
+    ("", "[extra]", "keys must be of unit, view, .* got 'extra'"),
+    ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a number, got nothing"),
+    ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0, got -1"),
+    ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
+    ("[view]", "[view", "scene must be a TOML file, got:"),
+]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"), WRONG, ids=[new.splitlines()[-1] if new else old for old, new, _ in WRONG]
+)
+def test_mistakes_are_one_line(written, old, new, message):
+    path = written(old, new)
+    with pytest.raises(InputError, match=message) as caught:
+        read(path)
+    assert str(caught.value).startswith(str(path))
+    assert "\n" not in str(caught.value)
+
+
+def test_missing_file(tmp_path):
+    with pytest.raises(InputError, match=r"absent.toml: scene must be a TOML file, got: No such file"):
+        read(tmp_path / "absent.toml")

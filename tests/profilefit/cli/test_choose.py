@@ -1,0 +1,50 @@
+"""profilefit choose: the whole way from a file to a table, and one line for a mistake."""
+
+import json
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from profilefit.cli import app
+from profilefit.errors import InputError
+
+SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
+
+
+def run(*arguments):
+    return CliRunner().invoke(app, ["choose", *map(str, arguments)])
+
+
+def test_a_mistake_is_one_line(tmp_path):
+    path = tmp_path / "scene.toml"
+    path.write_text("[view]\npixel = -1\n", encoding="utf-8")
+    found = run(path)
+    assert isinstance(found.exception, InputError)
+    assert str(found.exception) == f"{path}: table [material] is missing"
+
+
+@pytest.mark.slow
+def test_the_example():
+    """Skin: chosen within tolerance and budget, one layer enough; the same as data."""
+    table = run(SKIN)
+    assert table.exit_code == 0
+    assert table.stdout.startswith("The least that serves: ")
+    assert "one layer is enough" in table.stdout
+    made = json.loads(run(SKIN, "--json").stdout)
+    assert made["nearest"]["error"] <= 0.02
+    assert made["nearest"]["ms"] <= 5.0
+    assert made["cheaper"]["error"] > 0.02 or made["cheaper"]["ms"] > 5.0
+    assert made["one_layer"]["verdict"] == "enough"
+
+
+@pytest.mark.slow
+def test_nothing_serves(tmp_path):
+    """Exit status 1, and the nearest; refracting skin, whose truth is a law."""
+    text = SKIN.read_text(encoding="utf-8").partition("# Skin as two layers")[0]
+    path = tmp_path / "scene.toml"
+    path.write_text(text.replace("error = 0.02", "error = 0.002").replace("index = 1.0", "index = 1.4"), "utf-8")
+    found = run(path)
+    assert found.exit_code == 1
+    assert found.stdout.startswith("Nothing serves for 0.20 % within 5 ms: the most accurate in the budget is ")
+    assert "law: with what that for n = 1.4 may be off from photons" in found.stdout
