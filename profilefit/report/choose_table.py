@@ -27,6 +27,7 @@ CAUSES = {
 }
 LAYERS = {
     "enough": "one layer is enough",
+    "enough alone": "one layer is enough by itself, but not with this choice: a more accurate way leaves it room",
     "not enough": "one layer is not enough: fit the stack's own profile (profilefit fit STACK.mco)",
     "undecided": "undecided: as far from the tolerance as the photons' noise",
 }
@@ -35,7 +36,7 @@ LAYERS = {
 def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> RenderableType:
     """All that is said of a choice."""
     shown = {
-        "next cheaper": choice.cheaper,
+        "best cheaper": choice.cheaper,
         "chosen" if choice.chosen else "nearest": choice.nearest,
         "next dearer": choice.dearer,
     }
@@ -92,7 +93,7 @@ def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> di
         "export": export_hint(choice),
     }
     if layer is not None:
-        made["one_layer"] = {**vars(layer), "verdict": layer.verdict(scene.tolerance)}
+        made["one_layer"] = {**vars(layer), "verdict": _verdict(layer, choice)}
     return made
 
 
@@ -152,7 +153,7 @@ def _reason(error: Error, unit: str) -> str:
 def _caption(choice: Choice, ratios: Ratios) -> str:
     scene = choice.scene
     budget, setting = scene.budget, scene.setting
-    reasons = {"worst": choice.nearest, "the next cheaper": choice.cheaper}
+    reasons = {"worst": choice.nearest, "the best cheaper": choice.cheaper}
     lines = [
         *(f"{name}: {_reason(one.error, scene.unit)}." for name, one in reasons.items() if one is not None),
         f"error: root mean square of radiance within {scene.within.mfp:g} mean free paths (at least "
@@ -167,8 +168,15 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
     return "\n".join([*lines, export_hint(choice)])
 
 
+def _verdict(layer: OneLayer, choice: Choice) -> str:
+    """Whether it is within the tolerance, by itself and in what the choice leaves of it, in squares."""
+    alone = layer.verdict(choice.scene.tolerance)
+    left = max(choice.scene.tolerance**2 - choice.nearest.error.total**2, 0.0) if choice.meets_tolerance else 0.0
+    return "enough alone" if alone == "enough" and layer.verdict(math.sqrt(left)) != "enough" else alone
+
+
 def _layer(layer: OneLayer, choice: Choice) -> str:
-    verdict = layer.verdict(choice.scene.tolerance)
+    verdict = _verdict(layer, choice)
     unit = choice.scene.unit
     together = math.hypot(layer.error, choice.nearest.error.total)
     told = (

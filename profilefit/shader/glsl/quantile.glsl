@@ -56,7 +56,9 @@ LAW_Local LAW_local(float t, LAW_Shape s) {
 // t at x, by Newton's method in ln t over ln x, a curve whose slope stays between 0.7 and 3
 float LAW_depth(float radius, LAW_Shape s) {
     float x = clamp(radius, PF_NEAREST, PF_FARTHEST);
-    float t = x * (s.kappa + s.spread);
+    // Next to white M is c t^2, and x goes as t^3: from x lambda_0 alone the steps would not settle there.
+    float rising = x * s.spread;
+    float t = s.kappa * x + min(rising, exp(log(rising / max(s.c, 1.0e-12)) * (1.0 / 3.0)));
     for (int i = 0; i < QUANTILE_STEPS; ++i) {
         LAW_Local here = LAW_local(t, s);
         t = t * exp(log(x / here.radius) * here.radius / (t * here.slope));

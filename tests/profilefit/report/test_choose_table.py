@@ -48,16 +48,25 @@ def test_says_it_in_one_line_and_why(choice):
     text = printed(choose_table(choice, shipped(), LAYER))
     assert text.splitlines()[0] == "The least that serves: separable, 17 taps (asked: 2.0 % within 4 ms)"
     rows = {line[:12]: line for line in text.splitlines()}
-    assert "nothing (Lambert)" in rows["next cheaper"]
-    assert "no: error" in rows["next cheaper"]
+    assert "nothing (Lambert)" in rows["best cheaper"]
+    assert "no: error" in rows["best cheaper"]
     assert "1.2" in rows["chosen      "]
     assert "yes" in rows["chosen      "]
     assert "no: ms" in rows["next dearer "]
     assert "worst: green, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
-    assert "the next cheaper: red, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
+    assert "the best cheaper: red, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
     assert "one layer is enough" in text
     assert "law: with what that for n = 1.4 may be off from photons" in text  # where the truth is a law, and quick
     assert "an estimate of a frame on a gtx-1050" in text
+
+
+def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
+    """0.012 of 0.02 leaves 0.016, in squares."""
+    verdicts = {}
+    for error in (0.014, 0.017, 0.03):
+        layer = OneLayer(**{**vars(LAYER), "error": error, "standard_error": 0.0005})
+        verdicts[error] = content(choice, shipped(), layer)["one_layer"]["verdict"]
+    assert verdicts == {0.014: "enough", 0.017: "enough alone", 0.03: "not enough"}
 
 
 def test_says_when_nothing_serves(choice):

@@ -13,6 +13,7 @@ from profilefit.laws.gaussians import law_class
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.laws.quantile import Quantile
 from profilefit.shader import emit
 
 FITS = catalogue.fits_folder()
@@ -96,6 +97,14 @@ def test_two_steps_of_hazard_draw_its_density():
         own = np.asarray(jax.jit(law.samplers["two steps"].pdf)(jnp.asarray(X[:, ::4]), jnp.asarray(ALPHA)))
     made = twin(text_of(law))["law_pdf"](X[:, ::4], ALPHA, 1.0)
     assert np.max(np.abs(made / own - 1.0)[own > 1e-9]) < 1e-5
+
+
+@pytest.mark.parametrize("label", [label for label, law in LAWS.items() if isinstance(law, Quantile)])
+def test_quantile_finds_its_way_back_next_to_white_and_far_away(label):
+    names = twin(text_of(LAWS[label]))
+    shape = names["law_shape"](np.array([[0.0], [0.9999], [1.0 - 1e-7], [1.0]]))
+    x = np.geomspace(1e-6, 1e7, 100) + np.zeros((4, 1))
+    np.testing.assert_allclose(names["law_local"](names["law_depth"](x, shape), shape).radius, x, rtol=1e-13)
 
 
 def test_a_constant_that_is_off_in_the_eighth_digit_is_found():
