@@ -45,9 +45,9 @@ def test_an_exact_inverse_has_its_laws_bias_only():
 def test_noise_is_over_that_of_the_exact_quantile(uniform):
     law = uniform.law
     best = by_quantile(ALPHA)
-    assert samplers._ratio(best, best, ALPHA, law, 0, 20) == 1.0
-    ratios = samplers._variances(by_law, uniform, SMALL)
-    assert ratios.shape == (1, samplers.BLOCKS)
+    assert samplers._ratios(best, best, ALPHA, law, 0, 20) == (1.0, 1.0)
+    ratios = samplers._noise(by_law, uniform, SMALL)
+    assert ratios.shape == (2, 1, samplers.BLOCKS)
     assert ratios.min() > 1.3
     assert np.ptp(ratios) > 0.0
 
@@ -58,6 +58,6 @@ def test_wrong_densities_come_twice(uniform):
     (found,) = samplers._ways(exactly, SMALL)
     assert found.name == YARDSTICK
     noise, bias = samplers._points(found, samplers.Measured.exactly(2.0))
-    assert (noise.panel, bias.panel) == ("variance", "bias")
+    assert (noise.panel, bias.panel) == ("noise", "bias")
     assert noise.error.low < noise.error.value < noise.error.high
     assert bias.error.value == pytest.approx(abs(found.bias[0, 0]))
