@@ -43,11 +43,10 @@ Numbers = ArrayLike | jax.Array
 SEARCHLIGHT = Setting()
 FINER = STANDARD.scaled(1.5)
 
-TINIEST, LARGEST = 5e-324, np.finfo(float).max
 # What an argument of this name is, and its least and greatest value.
 ARGUMENTS = {
     "alpha": ("a single-scattering albedo in [0, 1]", 0.0, 1.0),
-    "mfp": ("a mean free path > 0", TINIEST, LARGEST),
+    "mfp": ("a mean free path > 0, from 1e-100 to 1e+100", 1e-100, 1e100),  # its square is a float64
     "r": ("a radius >= 0", 0.0, np.inf),
     "xi": ("a share of the energy in [0, 1]", 0.0, 1.0),
 }

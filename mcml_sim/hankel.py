@@ -19,6 +19,7 @@ from mcml_sim.bessel import bessel_k
 from mcml_sim.half_space_transform import FARTHEST_RADIUS, NEAREST_RADIUS, Transform
 
 MAX_STEPS = 60  # of Newton's method, which takes twelve at most where xi < 1 - 1e-8
+NO_LIGHT = 1e100  # mfp: nothing is left there but in white light, and products are finite
 SETTLED = 4e-15  # of the logarithm of a share: its rounding
 
 
@@ -102,4 +103,4 @@ def _concentrated(x: jax.Array) -> jax.Array:
 
 def _solved(transform: Transform, x: jax.Array) -> jax.Array:
     """The nearest radius that the contour reaches; white light ends in R_d ~ x^-3."""
-    return jnp.clip(x, NEAREST_RADIUS, jnp.where(transform.pole > 0.0, FARTHEST_RADIUS, jnp.inf))
+    return jnp.clip(x, NEAREST_RADIUS, jnp.where(transform.pole > 0.0, FARTHEST_RADIUS, NO_LIGHT))

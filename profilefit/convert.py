@@ -42,6 +42,7 @@ from profilefit.laws import published
 Floats = NDArray[np.float64]
 # Below this A the root is sought in alpha, above it in sqrt(1 - alpha): each is where A has a finite slope.
 MIDDLE = 0.5
+LEAST_ROOT = 1e-16  # of sqrt(1 - alpha): below 1e-8 alpha is 1 to the last bit, and A has steps
 TIGHTEST = 4 * np.finfo(float).eps
 LARGEST = np.finfo(float).max
 
@@ -80,6 +81,7 @@ def _alpha(reflectance: float, setting: Setting) -> float:
     options = {"xtol": 1e-300, "rtol": TIGHTEST}
     if reflectance < MIDDLE:
         return float(brentq(lambda alpha: exact.reflectance(alpha, setting) - reflectance, 0.0, 1.0, **options))
+    options["xtol"] = LEAST_ROOT
     s = brentq(lambda s: exact.reflectance(1.0 - s * s, setting) - reflectance, 0.0, 1.0, **options)
     return 1.0 - float(s) ** 2
 

@@ -13,10 +13,11 @@ import numpy as np
 
 from mcml_sim.errors import InputError
 
-# What an argument of this name may be, wherever it occurs.
-SHARE, ANY_LENGTH, POSITIVE = (0.0, 1.0), (0.0, np.inf), (np.finfo(float).tiny, np.finfo(float).max)
+# What an argument of this name may be, wherever it occurs. A mean free path beyond these, in whatever unit, has no
+# square in float64; jax arrays of single precision want it within 1e-12 and 1e12, and nobody can tell them so.
+SHARE, ANY_LENGTH, POSITIVE = (0.0, 1.0), (0.0, np.inf), (1e-100, 1e100)
 RANGES = {"alpha": SHARE, "reflectance": SHARE, "xi": SHARE, "r": ANY_LENGTH, "mfp": POSITIVE}
-ACCEPTED = {SHARE: "in [0, 1]", ANY_LENGTH: ">= 0", POSITIVE: "> 0 and finite"}
+ACCEPTED = {SHARE: "in [0, 1]", ANY_LENGTH: ">= 0", POSITIVE: "> 0, from 1e-100 to 1e+100"}
 
 
 def evaluated(method: Callable) -> Callable:

@@ -40,6 +40,7 @@ STARTS = {
     ),
 }
 EXTRA_STEPS = 12
+FARTHEST = 1e8  # x [mfp]: no light is left, and its square is finite in float32
 
 
 class Gaussians(ProfileLaw):
@@ -140,7 +141,7 @@ class GaussiansSampler(Sampler):
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         variance = self.law.variances(alpha)
-        r = jnp.asarray(x)[..., None]
+        r = jnp.minimum(jnp.asarray(x), FARTHEST)[..., None]
         return jnp.sum(jnp.exp(self.law.log_weights(alpha) - 0.5 * r**2 / variance) * r / variance, axis=-1)
 
 

@@ -11,11 +11,12 @@ from mcml_sim.setting import Setting
 from profilefit.laws.base import Sampler
 from profilefit.laws.decay import decay_rate
 from profilefit.laws.escape import EscapeLaw
-from profilefit.laws.hazard_curve import Shape, cumulative, density, radius, radius_at
+from profilefit.laws.hazard_curve import FARTHEST, Shape, cumulative, density, growth, radius, radius_at
 from profilefit.laws.rational import Rational
 
-# Closer to the source [mfp] than this the density is that at the source, to 1e-8.
-NEAR_SOURCE = 1e-9
+# Closer to the source than this many roots of a rounding [mfp] the map's density is the law's, to second order in x,
+# where a slope of a slope would be rounding only; and where no light is left but a white medium's.
+NEAR_SOURCE, NO_LIGHT = 10.0, 0.1 * FARTHEST
 # 1 + a x + b x^2 must have no zero, which a parabola through small b would give it somewhere [1/mfp^2].
 LEAST_B = 1e-4
 
@@ -69,7 +70,7 @@ class Hazard(EscapeLaw):
         return density(x, self.shape(alpha))
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        share = -jnp.expm1(-cumulative(x, self.shape(alpha)))
+        share = jnp.maximum(-jnp.expm1(-cumulative(x, self.shape(alpha))), 0.0)  # rounding may take a tiny one below
         return jnp.where(x > 0, jnp.where(x < jnp.inf, share, 1.0), 0.0)
 
     @property
@@ -104,14 +105,17 @@ class HazardSampler(Sampler):
         shape = self.law.shape(alpha)
 
         def mapped(t):
-            return radius_at(t, jnp.expm1(t), shape, self.steps)
+            return radius_at(t, growth(t), shape, self.steps)
 
         def slope(t):
             return jax.jvp(mapped, (t,), (jnp.ones_like(t),))
 
-        x = jnp.maximum(x, NEAR_SOURCE)
+        nearest = NEAR_SOURCE * float(jnp.finfo(jnp.result_type(x, float)).eps) ** 0.5
+        law = density(x, shape)
+        inner = (x > nearest) & (x < NO_LIGHT)
+        x = jnp.clip(x, nearest, NO_LIGHT)
         t = cumulative(x, shape)
         for _ in range(2):
             there, rate = slope(t)
             t = jnp.maximum(t + (x - there) / rate, 0.0)
-        return jnp.exp(-t) / slope(t)[1]
+        return jnp.where(inner, jnp.exp(-t) / slope(t)[1], law)

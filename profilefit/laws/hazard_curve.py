@@ -5,6 +5,7 @@ Written for float32 and a GPU: logarithms of numbers that are not near 1, one re
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import jax.numpy as jnp
@@ -59,16 +60,24 @@ def cumulative(x: Array, shape: Shape) -> Array:
 def radius(xi: Array, shape: Shape, steps: int) -> Array:
     """x at which the share xi of the energy has left, by `steps` steps from a guess; 0 at xi = 0, infinite at 1."""
     left = jnp.maximum(1.0 - xi, jnp.finfo(jnp.result_type(xi, float)).tiny)
-    x = radius_at(-jnp.log(left), xi / left, shape, steps)
+    t = -jnp.log(left)
+    x = radius_at(t, xi / left / jnp.maximum(t, NEAREST), shape, steps)
     return jnp.where(xi < 1.0, x, jnp.inf)
 
 
-def radius_at(t: Array, odds: Array, shape: Shape, steps: int) -> Array:
-    """x at t = -ln(1 - xi), odds = xi / (1 - xi) = e^t - 1."""
+def growth(t: Array) -> Array:
+    """(e^t - 1) / t, smooth at 0; where its square would leave the format it grows no more: 1/kappa is all then."""
+    near, far = jnp.minimum(t, 0.1), jnp.clip(t, 0.1, 0.45 * math.log(jnp.finfo(t.dtype).max))
+    series = 1.0 + near / 2 * (1.0 + near / 3 * (1.0 + near / 4 * (1.0 + near / 5 * (1.0 + near / 6))))
+    return jnp.where(t < 0.1, series, jnp.expm1(far) / far)
+
+
+def radius_at(t: Array, growth: Array, shape: Shape, steps: int) -> Array:
+    """x at t = -ln(1 - xi), growth = xi / ((1 - xi) t) = (e^t - 1) / t."""
     p, q = GUESS
     rise = shape.source - shape.kappa
     white = q * (rise / shape.source) ** 2
-    stretch = (1.0 - white) + p * t + white * odds / jnp.maximum(t, NEAREST)
+    stretch = (1.0 - white) + p * t + white * growth
     x = t * stretch / (shape.kappa * stretch + rise)
     for _ in range(steps):
         x = _closer(x, t, shape)

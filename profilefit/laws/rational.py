@@ -37,7 +37,8 @@ class Rational(AlbedoLaw):
     def reflectance(self, alpha) -> Array:
         """Total reflectance A [-] at single-scattering albedo alpha [-]."""
         s = jnp.sqrt(1.0 - alpha)
-        return self.entered * (1.0 - s) * (1.0 + self.b * s) / (1.0 + s * (self.c + self.d * s))
+        # 1 - s as alpha / (1 + s): where alpha is small, the difference has no digits.
+        return self.entered * alpha * (1.0 + self.b * s) / ((1.0 + s) * (1.0 + s * (self.c + self.d * s)))
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:

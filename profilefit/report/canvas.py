@@ -47,6 +47,7 @@ RC: Any = MappingProxyType(  # read only
     }
 )
 BAND = "95 % of posterior draws, the misfit taken for noise"
+TRUTH_BAND = "95 % of photon noise and model discrepancy together"
 # How each set of constants looks in every figure.
 PUBLISHED: Mapping[str, Any] = MappingProxyType({"color": VERMILION, "linestyle": (0, (5, 2))})
 CORRECTED: Mapping[str, Any] = MappingProxyType({"color": ORANGE, "linestyle": (0, (4, 1.5, 1, 1.5))})
@@ -88,11 +89,11 @@ def legend_below(figure: Figure, axes: list[Axes]) -> None:
         legend.remove()
 
 
-def band_under(ax: Axes, x: Any, band: tuple[Any, Any] | None, color: str) -> None:
-    """Shade a posterior band in its law's colour; the legend explains it once, in grey. Nothing if there is none."""
+def band_under(ax: Axes, x: Any, band: tuple[Any, Any] | None, color: str, label: str = BAND) -> None:
+    """Shade a band in its law's colour; the legend explains it once, in grey. Nothing if there is none."""
     if band is not None:
         ax.fill_between(x, *band, color=color, alpha=0.25, linewidth=0)
-        ax.fill_between([], [], [], color=GREY, alpha=0.4, linewidth=0, label=BAND)
+        ax.fill_between([], [], [], color=GREY, alpha=0.4, linewidth=0, label=label)
 
 
 def plain_log(axis: Axis) -> None:

@@ -13,6 +13,7 @@ photons                 truths and fits: photons traced for one answer
 first_call              truths: time of the first call, which compiles [s]
 stated                  truths: the relative error that the method itself states, root mean square [-]
 samples                 samplers: points of one estimate
+variance                samplers: its variance over that of the exact quantile's, without the bias
 standardised            fits: distance of the constants from their noise-free limit, in standard errors, median [-]
 light_seconds           fits: time of the order-resolved run, median [s]
 seeds, converged        fits: runs, and fits of them that converged

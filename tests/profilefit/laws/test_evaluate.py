@@ -69,7 +69,7 @@ def test_a_method_keeps_its_name_and_words():
         ({"r": 0.5, "alpha": 1.5}, r"alpha must be in \[0, 1\], got 1.5"),
         ({"r": 0.5, "alpha": np.nan}, r"alpha must be in \[0, 1\], got nan"),
         ({"r": [0.5, -1.0], "alpha": 0.5}, "r must be >= 0, got -1"),
-        ({"r": 0.5, "alpha": 0.5, "mfp": 0.0}, "mfp must be > 0 and finite, got 0"),
+        ({"r": 0.5, "alpha": 0.5, "mfp": 0.0}, r"mfp must be > 0, from 1e-100 to 1e\+100, got 0"),
         ({"r": "far", "alpha": 0.5}, "r must be a number or an array of numbers, got 'far'"),
     ],
 )

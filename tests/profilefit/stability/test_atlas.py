@@ -1,0 +1,46 @@
+"""The whole atlas: nothing red in our own laws inside their range, and nothing red without a cause."""
+
+import pytest
+
+from profilefit import catalogue
+from profilefit.errors import InputError
+from profilefit.stability import atlas
+
+FITS = catalogue.fits_folder()
+
+
+def test_jobs_by_name():
+    assert [name for name, _ in atlas.jobs(["liang"], FITS, False)] == [
+        *("liang, published", "liang, corrected", "liang-whole", "liang-as-published", "liang-inverse-as-published"),
+        *("map liang, published", "albedo-liang"),
+    ]
+    assert [name for name, _ in atlas.jobs(["exact", "hazard-n1.4"], FITS, False)] == ["hazard-n1.4", "exact"]
+    everything = [name for name, _ in atlas.jobs([], FITS, False)]
+    assert set(atlas.QUICK) | set(atlas.FUNCTIONS) | set(atlas.DERIVED) | {"albedo-liang"} <= set(everything)
+    assert len(everything) == len(set(everything))
+    with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
+        atlas.jobs(["hazzard"], FITS, False)
+
+
+def _law(region):
+    """The name of the law that a region is of."""
+    return region.subject.split("-")[0].split(",")[0]
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1800)
+def test_ours_hold_and_every_failure_has_a_cause():
+    parts = list(atlas.run(atlas.jobs([], FITS, False)))
+    regions = [one for part in parts for one in part.regions]
+    assert [(one.subject, one.quantity, one.arithmetic, one.place) for one in regions if one.is_failure] == []
+    assert [(one.subject, one.quantity, one.arithmetic, one.place) for one in regions if one.is_unexplained] == []
+    assert [one for part in parts for one in part.fits if one.is_failure] == []
+    assert [(one.subject, one.cause.key) for one in regions if one.own and _law(one) in one.cause.remedy] == []
+    assert {
+        "r_max is 0/0",
+        "misprint of b0",
+        "fold of (8)",
+        "g < 0 for xi < eps",
+        "form of (19)",
+        "no exponential tail",
+    } <= {one.cause.key for one in regions}

@@ -1,0 +1,37 @@
+"""Derivatives are those of differences, and what has none says so."""
+
+from profilefit import catalogue, inventory
+from profilefit.shader.check import validity
+from profilefit.stability import gradients
+from profilefit.stability.classes import Verdict
+from profilefit.stability.regions import regions_of
+
+FITS = catalogue.fits_folder()
+
+
+def of_map(label):
+    one = next(one for one in inventory.albedo_laws(FITS) if one.label == label)
+    return list(gradients.of_map(one, validity.of_map(one, FITS)))
+
+
+def test_the_rational_map_is_differentiable_both_ways():
+    cells = of_map("albedo-rational")
+    assert {one.quantity for one in cells} == {"∂α(A)/∂A", "∂α(A)/∂constants", "∂A(α)/∂α", "∂A(α)/∂constants"}
+    assert not any(one.failures.any() for one in cells)
+
+
+def test_the_printed_map_has_no_slope_above_its_fold():
+    regions = [region for cells in of_map("liang, published") for region in regions_of(cells)]
+    assert {one.cause.key for one in regions if one.verdict.is_red} <= {
+        "no A above the fold",
+        "no derivative at an end",
+    }
+    assert any(one.verdict == Verdict.NOT_FINITE and one.cause.key == "no A above the fold" for one in regions)
+
+
+def test_a_wrong_derivative_is_found(monkeypatch):
+    """Negative control: differences of half the step are half as large. A map that nothing has compiled yet."""
+    monkeypatch.setattr(gradients, "WEIGHTS", tuple((0.5 * k, weight) for k, weight in gradients.WEIGHTS))
+    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "van_de_hulst, published")
+    cells = list(gradients.of_map(one, validity.of_map(one, FITS)))
+    assert any(Verdict.INACCURATE in each.verdicts for each in cells)

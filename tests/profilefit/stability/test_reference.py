@@ -1,0 +1,89 @@
+"""What counts as right agrees with the law in float64 where that is sure, and shows what narrower formats do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from profilefit import catalogue
+from profilefit.inventory import find, profile_laws
+from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.quality import profile_quality
+from profilefit.shader.check.bounds import ALBEDOS
+from profilefit.stability.arithmetic import EXTENDED, Text
+from profilefit.stability.classes import Verdict
+from profilefit.stability.laws import MEASURED, _computed, limits_of
+from profilefit.stability.layout import CDF, FLOAT64, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, Grid
+from profilefit.stability.reference import Right
+
+FITS = catalogue.fits_folder()
+
+
+def small(dtype, x=(0.01, 1.0, 10.0), alpha=(0.3, 0.9), xi=(0.1, 0.5, 0.9)):
+    grid = Grid.of(dtype)
+
+    def cut(axis, values):
+        return replace(axis, values=np.asarray(values, dtype).astype(float))
+
+    return Grid(dtype, cut(grid.alpha, alpha), cut(grid.x, x), cut(grid.xi, xi), cut(grid.mfp, (1.0, 2.0)))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["hazard", "quantile"])
+def test_right_is_the_law(name):
+    """Of radii the two steps of hazard's text are right to 2e-8 in xi."""
+    law, at = catalogue.load(name), small(np.float64)
+    right, (r, xi, alpha, mfp) = Right(law, at), at.arguments
+    np.testing.assert_allclose(right.of(PROFILE), law.profile(r, alpha, mfp), rtol=1e-9)
+    np.testing.assert_allclose(right.of(CDF), law.cdf(r, alpha, mfp), rtol=1e-10)
+    sampler = law.samplers.get("two steps", law.sampler)
+    np.testing.assert_allclose(right.of(SAMPLE), sampler.sample(xi, alpha, mfp), rtol=1e-6)
+    np.testing.assert_allclose(right.of(PDF), sampler.pdf(r, alpha, mfp), rtol=1e-4)
+    assert np.max(right.misplaced(np.asarray(sampler.sample(xi, alpha, mfp)))) < 1e-7
+    assert np.min(right.misplaced(1.1 * np.asarray(sampler.sample(xi, alpha, mfp)))) > 1e-3
+
+
+@pytest.mark.slow
+def test_beam_diffusion_is_judged_by_more_nodes():
+    """And fewer nodes are seen: a negative control."""
+    one = find("beam_diffusion", FITS)
+    at = small(np.float64, x=(0.0, 0.01, 1.0, 10.0))
+    cells = {c.quantity: c for c in _computed(one, limits_of(one, FITS), FLOAT64, at)}
+    assert all(np.all(c.codes == Verdict.RIGHT) for c in cells.values())
+    assert np.max(cells[PROFILE].error) < 1e-9
+    coarse = replace(one, law=BeamDiffusion(one.law.setting, one.law.albedo, 1))
+    found = {c.quantity: c for c in _computed(coarse, limits_of(one, FITS), FLOAT64, at)}
+    assert np.max(found[CDF].error) > 10.0 * np.max(cells[CDF].error)
+
+
+@pytest.mark.slow
+def test_errors_that_no_record_tells_are_as_measured():
+    for kind, stated in MEASURED.items():
+        one = next(one for one in profile_laws(FITS) if isinstance(one.law, kind))
+        quality = profile_quality(one.law, ALBEDOS)
+        assert np.max(quality.rel) == pytest.approx(stated["rel"], rel=0.01)
+        assert np.max(quality.ks) == pytest.approx(stated["ks"], rel=0.01)
+
+
+def test_the_source_is_infinite_and_a_sum_of_gaussians_is_not():
+    at = small(np.float64, x=(0.0, 1.0))
+    assert np.all(np.isinf(Right(catalogue.load("hazard"), at).of(PROFILE)[:, 0]))
+    assert np.all(np.isfinite(Right(catalogue.load("gaussians:2"), at).of(PROFILE)))
+
+
+def test_single_precision_is_right_and_half_is_not():
+    """A text in half far out, and next to the source, is no number."""
+    one, x = find("hazard", FITS), (0.0, 1.0, 60000.0)
+    limits = limits_of(one, FITS)
+    for cells in _computed(one, limits, TEXT32, small(np.float32, x)):
+        assert np.all(cells.codes <= Verdict.BEYOND), cells.quantity
+    half = {cells.quantity: cells for cells in _computed(one, limits, TEXT16, small(np.float16, x))}
+    assert any(Verdict.NOT_FINITE in cells.verdicts for cells in half.values())
+    assert not any(cells.failures.any() for cells in half.values())  # half is measured, nothing is held to it
+
+
+def test_a_text_keeps_its_type():
+    law = catalogue.load("quantile")
+    for dtype in (np.float16, np.float32, EXTENDED):
+        text = Text(law, dtype)
+        assert text.call("profile", np.array([1.0]), np.array([0.5]), np.array([1.0])).dtype == dtype
