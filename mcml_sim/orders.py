@@ -75,7 +75,7 @@ class Orders:
         alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
         of any one variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
         condition number 1e16), so a small rank holds all there is. Between rings i != j the covariance is
-        -E_i E_j / N, E without `once`, which no factor holds: next to nothing when there are many rings. With
+        -E_i E_j / (N - 1), E without `once`, which no factor holds: next to nothing when there are many rings. With
         `overflow` a last row stands for the light beyond the last ring.
         """
         albedos = np.atleast_1d(_checked_alpha(alpha))

@@ -130,7 +130,8 @@ def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, 
     """Factors of each row's covariance between weightings, truncated to `rank` directions.
 
     counts (rows, bins), weights (alphas, bins) -> L (rows, alphas, rank) with L L^T the covariance of the row's means,
-    sum_n H_n g_n(a) g_n(b) / N^2 - E(a) E(b) / N, and the largest share of any one variance that truncation drops.
+    (sum_n H_n g_n(a) g_n(b) / N - E(a) E(b)) / (N - 1), and the largest share of any one variance that truncation
+    drops: on the diagonal the variance of `estimate`. One photon says nothing of its error and counts as without.
     The covariance is a sum over all photons of (g(a) - E(a)) (g(b) - E(b)), those that add 0 included. Its factor is
     decomposed, not itself: squaring would lose half the digits of a nearly singular matrix. Each weighting counts in
     units of its own standard deviation, or the strong ones would take all the directions.
@@ -141,7 +142,7 @@ def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, 
     silent = np.concatenate([weights, np.zeros((len(weights), 1))], axis=1)
     for row, hits in enumerate(counts):
         number = np.append(hits, photons - hits.sum()).astype(np.float64)
-        centred = (silent - (silent @ number / photons)[:, None]) * (np.sqrt(number) / photons)
+        centred = (silent - (silent @ number / photons)[:, None]) * np.sqrt(number / (photons * max(photons - 1.0, 1.0)))
         deviation = np.sqrt(np.sum(centred**2, axis=1, keepdims=True))
         unit = np.divide(centred, deviation, out=np.zeros_like(centred), where=deviation > 0)
         left, singular, _ = np.linalg.svd(unit, full_matrices=False)
