@@ -3,7 +3,7 @@
 from mcml_sim import exact
 from mcml_sim.errors import ClusterError, InputError, OutputError, SettingError, StoreError
 from mcml_sim.grid import Grid
-from mcml_sim.mcml_files import read_mci, write_mco
+from mcml_sim.mcml_files import read_mci, read_mco, write_mco
 from mcml_sim.medium import Layer, Medium, half_space
 from mcml_sim.orders import Orders, simulate_orders
 from mcml_sim.quantities import Precision, Tally
@@ -33,6 +33,7 @@ __all__ = [
     "exact",
     "half_space",
     "read_mci",
+    "read_mco",
     "read_results",
     "simulate",
     "simulate_orders",

@@ -95,16 +95,16 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     """What `read_mci` gives for a file of this name and content."""
-    lines = _Lines(name, _text(name, content))
+    lines = Lines(name, _text(name, content))
     (version,) = lines.take(1, "the file version, 1.0")
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
         raise lines.error("the file version, 1.0", _shown(version))
     (word,) = lines.take(1, "the number of runs")
     taken: set[str] = set()
-    return tuple(_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
+    return tuple(read_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
 
 
-class _Lines:
+class Lines:
     """The data lines of a file, one after the other, and where they stand."""
 
     def __init__(self, name: str, text: str) -> None:
@@ -156,7 +156,8 @@ class _Lines:
         return self.decimal(name, word, COEFFICIENTS, or_else="0 or ")
 
 
-def _run(lines: _Lines, taken: set[str]) -> Run:
+def read_run(lines: Lines, taken: set[str]) -> Run:
+    """The run that the next lines are of; `taken` are the output files of those before it."""
     output, form = _output(lines, taken)
     (word,) = lines.take(1, "the number of photons")
     photons = lines.whole("the number of photons", word, MAX_PHOTONS)
@@ -171,7 +172,7 @@ def _run(lines: _Lines, taken: set[str]) -> Run:
     return Run(output, form, photons, dz, dr, nz, nr, na, _medium(lines))
 
 
-def _output(lines: _Lines, taken: set[str]) -> tuple[str, str]:
+def _output(lines: Lines, taken: set[str]) -> tuple[str, str]:
     """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     name, *form = lines.take(1, "the name of an output file, and A or B", optional=1)
     if len(name) > MAX_NAME or not name.isprintable():
@@ -185,7 +186,7 @@ def _output(lines: _Lines, taken: set[str]) -> tuple[str, str]:
     return name, "B" if form and form[0][0] in "bB" else "A"
 
 
-def _medium(lines: _Lines) -> Medium:
+def _medium(lines: Lines) -> Medium:
     (word,) = lines.take(1, "the number of layers")
     number = lines.whole("the number of layers", word, MAX_LAYERS)
     n_above = _index(lines, "n above the layers")
@@ -193,12 +194,12 @@ def _medium(lines: _Lines) -> Medium:
     return Medium(layers, n_above, _index(lines, "n below the layers"))
 
 
-def _index(lines: _Lines, name: str) -> float:
+def _index(lines: Lines, name: str) -> float:
     (word,) = lines.take(1, name)
     return lines.decimal(name, word, INDICES)
 
 
-def _layer(lines: _Lines, at: int, number: int) -> Layer:
+def _layer(lines: Lines, at: int, number: int) -> Layer:
     of = f"of layer {at} of {number}"
     n, mu_a, mu_s, g, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
     values = {

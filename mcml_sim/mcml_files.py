@@ -1,6 +1,7 @@
-"""MCML's files: what `read_mci` reads and `write_mco` writes."""
+"""MCML's files: what `read_mci` and `read_mco` read and `write_mco` writes."""
 
 from mcml_sim.mci import Run, read_mci
 from mcml_sim.mco import write_mco
+from mcml_sim.mco_reader import Output, read_mco
 
-__all__ = ["Run", "read_mci", "write_mco"]
+__all__ = ["Output", "Run", "read_mci", "read_mco", "write_mco"]
