@@ -10,10 +10,14 @@ from rich.console import Console
 
 from mcml_sim import __version__
 from profilefit.cli.check import check
+from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert
 from profilefit.cli.export import export
+from profilefit.cli.fit import fit
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
+from profilefit.cli.stability import stability
+from profilefit.cli.tradeoff import tradeoff
 from profilefit.errors import InputError, OutputError, ShaderError, StoreError
 
 __all__ = ["app", "main"]
@@ -32,7 +36,11 @@ app.command()(regenerate)
 app.command()(report)
 app.command()(convert)
 app.command()(export)
+app.command()(fit)
 app.command()(check)
+app.command()(choose)
+app.command()(tradeoff)
+app.command()(stability)
 
 
 def _show_version(wanted: bool) -> None:

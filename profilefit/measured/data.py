@@ -1,0 +1,95 @@
+"""What was measured: reflected light at radii or on rings, with its errors, and where all of that comes from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.medium import Medium
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """Reflected light per area at n radii, or averaged over n rings.
+
+    source     where it comes from, for messages; digest the SHA-256 of that file
+    inner      (n,) inner radii of the rings [unit]; outer (n,) outer ones. A point is a ring without width
+    value      (n,) reflected light per area and per incident light [1/unit^2]; in any other measure with a free scale
+    sigma      (n,) standard errors of `value`
+    freedom    (n,) degrees of freedom that each sigma rests on; infinite where it is known. pooled those of what all
+               sigmas have in common, the trend of replicates
+    errors     what the sigmas are, in words
+    unit       of length; "" where nobody named one
+    counted    True of photon counts: the variance of a ring goes with the light expected there, which the model knows
+               better than the ring itself. bounded: True if the sigmas are upper bounds
+    photons    of the run whose rings these are: they share them (see `noise`); infinite where rows are independent
+    medium     what a simulation was of, lengths in `unit`; None of what was measured
+    notes      what was left out or merged, for the reader
+    """
+
+    source: str
+    digest: str
+    inner: Floats
+    outer: Floats
+    value: Floats
+    sigma: Floats
+    freedom: Floats
+    errors: str
+    unit: str
+    counted: bool = False
+    bounded: bool = False
+    pooled: float = np.inf
+    photons: float = np.inf
+    medium: Medium | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def rings(self) -> bool:
+        """True of averages over rings, False of values at radii."""
+        return bool(np.all(self.outer > self.inner))
+
+    @property
+    def r(self) -> Floats:
+        """(n,) radii, of rings the middles [unit]."""
+        return 0.5 * (self.inner + self.outer)
+
+    @property
+    def relative_error(self) -> float:
+        """Median of |sigma / value| [-]."""
+        return float(np.median(np.abs(self.sigma) / np.maximum(np.abs(self.value), np.finfo(float).tiny)))
+
+    def within(self, least: float | None, most: float | None) -> Measured:
+        """Only what lies wholly between two radii [unit]; InputError if nothing does."""
+        keep = np.ones(self.value.size, bool)
+        if least is not None:
+            keep &= self.inner >= least
+        if most is not None:
+            keep &= self.outer <= most
+        if np.all(keep):
+            return self
+        if not np.any(keep):
+            low, high = self.inner[0], self.outer[-1]
+            raise InputError(
+                f"{self.source}: no row is left between --r-min and --r-max: r goes from {low:g} to {high:g}"
+            )
+        note = f"{np.sum(~keep)} of {keep.size} rows left out, by --r-min and --r-max"
+        return self.chosen(keep, note)
+
+    def chosen(self, keep: NDArray[np.bool_], note: str = "") -> Measured:
+        """The rows where `keep` (n,) is true."""
+        fields = ("inner", "outer", "value", "sigma", "freedom")
+        rows: dict[str, Any] = {name: getattr(self, name)[keep] for name in fields}
+        return replace(self, **rows, notes=(*self.notes, *([note] if note else [])))
+
+    def with_row(self, inner: float, outer: float, value: float, sigma: float) -> Measured:
+        """One point or ring more, of a known error, put where it belongs."""
+        at = int(np.searchsorted(self.inner, inner))
+        new: dict[str, float] = {"inner": inner, "outer": outer, "value": value, "sigma": sigma, "freedom": np.inf}
+        rows: dict[str, Any] = {name: np.insert(getattr(self, name), at, one) for name, one in new.items()}
+        return replace(self, **rows)

@@ -1,0 +1,43 @@
+"""Lengths with their units, as people write them: 1.2mm, 30 um."""
+
+from __future__ import annotations
+
+import re
+
+from profilefit.errors import InputError
+
+# In millimetres.
+UNITS = {"um": 1e-3, "µm": 1e-3, "μm": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D*)")
+PER_AREA = re.compile(r"(?:1\s*/\s*(?P<over>[^\W\d_]+)\s*\^?2|(?P<power>[^\W\d_]+)\s*\^?-2)")
+
+
+def checked_unit(name: str, unit: str) -> str:
+    """A unit of length that is known; InputError names what `name` was given."""
+    if unit in UNITS:
+        return unit
+    raise InputError(f"{name} must be a unit of length ({', '.join(UNITS)}), got {unit!r}")
+
+
+def length(name: str, text: str, unit: str) -> float:
+    """A length > 0 such as 1.2mm, in `unit`; a bare number is in `unit` already."""
+    match = NUMBER.fullmatch(text.strip())
+    if match is None or not float(match[1]) > 0 or (match[2] and match[2] not in UNITS):
+        raise InputError(f"{name} must be a length > 0 such as 1.2mm (units: {', '.join(UNITS)}), got {text!r}")
+    if not match[2] or match[2] == unit:
+        return float(match[1])
+    if not unit:
+        raise InputError(f"{name} must be without a unit where the data has none (--unit gives it one), got {text!r}")
+    return float(match[1]) * factor(match[2], unit)
+
+
+def factor(source: str, target: str) -> float:
+    """How many `target` a `source` is."""
+    return UNITS[source] / UNITS[target]
+
+
+def area_unit(text: str) -> str | None:
+    """The unit of length in 1/mm^2, 1/mm2 or mm^-2; None if the text is no such thing."""
+    match = PER_AREA.fullmatch(text.strip())
+    unit = (match["over"] or match["power"]) if match else None
+    return unit if unit in UNITS else None

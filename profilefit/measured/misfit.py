@@ -1,0 +1,141 @@
+"""Whether one layer and one law can have made the data, and if not, by how much they miss.
+
+The residuals R of n rows, in standard errors, are projected onto what the p fitted coordinates cannot take up: n - p
+numbers z whose covariance is known, S = N^T (1 + B) N, B being the law's own error. Two questions are put to them:
+
+scatter  chi-square z^T S^-1 z, of n - p degrees of freedom
+waves    the score z^T S^-1 D S^-1 z of a relative error that comes in waves along ln r (D): what a layer underneath, a
+         wrong unit or a wrong law leave is no noise, its neighbours repeat each other. Its distribution, a weighted sum
+         of chi-squares, is drawn
+Errors made from replicates share the error of their trend: with `pooled` degrees of freedom behind it chi-square is an
+F, and the waves' draws are divided likewise. Both chances are joined by Sidak's rule. The misfit is the relative error,
+row by row, that brings chi-square to n - p.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import special, stats
+from scipy.optimize import brentq
+
+Floats = NDArray[np.float64]
+DETECTED = 1e-3  # chance below which a misfit counts as one
+DRAWS = 10_000
+TINY = float(np.finfo(float).tiny)
+LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How well a fit explains its data.
+
+    chi2, freedom    in the data's errors alone; chance of a larger one if these were all
+    scatter, waves   chances of a larger statistic if data and law err as stated; joined the chance of both
+    along_r          lag-1 autocorrelation of the residuals, runs the stretches of one sign and what noise would have
+    relative         relative error [-] that brings chi-square to its degrees of freedom; 0 if nothing is left
+    """
+
+    chi2: float
+    freedom: int
+    chance: float
+    scatter: float
+    waves: float
+    joined: float
+    along_r: float
+    runs: tuple[int, float]
+    relative: float
+
+    @property
+    def detected(self) -> bool:
+        return self.joined < DETECTED
+
+    @property
+    def within_law(self) -> bool:
+        """True where the data alone would have it, but the law's own error explains it."""
+        return self.chance < DETECTED and not self.detected
+
+
+def misfit(
+    residuals: Floats,
+    jacobian: Floats,
+    law: Floats,
+    shape: Floats,
+    rows: int,
+    uneven: Floats | None = None,
+    pooled: float = np.inf,
+) -> Misfit:
+    """Judge residuals (m,) of a fit with derivatives (m, p), the first `rows` of them along r.
+
+    law    (m, m) covariance of the law's own error, shape (m, m) that of a relative error 1 in waves, uneven (m, m)
+           that of one which differs from row to row (by default, shape without its correlations); all in errors
+    pooled degrees of freedom of what the rows' errors have in common
+    """
+    free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
+    z = free.T @ residuals
+    own, waved = np.eye(z.size) + free.T @ law @ free, free.T @ shape @ free
+    scatter = scatter_chance(float(z @ np.linalg.solve(own, z)), z.size, pooled)
+    score = wave_chance(z, own, waved, pooled)
+    signs = np.sign(residuals[:rows])
+    chi2 = float(residuals @ residuals)
+    along = residuals[:rows]
+    return Misfit(
+        chi2,
+        z.size,
+        scatter_chance(chi2, z.size, pooled),
+        scatter,
+        score,
+        1.0 - (1.0 - min(scatter, score)) ** 2,
+        float(along[1:] @ along[:-1]) / max(float(along @ along), TINY),
+        (1 + int(np.sum(signs[1:] != signs[:-1])), 1 + (rows - 1) / 2),
+        amplitude(z, own, free.T @ (np.diag(np.diag(shape)) if uneven is None else uneven) @ free),
+    )
+
+
+def scatter_chance(square: float, freedom: int, pooled: float) -> float:
+    """Chance of a larger chi-square whose errors share a scale of `pooled` degrees of freedom."""
+    if np.isinf(pooled):
+        return float(stats.chi2.sf(square, freedom))
+    return float(stats.f.sf(square / freedom, freedom, pooled))
+
+
+def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float = np.inf, seed: int = 0) -> float:
+    """Chance of a larger score z^T S^-1 D S^-1 z if z has covariance S = `own` and nothing else."""
+    there = np.linalg.solve(own, z)
+    root = np.linalg.cholesky(own)
+    inner = np.linalg.solve(root, np.linalg.solve(root, shape).T)
+    weights = np.linalg.eigvalsh(0.5 * (inner + inner.T))
+    weights = weights[weights > 1e-6 * weights.max()]
+    generator = np.random.default_rng(seed)
+    drawn = generator.chisquare(1.0, (DRAWS, weights.size)) @ weights
+    if np.isfinite(pooled):
+        drawn /= generator.chisquare(pooled, DRAWS) / pooled
+    return float((1 + np.sum(drawn >= there @ shape @ there)) / (1 + DRAWS))
+
+
+def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
+    """The relative error d for which z^T (S + d^2 D)^-1 z is its degrees of freedom; 0 if it is less at d = 0."""
+
+    def excess(d: float) -> float:
+        return float(z @ np.linalg.solve(own + d**2 * relative, z)) - z.size
+
+    if excess(0.0) <= 0:
+        return 0.0
+    return LARGEST if excess(LARGEST) > 0 else float(brentq(excess, 0.0, LARGEST, xtol=1e-8))
+
+
+def alone(freedom: Floats, pooled: float) -> Floats:
+    """Degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d each, add up."""
+    own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
+    return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
+
+
+def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
+    """Residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
+    size = np.abs(residuals)
+    tail = stats.t.logsf(size, freedom)
+    # Where Student's tail has no float left, so many degrees of freedom are behind it that it is a normal one.
+    few = np.isfinite(freedom) & np.isfinite(tail)
+    return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)

@@ -1,0 +1,135 @@
+"""What a law says would be measured: light at radii or on rings, of a medium with a length and a scale.
+
+Three coordinates without bounds stand for the medium and the instrument, in this order:
+
+u     s = sqrt(1 - alpha) = 1 / (1 + e^-u): laws are smooth in s, and both ends of alpha lie at infinity
+ln l  of the mean free path [ln unit]
+ln k  of the scale: the value column holds k times the light
+
+Radii are worked off in blocks of one size, so that data of any length share one compiled function.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.diffusion import DiffusionLaw
+
+Floats = NDArray[np.float64]
+NAMES = ("alpha", "l", "scale")
+U, LENGTH, SCALE = range(3)
+BLOCK = 32  # radii
+FLOCK = 32  # points of the three coordinates that are evaluated at once
+
+
+@dataclass(frozen=True)
+class Model:
+    """A law whose constants stand; rings says whether it is averaged over rings."""
+
+    law: ProfileLaw
+    rings: bool
+
+    def linearised(self, point: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+        """Predictions (n + 1,) at one point (3,), the last being A, and their derivatives (n + 1, 3)."""
+        parts = [_linearised(self.law, self.rings, point, *block) for block in _blocks(inner, outer)]
+        light = np.concatenate([np.asarray(value)[:-1] for value, _ in parts])[: inner.size]
+        slopes = np.concatenate([np.asarray(slope)[:, :-1] for _, slope in parts], axis=1)[:, : inner.size]
+        value, slope = parts[0]
+        return np.append(light, np.asarray(value)[-1]), np.column_stack([slopes, np.asarray(slope)[:, -1]]).T
+
+    def predicted(self, points: Floats, inner: Floats, outer: Floats) -> Floats:
+        """Predictions (m, n + 1) at points (m, 3), the last column being A."""
+        flocks = -(-len(points) // FLOCK)
+        filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
+        rows = []
+        for flock in np.split(filled, flocks):
+            parts = [np.asarray(_predicted(self.law, self.rings, flock, *block)) for block in _blocks(inner, outer)]
+            light = np.concatenate([part[:, :-1] for part in parts], axis=1)[:, : inner.size]
+            rows.append(np.column_stack([light, parts[0][:, -1]]))
+        return np.concatenate(rows)[: len(points)]
+
+    def shares(self, point: Floats, r: Floats) -> Floats:
+        """Shares of the reflected energy within radii (n,) [-]."""
+        return np.concatenate([np.asarray(_shares(self.law, self.rings, point, one)) for one, _ in _blocks(r, r)])[
+            : r.size
+        ]
+
+
+def alpha_of(u) -> Floats:
+    """alpha [-] at the coordinate u, to rounding also where it is small."""
+    white, dark = 1.0 / (1.0 + np.exp(np.asarray(u, float))), 1.0 / (1.0 + np.exp(-np.asarray(u, float)))
+    return white * (1.0 + dark)
+
+
+def u_of(alpha: float) -> float:
+    """The coordinate u of an albedo in (0, 1)."""
+    s = np.sqrt(1.0 - alpha)
+    return float(np.log(s) - np.log(alpha / (1.0 + s)))
+
+
+def total(law: ProfileLaw, alpha) -> jax.Array:
+    """Total reflectance A [-] that the profile integrates to."""
+    if isinstance(law, DiffusionLaw):
+        return law.reflectance(alpha)
+    return law.albedo.reflectance(alpha)  # type: ignore[attr-defined]
+
+
+def _blocks(inner: Floats, outer: Floats):
+    """Radii in blocks of one size, the last filled with its last radius."""
+    count = -(-inner.size // BLOCK)
+    fill = (0, count * BLOCK - inner.size)
+    return zip(*(np.split(np.pad(one, fill, mode="edge"), count) for one in (inner, outer)), strict=True)
+
+
+def _light(law: ProfileLaw, rings: bool, point, inner, outer):
+    alpha = _alpha(point[U])
+    mfp, scale, reflected = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE]), total(law, alpha)
+    if rings:
+        within = law.scaled_cdf(jnp.stack([inner, outer]) / mfp, alpha)
+        light = reflected * (within[1] - within[0]) / (jnp.pi * (outer - inner) * (outer + inner))
+    else:
+        light = law.scaled_profile(inner / mfp, alpha) / mfp**2
+    return jnp.append(scale * light, reflected)
+
+
+def _alpha(u):
+    """1 - s^2 without cancellation."""
+    return jax.nn.sigmoid(-u) * (1.0 + jax.nn.sigmoid(u))
+
+
+def _double(function):
+    """Compile a function of numpy arrays in double precision; the law's class, its setting and `rings` select it."""
+    compiled = eqx.filter_jit(function)
+
+    def call(law, rings, *arrays):
+        with jax.enable_x64(True):
+            doubles = jax.tree.map(jnp.asarray, (law, arrays))
+            return compiled(doubles[0], rings, *doubles[1])
+
+    return call
+
+
+@_double
+def _linearised(law, rings, point, inner, outer):
+    light = partial(_light, law, rings, inner=inner, outer=outer)
+    values, slopes = jax.vmap(lambda way: jax.jvp(light, (point,), (way,)), out_axes=(None, 0))(jnp.eye(len(NAMES)))
+    return values, slopes
+
+
+@_double
+def _predicted(law, rings, points, inner, outer):
+    return jax.vmap(lambda point: _light(law, rings, point, inner, outer))(points)
+
+
+@_double
+def _shares(law, rings, point, r):
+    del rings
+    return law.scaled_cdf(r / jnp.exp(point[LENGTH]), _alpha(point[U]))

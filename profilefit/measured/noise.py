@@ -1,0 +1,63 @@
+"""The errors of the rows together: which weight each has, and what the rings of one simulation share.
+
+A photon that leaves through one ring leaves through no other, and what N photons leave nowhere was absorbed: ring
+energies E of one run have the covariance -E_i E_j / (N - 1), as counts of a multinomial have, light lost or absorbed
+being the complement. Values per area v keep it: C = diag(sigma^2 + v^2 / (N - 1)) - v v^T / (N - 1). With the first
+term's root S and b = S^-1 v / sqrt(N - 1) this is S (1 - b b^T) S, whose inverse root is (Sherman and Morrison)
+
+    C^-1/2 = (1 + c b b^T) S^-1,   c = (1 / sqrt(1 - b^T b) - 1) / b^T b.
+
+Without photons to share b is zero, and this divides by sigma.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.measured.data import Measured
+
+Floats = NDArray[np.float64]
+# b^T b is the share of the photons that the rings hold: 1 only if none is lost, and more only by rounding.
+LARGEST_SHARE = 1.0 - 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """The covariance of n rows: root (n,) is the diagonal S [of the values], common (n,) the vector b [-]."""
+
+    root: Floats
+    common: Floats
+
+    @property
+    def share(self) -> float:
+        return float(self.common @ self.common)
+
+    @property
+    def sigma(self) -> Floats:
+        """(n,) standard error of each row alone."""
+        return self.root * np.sqrt(1.0 - self.common**2)
+
+    def whitened(self, rows: Floats) -> Floats:
+        """Rows (n,) or (n, k) in standard errors, independent of each other."""
+        alone = (rows.T / self.root).T
+        if self.share == 0.0:
+            return alone
+        growth = (1.0 / np.sqrt(1.0 - self.share) - 1.0) / self.share
+        return alone + growth * np.multiply.outer(self.common, self.common @ alone)
+
+
+def noise(data: Measured, light: Floats | None = None, widening: float = 1.0) -> Noise:
+    """The errors of the data; of counts those of `light` (n,), where a fit knows it better than the rings themselves.
+
+    widening    factor on every variance
+    """
+    expected = data.value if light is None or not data.counted else light
+    others = data.photons - 1.0
+    variance = (data.sigma**2 + data.value**2 / others) * expected / data.value if data.counted else data.sigma**2
+    root = np.sqrt(widening * variance)
+    common = expected / (np.sqrt(others) * root)
+    share = float(common @ common)
+    return Noise(root, common * np.sqrt(min(1.0, LARGEST_SHARE / share)) if share > 0 else common)

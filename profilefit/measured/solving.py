@@ -1,0 +1,183 @@
+"""Least squares in the three coordinates, from where the data themselves point.
+
+MINPACK's successor in scipy and not `profilefit.solver`: that one compiles a whole Levenberg-Marquardt around the law,
+which pays for a batch of fits and makes one fit wait nine seconds for a tenth of a millisecond's work.
+
+A failure is a result: `Minimum.result` is "converged" or says what happened and what to try.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from profilefit.measured.data import Measured
+from profilefit.measured.model import LENGTH, NAMES, SCALE, Model, U, u_of
+from profilefit.measured.noise import Noise
+from profilefit.measured.question import Question
+from profilefit.solver import CONVERGED
+
+Floats = NDArray[np.float64]
+# Far below any error that data leave a coordinate, well above what rounding of the profile does to it.
+TOLERANCE = 1e-9
+MAX_STEPS = 200
+# Albedos and lengths where the search begins; lengths from a twentieth of the first radius to twice the last.
+ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
+LENGTHS, SHORTEST, LONGEST = 20, 1 / 20, 2.0
+STARTS = 4  # the best of them, no two neighbours, that are followed to their minimum
+# How far the coordinates may go: beyond, laws have reached their limits. ln l and ln k: from what the search saw.
+FARTHEST_U, FARTHEST_LN = 12.0, 7.0
+WHITE, BLACK = -9.0, 6.0  # u beyond which alpha is 1 or 0 for all that data can say
+AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with --fix alpha=..."
+AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use --fix alpha=..."
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Data and a question, as residuals. noise is what weighs the rows: the errors of the data or better."""
+
+    data: Measured
+    question: Question
+    noise: Noise
+
+    @property
+    def model(self) -> Model:
+        return Model(self.question.law, self.data.rings)
+
+    def residuals(self, point: Floats) -> tuple[Floats, Floats]:
+        """Residuals in standard errors (m,) and their derivatives (m, 3): the n rows, then A and scale where known."""
+        light, slope = self.model.linearised(point, self.data.inner, self.data.outer)
+        rows, slopes = self.noise.whitened(light[:-1] - self.data.value), self.noise.whitened(slope[:-1])
+        if (total := self.question.total) is not None:
+            rows = np.append(rows, (light[-1] - total.value) / total.error)
+            slopes = np.vstack([slopes, slope[-1:] / total.error])
+        if (known := self.question.scale) is not None:
+            scale = np.exp(point[SCALE])
+            rows = np.append(rows, (scale - known.value) / known.error)
+            slopes = np.vstack([slopes, scale / known.error * np.eye(len(NAMES))[SCALE]])
+        return rows, slopes
+
+    def costs(self, points: Floats) -> Floats:
+        """Sums of squared residuals (m,) at points (m, 3)."""
+        light = self.model.predicted(points, self.data.inner, self.data.outer)
+        cost = np.sum(self.noise.whitened((light[:, :-1] - self.data.value).T) ** 2, axis=0)
+        if (total := self.question.total) is not None:
+            cost += ((light[:, -1] - total.value) / total.error) ** 2
+        if (known := self.question.scale) is not None:
+            cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
+        return cost
+
+    @cached_property
+    def starts(self) -> Floats:
+        """(k, 3) the best points of a coarse search, no two neighbours."""
+        held, r = self.question.base, self.data.r
+        u = [held[U]] if U not in self.question.free else [u_of(alpha) for alpha in ALBEDOS]
+        lengths = np.linspace(np.log(r[0] * SHORTEST), np.log(r[-1] * LONGEST), LENGTHS)
+        ln_l = [held[LENGTH]] if LENGTH not in self.question.free else lengths
+        points = np.array([[a, b, held[SCALE]] for a in u for b in ln_l])
+        if SCALE in self.question.free:
+            points[:, SCALE] = np.log(self._best_scales(points))
+        places = np.array([[i, j] for i in range(len(u)) for j in range(len(ln_l))])
+        order = np.argsort(self.costs(points))
+        chosen: list[int] = []
+        for at in order:
+            if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
+                chosen.append(int(at))
+        return points[chosen[:STARTS]]
+
+    def _best_scales(self, points: Floats) -> Floats:
+        """The scale that fits best at each point, by linear least squares (m,)."""
+        light = self.noise.whitened(self.model.predicted(points, self.data.inner, self.data.outer)[:, :-1].T).T
+        value = self.noise.whitened(self.data.value)
+        norm = np.maximum(np.sum(light**2, axis=1), np.finfo(float).tiny)
+        best = light @ value / norm
+        return np.maximum(best, 1e-3 * np.linalg.norm(value) / np.sqrt(norm))  # light is never negative
+
+
+@dataclass(frozen=True)
+class Minimum:
+    """Where a least-squares problem ended: point (3,), residuals (m,), jacobian (m, 3) there."""
+
+    point: Floats
+    residuals: Floats
+    jacobian: Floats
+    steps: int
+    result: str
+
+    @property
+    def cost(self) -> float:
+        return float(self.residuals @ self.residuals)
+
+    @property
+    def converged(self) -> bool:
+        return self.result == CONVERGED
+
+    @property
+    def at_edge(self) -> bool:
+        """True where the best albedo is 0 or 1: no error can be told of it, only how far from there it may be."""
+        return self.result in (AT_WHITE, AT_BLACK)
+
+
+def minimised(problem: Problem) -> Minimum:
+    """The lowest of the minima that several starts lead to."""
+    found = [descended(problem, start, problem.question.free) for start in problem.starts]
+    return min(found, key=lambda one: (not np.isfinite(one.cost), one.cost))
+
+
+def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum:
+    """The minimum below `start` (3,) in the coordinates `free`; the others stay."""
+    moving, last = list(free), _Last(problem, start, list(free))
+    if not moving:
+        rows, slopes = problem.residuals(start)
+        return Minimum(start, rows, slopes, 0, CONVERGED)
+    reach = np.array([FARTHEST_U, FARTHEST_LN + LENGTHS, FARTHEST_LN + LENGTHS])[moving]
+    centre = np.where(np.array(moving) == U, 0.0, start[moving])
+    inside = np.clip(start[moving], centre - 0.99 * reach, centre + 0.99 * reach)
+    done = least_squares(
+        last.rows, inside, last.slopes, bounds=(centre - reach, centre + reach), x_scale="jac",
+        xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE, max_nfev=MAX_STEPS,
+    )  # fmt: skip
+    point = start.copy()
+    point[moving] = done.x
+    rows, slopes = problem.residuals(point)
+    return Minimum(point, rows, slopes, int(done.nfev), _explained(done.status, point, rows, moving, centre, reach))
+
+
+class _Last:
+    """Residuals and derivatives in the moving coordinates; both come at once, so the last point's are kept."""
+
+    def __init__(self, problem: Problem, start: Floats, moving: list[int]) -> None:
+        self._problem, self._point, self._moving = problem, start.copy(), moving
+        self._at: Floats | None = None
+        self._found: tuple[Floats, Floats]
+
+    def rows(self, x: Floats) -> Floats:
+        return self._evaluated(x)[0]
+
+    def slopes(self, x: Floats) -> Floats:
+        return self._evaluated(x)[1][:, self._moving]
+
+    def _evaluated(self, x: Floats) -> tuple[Floats, Floats]:
+        if self._at is None or not np.array_equal(x, self._at):
+            self._at = x.copy()
+            self._point[self._moving] = x
+            self._found = self._problem.residuals(self._point)
+        return self._found
+
+
+def _explained(status: int, point: Floats, rows: Floats, moving: list[int], centre: Floats, reach: Floats) -> str:
+    if not np.all(np.isfinite(rows)):
+        return "the law is not finite there: leave out the outermost rows, or choose another law"
+    if U in moving and point[U] < WHITE:
+        return AT_WHITE
+    if U in moving and point[U] > BLACK:
+        return AT_BLACK
+    if np.any(np.abs(point[moving] - centre) > 0.999 * reach):
+        return "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with --fix"
+    if status <= 0:
+        return f"no convergence in {MAX_STEPS} steps: hold one of alpha, l and scale, or measure over a wider range"
+    return CONVERGED

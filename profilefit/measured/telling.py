@@ -1,0 +1,126 @@
+"""What the data can tell, and what they cannot: intervals by profile likelihood, and pairs that trade."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.measured.derived import STRENGTHS
+from profilefit.measured.fitting import Found
+from profilefit.measured.model import NAMES, U, alpha_of
+from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, descended
+
+Floats = NDArray[np.float64]
+# A quantity is not told if its standard error is more than half of itself: it may as well be twice as much.
+LOOSE = 0.5
+# A pair trades if all but a tenth of one's variance goes with the other.
+TRADING = 0.95
+STRIDES = 14  # doublings of a step outwards
+HALVINGS = 7  # of the last one: to a hundredth
+
+
+@dataclass(frozen=True)
+class Interval:
+    """What a coordinate may be at 95 %, all others free: low and high, as values; an end is open if nothing ends it."""
+
+    name: str
+    low: float
+    high: float
+    open_low: bool
+    open_high: bool
+
+    @property
+    def is_open(self) -> bool:
+        return self.open_low or self.open_high
+
+
+@dataclass(frozen=True)
+class Telling:
+    """What a fit can tell.
+
+    intervals  of the free coordinates; loose the quantities that are not told, with their relative errors
+    pair       the two free coordinates that trade most; correlation of theirs (0 with fewer than two)
+    """
+
+    intervals: tuple[Interval, ...]
+    loose: dict[str, float]
+    pair: tuple[str, str] | None
+    correlation: float
+
+    @property
+    def told(self) -> bool:
+        """True if the data tell every quantity."""
+        return not self.loose and not any(one.is_open for one in self.intervals)
+
+    @property
+    def trades(self) -> bool:
+        return not self.told and abs(self.correlation) > TRADING
+
+
+def told(found: Found) -> Telling:
+    """Judge a fit by what is left of it when one coordinate is moved and the others follow."""
+    intervals = tuple(_interval(found, at) for at in found.question.free)
+    relative = relative_errors(found, found.statistical)
+    if found.minimum.at_edge:  # mu_a is anything down to, or up to, where alpha ends
+        relative["mu_a"] = np.inf
+    loose = {name: value for name, value in relative.items() if not value < LOOSE}
+    pair, correlation = _pair(found)
+    return Telling(intervals, loose, pair, correlation)
+
+
+def relative_errors(found: Found, covariance: Floats) -> dict[str, float]:
+    """Standard errors of mu_s', mu_a and a free scale over themselves [-]."""
+    errors = found.errors(covariance)
+    names = [name for name in STRENGTHS if name != "scale" or "scale" not in found.question.held]
+    return {name: errors[name] / max(abs(found.values[name]), np.finfo(float).tiny) for name in names}
+
+
+def _pair(found: Found) -> tuple[tuple[str, str] | None, float]:
+    free = list(found.question.free)
+    if len(free) < 2:
+        return None, 0.0
+    joint = found.statistical[np.ix_(free, free)]
+    spread = np.sqrt(np.maximum(np.diag(joint), np.finfo(float).tiny))
+    upper = np.triu(joint / np.outer(spread, spread), 1)
+    i, j = np.unravel_index(np.argmax(np.abs(upper)), upper.shape)
+    return (NAMES[free[i]], NAMES[free[j]]), float(upper[i, j])
+
+
+def _interval(found: Found, at: int) -> Interval:
+    """Both ends of the profile likelihood in coordinate `at`."""
+    ends = [_end(found, at, side) for side in (-1.0, 1.0)]
+    values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
+    opened = [is_open for _, is_open in ends]
+    if at == U:  # alpha falls as u rises
+        values, opened = values[::-1], opened[::-1]
+    return Interval(NAMES[at], values[0], values[1], opened[0], opened[1])
+
+
+def _end(found: Found, at: int, side: float) -> tuple[float, bool]:
+    """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does."""
+    best, others = found.minimum, tuple(one for one in found.question.free if one != at)
+    limit = side * FARTHEST_U if at == U else best.point[at] + side * FARTHEST_LN
+    last = [best.point]
+
+    def rise(x: float) -> float:
+        start = last[-1].copy()
+        start[at] = x
+        there = descended(found.problem, start, others)
+        last.append(there.point)
+        return there.cost - best.cost - found.quantile**2
+
+    step = max(float(np.sqrt(found.statistical[at, at])), 1e-6)
+    inside = outside = best.point[at]
+    for _ in range(STRIDES):
+        outside = best.point[at] + side * min(step, side * (limit - best.point[at]))
+        if rise(outside) > 0:
+            for _ in range(HALVINGS):  # by sign alone: each value is a fit, and known to its tolerance only
+                middle = 0.5 * (inside + outside)
+                inside, outside = (inside, middle) if rise(middle) > 0 else (middle, outside)
+            return float(0.5 * (inside + outside)), False
+        if outside == limit:
+            break
+        inside, step = outside, 2.0 * step
+    return float(outside), True

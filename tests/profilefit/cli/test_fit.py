@@ -1,0 +1,138 @@
+"""`profilefit fit` as a user meets it."""
+
+import json
+import math
+from pathlib import Path
+
+import pytest
+
+DATA = Path(__file__).parents[1] / "measured" / "data"
+PHANTOM, LAYERS = str(DATA / "phantom.csv"), str(DATA / "two_layers.mco")
+
+
+@pytest.fixture
+def phantom(command, tmp_path):
+    return command("fit", PHANTOM, "--out", str(tmp_path / "out"))
+
+
+def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_path):
+    status, out, err = phantom
+    assert (status, err) == (0, "")
+    lines = out.splitlines()
+    assert max(map(len, lines)) <= 100
+    assert lines[0] == "phantom.csv: 20 points, law hazard, searchlight, n = 1, g = 0"
+    (row,) = [line.split() for line in lines if line.startswith("mu_s'  ") and line.endswith("1/mm")]
+    assert abs(float(row[1]) - 0.95 / 1.1) < 3 * (float(row[2]) + float(row[3]))
+    assert any(line.startswith("no misfit is seen") for line in lines)
+    assert "wrote fit.json and 4 figures into" in " ".join(out.split())
+    folder = tmp_path / "out"
+    assert {one.name for one in folder.iterdir()} == {
+        "fit.json", "fit-residuals.png", "fit-residuals.svg", "fit-corner.png", "fit-corner.svg",
+    }  # fmt: skip
+    found = json.loads((folder / "fit.json").read_text())
+    assert found["result"] == found["posterior"]["result"] == "converged"
+    assert found["law"]["record"] == "hazard.json"
+    assert len(found["law"]["record_sha256"]) == len(found["data"]["sha256"]) == 64
+    assert found["versions"]["profilefit"]
+    alpha = found["quantities"]["alpha"]
+    assert alpha["interval_95_total"][0] < 0.95 < alpha["interval_95_total"][1]
+    assert half(alpha["interval_95_data"]) == pytest.approx(1.96 * alpha["statistical_error"], rel=0.2), "the chain"
+    assert found["quantities"]["scale"]["interval_95_data"] is None
+    length = found["quantities"]["l"]
+    joint = 1.96 * math.hypot(length["statistical_error"], length["law_error"])
+    assert half(length["interval_95_total"]) == pytest.approx(joint, rel=0.06), "the law's error as well"
+    assert half(length["interval_95_total"]) > 1.04 * half(length["interval_95_data"])
+    assert "95 %: all of these errors together" in " ".join(out.split())
+
+
+def half(ends):
+    return (ends[1] - ends[0]) / 2
+
+
+def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path):
+    """Table, JSON and chain have one and the same width: Student's of the trend's freedom, and Meier's factor."""
+    rows = [line.split(",") for line in Path(PHANTOM).read_text().splitlines()[2:]]
+    text = "r [mm],value1,value2,value3\n"
+    for at, (r, value, _) in enumerate(rows):
+        text += (
+            f"{r}," + ",".join(f"{float(value) * (1 + 0.03 * math.sin(7 * at + 2 * k)):.6g}" for k in range(3)) + "\n"
+        )
+    (tmp_path / "three.csv").write_text(text)
+    status, out, err = command("fit", str(tmp_path / "three.csv"))
+    assert (status, err) == (0, "")
+    found = json.loads(command("fit", str(tmp_path / "three.csv"), "--json")[1])
+    assert found["data"]["pooled_freedom"] == pytest.approx(0.61 * 2 * 18, rel=0.01)
+    assert max(found["data"]["freedom"]) <= found["data"]["pooled_freedom"] + 2
+    assert found["widening"] > 1.1
+    assert found["quantile_95"] == pytest.approx(2.07, abs=0.01)
+    assert f"95 % is {found['quantile_95']:.2f} times ± data (Student)" in " ".join(out.split())
+    length = found["quantities"]["l"]
+    assert half(length["interval_95_data"]) == pytest.approx(2.07 * length["statistical_error"], rel=0.1)
+
+
+def test_data_that_cannot_tell_say_so_and_what_would(command):
+    status, out, err = command("fit", PHANTOM, "--scale", "free", "--r-max", "0.5mm")
+    assert (status, err) == (0, "")
+    assert "AT AN EDGE: alpha runs to " in out
+    assert "THE DATA CANNOT TELL" in out
+    assert "fits as well, at 95 %" in out
+    assert "what would tell: " in out
+    assert "15 of 20 rows left out, by --r-min and --r-max" in out
+
+
+@pytest.mark.slow
+def test_two_layers_are_a_misfit(command):
+    """A second law to compile, that of rings."""
+    status, out, _ = command("fit", LAYERS, "--json")
+    found = json.loads(out)
+    assert status == 0
+    assert json.loads(command("fit", LAYERS, "--json")[1]) == found, "to the last digit"
+    assert found["misfit"]["detected"] is True
+    assert found["data"]["errors_are_bounds"] is True
+    assert found["data"]["medium"]["layers"][0]["mu_a"] == 5.0
+    assert found["quantities"]["mu_a"]["of_file"] == 5.0
+    assert found["quantities"]["mu_a"]["misfit_error"] > 20 * found["quantities"]["mu_a"]["statistical_error"]
+
+
+def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
+    """Five times as much as is there."""
+    status, out, err = command("fit", PHANTOM, "--scale", "0.2")
+    assert (status, err) == (0, "")
+    assert "AT AN EDGE: alpha runs to 1" in out
+    assert "MISFIT (chance below 1e-16)" in out
+
+
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("nothing.csv",), "nothing.csv: expected a file that can be read, got: No such file"),
+        ((PHANTOM, "--law", "hazzard"), "law must be one of liang, burley"),
+        (
+            (PHANTOM, "--n", "1.37"),
+            "got a request for searchlight, n = 1.37, g = 0; --n and --light choose one of these",
+        ),
+        ((PHANTOM, "--n", "-1"), "n must be a refractive index > 0"),
+        ((PHANTOM, "--light", "sun"), "--light must be one of searchlight, diffuse, got 'sun'"),
+        ((LAYERS, "--light", "diffuse"), "--light must be searchlight for"),
+        ((LAYERS, "--unit", "mm"), "--unit must be cm or left out for .mco"),
+        ((PHANTOM, "--unit", "cm"), "expected one unit, here and in --unit, got cm, mm"),
+        ((PHANTOM, "--fix", "l"), "--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got 'l'"),
+        ((PHANTOM, "--fix", "l=-1mm"), "--fix l must be a length > 0"),
+        ((PHANTOM, "--fix", "A=2"), "--fix A must be a total reflectance in ["),
+        ((PHANTOM, "--fix", "A=x"), "--fix A must be a number, got 'x'"),
+        ((PHANTOM, "--fix", "A=.5", "--fix", "alpha=.9"), "--fix must hold each of l and alpha (or A) once"),
+        ((PHANTOM, "--scale", "-1"), "--scale must be a number > 0, free, or a number with its error"),
+        ((PHANTOM, "--scale", "1+-0"), "--scale must be a number > 0, free, or a number with its error"),
+        ((PHANTOM, "--total", "0.5"), "--total must be a reflectance in (0, 1) with its error"),
+        ((PHANTOM, "--r-min", "1furlong"), "--r-min must be a length > 0 such as 1.2mm"),
+        ((PHANTOM, "--r-min", "1m"), "no row is left between --r-min and --r-max"),
+        ((PHANTOM, "--r-max", "0.26mm", "--scale", "free"), "expected more than 3 rows, one more than is free, got 2"),
+        ((PHANTOM, "--seed", "-1"), "--seed must be a whole number >= 0, got -1"),
+        ((PHANTOM, "--out", "/proc/nowhere"), "cannot write into /proc/nowhere"),
+    ],
+)
+def test_bad_input_is_one_line_and_status_2(command, words, told):
+    status, out, err = command("fit", *words)
+    assert (status, out) == (2, "")
+    assert told in err
+    assert err.count("\n") == 1

@@ -1,0 +1,186 @@
+"""Fits of one's own data, whole: what they find, what they cannot tell, what they say would help. One file, since its
+tests share one compiled law; those over hundreds of replicates are in test_coverage.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting
+from profilefit import catalogue
+from profilefit.errors import InputError
+from profilefit.measured.candidates import advised
+from profilefit.measured.data import Measured
+from profilefit.measured.fitting import Found, fitted
+from profilefit.measured.law_error import origin, relative_error
+from profilefit.measured.model import Model, u_of
+from profilefit.measured.question import Known, Question
+from profilefit.measured.reading import read
+from profilefit.measured.telling import relative_errors, told
+
+DATA = Path(__file__).parent / "data"
+LAW = catalogue.load("hazard")
+SOURCE = origin("hazard", "regenerated", Setting(), catalogue.fits_folder())
+ALPHA, MFP = 0.95, 1.1
+EDGES = np.geomspace(0.05, 12.0, 25)
+TOTAL = LAW.albedo.reflectance(ALPHA)
+
+
+def light(inner, outer, scale=1.0) -> np.ndarray:
+    """What the law itself would give of this medium."""
+    point = np.array([u_of(ALPHA), np.log(MFP), np.log(scale)])
+    return Model(LAW, True).predicted(point[None], inner, outer)[0, :-1]
+
+
+def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
+    """Averages over rings, of this relative error, with noise if there is a seed."""
+    inner, outer = EDGES[:-1][EDGES[1:] <= most], EDGES[1:][EDGES[1:] <= most]
+    value = light(inner, outer, scale)
+    sigma = error * value
+    if seed is not None:
+        value = value + sigma * np.random.default_rng(seed).standard_normal(value.size)
+    return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
+
+
+def fit(data, total=None, scale_error=None, **held) -> Found:
+    known = None if scale_error is None else Known(1.0, scale_error)
+    return fitted(data, Question(LAW, held, total, known), SOURCE)
+
+
+@pytest.fixture(scope="module")
+def plain():
+    return fit(rings(), scale=1.0)
+
+
+@pytest.fixture(scope="module")
+def unscaled():
+    return fit(rings(scale=3.0))
+
+
+def test_light_without_noise_gives_its_medium(plain, unscaled):
+    assert plain.minimum.result == unscaled.minimum.result == "converged"
+    expected = {"A": TOTAL, "alpha": ALPHA, "l": MFP, "mu_s'": ALPHA / MFP, "mu_a": (1 - ALPHA) / MFP}
+    assert plain.values == pytest.approx({**expected, "scale": 1.0}, rel=1e-6)
+    assert unscaled.values == pytest.approx({**expected, "scale": 3.0}, rel=1e-5)
+    assert plain.misfit.chi2 < 1e-6
+
+
+def test_errors_are_those_of_linear_least_squares(plain):
+    """A slow, obvious twin: derivatives of the light by differences, and the normal equations."""
+    data, names, step = plain.data, ("u", "ln l"), 1e-5
+    columns = []
+    for at in range(len(names)):
+        ends = plain.point + step * np.outer([1, -1], np.eye(3)[at])
+        up, down = Model(LAW, True).predicted(ends, data.inner, data.outer)[:, :-1]
+        columns.append((up - down) / (2 * step) / data.sigma)
+    jacobian = np.column_stack(columns)
+    covariance = np.linalg.inv(jacobian.T @ jacobian)
+    np.testing.assert_allclose(plain.statistical[:2, :2], covariance, rtol=1e-5)
+    errors = plain.errors(plain.statistical)
+    assert errors["l"] == pytest.approx(MFP * np.sqrt(covariance[1, 1]), rel=1e-5)
+    assert errors["scale"] == 0
+    assert 0 < plain.errors(plain.of_law)["l"] < errors["l"], "hazard is ten times nearer than these data"
+
+
+def test_what_is_held_stays_and_what_is_known_counts():
+    data = rings(seed=1)
+    held = fit(data, scale=1.0, l=1.0)
+    assert held.values["l"] == pytest.approx(1.0, rel=1e-12)
+    assert held.question.free == (0,)
+    darker = fit(data, total=Known(TOTAL / 2, TOTAL / 1000), scale=1.0)
+    assert TOTAL / 2 < darker.values["A"] < 0.6 * TOTAL, "thousandth against 2 % errors"
+    assert darker.minimum.residuals.size == data.value.size + 1
+    loose, tight = fit(data), fit(data, scale_error=0.01)
+    assert tight.errors(tight.statistical)["scale"] == pytest.approx(0.01, rel=0.1)
+    assert tight.errors(tight.statistical)["scale"] < 0.5 * loose.errors(loose.statistical)["scale"]
+
+
+def test_failures_have_names():
+    bright = fit(rings(), scale=0.3)  # no medium reflects more than all of the light
+    assert "alpha runs to 1" in bright.minimum.result
+    with pytest.raises(InputError, match=r"made up: expected more than 3 rows, one more than is free, got 3"):
+        fit(rings().chosen(np.arange(24) < 3))
+
+
+def test_a_simulated_half_space_comes_back(sidak):
+    """mu_a 1, mu_s 9 per cm: within both errors, of the photons and of the law."""
+    found = fit(read(DATA / "half_space.mco"), scale=1.0)
+    assert found.minimum.converged
+    joint = found.errors(found.statistical + found.of_law)
+    for name, truth in (("mu_a", 1.0), ("mu_s'", 9.0), ("A", 0.414947)):
+        assert abs(found.values[name] - truth) < sidak(3) * joint[name], name
+    assert not found.misfit.detected
+    own = fit(read(DATA / "half_space.npz"), scale=1.0)
+    assert own.errors(own.statistical)["mu_a"] < found.errors(found.statistical)["mu_a"], "its errors are no bounds"
+    assert own.misfit.chance > 1e-3
+    assert own.values["mu_a"] == pytest.approx(found.values["mu_a"], rel=0.005)
+
+
+def test_two_layers_are_no_half_space():
+    """A layer of .3 mm that absorbs fifty times as much, fitted with one: 16 % of the light is unexplained."""
+    found = fit(read(DATA / "two_layers.mco"), scale=1.0)
+    assert found.minimum.converged
+    assert found.misfit.detected
+    assert found.misfit.along_r > 0.5
+    assert 0.1 < found.misfit.relative < 0.25
+    statistical, inflated = found.errors(found.statistical), found.errors(found.of_misfit)
+    assert inflated["mu_a"] > 20 * statistical["mu_a"]
+    assert relative_errors(found, found.of_misfit)["mu_a"] > 0.1
+
+
+def test_near_the_beam_colour_length_and_scale_are_one():
+    near = fit(rings(seed=2, most=0.3 * MFP))
+    judged = told(near)
+    assert not judged.told
+    assert judged.trades
+    assert abs(judged.correlation) > 0.99
+    assert any(one.is_open for one in judged.intervals)
+    assert set(judged.loose) == {"mu_s'", "mu_a", "scale"}
+    whole = told(fit(rings(seed=2), scale=1.0))
+    assert whole.told
+    assert whole.loose == {}
+
+
+def test_intervals_are_where_chi_square_rises(plain):
+    """Where the problem is nearly linear the profile likelihood has the width of the covariance."""
+    for one in told(plain).intervals:
+        half = 1.96 * plain.errors(plain.statistical)[one.name]
+        assert (one.high - one.low) / 2 == pytest.approx(half, rel=0.05)
+        assert one.low < plain.values[one.name] < one.high
+
+
+def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled):
+    advice = advised(unscaled)
+    found = {one.kind: one for one in advice.candidates}
+    assert set(found) == {"point", "reflectance", "scale", "repeats"}
+    assert advice.now == max(relative_errors(unscaled, unscaled.statistical).values())
+    best = advice.candidates[0]
+    assert best.kind == "reflectance"
+    assert best.worst[1] < advice.now / 4
+
+    taken = fitted(unscaled.data, replace(unscaled.question, total=Known(TOTAL, best.error)), SOURCE)
+    real = relative_errors(taken, taken.statistical)
+    assert real == pytest.approx(best.relative, rel=0.02)
+
+    point = found["point"]
+    value = light(np.array([point.inner]), np.array([point.outer]), 3.0)[0]
+    assert value == pytest.approx(point.value, rel=1e-5)
+    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.question, SOURCE)
+    assert relative_errors(with_point, with_point.statistical) == pytest.approx(point.relative, rel=0.02)
+    assert max(point.relative.values()) > max(real.values())
+    four = fit(rings(error=0.01, scale=3.0))
+    assert relative_errors(four, four.statistical) == pytest.approx(found["repeats"].relative, rel=0.02)
+
+
+def test_what_is_known_of_a_law():
+    assert SOURCE is not None
+    assert SOURCE.path.name == "hazard.json"
+    assert 0.001 < relative_error(LAW, 0.9, SOURCE) < 0.004
+    refracting = catalogue.load("hazard", setting=Setting(n=1.4))
+    there = origin("hazard", "regenerated", refracting.setting, catalogue.fits_folder())
+    assert 0.005 < relative_error(refracting, 0.9, there) < 0.02
+    dipole = catalogue.load("better_dipole", setting=Setting(n=1.4))
+    assert origin("better_dipole", "regenerated", dipole.setting, catalogue.fits_folder()) is None
+    assert relative_error(dipole, 0.9, None) is None

@@ -1,0 +1,74 @@
+"""The model against the law itself, its derivatives against differences, and rings against a quadrature."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting
+from profilefit import catalogue
+from profilefit.errors import InputError
+from profilefit.measured import derived
+from profilefit.measured.model import BLOCK, Model, alpha_of, u_of
+from profilefit.measured.question import held_albedo
+
+LAW = catalogue.load("hazard")
+POINT = np.array([u_of(0.9), np.log(1.3), np.log(0.7)])
+R = np.geomspace(0.05, 9.0, BLOCK + 3)  # more than one block
+
+
+def test_points_are_the_laws_own():
+    light, _ = Model(LAW, False).linearised(POINT, R, R)
+    np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
+    assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
+
+
+def test_derivatives_and_flocks_agree_with_single_evaluations():
+    model, step = Model(LAW, False), 1e-5
+    light, slopes = model.linearised(POINT, R, R)
+    ways = np.concatenate([POINT + step * np.eye(3), POINT - step * np.eye(3)])
+    moved = model.predicted(ways, R, R)
+    # Central differences: their own error is step^2 times a third derivative, and rounding over the step.
+    np.testing.assert_allclose((moved[:3] - moved[3:]).T / (2 * step), slopes, rtol=1e-7, atol=1e-9 * light.max())
+    many = np.repeat(POINT[None], 70, axis=0)
+    np.testing.assert_allclose(model.predicted(many, R, R), np.repeat(light[None], 70, axis=0), rtol=1e-12)
+
+
+def test_rings_are_averages():
+    inner, outer = np.array([0.0, 0.5, 3.0]), np.array([0.3, 0.6, 5.0])
+    found = Model(LAW, True).predicted(POINT[None], inner, outer)[0, :-1]
+    nodes, weights = np.polynomial.legendre.leggauss(200)
+    r = 0.5 * (outer + inner)[:, None] + 0.5 * (outer - inner)[:, None] * nodes
+    integral = np.sum(2 * np.pi * r * 0.7 * LAW.profile(r, 0.9, 1.3) * weights, axis=1) * 0.5 * (outer - inner)
+    np.testing.assert_allclose(found, integral / (np.pi * (outer**2 - inner**2)), rtol=1e-5)  # r ln r at the source
+
+
+@pytest.mark.parametrize("alpha", [1e-6, 0.3, 0.9, 1 - 1e-9])
+def test_alpha_keeps_its_digits(alpha):
+    assert alpha_of(u_of(alpha)) == pytest.approx(alpha, rel=1e-12)
+    s = 1.0 / (1.0 + np.exp(-u_of(alpha)))
+    assert s == pytest.approx(np.sqrt(1 - alpha), rel=1e-9)
+
+
+def test_quantities_and_their_slopes():
+    found = derived.quantities(POINT[None], np.array([0.4]))
+    assert {name: float(value[0]) for name, value in found.items()} == pytest.approx(
+        {"A": 0.4, "alpha": 0.9, "l": 1.3, "mu_s'": 0.9 / 1.3, "mu_a": 0.1 / 1.3, "scale": 0.7}
+    )
+    step, slopes = 1e-6, derived.slopes(POINT, np.zeros(3))
+    for at in range(3):
+        ends = np.stack([POINT + step * np.eye(3)[at], POINT - step * np.eye(3)[at]])
+        two = derived.quantities(ends, np.zeros(2))
+        for name in ("alpha", "l", "mu_s'", "mu_a", "scale"):
+            assert (two[name][0] - two[name][1]) / (2 * step) == pytest.approx(slopes[name][at], abs=1e-8)
+    names = ("alpha", "mu_a")
+    np.testing.assert_allclose(derived.correlation(slopes, np.diag([1.0, 0, 0]), names), [[1, -1], [-1, 1]])
+    assert derived.unit_of("mu_a", "mm") == "1/mm"
+    assert derived.unit_of("l", "") == "unit of r"
+
+
+def test_a_held_reflectance_is_an_albedo():
+    assert held_albedo(LAW, "A", LAW.albedo.reflectance(0.8)) == pytest.approx(0.8, abs=1e-10)
+    refracting = catalogue.load("hazard", setting=Setting(n=1.4))
+    with pytest.raises(InputError, match=r"--fix A must be a total reflectance in \[.*, 0.97\d+\] of this light"):
+        held_albedo(refracting, "A", 0.99)
+    with pytest.raises(InputError, match=r"--fix alpha must be a single-scattering albedo in \(0, 1\), got 1"):
+        held_albedo(LAW, "alpha", 1.0)

@@ -1,0 +1,134 @@
+"""Errors from three replicates, on data of known variance."""
+
+import numpy as np
+import pytest
+from scipy import stats
+
+from profilefit.measured.chain import likelihood
+from profilefit.measured.misfit import alone, gaussianised, scatter_chance
+from profilefit.measured.replicates import steadied, trend_freedom, widening
+
+ROWS, COUNT = 40, 3
+
+
+def draws(spread, sets=400, seed=0):
+    """(sets, rows, replicates) of light that falls over four decades, with 5 % gain noise scattered between rows."""
+    generator = np.random.default_rng(seed)
+    mean = np.geomspace(1.0, 1e-4, ROWS)
+    sigma = 0.05 * mean * np.exp(spread * generator.standard_normal((sets, ROWS)))
+    return mean, sigma, mean[:, None] + sigma[..., None] * generator.standard_normal((sets, ROWS, COUNT))
+
+
+def held(rows, count, spread, sets, widened=True, seed=0):
+    """How many of `sets` intervals of 95 % hold each of two coordinates, of a line through rows of known truth."""
+    generator, light = np.random.default_rng(seed), np.geomspace(1.0, 1e-2, rows)
+    line = light[:, None] * np.stack([np.ones(rows), np.linspace(-1, 1, rows)], axis=1)
+    inside = np.zeros(2, int)
+    for _ in range(sets):
+        sigma = 0.02 * light * np.exp(spread * generator.standard_normal(rows))
+        found = steadied(light[:, None] + sigma[:, None] * generator.standard_normal((rows, count)))
+        gain = np.linalg.pinv(line / found.sigma[:, None])
+        error = np.sqrt(np.sum(gain**2, axis=1) * (widening(found.freedom, 2) if widened else 1.0))
+        times = stats.t.ppf(0.975, found.pooled if widened else np.inf)
+        inside += np.abs(gain @ ((found.value - light) / found.sigma)) < times * error
+    return inside
+
+
+def band(sets, coordinates=2):
+    """Counts that intervals of exactly 95 % exceed on either side with a chance of 1e-3, all coordinates at once."""
+    tail = (1 - (1 - 1e-3) ** (1 / coordinates)) / 2
+    return stats.binom.ppf([tail, 1 - tail], sets, 0.95)
+
+
+@pytest.mark.parametrize("spread", [0.0, 1.0])
+def test_intervals_from_three_replicates_cover(spread):
+    low, high = band(300)
+    counts = held(24, 3, spread, 300)
+    assert np.all((low <= counts) & (counts <= high))
+
+
+def test_intervals_whose_errors_are_taken_for_known_do_not():
+    """Negative control: what the same rows make without Meier's factor and Student's quantile."""
+    assert np.all(held(24, 3, 1.0, 300, widened=False) < band(300)[0])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("spread", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize("count", [3, 5, 10])
+@pytest.mark.parametrize("rows", [8, 16, 40])
+def test_intervals_cover_for_few_and_many(rows, count, spread):
+    """1500 sets each: never below 93 %, and above 97.5 % only where ten uneven ones know their own scatter."""
+    share = held(rows, count, spread, 1500) / 1500
+    assert np.all(share > 0.925)
+    assert np.all(share < (0.99 if count == 10 and spread else 0.98))
+
+
+def test_the_freedom_of_a_trend_is_what_it_rests_on():
+    """Of three replicates .61 (k - 1) (rows - 2), and many normal variances really scatter so."""
+    assert trend_freedom(24, 2.0) == pytest.approx(0.61 * 2 * 22, rel=0.01)
+    levels = np.log(np.random.default_rng(2).chisquare(2.0, (4000, 22))).mean(axis=1)
+    # The standard error of a variance from 4000 is 2.2 %, three of these.
+    assert 2 / np.var(levels) == pytest.approx(trend_freedom(24, 2.0), rel=0.07)
+    found = steadied(draws(0.0, sets=1)[2][0])
+    assert found.pooled == trend_freedom(ROWS, 2.0)
+    assert found.freedom.max() <= found.pooled + 2
+    assert widening(np.full(9, np.inf), 3) == 1.0
+
+
+def test_a_likelihood_of_an_estimated_scale_is_students():
+    x = np.linspace(0, 6, 7)
+    expected = stats.t.logpdf(x, 5.0) - stats.t.logpdf(0.0, 5.0)
+    np.testing.assert_allclose(likelihood(x**2, 1, 5.0), expected, atol=1e-12)
+    np.testing.assert_allclose(likelihood(x**2, 2, np.inf), -0.5 * x**2)
+
+
+@pytest.mark.parametrize("spread", [0.0, 0.5])
+def test_chi_square_has_its_chance(spread):
+    """Of true means over steadied errors, 400 sums over 40 rows: one in twenty has a chance below 5 %."""
+    mean, _, samples = draws(spread)
+    below, too_sure = 0, 0
+    for one in samples:
+        found = steadied(one)
+        residuals = gaussianised((found.value - mean) / found.sigma, alone(found.freedom, found.pooled))
+        below += scatter_chance(residuals @ residuals, ROWS, found.pooled) < 0.05
+        too_sure += scatter_chance(residuals @ residuals, ROWS, np.inf) < 0.05
+    low, high = stats.binom.ppf([5e-4, 1 - 5e-4], len(samples), 0.05)
+    assert low / 4 <= below <= high  # the trend's freedom counts for all rows, also where they go their own ways
+    assert too_sure > high, "negative control: chi-square with an estimated scale"
+
+
+def test_students_tails_are_normal_ones_of_equal_chance_however_far_out():
+    normal = gaussianised(np.array([-3.0, 2.0, 1e3]), np.array([2.0, 3.0, 4.0]))
+    chance = stats.t.sf([3.0, 2.0, 1e3], [2.0, 3.0, 4.0])
+    np.testing.assert_allclose(normal, [-1, 1, 1] * stats.norm.isf(chance), rtol=1e-9)
+    hopeless = np.array([-50.0, 1e4])
+    np.testing.assert_array_equal(gaussianised(hopeless, np.array([1e6, np.inf])), hopeless)
+
+
+def test_raw_scatter_of_three_is_no_error():
+    """Negative control: taken for normal, each row's own scatter makes chi-square diverge."""
+    mean, _, samples = draws(0.0)
+    value, error = samples.mean(axis=2), samples.std(axis=2, ddof=1) / np.sqrt(COUNT)
+    sums = np.sum(((value - mean) / error) ** 2, axis=1)
+    assert np.mean(sums > stats.chi2.ppf(0.95, ROWS)) > 0.9
+
+
+def test_equal_variances_are_pooled_and_unequal_ones_are_not():
+    freedom = {}
+    for spread in (0.0, 1.5):
+        _, sigma, samples = draws(spread, sets=50)
+        found = [steadied(one) for one in samples]
+        freedom[spread] = np.median([one.freedom.max() for one in found])
+        if spread == 0.0:
+            ratio = np.stack([one.sigma for one in found]) * np.sqrt(COUNT) / sigma
+            # Pooled over 40 rows an error is known to 8 %, its own scatter alone would leave 50 %.
+            assert np.sqrt(np.mean((ratio - 1) ** 2)) < 0.25
+    assert freedom[0.0] > 20
+    assert freedom[1.5] < 5
+
+
+def test_rows_that_never_differ_keep_their_own():
+    found = steadied(np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [3.0, 3.0, 3.1]]))
+    np.testing.assert_allclose(found.value, [1, 2, 3.0333333])
+    assert found.sigma[0] == 0
+    np.testing.assert_array_equal(found.freedom, 2)

@@ -1,0 +1,81 @@
+"""Simulated profiles: what is left out, what is merged, which errors they get."""
+
+import dataclasses
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mcml_sim import read_mco
+from profilefit.errors import InputError
+from profilefit.measured.reading import read
+from profilefit.measured.simulated import FEWEST_PHOTONS, NARROWEST, merged
+
+DATA = Path(__file__).parent / "data"
+
+
+def test_rings_are_merged_until_each_holds_enough_photons():
+    edges, photons = np.arange(9.0), np.array([500, 400, 60, 60, 0, 99, 2, 0])
+    np.testing.assert_array_equal(merged(edges, photons), [0, 1, 2, 4])
+    np.testing.assert_array_equal(merged(edges, np.zeros(8)), [])
+    fine = np.linspace(0, 1, 1001)
+    starts = merged(fine, np.full(1000, 1e6))
+    outer = np.append(fine[starts[1:]], 1.0)
+    assert np.all(outer - fine[starts] > 0.999 * NARROWEST * outer)
+    assert starts.size < 200
+
+
+def test_an_mco_has_bounds_for_errors_and_no_last_ring():
+    found, raw = read(DATA / "half_space.mco"), read_mco(DATA / "half_space.mco")
+    assert (found.unit, found.counted, found.bounded, found.rings) == ("cm", True, True, True)
+    assert found.outer[-1] == pytest.approx(raw.run.grid.r_edges[-2])
+    areas = np.pi * (found.outer**2 - found.inner**2)
+    energy = (raw.reflectance_r * raw.run.grid.r_areas)[:-1].sum()
+    assert np.sum(found.value * areas) == pytest.approx(energy), "no light is lost where rings are merged"
+    counts = found.value * areas * raw.run.photons
+    assert counts.min() > FEWEST_PHOTONS
+    photons = raw.run.photons
+    assert found.photons == photons
+    np.testing.assert_allclose((found.sigma / found.value) ** 2, 1 / counts - 1 / (photons - 1))
+    assert found.notes[0] == "the last of 120 rings, which holds the light beyond, is left out"
+    assert "119 rings merged into" in found.notes[1]
+
+
+def test_an_npz_has_its_own_errors_and_keeps_every_ring():
+    """The same run as the .mco."""
+    exact, bound = read(DATA / "half_space.npz"), read(DATA / "half_space.mco")
+    assert (exact.counted, exact.bounded) == (True, False)
+    assert exact.outer[-1] == pytest.approx(1.2)
+    assert exact.medium is not None
+    assert exact.medium.layers[0].mu_s == 9.0
+    assert exact.photons == bound.photons
+    same = slice(0, 30)  # not merged yet
+    np.testing.assert_allclose(exact.value[same], bound.value[same], rtol=1e-4)
+    assert np.all(exact.sigma[same] < bound.sigma[same]), "a bound is one"
+    assert exact.inner.size < 120, "the empty tail belongs to the last ring"
+    with pytest.raises(InputError, match=r"--unit must be cm or left out for .npz, whose lengths are in cm, got 'mm'"):
+        read(DATA / "half_space.npz", unit="mm")
+
+
+def test_files_with_too_little_light(tmp_path):
+    text = (DATA / "half_space.mco").read_text()
+    (tmp_path / "few.mco").write_text(text.replace("2097152 \t", "50 \t"))
+    with pytest.raises(InputError, match=r"few.mco: expected light in at least 3 rings .*, got \d\d in"):
+        read(tmp_path / "few.mco")
+    (tmp_path / "bad.npz").write_bytes(b"PK")
+    with pytest.raises(InputError, match=r"bad.npz: expected results of mcml_sim, got: not a whole .npz file"):
+        read(tmp_path / "bad.npz")
+
+
+def test_rows_can_be_chosen_and_added():
+    data = read(DATA / "phantom.csv")
+    near = data.within(None, 1.0)
+    assert near.r.max() <= 1.0
+    assert near.notes == ("12 of 20 rows left out, by --r-min and --r-max",)
+    assert data.within(0.1, 100.0) is data
+    more = near.with_row(0.5, 0.5, 7.0, 0.1)
+    np.testing.assert_array_equal(np.diff(more.inner) > 0, True)
+    assert more.value[more.inner == 0.5] == 7.0
+    with pytest.raises(InputError, match=r"no row is left between --r-min and --r-max: r goes from 0.2 to 12"):
+        data.within(20.0, None)
+    assert dataclasses.replace(data, unit="m").relative_error == pytest.approx(0.02, rel=0.1)
