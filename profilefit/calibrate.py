@@ -5,6 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jax
+
 from mcml_sim import Orders
 from profilefit import record, starts
 from profilefit.pipelines import PIPELINES, needs_photons
@@ -25,6 +27,8 @@ def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
         light = lights[recipe.setting] if needs_photons(recipe) else None
         content, arrays = PIPELINES[recipe.pipeline](recipe, run, light)
         written.append(record.write(run.out, recipe.name, {**_header(recipe, run, light), **content}, arrays))
+        # Every law compiles its own fit, and what two dozen leave in memory is more than Linux maps for a process.
+        jax.clear_caches()
     return written
 
 

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit import record
+from profilefit import derived, record
+from profilefit.discrepancy import discrepancy
+from profilefit.discretisation import discretisation_error
 from profilefit.estimate import Fit
 from profilefit.posterior import LEVELS, Posterior, posterior
 from profilefit.profiles import Profiles
@@ -21,9 +23,13 @@ def described(
 ) -> tuple[dict[str, Any], Arrays]:
     """The part of a record that every fit has, and the samples beside it; `printed` are published constants."""
     chains = _chains(result, seed, max_chain)
+    off, width = discrepancy(result, profiles), discretisation_error(result)
+    errors = {"model_error": np.sqrt(np.diag(off.covariance)), "discretisation_error": width}
+    covariances = {"statistical": result.statistical, "discrepancy": result.discrepancy, "model": off.covariance}
     content = {
-        "constants": _constants(result, printed, chains),
-        "covariance": {"names": result.free, "statistical": result.statistical, "discrepancy": result.discrepancy},
+        "constants": _constants(result, printed, chains, errors),
+        "covariance": {"names": result.free, **covariances},
+        "discrepancy": off.content(),
         "fit": {
             "result": result.result,
             "steps": result.solution.steps,
@@ -33,10 +39,14 @@ def described(
         "posterior": {c.kind: _chain_facts(c) for c in chains},
         "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
     }
+    if result.solution.converged:
+        content["derived"] = derived.summary(derived.Known.of_fit(result, off), profiles)
     if profiles.covariance is not None:
         content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
         content["left_out"] = _left_out(profiles, result)
-    return content, {f"samples_{c.kind}": c.samples.astype(np.float32) for c in chains}
+    samples = {f"samples_{c.kind}": c.samples.astype(np.float32) for c in chains}
+    samples |= {f"log_density_{c.kind}": c.log_density.astype(np.float32) for c in chains}
+    return content, samples | off.arrays()
 
 
 def curves(profiles: Profiles) -> Arrays:
@@ -55,7 +65,9 @@ def errors_by_name(names: tuple[str, ...], covariance: Floats | None) -> dict[st
     return {} if covariance is None else dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
-def _constants(result: Fit, printed: dict[str, float], chains: list[Posterior]) -> dict[str, dict[str, Any]]:
+def _constants(
+    result: Fit, printed: dict[str, float], chains: list[Posterior], errors: dict[str, Floats]
+) -> dict[str, dict[str, Any]]:
     fitted = result.law.constants()
     constants: dict[str, dict[str, Any]] = {
         name: {"published": printed.get(name), "regenerated": fitted[name], "free": name in result.free}
@@ -66,6 +78,7 @@ def _constants(result: Fit, printed: dict[str, float], chains: list[Posterior]) 
             "statistical_error": None if result.statistical is None else float(np.sqrt(result.statistical[i, i])),
             "discrepancy_error": float(np.sqrt(result.discrepancy[i, i])),
             "jackknife_error": float(result.jackknife[i]),
+            **{name: float(error[i]) for name, error in errors.items()},
             "intervals": {c.kind: {f"{level:.0%}": c.interval(level)[i] for level in LEVELS} for c in chains},
         }
     return constants

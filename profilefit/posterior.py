@@ -13,7 +13,9 @@ misfit that is blind to a constant leaves it to the prior, and the interval then
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import emcee
 import equinox as eqx
@@ -31,6 +33,12 @@ LENGTHS = 50
 PRIOR_WIDTH = 10.0
 LEVELS = (0.68, 0.95)
 KEPT = 1000
+Moves = Sequence[tuple[emcee.moves.Move, float]]
+
+
+def default_moves() -> Moves:
+    """Differential evolution with snooker steps: the fewest evaluations an independent draw (`benchmarks.moves`)."""
+    return (emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)
 
 
 @dataclass(frozen=True)
@@ -38,15 +46,19 @@ class Posterior:
     """Chains of one fit's constants.
 
     names       (p,) of the constants; kind "statistical" or "discrepancy"
-    samples     (k, p) thinned draws after burn-in
+    law         its name, and objective what it was fitted by
+    samples     (k, p) thinned draws after burn-in, all walkers of a step together; log_density (k,) of the target there
     tau         the longest integrated autocorrelation time of any constant [steps]
     acceptance  mean share of accepted proposals; walkers, steps of the chain
     result      "converged" or what is missing
     """
 
     kind: str
+    law: str
+    objective: str
     names: tuple[str, ...]
     samples: Floats
+    log_density: Floats
     tau: float
     acceptance: float
     walkers: int
@@ -61,10 +73,31 @@ class Posterior:
     def standard_deviation(self) -> Floats:
         return self.samples.std(axis=0, ddof=1)
 
+    def to_arviz(self) -> Any:
+        """The draws as ArviZ has them: an xarray.DataTree, a walker a chain, with the log density as `lp`.
 
-def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int = 20_000) -> Posterior:
+        Walkers of one ensemble learn from each other, so ArviZ's comparison of chains flatters them: `tau` does not.
+        Needs the package arviz-base; InputError without it.
+        """
+        try:
+            from arviz_base import from_dict
+        except ImportError:
+            raise InputError("to_arviz needs the package arviz-base: pip install 'profilefit[arviz]'") from None
+        shape = (-1, self.walkers)
+        draws = {name: column.reshape(shape).T for name, column in zip(self.names, self.samples.T, strict=True)}
+        groups = {"posterior": draws, "sample_stats": {"lp": self.log_density.reshape(shape).T}}
+        facts = ("law", "objective", "kind", "tau", "acceptance", "steps", "result")
+        told = {name: getattr(self, name) for name in facts}
+        named = {"/": {"inference_library": "emcee", **told}}
+        return from_dict(groups, attrs=named, check_conventions=False)  # it warns of more chains than draws
+
+
+def posterior(
+    fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int = 20_000, moves: Moves | None = None
+) -> Posterior:
     """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "discrepancy" (the law's misfit).
 
+    moves  emcee's, with their weights; by default those of `default_moves`
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
     if kind not in ("statistical", "discrepancy"):
@@ -79,7 +112,7 @@ def posterior(fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int
             "the truth of this fit has no photon noise: only kind='discrepancy' applies, got 'statistical'"
         )
     density = _Density.of(fit, kind, covariance)
-    return _walk(density, covariance, fit, kind, seed, max_steps)
+    return _walk(density, covariance, fit, kind, seed, max_steps, moves or default_moves())
 
 
 class _Density(eqx.Module):
@@ -136,7 +169,7 @@ def _curvature_adjustment(hessian: Floats, covariance: Floats) -> tuple[Floats, 
     return scale[:, None] * adjust / size / scale[None, :], float(size**-2)
 
 
-def _walk(density, covariance, fit, kind, seed, max_steps) -> Posterior:
+def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
     size = fit.solution.parameters.size
     walkers = max(4 * size, 32)
     generator = np.random.default_rng(seed)
@@ -150,20 +183,19 @@ def _walk(density, covariance, fit, kind, seed, max_steps) -> Posterior:
     for _ in range(20):  # a walker that starts where the density is zero moves halfway to the optimum
         outside = ~np.isfinite(log_probability(start))
         start[outside] = 0.5 * (start[outside] + fit.solution.parameters)
-    # Differential evolution with snooker steps mixes these elongated posteriors three times faster than stretches.
-    moves = [(emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)]
-    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True, moves=moves)
+    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True, moves=list(moves))
     sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()
     tau, steps = _run(sampler, start, max_steps)
     long_enough = np.isfinite(tau) and steps >= LENGTHS * tau
     burn = int(min(steps // 2, 5 * tau if np.isfinite(tau) else steps // 2))
-    samples = sampler.get_chain(discard=burn, flat=True)
-    keep = np.linspace(0, len(samples) - 1, min(KEPT, len(samples))).astype(int)
+    keep = np.linspace(burn, steps - 1, max(min(KEPT // walkers, steps - burn), 1)).astype(int)
+    samples, density_there = sampler.get_chain()[keep].reshape(-1, size), sampler.get_log_prob()[keep].ravel()
     result = (
         "converged" if long_enough else f"chain of {steps} steps is under {LENGTHS} autocorrelation times ({tau:.0f})"
     )
     acceptance = float(np.mean(sampler.acceptance_fraction))
-    return Posterior(kind, fit.free, samples[keep], float(tau), acceptance, walkers, steps, result)
+    of = type(fit.law).__name__, fit.objective
+    return Posterior(kind, *of, fit.free, samples, density_there, float(tau), acceptance, walkers, steps, result)
 
 
 def _run(sampler, start, max_steps) -> tuple[float, int]:

@@ -80,6 +80,23 @@ STAGED: Kinds = {
 }
 # What a recipe may ask for besides; checked where it is there.
 OPTIONAL: Mapping[str, Kinds] = {
+    "derived": {
+        "derived": dict,
+        "derived.quantity": str,
+        "derived.alpha": list,
+        "derived.value": list,
+        "derived.statistical": list,
+        "derived.model": list,
+    },
+    "discrepancy": {
+        "discrepancy": dict,
+        "discrepancy.amplitude": MEASURE,
+        "discrepancy.amplitude_error": MEASURE,
+        "discrepancy.length_r": MEASURE,
+        "discrepancy.length_s": MEASURE,
+        "discrepancy.rms": MEASURE,
+        "discrepancy.result": str,
+    },
     "crosscheck": {
         "crosscheck": dict,
         "crosscheck.constants": dict,

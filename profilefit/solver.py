@@ -25,6 +25,8 @@ MAX_STEPS = 200
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
 STALLED, NO_MISFIT = 0.03, 1e-8
+# Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
+ORTHOGONAL = 1e-7
 # A dozen constants against thousands of residuals: ten times as fast as QR. It squares the condition number, which is
 # harmless up to the 1e7 at which a fit counts as degenerate, since the damping of each step bounds it.
 LINEAR_SOLVER = lx.Normal(lx.Cholesky())
@@ -76,10 +78,10 @@ def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> t
         begin = jnp.asarray(starts, jnp.float64)
         arrays = jax.tree.map(lambda leaf: jnp.asarray(leaf), data)
         found, steps, codes = _levenberg_marquardt(residual, begin, arrays)
-        values, jacobians = _linearise(residual, found, arrays)
+        ended = (found, *_linearise(residual, found, arrays), steps, codes)
     return tuple(
-        Solution(np.asarray(p), np.asarray(v), np.asarray(j), int(n), _explain(int(c), p, np.asarray(v), np.asarray(j)))
-        for p, v, j, n, c in zip(found, values, jacobians, steps, codes, strict=True)
+        Solution(p, v, j, int(n), _explain(int(c), p, v, j))
+        for p, v, j, n, c in zip(*map(np.asarray, ended), strict=True)  # rows of a jax array cost a dispatch each
     )
 
 
@@ -105,10 +107,10 @@ def _linearise(residual, parameters, data):
     return jax.vmap(residual)(parameters, data), jax.vmap(jax.jacfwd(residual))(parameters, data)
 
 
-def _explain(code: int, parameters: jax.Array, values: Floats, jacobian: Floats) -> str:
+def _explain(code: int, parameters: Floats, values: Floats, jacobian: Floats) -> str:
     if not np.all(np.isfinite(parameters)) or not np.all(np.isfinite(values)):
         return "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
-    if code:
+    if code and _steepness(values, jacobian) > ORTHOGONAL:
         return f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
     if _steepness(values, jacobian) > STALLED:
         return "stalled beside an optimum, at the edge of where the law is defined: start elsewhere"

@@ -7,6 +7,7 @@ import json
 import math
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -78,6 +79,7 @@ def fit(
     measured = read(data, unit, scale == FREE)
     measured = measured.within(_radius("--r-min", r_min, measured), _radius("--r-max", r_max, measured))
     setting = _setting(measured, light, n)
+    measured = _noted(measured, setting)
     chosen = _law(law, constants, setting, folder)
     question = _question(chosen, measured, fix or [], scale, total)
     if out is not None:
@@ -119,8 +121,22 @@ def _setting(measured: Measured, light: str, n: float | None) -> Setting:
         raise InputError(
             f"--light must be {ILLUMINATIONS[0]} for {measured.source}, which was simulated so, got {light!r}"
         )
-    own = 1.0 if medium is None else medium.layers[0].n / medium.n_above
-    return Setting(light, own if n is None else n)
+    own = _own_index(measured)
+    return Setting(light, n if n is not None else 1.0 if own is None else own)
+
+
+def _noted(measured: Measured, setting: Setting) -> Measured:
+    """The data, with a note where a simulation's surface is not the one that is fitted."""
+    own = _own_index(measured)
+    if own is None or math.isclose(own, setting.n):
+        return measured
+    return replace(measured, notes=(*measured.notes, f"the file's n is {own:g}, fitted as n = {setting.n:g}"))
+
+
+def _own_index(measured: Measured) -> float | None:
+    """Refractive index of a simulated medium over that above it; None of what was measured."""
+    medium = measured.medium
+    return None if medium is None else medium.layers[0].n / medium.n_above
 
 
 def _law(name: str, constants: str, setting: Setting, folder: Path) -> ProfileLaw:

@@ -82,7 +82,7 @@ def _others(found: Found) -> list[Candidate]:
     scale = found.values["scale"]
     four = {name: one / np.sqrt(REPEATS) for name, one in relative_errors(found, found.statistical).items()}
     out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
-    if found.question.total is None:
+    if found.question.total is None and found.data.medium is None:  # a simulation has told it already
         error = CALIBRATED * reflectance
         out.append(_candidate(found, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
     if SCALE in found.question.free and found.question.scale is None:

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from profilefit.measured.model import LENGTH, SCALE, U, alpha_of
 
@@ -18,7 +19,7 @@ STRENGTHS = ("mu_s'", "mu_a", "scale")
 
 def quantities(points: Floats, reflectance: Floats) -> dict[str, Floats]:
     """Each quantity (m,) at points (m, 3) whose total reflectances A are (m,)."""
-    s = 1.0 / (1.0 + np.exp(-points[:, U]))
+    s = expit(points[:, U])
     alpha, length = alpha_of(points[:, U]), np.exp(points[:, LENGTH])
     values = (reflectance, alpha, length, alpha / length, s**2 / length, np.exp(points[:, SCALE]))
     return dict(zip(QUANTITIES, values, strict=True))

@@ -12,6 +12,7 @@ from scipy import stats
 from profilefit.errors import InputError
 from profilefit.measured import derived, law_error
 from profilefit.measured.data import Measured
+from profilefit.measured.limits import require_workable
 from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import noise
@@ -22,6 +23,8 @@ from profilefit.measured.solving import Minimum, Problem, descended, minimised
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
+# A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
+LEAST_EXPECTED = 0.01
 LEVEL = 0.95  # of every interval
 
 
@@ -83,7 +86,8 @@ class Found:
     def gain(self) -> Floats:
         """(3, m) how the coordinates follow errors of the rows, in standard errors."""
         full = np.zeros((3, self.minimum.residuals.size))
-        full[list(self.question.free)] = np.linalg.pinv(self.jacobian)
+        if np.all(np.isfinite(self.jacobian)):  # else the fit has failed, and nothing is told of errors
+            full[list(self.question.free)] = np.linalg.pinv(self.jacobian)
         return full
 
     @property
@@ -156,17 +160,21 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
 
     source  the record that the law's constants came from, which knows how far it is from the truth
-    InputError if there are not more rows than free coordinates.
+    InputError if there are not more rows than free coordinates, or if the data are beyond `limits`.
     """
     free = len(question.free)
     if data.value.size <= free:
         raise InputError(f"{data.source}: expected more than {free} rows, one more than is free, got {data.value.size}")
+    require_workable(data)
     wider = widening(data.freedom, free)
     problem = Problem(data, question, noise(data, widening=wider))
     minimum = minimised(problem)
     for _ in range(REWEIGHTED if data.counted else 0):
         light = problem.model.linearised(minimum.point, data.inner, data.outer)[0][:-1]
-        problem = replace(problem, noise=noise(data, light, wider))
+        if not np.all(np.isfinite(light)):
+            break
+        expected = np.maximum(light, LEAST_EXPECTED * data.value)
+        problem = replace(problem, noise=noise(data, expected, wider))
         minimum = descended(problem, minimum.point, question.free)
     alpha = float(alpha_of(minimum.point[0]))
     return Found(problem, minimum, source, law_error.relative_error(question.law, alpha, source), wider)

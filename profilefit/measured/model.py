@@ -19,6 +19,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit
 
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.diffusion import DiffusionLaw
@@ -65,8 +66,7 @@ class Model:
 
 def alpha_of(u) -> Floats:
     """alpha [-] at the coordinate u, to rounding also where it is small."""
-    white, dark = 1.0 / (1.0 + np.exp(np.asarray(u, float))), 1.0 / (1.0 + np.exp(-np.asarray(u, float)))
-    return white * (1.0 + dark)
+    return expit(-np.asarray(u, float)) * (1.0 + expit(np.asarray(u, float)))
 
 
 def u_of(alpha: float) -> float:

@@ -33,6 +33,7 @@ FEWEST_PHOTONS = 100.0
 # Narrower rings, relative to their radius, tell nothing more of a smooth profile.
 NARROWEST = 0.03
 FEWEST_RINGS = 3
+ALL_LIGHT = 1.0 + 1e-3  # files are rounded
 
 
 def read_mco_profile(path: Path) -> Measured:
@@ -83,6 +84,8 @@ def _counted(
                 variance of E; seen the photons that it rests on
     photons     N, of the whole run
     """
+    if not (np.all(energy >= 0) and energy.sum() <= ALL_LIGHT):
+        raise InputError(f"{path}: expected rings of no less than 0 and, in all, no more than 1 of the light")
     starts = merged(edges, seen)
     if starts.size < FEWEST_RINGS:
         raise InputError(

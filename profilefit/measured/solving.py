@@ -29,10 +29,13 @@ MAX_STEPS = 200
 ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
 LENGTHS, SHORTEST, LONGEST = 20, 1 / 20, 2.0
 STARTS = 4  # the best of them, no two neighbours, that are followed to their minimum
-# How far the coordinates may go: beyond, laws have reached their limits. ln l and ln k: from what the search saw.
+# How far the coordinates may go: beyond, laws have reached their limits. ln l: from the range of the search; ln k: from
+# where it starts, as far as l may go.
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
+EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has run there
 WHITE, BLACK = -9.0, 6.0  # u beyond which alpha is 1 or 0 for all that data can say
 AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with --fix alpha=..."
+NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
 AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use --fix alpha=..."
 
 
@@ -64,19 +67,32 @@ class Problem:
     def costs(self, points: Floats) -> Floats:
         """Sums of squared residuals (m,) at points (m, 3)."""
         light = self.model.predicted(points, self.data.inner, self.data.outer)
-        cost = np.sum(self.noise.whitened((light[:, :-1] - self.data.value).T) ** 2, axis=0)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no start
+            cost = np.sum(self.noise.whitened((light[:, :-1] - self.data.value).T) ** 2, axis=0)
         if (total := self.question.total) is not None:
             cost += ((light[:, -1] - total.value) / total.error) ** 2
         if (known := self.question.scale) is not None:
             cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
         return cost
 
+    @property
+    def lengths(self) -> tuple[float, float]:
+        """The range of ln l where the search begins."""
+        return float(np.log(self.data.r[0] * SHORTEST)), float(np.log(self.data.r[-1] * LONGEST))
+
+    def bounds(self, start: Floats) -> tuple[Floats, Floats]:
+        """The lowest and highest (3,) coordinates of a descent from `start` (3,)."""
+        shortest, longest = self.lengths
+        far = FARTHEST_LN + longest - shortest
+        low = np.array([-FARTHEST_U, shortest - FARTHEST_LN, start[SCALE] - far])
+        return low, np.array([FARTHEST_U, longest + FARTHEST_LN, start[SCALE] + far])
+
     @cached_property
     def starts(self) -> Floats:
         """(k, 3) the best points of a coarse search, no two neighbours."""
-        held, r = self.question.base, self.data.r
+        held = self.question.base
         u = [held[U]] if U not in self.question.free else [u_of(alpha) for alpha in ALBEDOS]
-        lengths = np.linspace(np.log(r[0] * SHORTEST), np.log(r[-1] * LONGEST), LENGTHS)
+        lengths = np.linspace(*self.lengths, LENGTHS)
         ln_l = [held[LENGTH]] if LENGTH not in self.question.free else lengths
         points = np.array([[a, b, held[SCALE]] for a in u for b in ln_l])
         if SCALE in self.question.free:
@@ -110,7 +126,8 @@ class Minimum:
 
     @property
     def cost(self) -> float:
-        return float(self.residuals @ self.residuals)
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(self.residuals @ self.residuals)
 
     @property
     def converged(self) -> bool:
@@ -133,18 +150,27 @@ def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum
     moving, last = list(free), _Last(problem, start, list(free))
     if not moving:
         rows, slopes = problem.residuals(start)
-        return Minimum(start, rows, slopes, 0, CONVERGED)
-    reach = np.array([FARTHEST_U, FARTHEST_LN + LENGTHS, FARTHEST_LN + LENGTHS])[moving]
-    centre = np.where(np.array(moving) == U, 0.0, start[moving])
-    inside = np.clip(start[moving], centre - 0.99 * reach, centre + 0.99 * reach)
+        return Minimum(start, rows, slopes, 0, CONVERGED if _usable(rows, slopes) else NOT_FINITE)
+    low, high = (end[moving] for end in problem.bounds(start))
+    edge = EDGE * (high - low)
+    inside = np.clip(start[moving], low + edge, high - edge)
+    if not np.all(np.isfinite(last.rows(inside))):
+        return Minimum(start, *problem.residuals(start), 0, NOT_FINITE)
     done = least_squares(
-        last.rows, inside, last.slopes, bounds=(centre - reach, centre + reach), x_scale="jac",
+        last.rows, inside, last.slopes, bounds=(low, high), x_scale="jac",
         xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE, max_nfev=MAX_STEPS,
     )  # fmt: skip
     point = start.copy()
     point[moving] = done.x
     rows, slopes = problem.residuals(point)
-    return Minimum(point, rows, slopes, int(done.nfev), _explained(done.status, point, rows, moving, centre, reach))
+    ran = [at for at, x, a, b, e in zip(moving, done.x, low, high, edge, strict=True) if not a + e < x < b - e]
+    return Minimum(point, rows, slopes, int(done.nfev), _explained(done.status, point, slopes[:, moving], ran, free))
+
+
+def _usable(rows: Floats, slopes: Floats) -> bool:
+    """True where sums of squares of residuals and derivatives are floats."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return bool(np.isfinite(np.sum(rows**2) + np.sum(slopes**2)))
 
 
 class _Last:
@@ -165,19 +191,22 @@ class _Last:
         if self._at is None or not np.array_equal(x, self._at):
             self._at = x.copy()
             self._point[self._moving] = x
-            self._found = self._problem.residuals(self._point)
+            rows, slopes = self._problem.residuals(self._point)
+            # The solver steps back from residuals that are not finite, but not from such derivatives.
+            self._found = (rows if _usable(rows, slopes) else np.full(rows.shape, np.nan), slopes)
         return self._found
 
 
-def _explained(status: int, point: Floats, rows: Floats, moving: list[int], centre: Floats, reach: Floats) -> str:
-    if not np.all(np.isfinite(rows)):
-        return "the law is not finite there: leave out the outermost rows, or choose another law"
-    if U in moving and point[U] < WHITE:
-        return AT_WHITE
-    if U in moving and point[U] > BLACK:
-        return AT_BLACK
-    if np.any(np.abs(point[moving] - centre) > 0.999 * reach):
+def _explained(status: int, point: Floats, slopes: Floats, ran: list[int], free: tuple[int, ...]) -> str:
+    """How a descent ended, with the derivatives (m, p) there; `ran` the coordinates at the end of their range."""
+    if LENGTH in ran or SCALE in ran:
         return "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with --fix"
+    if U in free and point[U] < WHITE:
+        return AT_WHITE
+    if U in free and point[U] > BLACK:
+        return AT_BLACK
+    if not np.all(np.any(slopes != 0, axis=0)):
+        return "the law has no light there that changes with what is free: check the unit and what is held"
     if status <= 0:
         return f"no convergence in {MAX_STEPS} steps: hold one of alpha, l and scale, or measure over a wider range"
     return CONVERGED

@@ -7,7 +7,14 @@ from typing import Any
 
 Content = Mapping[str, Any]
 SETS = ("published", "corrected", "regenerated")
-ERRORS = ("statistical_error", "discrepancy_error", "jackknife_error")
+# A constant's errors in a record, and what tables call them; records before this had no second and third.
+ERRORS = {
+    "statistical_error": "photons",
+    "discretisation_error": "dr",
+    "model_error": "model",
+    "discrepancy_error": "misfit",
+    "jackknife_error": "jackknife",
+}
 
 
 def converged(content: Content) -> bool:
@@ -18,6 +25,11 @@ def converged(content: Content) -> bool:
 def largest_error(constant: Content) -> float | None:
     """The largest of a constant's errors, in its own unit; None if it was held."""
     return max((constant[key] for key in ERRORS if constant.get(key) is not None), default=None)
+
+
+def known_errors(constants: Content) -> dict[str, str]:
+    """Those of `ERRORS` that a record's constants, by name, tell of."""
+    return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
 
 
 def measured_sets(content: Content) -> list[str]:

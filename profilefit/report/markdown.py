@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from profilefit.report.content import ERRORS, Content, converged, largest_error, measured_sets, measures
+from profilefit.report.content import ERRORS, Content, converged, known_errors, largest_error, measured_sets, measures
 from profilefit.report.digits import ABSENT, significant, to_error
 from profilefit.report.quality_tables import ALBEDO_MEASURES, MEANING, albedo_number, worst
 from profilefit.reproduction import LENGTH, PUBLISHED
@@ -23,7 +23,9 @@ NAMES |= {"verdict", "law", "light", "sampler"}
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
     """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
-    header = ("record", "equation", "constant", "published", "regenerated", "± photons", "± misfit", "± jackknife")
+    told = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
+    known = {key: word for key, word in ERRORS.items() if key in told}
+    header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
     rows: list[Sequence[str]] = []
     failures = []
     for name, content in _fits(records).items():
@@ -31,9 +33,9 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
             failures.append(f"`{name}` has no constants to show: {content['fit']['result']}.")
             continue
         for constant, values in content["constants"].items():
-            errors = [significant(values.get(key)) for key in ERRORS]
+            errors = [significant(values.get(key)) for key in known]
             if not values.get("free", True):
-                errors = ["held", ABSENT, ABSENT]
+                errors = ["held", *[ABSENT] * (len(known) - 1)]
             published = values.get("published")
             rows.append(
                 (

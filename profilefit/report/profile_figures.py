@@ -10,6 +10,7 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from profilefit import derived
 from profilefit.report.canvas import (
     AS_PUBLISHED,
     BLACK,
@@ -17,6 +18,7 @@ from profilefit.report.canvas import (
     DATA,
     GREY,
     PUBLISHED,
+    TRUTH_BAND,
     WHOLE,
     band_under,
     canvas,
@@ -107,7 +109,11 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
     r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
     for name, one in laws.items():
-        _draw(ax, r, one, lambda law: law.profile(r, alpha) / truth - 1.0, name)
+        band = _truth_band(one, r, alpha)
+        if band is not None:
+            band_under(ax, r, (band[0] / truth - 1.0, band[1] / truth - 1.0), STYLES[name]["color"], TRUTH_BAND)
+        law = one.law if isinstance(one, Fitted) else one
+        ax.plot(r, law.profile(r, alpha) / truth - 1.0, label=LABELS[name], **STYLES[name])
     edges = data.arrays["r_edges"]
     expected = np.diff(exact.cdf(edges, alpha, setting=setting)) * exact.reflectance(alpha, setting=setting)
     energy, error = data.arrays["energy"][row], data.arrays["energy_error"][row]
@@ -120,6 +126,14 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
     ax.axhline(0.0, color=BLACK, linewidth=0.8)
     ax.axvspan(float(outer), r[-1], color=GREY, alpha=0.15, linewidth=0, label="the last 0.5 % of the energy")
     ax.set(xscale="log", xlim=(NEAREST, r[-1]), ylim=(-1.05, 1.05), title=f"α = {alpha:.3f}")
+
+
+def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
+    """Where a fitted law says that the truth is; None where it says nothing, as printed ones and old records don't."""
+    if not isinstance(one, Fitted):
+        return None
+    known = derived.Known.of_record(one.law, one.content, one.arrays)
+    return None if known.off is None else derived.profile(known, r, alpha).interval()
 
 
 def _draw(ax: Axes, r: Floats, one: Any, evaluate: Any, name: str) -> None:

@@ -13,7 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from profilefit.report.columns import column_table
-from profilefit.report.content import ERRORS, Content, converged, largest_error
+from profilefit.report.content import Content, converged, known_errors, largest_error
 from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
 from profilefit.report.evidence_tables import evidence_line, evidence_tables
 from profilefit.report.quality_tables import quality_tables, worst_lines
@@ -22,6 +22,17 @@ from profilefit.starts import SAME_COST
 __all__ = ["constants_table", "record_tables", "summary"]
 
 Line = tuple[str, RenderableType]
+MEANING_OF_ERROR = {
+    "photons": "another run's noise",
+    "dr": "rings of finite width",
+    "model": "what the law cannot follow, were it wrong in another way of the same size and reach",
+    "misfit": "residuals taken for independent noise, which they are not",
+    "jackknife": "what leaving out a sixth of the albedos moves",
+}
+DERIVED = {
+    "radius": ("r [mfp]", "Radius within which 99.5 % of the light leaves"),
+    "reflectance": ("A", "Total reflectance"),
+}
 KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
 
 
@@ -62,7 +73,10 @@ def record_tables(content: Content) -> list[RenderableType]:
     """Everything about one record: where it comes from, constants, the state of fit and chains, quality."""
     if _is_evidence(content):
         return _spaced([_title(content), *evidence_tables(content)])
-    parts = [_title(content), constants_table(content), intervals_table(content), fit_facts(content)]
+    parts = [_title(content), constants_table(content), intervals_table(content)]
+    if "derived" in content:
+        parts.append(derived_table(content["derived"]))
+    parts.append(fit_facts(content))
     if "stages" in content:
         parts += stage_tables(content["stages"])
     parts += quality_tables(content)
@@ -74,23 +88,21 @@ def _spaced(parts: list[RenderableType]) -> list[RenderableType]:
 
 
 def constants_table(content: Content) -> RenderableType:
-    """Name, published and regenerated value, and the three errors, each column on its decimal point."""
+    """Name, published (where there is one) and regenerated value, and the errors, each on its decimal point."""
     constants = content["constants"]
     rows = list(constants.values())
-    columns = {
-        "published": on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")]),
-        "regenerated": on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows]),
-    }
-    for header, key in zip(("± photons", "± misfit", "± jackknife"), ERRORS, strict=True):
-        columns[header] = on_the_point([significant(value) for value in _each(rows, key)])
-    columns["± photons"] = [
-        text if row.get("free", True) else "held" for text, row in zip(columns["± photons"], rows, strict=True)
-    ]
+    columns: dict[str, list[str]] = {}
+    if any(row.get("published") is not None for row in rows):
+        columns["published"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")])
+    columns["regenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
+    known = known_errors(constants)
+    for place, (key, word) in enumerate(known.items()):
+        texts = on_the_point([significant(value) for value in _each(rows, key)])
+        if place == 0:
+            texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
+        columns[f"± {word}"] = texts
     title = "Constants, lengths in units of the mean free path"
-    caption = (
-        "photons: another run's noise; misfit: residuals taken for independent noise; jackknife: what leaving out a "
-        "sixth of the albedos moves, the honest one for a law that is not the truth"
-    )
+    caption = "; ".join(f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values())
     if not converged(content):
         caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
     return column_table(title, {"": list(constants), **columns}, caption)
@@ -112,6 +124,20 @@ def intervals_table(content: Content) -> RenderableType:
     return column_table("Credible intervals (emcee)", cells, left=("", "from"))
 
 
+def derived_table(derived: Content) -> RenderableType:
+    """A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
+    errors = derived["statistical"], derived["model"]
+    both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
+    header, title = DERIVED[derived["quantity"]]
+    columns = {
+        "α": [f"{alpha:g}" for alpha in derived["alpha"]],
+        header: on_the_point([to_error(v, e) for v, e in zip(derived["value"], both, strict=True)]),
+        "± photons": on_the_point([significant(error) for error in errors[0]]),
+        "± model": on_the_point([significant(error) for error in errors[1]]),
+    }
+    return column_table(title, columns, "model: how far the law is from the truth; one standard error each", ("α",))
+
+
 def fit_facts(content: Content) -> RenderableType:
     """What the solver and the chains said."""
     fit = content["fit"]
@@ -127,12 +153,26 @@ def fit_facts(content: Content) -> RenderableType:
         facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
         lines.append((f"chain, {KINDS.get(kind, kind)}", _verdict(chain["result"])))
         lines.append(("", f"{facts}, {chain['steps']} steps of {chain['walkers']} walkers"))
+    if off := content.get("discrepancy"):
+        lines += _discrepancy(off)
     if left := content.get("left_out"):
         told = (
             f"{left['rings']} rings and {left['albedos']} albedos left out: too few photons for an error of their own"
         )
         lines.append(("data", told))
     return _facts("Fit", lines + _second_opinions(content))
+
+
+def _discrepancy(off: Content) -> list[Line]:
+    """The process that the residuals are taken for."""
+    if off["amplitude"] is None:
+        return [("discrepancy", _verdict(off["result"]))]
+    amplitude = to_error(off["amplitude"], off["amplitude_error"])
+    reach = f"reaching {significant(off['length_s'])} in √(1 − α)"
+    if off["length_r"] is not None:
+        reach += f", {significant(off['length_r'])} in ln r"
+    size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
+    return [("discrepancy", size), ("", f"{reach}; {off['result']}")]
 
 
 def _second_opinions(content: Content) -> list[Line]:

@@ -28,7 +28,13 @@ TARGETS = {
 }
 TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
-ERRORS = {"statistical_error": "photons", "discrepancy_error": "misfit", "jackknife_error": "jackknife"}
+ERRORS = {
+    "statistical_error": "photons",
+    "discretisation_error": "dr",
+    "model_error": "model",
+    "discrepancy_error": "misfit",
+    "jackknife_error": "jackknife",
+}
 MEASURES = {"rel": "mean relative error of R_d", "ks": "error of the cdf", "inversion_error": "error in xi"}
 LIGHT = {
     "searchlight": "a pencil beam along the normal (MCML's)",

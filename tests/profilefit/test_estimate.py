@@ -75,6 +75,7 @@ def test_constants_scatter_as_predicted(tallies, toy, sidak):
         assert spread(scattered, wrong * one.statistical) < 1e-12
 
 
+@pytest.mark.slow
 def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sidak):
     """Normalized diffusion misses these photons by a tenth, and only the sandwich knows how it scatters."""
     one, scattered = refits(tallies, burley, ("s0", "s1", "s2"))

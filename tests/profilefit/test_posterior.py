@@ -127,6 +127,24 @@ def test_chain_facts(line_fit):
     assert 0.1 < found.acceptance < 0.9
 
 
+def test_draws_go_to_arviz_and_back(line_fit):
+    """A walker a chain, the log density beside it, and the fit's name on it."""
+    pytest.importorskip("arviz_base")
+    found = posterior(line_fit, "statistical", seed=2, max_steps=1000)
+    tree = found.to_arviz()
+    draws = tree["posterior"]
+    assert dict(draws.sizes) == {"chain": 32, "draw": 31}
+    np.testing.assert_array_equal(draws["u"].values.T.ravel(), found.samples[:, 0])
+    np.testing.assert_allclose(draws["v"].mean(), found.samples[:, 1].mean(), rtol=1e-12)
+    np.testing.assert_array_equal(tree["sample_stats"]["lp"].values.T.ravel(), found.log_density)
+    assert {tree.attrs[key] for key in ("law", "objective", "kind")} == {"Line", "reflectance", "statistical"}
+    assert tree.attrs["result"] == "converged"
+    # The density is that of the draws: highest where they are nearest to the optimum.
+    off = found.samples - line_fit.solution.parameters
+    expected = -0.5 * np.sum(off @ np.linalg.inv(line_fit.statistical) * off, axis=1)
+    np.testing.assert_allclose(found.log_density, expected, rtol=1e-6, atol=1e-8)
+
+
 def test_kind_must_be_known(line_fit):
     with pytest.raises(InputError, match="kind must be 'statistical' or 'discrepancy', got 'both'"):
         posterior(line_fit, "both")

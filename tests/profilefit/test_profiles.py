@@ -110,12 +110,25 @@ def test_rank_is_that_of_the_albedos_or_eight(white_run, photons):
 
 def test_the_diagonal_is_the_standard_error(photons):
     variance = np.sum(photons.covariance.factor**2, axis=2).T
-    # Rank 4 holds it all; what is left of a photon with weight .3^40 is rounding.
-    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-6, atol=1e-18)
+    # Rank 4 holds it all, and both divide by N (N - 1); what is left of a photon with weight .3^40 is rounding.
+    np.testing.assert_allclose(np.sqrt(variance)[:, :-1], photons.standard_error, rtol=1e-9, atol=1e-18)
 
 
 def test_sandwich_is_the_dense_closed_form():
-    """delta_ij sum_n (ab)^n H_in / N^2 - E_i(a) E_j(b) / N, every pair of rings and albedos written out."""
+    """(delta_ij sum_n (ab)^n H_in / N - E_i(a) E_j(b)) / (N - 1), every pair of rings and albedos written out."""
+    one, dense = dense_covariance()
+    factor, energy, photons = one.factor, one.energy, one.photons
+    gain = np.random.default_rng(11).standard_normal((4, 2, 3))
+    expected = np.einsum("pai,aibj,qbj->pq", gain, dense, gain)
+    found = Covariance(factor, energy, photons, 0.0).sandwich(gain)
+    np.testing.assert_allclose(found, expected, rtol=1e-10)
+    # Negative control: without what is between rings it is another matrix.
+    within = np.einsum("pai,iak,ibk,qbi->pq", gain, factor, factor, gain)
+    assert np.max(np.abs(within - expected)) > 1e-2 * np.max(np.abs(expected))
+
+
+def dense_covariance():
+    """500 photons, two albedos, three rings: the covariance, and all of it written out (2, 3, 2, 3)."""
     rng = np.random.default_rng(10)
     photons, alphas, orders = 500, np.array([0.5, 0.9]), np.arange(1, 6)
     weights = alphas[:, None] ** orders
@@ -123,16 +136,49 @@ def test_sandwich_is_the_dense_closed_form():
     energy = (counts @ weights.T).T / photons
     dense = np.empty((2, 3, 2, 3))
     for a, i, b, j in np.ndindex(2, 3, 2, 3):
-        same = np.sum(weights[a] * weights[b] * counts[i]) / photons**2 if i == j else 0.0
-        dense[a, i, b, j] = same - energy[a, i] * energy[b, j] / photons
+        same = np.sum(weights[a] * weights[b] * counts[i]) / photons if i == j else 0.0
+        dense[a, i, b, j] = (same - energy[a, i] * energy[b, j]) / (photons - 1)
     factor = np.stack([_root(dense[:, i, :, i]) for i in range(3)])
-    gain = rng.standard_normal((4, 2, 3))
-    expected = np.einsum("pai,aibj,qbj->pq", gain, dense, gain)
-    found = Covariance(factor, energy, photons, 0.0).sandwich(gain)
-    np.testing.assert_allclose(found, expected, rtol=1e-10)
-    # Negative control: without what is between rings it is another matrix.
-    within = np.einsum("pai,iak,ibk,qbi->pq", gain, factor, factor, gain)
-    assert np.max(np.abs(within - expected)) > 1e-2 * np.max(np.abs(expected))
+    return Covariance(factor, energy, photons, 0.0), dense
+
+
+def test_draws_have_the_covariance_between_rings_too(sidak):
+    """Ten thousand draws against the closed form, pair by pair (Wishart)."""
+    one, dense = dense_covariance()
+    number, closed = 10_000, dense.reshape(6, 6)
+    drawn = one.draws(number, seed=3).reshape(number, 6)
+    error = np.sqrt((closed**2 + np.outer(np.diag(closed), np.diag(closed))) / (number - 1))
+    assert np.abs((np.cov(drawn, rowvar=False) - closed) / error).max() < sidak(21)
+    assert np.abs(drawn.mean(axis=0) / np.sqrt(np.diag(closed) / number)).max() < sidak(6)
+    # Negative control: rings that do not share out their photons.
+    alone = np.where(np.eye(3, dtype=bool)[None, :, None, :], dense, 0.0).reshape(6, 6)
+    assert np.abs((np.cov(drawn, rowvar=False) - alone) / error).max() > 2 * sidak(21)
+
+
+def test_draws_scatter_as_the_sandwich_where_many_rings_hold_few_photons(white_run):
+    """Sums over all rings and of some, whose variance lives on what rings take from each other; twenty albedos."""
+    one = Profiles.from_orders(white_run, 1.0 - np.linspace(0.98, 0.05, 20) ** 2).covariance
+    gain = np.zeros((3, 20, 26))
+    gain[0], gain[1, 19], gain[2, 5, 3:9] = 1.0, 1.0, 1.0
+    number = 4000
+    sums = np.einsum("pai,rai->rp", gain, one.draws(number, seed=4))
+    # A standard deviation of 4000 is known to 1.1 %: four of these.
+    np.testing.assert_allclose(sums.std(axis=0) / np.sqrt(np.diag(one.sandwich(gain))), 1.0, atol=0.045)
+
+
+@pytest.mark.slow
+def test_rank_eight_loses_nothing_of_a_sum_and_rank_four_does(white_run):
+    """What the truncation drops of a ring's variance shows in constants."""
+    alphas = 1.0 - np.linspace(0.98, 0.05, 20) ** 2
+    gain = np.random.default_rng(5).standard_normal((4, 20, 26)) * Profiles.from_orders(white_run, alphas).energy.max()
+    errors, dropped = {}, {}
+    for rank in (4, 8, 20):
+        factor, dropped[rank] = white_run.covariance_factor(alphas, rank, overflow=True)
+        whole = Covariance(factor, np.zeros((20, 26)), white_run.photons, dropped[rank])
+        errors[rank] = np.sqrt(np.diag(whole.sandwich(gain)))
+    assert dropped[8] < 1e-3 < 1e-2 < dropped[4]
+    np.testing.assert_allclose(errors[8] / errors[20], 1.0, atol=1e-3)
+    assert np.max(np.abs(errors[4] / errors[20] - 1.0)) > 1e-3
 
 
 def _root(matrix):

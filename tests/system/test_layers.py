@@ -166,6 +166,7 @@ ORDER = {
     "profilefit.measured": (
         "lengths",
         "data",
+        "limits",
         "replicates",
         "table_file",
         "simulated",

@@ -83,6 +83,8 @@ def test_data_that_cannot_tell_say_so_and_what_would(command):
 @pytest.mark.slow
 def test_two_layers_are_a_misfit(command):
     """A second law to compile, that of rings."""
+    refracting = json.loads(command("fit", LAYERS, "--n", "1.4", "--json")[1])
+    assert "the file's n is 1, fitted as n = 1.4" in refracting["data"]["notes"]
     status, out, _ = command("fit", LAYERS, "--json")
     found = json.loads(out)
     assert status == 0

@@ -18,6 +18,7 @@ from profilefit.measured.law_error import origin, relative_error
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.question import Known, Question
 from profilefit.measured.reading import read
+from profilefit.measured.solving import FARTHEST_LN, LONGEST
 from profilefit.measured.telling import relative_errors, told
 
 DATA = Path(__file__).parent / "data"
@@ -102,6 +103,29 @@ def test_failures_have_names():
     assert "alpha runs to 1" in bright.minimum.result
     with pytest.raises(InputError, match=r"made up: expected more than 3 rows, one more than is free, got 3"):
         fit(rings().chosen(np.arange(24) < 3))
+
+
+def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
+    """Light that underflows, of a length in the wrong unit."""
+    slip = fit(read(DATA / "half_space.mco"), scale=1.0, l=1e-4)
+    assert np.all(np.isfinite(slip.statistical))
+    assert slip.misfit.detected
+    for held in ({"l": 1e-300}, {"l": 1e300}, {"l": 1e-9, "alpha": 0.5, "scale": 1e300}):
+        failed = fit(rings(), **({"scale": 1.0} | held)).minimum
+        assert not failed.converged or failed.cost > 1e4, held
+
+
+def test_light_that_rises_outwards_runs_away():
+    data = rings()
+    rising = replace(data, value=data.r, sigma=0.02 * data.r)
+    assert fit(rising).minimum.result.startswith("a coordinate runs away")
+    longest = data.r[-1] * LONGEST * np.exp(FARTHEST_LN)
+    assert fit(rising).values["l"] <= longest
+
+
+def test_a_simulation_is_not_asked_for_its_total_reflectance():
+    kinds = {one.kind for one in advised(fit(read(DATA / "half_space.mco"))).candidates}
+    assert kinds == {"point", "scale", "repeats"}
 
 
 def test_a_simulated_half_space_comes_back(sidak):

@@ -62,6 +62,11 @@ def test_files_with_too_little_light(tmp_path):
     (tmp_path / "few.mco").write_text(text.replace("2097152 \t", "50 \t"))
     with pytest.raises(InputError, match=r"few.mco: expected light in at least 3 rings .*, got \d\d in"):
         read(tmp_path / "few.mco")
+    head, _, rest = text.partition("\nRd_r #")
+    first = rest.split("\n")[1]
+    (tmp_path / "bright.mco").write_text(head + "\nRd_r #" + rest.replace(first, "1E+20", 1))
+    with pytest.raises(InputError, match=r"bright.mco: expected rings of no less than 0 and, in all"):
+        read(tmp_path / "bright.mco")
     (tmp_path / "bad.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"bad.npz: expected results of mcml_sim, got: not a whole .npz file"):
         read(tmp_path / "bad.npz")

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from profilefit import catalogue, record
 from profilefit.report import digits, tables
-from profilefit.report.content import ERRORS, converged, largest_error
+from profilefit.report.content import converged, known_errors, largest_error
 from profilefit.report.evidence_tables import evidence_tables
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
@@ -57,19 +57,22 @@ def test_the_summary_fits_and_names_every_record(width):
 def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
     content = FITS[name]
     lines = rendered([tables.constants_table(content)], 100).splitlines()
+    headers = lines[1].replace("± ", "±").split()
+    known = known_errors(content["constants"])
+    assert [header for header in headers if header[0] == "±"] == [f"±{word}" for word in known.values()]
     for constant, values in content["constants"].items():
         cells = next(line.split() for line in lines if line.split()[:1] == [constant])
-        published, regenerated, photons, misfit, jackknife = cells[1:]
+        shown = dict(zip(headers, cells[1:], strict=True))
+        published, regenerated = shown.pop("published", "–"), shown.pop("regenerated")
         value, error = values["regenerated"], largest_error(values)
         # Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200.
         assert abs(float(regenerated) - value) <= max(0.05 * (error or 0.0), 0.005 * abs(value))
         assert published == "–" if values["published"] is None else float(published) == values["published"]
         if not values["free"]:
-            assert (photons, misfit, jackknife) == ("held", "–", "–")
+            assert list(shown.values()) == ["held", *["–"] * (len(known) - 1)]
             continue
-        for text, key in zip((photons, misfit, jackknife), ERRORS, strict=True):
-            known = values.get(key)
-            assert text == "–" if known is None else float(text) == pytest.approx(known, rel=0.05)
+        for text, number in zip(shown.values(), (values.get(key) for key in known), strict=True):
+            assert text == "–" if number is None else float(text) == pytest.approx(number, rel=0.05)
 
 
 @pytest.mark.parametrize("name", FITS)
@@ -100,6 +103,27 @@ def test_a_failed_fit_says_why_wherever_it_is_shown():
 
 def _stages(content):
     return rendered(tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
+
+
+def test_three_errors_are_told_apart_and_old_records_have_none_of_it():
+    content = copy.deepcopy(FITS["hazard"])
+    content.pop("discrepancy", None)
+    for number, constant in enumerate(content["constants"].values()):
+        constant["discretisation_error"] = constant["model_error"] = None
+        if number == 0:
+            constant |= {"statistical_error": 0.0011, "discretisation_error": 0.0022, "model_error": 0.033}
+    line = next(x for x in rendered([tables.constants_table(content)], 80).splitlines() if x.startswith("a0 "))
+    assert line.split()[2:5] == ["0.0011", "0.0022", "0.033"]
+    process = {"amplitude": 0.0123, "amplitude_error": 0.0011, "length_r": 2.0, "length_s": 0.5, "rms": 0.009}
+    told = {**content, "discrepancy": {**process, "gain": None, "result": "found"}}
+    text = " ".join(rendered([tables.fit_facts(told)], 100).split())
+    assert "discrepancy amplitude 0.0123 ± 0.0011; residuals 0.0090 rms" in text
+    assert "reaching 0.50 in √(1 − α), 2.0 in ln r; found" in text
+    for constant in content["constants"].values():
+        del constant["discretisation_error"], constant["model_error"]
+    old = rendered([tables.constants_table(content), tables.fit_facts(content)], 80)
+    assert "± dr" not in old
+    assert "amplitude" not in old
 
 
 def test_a_chain_that_is_too_short_says_so():

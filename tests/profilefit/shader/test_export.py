@@ -83,6 +83,7 @@ def test_data_hold_the_same(tmp_path):
     assert made["constants"] == {name: one["regenerated"] for name, one in content["constants"].items()}
     assert made["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
     errors = made["records"]["hazard-n1.4"]["errors"]
+    assert {"statistical_error", "discretisation_error", "model_error"} <= set(errors["a0"])
     assert errors["a0"]["statistical_error"] == content["constants"]["a0"]["statistical_error"]
     assert set(made["map"]) == {"entered", "b", "c", "d"}
     assert set(made["records"]) == {"hazard-n1.4", "albedo-rational-n1.4"}
