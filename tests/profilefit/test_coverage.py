@@ -5,8 +5,9 @@ import pytest
 from scipy.stats import binom, norm
 
 from mcml_sim import InputError
-from profilefit.coverage import binomial_band, counted, coverage, refits
+from profilefit.coverage import LEVELS, binomial_band, counted, coverage, refits
 from profilefit.estimate import fit
+from profilefit.posterior import posterior
 
 REPLICATES = 2000
 
@@ -85,6 +86,26 @@ def test_a_law_that_is_not_the_truth_covers_its_pseudo_true_constants(tallies, b
     assert not np.any(misfit.inside)
     assert np.all(misfit.share > 0.99)
     assert not coverage(one.free, off, again.independent_errors(covariance)).honest
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_posteriors_cover_too(tallies, toy):
+    """200 runs of photons, each with a fit and a chain of its own; not if intervals are a third too narrow."""
+    truth, within, narrow = np.array([1.0, 0.5, 0.5]), [], []
+    for seed, counts in enumerate(tallies.draw(23, 200)):
+        one = fit(tallies.profiles(counts), toy, "energy", jackknife=False)
+        chain = posterior(one, "statistical", seed)
+        assert chain.result == "converged"
+        ends = np.stack([chain.interval(level) for level in LEVELS])
+        middle = ends.mean(axis=2, keepdims=True)
+        for held, (low, high) in (
+            (within, np.moveaxis(ends, 2, 0)),
+            (narrow, np.moveaxis(middle + (ends - middle) / 1.5, 2, 0)),
+        ):
+            held.append((low <= truth) & (truth <= high))
+    assert counted(one.free, np.stack(within, axis=1)).honest
+    assert not counted(one.free, np.stack(narrow, axis=1)).honest
 
 
 def test_the_band_is_binomial():
