@@ -19,9 +19,10 @@ from benchmarks.table import show
 from mcml_sim import Grid, simulate_orders
 from profilefit import catalogue, inventory, recipe
 from profilefit.estimate import Fit
-from profilefit.posterior import Moves, default_moves, posterior
+from profilefit.posterior import posterior
 from profilefit.profiles import Profiles
 from profilefit.targets import albedo_values, ring_edges
+from profilefit.walking import Moves, default_moves
 
 LAWS = ("burley-whole", "liang-whole", "albedo-rational")
 SEED, PHOTONS, LONGEST = 43, 4 * 2**20, 40_000

@@ -13,11 +13,9 @@ misfit that is blind to a constant leaves it to the prior, and the interval then
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import emcee
 import equinox as eqx
 import jax
 import jax.numpy as jnp
@@ -26,22 +24,12 @@ from numpy.typing import NDArray
 
 from profilefit.errors import InputError
 from profilefit.estimate import Fit, Problem, curvature
+from profilefit.walking import Moves, walk
 
 Floats = NDArray[np.float64]
-# emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
-LENGTHS = 50
 PRIOR_WIDTH = 10.0
 LEVELS = (0.68, 0.95)
 KEPT = 1000
-Moves = Sequence[tuple[emcee.moves.Move, float]]
-
-
-def default_moves() -> Moves:
-    """Differential evolution with snooker steps: a third of the evaluations of stretches (`benchmarks.moves`).
-
-    With three or four constants draws from a kernel density take a third of these again.
-    """
-    return (emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)
 
 
 @dataclass(frozen=True)
@@ -100,7 +88,7 @@ def posterior(
 ) -> Posterior:
     """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "discrepancy" (the law's misfit).
 
-    moves  emcee's, with their weights; by default those of `default_moves`
+    moves  emcee's, with their weights; by default those of `walking.default_moves`
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
     if kind not in ("statistical", "discrepancy"):
@@ -115,7 +103,7 @@ def posterior(
             "the truth of this fit has no photon noise: only kind='discrepancy' applies, got 'statistical'"
         )
     density = _Density.of(fit, kind, covariance)
-    return _walk(density, covariance, fit, kind, seed, max_steps, moves or default_moves())
+    return _walk(density, covariance, fit, kind, seed, max_steps, moves)
 
 
 class _Density(eqx.Module):
@@ -183,30 +171,5 @@ def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
         with jax.enable_x64(True):
             return np.asarray(density(jnp.asarray(points)))
 
-    for _ in range(20):  # a walker that starts where the density is zero moves halfway to the optimum
-        outside = ~np.isfinite(log_probability(start))
-        start[outside] = 0.5 * (start[outside] + fit.solution.parameters)
-    sampler = emcee.EnsembleSampler(walkers, size, log_probability, vectorize=True, moves=list(moves))
-    sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()
-    tau, steps = _run(sampler, start, max_steps)
-    long_enough = np.isfinite(tau) and steps >= LENGTHS * tau
-    burn = int(min(steps // 2, 5 * tau if np.isfinite(tau) else steps // 2))
-    keep = np.linspace(burn, steps - 1, max(min(KEPT // walkers, steps - burn), 1)).astype(int)
-    samples, density_there = sampler.get_chain()[keep].reshape(-1, size), sampler.get_log_prob()[keep].ravel()
-    result = (
-        "converged" if long_enough else f"chain of {steps} steps is under {LENGTHS} autocorrelation times ({tau:.0f})"
-    )
-    acceptance = float(np.mean(sampler.acceptance_fraction))
-    of = type(fit.law).__name__, fit.objective
-    return Posterior(kind, *of, fit.free, samples, density_there, float(tau), acceptance, walkers, steps, result)
-
-
-def _run(sampler, start, max_steps) -> tuple[float, int]:
-    """Run in doubling stretches until the chain is long enough for its own autocorrelation time."""
-    steps, state, tau = min(1000, max_steps), start, np.inf
-    while True:
-        state = sampler.run_mcmc(state, steps - sampler.iteration if sampler.iteration else steps, progress=False)
-        tau = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
-        if sampler.iteration >= max_steps or (np.isfinite(tau) and sampler.iteration >= LENGTHS * tau):
-            return tau, sampler.iteration
-        steps = min(2 * sampler.iteration, max_steps)
+    done = walk(log_probability, start, fit.solution.parameters, seed, max_steps, KEPT, moves)
+    return Posterior(kind, type(fit.law).__name__, fit.objective, fit.free, **vars(done))

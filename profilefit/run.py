@@ -14,7 +14,7 @@ Say = Callable[[str], None]
 PHOTONS = {"quick": 20 * 2**20, "full": 400 * 2**20}
 # Surfaces that refract take the general kernel, which needs six times as long for a photon.
 REFRACTED_PHOTONS = {"quick": 8 * 2**20, "full": 160 * 2**20}
-MAX_CHAIN = {"quick": 16_000, "full": 64_000}
+MAX_CHAIN = {"quick": 64_000, "full": 256_000}
 
 
 @dataclass(frozen=True)

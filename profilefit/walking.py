@@ -18,7 +18,10 @@ Moves = Sequence[tuple[emcee.moves.Move, float]]
 
 
 def default_moves() -> Moves:
-    """Differential evolution with snooker steps: elongated posteriors mix three times faster than by stretches."""
+    """Differential evolution with snooker steps: a third of the evaluations of stretches (`benchmarks.moves`).
+
+    With three or four constants draws from a kernel density take a third of these again.
+    """
     return (emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)
 
 

@@ -23,6 +23,7 @@ from profilefit.measured.data import Measured
 from profilefit.measured.fitting import fitted
 from profilefit.measured.law_error import origin
 from profilefit.measured.lengths import length
+from profilefit.measured.limits import LARGEST, SMALLEST
 from profilefit.measured.question import Known, Question, held_albedo
 from profilefit.measured.reading import read
 from profilefit.report.fit_figures import posterior_figure, residual_figure
@@ -185,6 +186,8 @@ def _known(option: str, text: str) -> Known:
             f"a number > 0, {'free, ' if option == '--scale' else ''}or a number with its error such as 1.0+-0.02"
         )
         raise InputError(f"{option} must be {accepted}, got {text!r}")
+    if not SMALLEST <= value <= LARGEST:
+        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {text!r}")
     return Known(value, error)
 
 

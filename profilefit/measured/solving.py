@@ -24,7 +24,7 @@ from profilefit.solver import CONVERGED
 Floats = NDArray[np.float64]
 # Far below any error that data leave a coordinate, well above what rounding of the profile does to it.
 TOLERANCE = 1e-9
-MAX_STEPS = 200
+MAX_STEPS = 1000  # along a ridge, where alpha and scale run away together, hundreds are taken
 # Albedos and lengths where the search begins; lengths from a twentieth of the first radius to twice the last.
 ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
 LENGTHS, SHORTEST, LONGEST = 20, 1 / 20, 2.0
@@ -36,6 +36,7 @@ EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has ru
 WHITE, BLACK = -9.0, 6.0  # u beyond which alpha is 1 or 0 for all that data can say
 AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with --fix alpha=..."
 NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
+RAN_AWAY = "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with --fix"
 AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use --fix alpha=..."
 
 
@@ -199,12 +200,14 @@ class _Last:
 
 def _explained(status: int, point: Floats, slopes: Floats, ran: list[int], free: tuple[int, ...]) -> str:
     """How a descent ended, with the derivatives (m, p) there; `ran` the coordinates at the end of their range."""
-    if LENGTH in ran or SCALE in ran:
-        return "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with --fix"
+    if LENGTH in ran:
+        return RAN_AWAY
     if U in free and point[U] < WHITE:
         return AT_WHITE
-    if U in free and point[U] > BLACK:
+    if U in free and point[U] > BLACK:  # there less light and a larger scale are one
         return AT_BLACK
+    if SCALE in ran:
+        return RAN_AWAY
     if not np.all(np.any(slopes != 0, axis=0)):
         return "the law has no light there that changes with what is free: check the unit and what is held"
     if status <= 0:

@@ -124,6 +124,7 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         ((PHANTOM, "--fix", "A=x"), "--fix A must be a number, got 'x'"),
         ((PHANTOM, "--fix", "A=.5", "--fix", "alpha=.9"), "--fix must hold each of l and alpha (or A) once"),
         ((PHANTOM, "--scale", "-1"), "--scale must be a number > 0, free, or a number with its error"),
+        ((PHANTOM, "--scale", "1e300"), "--scale must lie between 1e-40 and 1e+40, got '1e300'"),
         ((PHANTOM, "--scale", "1+-0"), "--scale must be a number > 0, free, or a number with its error"),
         ((PHANTOM, "--total", "0.5"), "--total must be a reflectance in (0, 1) with its error"),
         ((PHANTOM, "--r-min", "1furlong"), "--r-min must be a length > 0 such as 1.2mm"),
