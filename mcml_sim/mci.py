@@ -26,12 +26,12 @@ import os
 import posixpath
 import re
 from dataclasses import dataclass
-from pathlib import Path
 
 from mcml_sim.checks import MAX_PHOTONS
 from mcml_sim.errors import InputError
 from mcml_sim.grid import MAX_BINS, MAX_CELLS, Grid
 from mcml_sim.medium import MAX_LAYERS, Layer, Medium
+from mcml_sim.whole_file import read_whole
 
 # Bounds of a file and of what it asks for: far beyond any use, near enough that a slip of the pen fails at once and
 # not after hours or gigabytes.
@@ -84,13 +84,7 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
     InputError in one line, `FILE:LINE: expected ..., got ...`, for everything that is not such a file, and for runs
     beyond the bounds above: 1e13 photons, 65536 bins an axis, 2^21 cells a table, 1000 layers, 10000 runs, 2 MiB.
     """
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
-    return parse_mci(content, str(path))
+    return parse_mci(read_whole(path, MAX_BYTES), str(path))
 
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:

@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.mci import DECIMAL, Lines, Run, read_run
+from mcml_sim.whole_file import read_whole
 
 Floats = NDArray[np.float64]
 MAX_BYTES = 2**28  # tables of 2^21 cells take 30 MB each
@@ -38,13 +38,7 @@ class Output:
 
 def read_mco(path: str | os.PathLike[str]) -> Output:
     """Parameters, totals and Rd_r of a V1 .mco file. InputError in one line, `FILE:LINE: expected ..., got ...`."""
-    try:
-        with Path(path).open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except (OSError, ValueError, TypeError) as error:
-        reason = getattr(error, "strerror", None) or error
-        raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
-    return parse_mco(content, str(path))
+    return parse_mco(read_whole(path, MAX_BYTES), str(path))
 
 
 def parse_mco(content: bytes, name: str) -> Output:

@@ -1,4 +1,4 @@
-"""Files that are whole or absent, whatever happens while they are written."""
+"""Files as a whole: read up to a bound, and whole or absent, whatever happens while they are written."""
 
 from __future__ import annotations
 
@@ -16,6 +16,19 @@ def checked_path(path: object) -> Path:
     if isinstance(path, (str, os.PathLike)):
         return Path(path)
     raise InputError(f"path must be the name of a file, got {reprlib.repr(path)}")
+
+
+def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
+    """A file's bytes, and no more than `most` + 1 of them: one that is longer is not read to its end.
+
+    InputError names the file and why it cannot be read.
+    """
+    try:
+        with Path(path).open("rb") as file:
+            return file.read(most + 1)
+    except (OSError, ValueError, TypeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
 
 
 def require_writable(path: Path) -> None:

@@ -20,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 
+from mcml_sim.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
@@ -61,11 +62,7 @@ def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Mea
 
 def read_bytes(path: Path) -> bytes:
     """A file's bytes; InputError if it cannot be read or is too long for a profile."""
-    try:
-        with path.open("rb") as file:
-            content = file.read(MAX_BYTES + 1)
-    except OSError as error:
-        raise InputError(f"{path}: expected a file that can be read, got: {error.strerror or error}") from None
+    content = read_whole(path, MAX_BYTES)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     return content

@@ -10,18 +10,6 @@ from benchmarks.choose import Compared, verified
 from benchmarks.choose_render import Measured
 from profilefit.choose.case import Case, Within
 from profilefit.choose.options import NOTHING
-from profilefit.errors import ShaderError
-from profilefit.shader.context import open_context
-
-
-@pytest.fixture
-def opened():
-    try:
-        context = open_context()
-    except ShaderError as error:
-        pytest.skip(str(error))
-    yield context
-    context.release()
 
 
 @pytest.mark.slow

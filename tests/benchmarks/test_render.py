@@ -5,8 +5,6 @@ import json
 import numpy as np
 import pytest
 
-from profilefit.errors import ShaderError
-from profilefit.shader.context import open_context
 from profilefit.shader.stage.scene import head_scene
 from profilefit.shader.stage.stage import Stage
 
@@ -16,16 +14,6 @@ from benchmarks import render, render_errors, render_pictures, render_table2, re
 from benchmarks.render_laws import contenders
 from benchmarks.render_pictures import shots
 from benchmarks.render_view import CLOSE, Judged
-
-
-@pytest.fixture
-def opened():
-    try:
-        context = open_context()
-    except ShaderError as error:
-        pytest.skip(str(error))
-    yield context
-    context.release()
 
 
 @pytest.fixture(scope="module")
