@@ -22,8 +22,8 @@ from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from profilefit import catalogue, inventory, recipe
 from profilefit.bootstrap import bootstrap
+from profilefit.chains import posterior
 from profilefit.discrepancy import discrepancy
-from profilefit.posterior import posterior
 from profilefit.profiles import Profiles
 from profilefit.targets import albedo_values, ring_edges
 

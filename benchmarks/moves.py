@@ -18,8 +18,8 @@ from benchmarks.coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, simulate_orders
 from profilefit import catalogue, inventory, recipe
+from profilefit.chains import posterior
 from profilefit.estimate import Fit
-from profilefit.posterior import posterior
 from profilefit.profiles import Profiles
 from profilefit.targets import albedo_values, ring_edges
 from profilefit.walking import Moves, default_moves

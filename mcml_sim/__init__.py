@@ -1,18 +1,39 @@
 """What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
-from mcml_sim import exact
+from typing import TYPE_CHECKING
+
 from mcml_sim.errors import ClusterError, InputError, OutputError, SettingError, StoreError
-from mcml_sim.grid import Grid
-from mcml_sim.mcml_files import read_mci, read_mco, write_mco
-from mcml_sim.medium import Layer, Medium, half_space
-from mcml_sim.orders import Orders, simulate_orders
-from mcml_sim.quantities import Precision, Tally
-from mcml_sim.results import read_results, write_results
+from mcml_sim.lazy import attributes
 from mcml_sim.setting import Setting
-from mcml_sim.simulation import simulate
-from mcml_sim.store import DamagedBatch
-from mcml_sim.tally import Estimate
 from mcml_sim.version import __version__
+
+if TYPE_CHECKING:
+    from mcml_sim import exact
+    from mcml_sim.grid import Grid
+    from mcml_sim.mcml_files import read_mci, read_mco, write_mco
+    from mcml_sim.medium import Layer, Medium, half_space
+    from mcml_sim.orders import Orders, simulate_orders, trace_share
+    from mcml_sim.quantities import Precision, Tally
+    from mcml_sim.results import read_results, write_results
+    from mcml_sim.simulation import simulate
+    from mcml_sim.store import DamagedBatch
+    from mcml_sim.tally import Estimate
+else:
+    __getattr__ = attributes(
+        __name__,
+        {
+            "exact": "",
+            "Grid": "grid",
+            **dict.fromkeys(("read_mci", "read_mco", "write_mco"), "mcml_files"),
+            **dict.fromkeys(("Layer", "Medium", "half_space"), "medium"),
+            **dict.fromkeys(("Orders", "simulate_orders", "trace_share"), "orders"),
+            **dict.fromkeys(("Precision", "Tally"), "quantities"),
+            **dict.fromkeys(("read_results", "write_results"), "results"),
+            "simulate": "simulation",
+            "DamagedBatch": "store",
+            "Estimate": "tally",
+        },
+    )
 
 __all__ = [
     "ClusterError",
@@ -37,6 +58,7 @@ __all__ = [
     "read_results",
     "simulate",
     "simulate_orders",
+    "trace_share",
     "write_mco",
     "write_results",
 ]

@@ -1,5 +1,9 @@
 """What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
 
+# What errors tell to do about them; a command line has other words for it.
+ELSEWHERE = "delete it, or use another folder"
+RESUMES = "the same run with its store resumes"
+
 
 class InputError(ValueError):
     """An argument that no physics or file format allows."""

@@ -168,14 +168,9 @@ def simulate_orders(
     InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
     named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
     """
-    if not isinstance(setting, Setting):
-        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
-    require_resolved(grid)
-    number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
-    key = checked_whole("seed", seed, lowest=0)
+    number, key = _checked_run(grid, photons, seed, setting)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
-    read = partial(Counts.from_arrays, shape=_shape(grid))
-    kept = None if folder is None else Store(folder, _made_by(grid, key, setting), read)
+    kept = None if folder is None else _store(folder, grid, key, setting)
     counts = run_batches(
         partial(tracer.trace_batch, grid, key, setting=setting),
         tracer.BATCH_PHOTONS,
@@ -186,6 +181,51 @@ def simulate_orders(
         scheduler=scheduler,
     )
     return Orders(grid, number, key, setting, counts)
+
+
+def trace_share(
+    share: int,
+    shares: int,
+    grid: Grid,
+    photons: int,
+    seed: int = 0,
+    setting: Setting = SEARCHLIGHT,
+    *,
+    store: str | Path,
+) -> int:
+    """Trace the batches share, share + shares, share + 2 shares, ... of `simulate_orders` into its store, on one core.
+
+    For jobs that share a folder but no network: when each of them has traced its share, `simulate_orders` with the same
+    arguments and that `store` reads all batches and traces none. Returns the number of batches that had to be traced.
+
+    share     which of the shares [-], 0 ... shares - 1; the other arguments as for `simulate_orders`
+    InputError, StoreError as there; what is finished stays, and the same call goes on from it.
+    """
+    number, key = _checked_run(grid, photons, seed, setting)
+    parts = checked_whole("shares", shares, lowest=1)
+    first = checked_whole("share", share, lowest=0, highest=parts - 1)
+    if (folder := checked_folder(store)) is None:
+        raise InputError("store must be the path of a folder, got None")
+    kept, traced = _store(folder, grid, key, setting), 0
+    for batch in range(first, -(-number // tracer.BATCH_PHOTONS), parts):
+        size = min(tracer.BATCH_PHOTONS, number - batch * tracer.BATCH_PHOTONS)
+        found = kept.load(batch)
+        if found is None or found.started < size:
+            kept.save(batch, tracer.trace_batch(grid, key, batch, size, setting=setting))
+            traced += 1
+    return traced
+
+
+def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
+    """How many photons, and the seed."""
+    if not isinstance(setting, Setting):
+        raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
+    require_resolved(grid)
+    return checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS), checked_whole("seed", seed, lowest=0)
+
+
+def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
+    return Store(folder, _made_by(grid, seed, setting), partial(Counts.from_arrays, shape=_shape(grid)))
 
 
 def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 import contextlib
 import os
-import sys
 import threading
 from collections.abc import Callable
 from concurrent.futures import FIRST_EXCEPTION, Future, ThreadPoolExecutor, wait
 from typing import Generic
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn, TimeRemainingColumn
-from rich.text import Text
+from rich.progress import Progress
 
 from mcml_sim.checks import checked_workers
 from mcml_sim.cluster import Cluster
+from mcml_sim.progress import bar
 from mcml_sim.store import R, Store
 
 # How often the waiting thread looks up: where a wait cannot be interrupted, this is the delay of Ctrl-C [s].
@@ -58,9 +56,13 @@ def run_batches(
     cluster = None if scheduler is None else Cluster(scheduler, trace)
     threads = min(cluster.tasks if cluster else workers or os.cpu_count() or 1, -(-photons // batch_photons))
     # Leaving, the cluster is closed first: that frees the threads that wait for it.
-    with _bar(progress) as bar, ThreadPoolExecutor(threads) as pool, cluster or contextlib.nullcontext():
+    with (
+        bar("photons", progress, kept=True) as shown,
+        ThreadPoolExecutor(threads) as pool,
+        cluster or contextlib.nullcontext(),
+    ):
         fold = _Fold(enough, AHEAD * threads)
-        run = _Run(cluster.trace if cluster else trace, batch_photons, photons, store, fold, bar)
+        run = _Run(cluster.trace if cluster else trace, batch_photons, photons, store, fold, shown)
         try:
             _wait([pool.submit(run.work) for _ in range(threads)])
         finally:
@@ -125,11 +127,11 @@ class _Run(Generic[R]):
         photons: int,
         store: Store[R] | None,
         fold: _Fold[R],
-        bar: Progress,
+        shown: Progress,
     ) -> None:
         self._trace, self._store, self._fold = trace, store, fold
         self._batch_photons, self._photons = batch_photons, photons
-        self._bar, self._line = bar, bar.add_task("photons", total=photons)
+        self._bar, self._line = shown, shown.add_task("photons", total=photons)
 
     def work(self) -> None:
         """Take the next batch until there is none."""
@@ -158,18 +160,3 @@ def _wait(futures: list[Future[None]]) -> None:
         done, pending = wait(pending, timeout=GLANCE, return_when=FIRST_EXCEPTION)
         for future in done:
             future.result()
-
-
-class _RateColumn(ProgressColumn):
-    """Photons a second."""
-
-    def render(self, task: Task) -> Text:
-        """The rate in millions, once there is one."""
-        return Text(f"{(task.speed or 0.0) / 1e6:.2f} M photons/s")
-
-
-def _bar(progress: bool | None) -> Progress:
-    columns = (TextColumn("{task.description}"), BarColumn(), _RateColumn(), TimeRemainingColumn())
-    # There is no stderr where a shell has closed it.
-    shown = (sys.stderr is not None and sys.stderr.isatty()) if progress is None else progress
-    return Progress(*columns, console=Console(stderr=True), disable=not shown)

@@ -24,14 +24,11 @@ import jaxlib.version
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.errors import StoreError
+from mcml_sim.errors import ELSEWHERE, RESUMES, StoreError
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import replace_whole
 
 MANIFEST = "run.json"
-# Remedies, apart from what is wrong, since a command line has other words for them.
-ELSEWHERE = "delete it, or use another folder"
-RESUMES = "the same run with its store resumes"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
 SEAL_BYTES = 64  # SHA-256 in hexadecimal

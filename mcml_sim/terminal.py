@@ -12,19 +12,21 @@ import threading
 from collections.abc import Iterator
 from types import FrameType
 
+from mcml_sim import letters
+
 INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 STOPPING = "mcml-sim: stopping after the batches in flight; Ctrl-C again stops at once\n"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress bar hides
 
 
 def mend_streams() -> None:
-    """Have a stdout and a stderr to print to where the shell has closed them, and print what stdout cannot encode."""
+    """Have a stdout and a stderr to print to where the shell has closed them; what they cannot encode is spelled."""
     for name in ("stdout", "stderr"):
         if getattr(sys, name) is None:
             # For as long as the process lives, so nobody closes it.
             setattr(sys, name, open(os.devnull, "w", encoding="utf-8"))  # noqa: SIM115
-    if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="replace")
+        if isinstance(stream := getattr(sys, name), io.TextIOWrapper):
+            stream.reconfigure(errors=letters.NAME)
 
 
 @contextlib.contextmanager

@@ -1,11 +1,27 @@
 """Closed-form laws of subsurface scattering, fitted to simulated or exact light, with error bars."""
 
-from profilefit.catalogue import albedo_law, load, names
+from typing import TYPE_CHECKING
+
+from mcml_sim.lazy import attributes
 from profilefit.errors import InputError, OutputError, RecipeError, RecordError, SettingError, StoreError
-from profilefit.estimate import Fit, fit
-from profilefit.posterior import Posterior, posterior
-from profilefit.profiles import Profiles
-from profilefit.quality import albedo_quality, profile_quality
+
+if TYPE_CHECKING:
+    from profilefit.catalogue import albedo_law, load, names
+    from profilefit.chains import Posterior, posterior
+    from profilefit.estimate import Fit, fit
+    from profilefit.profiles import Profiles
+    from profilefit.quality import albedo_quality, profile_quality
+else:
+    __getattr__ = attributes(
+        __name__,
+        {
+            **dict.fromkeys(("albedo_law", "load", "names"), "catalogue"),
+            **dict.fromkeys(("Posterior", "posterior"), "chains"),
+            **dict.fromkeys(("Fit", "fit"), "estimate"),
+            "Profiles": "profiles",
+            **dict.fromkeys(("albedo_quality", "profile_quality"), "quality"),
+        },
+    )
 
 __all__ = [
     "Fit",

@@ -10,6 +10,7 @@ import numpy as np
 from mcml_sim.setting import Setting
 from profilefit import record
 from profilefit.errors import InputError, RecordError, SettingError
+from profilefit.folder import fits_folder
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.beam_diffusion import BeamDiffusion
@@ -62,13 +63,6 @@ REGENERATED = {
 }
 # The map that profile laws normalise with: it is exact to a few parts in a million.
 ALBEDO_RECORD = "albedo-rational"
-
-
-def fits_folder() -> Path:
-    """The recipes and records that came with this installation: in the wheel, or beside the package in a checkout."""
-    package = Path(__file__).resolve().parent
-    shipped = package / "fits"
-    return shipped if shipped.is_dir() else package.parent / "fits"
 
 
 def names() -> tuple[str, ...]:

@@ -8,10 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit import derived, record
+from profilefit.chains import LEVELS, Posterior, posterior
 from profilefit.discrepancy import discrepancy
 from profilefit.discretisation import discretisation_error
 from profilefit.estimate import Fit
-from profilefit.posterior import LEVELS, Posterior, posterior
 from profilefit.profiles import Profiles
 
 Floats = NDArray[np.float64]

@@ -13,7 +13,6 @@ import tempfile
 import zipfile
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import asdict, is_dataclass
 from importlib.metadata import version
 from pathlib import Path
 from types import NoneType
@@ -21,6 +20,7 @@ from typing import Any
 
 import numpy as np
 
+from mcml_sim.plain import plain as to_plain
 from profilefit.errors import OutputError, RecordError
 
 FORMAT = 1
@@ -138,6 +138,14 @@ SPOKEN = {
     NUMBER: "a number",
     MEASURE: "a number or null",
 }
+# A constant's errors in a record, and what tables and texts call them; older records have no second and third.
+ERRORS = {
+    "statistical_error": "photons",
+    "discretisation_error": "dr",
+    "model_error": "model",
+    "discrepancy_error": "misfit",
+    "jackknife_error": "jackknife",
+}
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
 
@@ -252,24 +260,8 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """Numbers, text, lists and dicts only; floats to twelve digits; what is not finite becomes None."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return plain(asdict(value))
-    if isinstance(value, Mapping):
-        return {str(key): plain(item) for key, item in value.items()}
-    if isinstance(value, np.ndarray):
-        return plain(value.tolist())
-    if isinstance(value, list | tuple):
-        return [plain(item) for item in value]
-    if isinstance(value, bool | np.bool_):
-        return bool(value)
-    if isinstance(value, int | np.integer):
-        return int(value)
-    if isinstance(value, float | np.floating):
-        return float(f"{value:.{DIGITS}g}") if np.isfinite(value) else None
-    if value is None or isinstance(value, str):
-        return value
-    return str(value)
+    """`mcml_sim.plain` with the digits of a record: numbers, text, lists and dicts; None for what is not finite."""
+    return to_plain(value, DIGITS)
 
 
 def _replace(target: Path, fill: Callable[[Any], object]) -> None:

@@ -43,9 +43,14 @@ class Run:
 
     def number(self, setting: Setting) -> int:
         """How many photons a setting gets."""
-        return self.photons or (PHOTONS if setting.is_matched_isotropic else REFRACTED_PHOTONS)[self.preset]
+        return self.photons or preset_photons(self.preset, setting)
 
     def _store(self, setting: Setting) -> Path | None:
         """A folder for each setting, inside that of Setting(): photons that are there already stay valid."""
         name = record_name("", setting).removeprefix("-")
         return None if self.store is None else self.store / name
+
+
+def preset_photons(preset: str, setting: Setting) -> int:
+    """How many photons a setting gets where nothing else is asked for."""
+    return (PHOTONS if setting.is_matched_isotropic else REFRACTED_PHOTONS)[preset]

@@ -67,10 +67,13 @@ class Rings:
         return (self.share if share is None else share) @ across.T
 
 
-def one_layer(stack: Medium, tolerance: float, within: Within, photons: int | None = None) -> OneLayer:
+def one_layer(
+    stack: Medium, tolerance: float, within: Within, photons: int | None = None, progress: bool | None = None
+) -> OneLayer:
     """Trace both, and compare; InputError where nothing comes back. Seconds to a minute.
 
     tolerance  share of white, which says how many photons it takes, unless `photons` does
+    progress   show a bar on stderr; by default only if that is a terminal
     """
     number = int(np.clip((PRECISE / tolerance) ** 2, FEWEST, MOST)) if photons is None else photons
     reduced = [layer.mu_a + layer.mu_s * (1.0 - layer.g) for layer in stack.layers]
@@ -78,11 +81,11 @@ def one_layer(stack: Medium, tolerance: float, within: Within, photons: int | No
     if not lengths:
         raise InputError(f"layers must scatter or absorb somewhere, got {len(reduced)} that are clear")
     edges = np.append(0.0, np.geomspace(NEAREST * min(lengths), FARTHEST * max(lengths), RINGS))
-    tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED)
+    tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress)
     reflectance = float(tally.diffuse_reflectance.value)
     n = stack.layers[0].n / stack.n_above
     scaled = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
-    white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=Setting(n=n))
+    white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=Setting(n=n), progress=progress)
     alpha = _alpha(white, reflectance)
     of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))

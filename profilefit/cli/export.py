@@ -7,41 +7,44 @@ from typing import Annotated
 
 import typer
 
-from profilefit import catalogue, record
-from profilefit.inventory import find
-from profilefit.shader.export import LANGUAGES
-from profilefit.shader.export import export as exported
-
-LOCAL = Path("fits")
+from mcml_sim.lazy import carried_out
+from profilefit.cli import words
+from profilefit.cli.options import Fits
 
 
+@carried_out("profilefit.commands.export")
 def export(
     what: Annotated[
         str,
-        typer.Argument(metavar="NAME", help="A record (hazard-diffuse), a law (burley) or a map (chiang)."),
+        typer.Argument(
+            metavar="NAME",
+            help="A record (hazard-diffuse), a law (burley) or a map (chiang).",
+            autocompletion=words.subjects,
+        ),
     ],
-    lang: Annotated[str, typer.Option(help=f"One of {', '.join(LANGUAGES)}.")] = "glsl",
+    lang: Annotated[
+        str, typer.Option(help=f"One of {', '.join(words.LANGUAGES)}.", autocompletion=words.languages)
+    ] = "glsl",
     constants: Annotated[
         str | None,
-        typer.Option(help="Of a law: regenerated, a printed set (published, corrected), or a record's path."),
+        typer.Option(
+            help="Of a law: regenerated, a printed set (published, corrected), or a record's path.",
+            autocompletion=words.constants,
+        ),
     ] = None,
     name: Annotated[
         str | None,
         typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
     ] = None,
     out: Annotated[Path | None, typer.Option(help="File to write; without it the text is printed.")] = None,
-    fits: Annotated[
-        Path | None, typer.Option(help="Folder of the records: ./fits if it has any, else the ones shipped.")
-    ] = None,
+    fits: Fits = None,
 ) -> None:
-    """Write a law as one file: its functions, every constant with its errors, units, light, range and digests.
+    """Write a law as one file for a shader or a program.
 
-    Without --constants a law or map that was not regenerated has its printed ones.
-    Example: profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
+    Its functions, every constant with its errors, units, light, range and digests. Without --constants a law or map
+    that was not regenerated has its printed ones.
+
+    \b
+    Example:
+      profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
     """
-    folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
-    text = exported(find(what, folder, constants), folder, lang, name)
-    if out is None:
-        typer.echo(text, nl=False)
-    else:
-        record.write_text(out, text)

@@ -2,46 +2,27 @@
 
 from __future__ import annotations
 
-import contextlib
-import json
-import math
-import re
-import sys
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.console import Console
 
-from mcml_sim.setting import ILLUMINATIONS, Setting
-from profilefit import catalogue, record
-from profilefit.errors import InputError, SettingError
-from profilefit.laws.base import ProfileLaw
-from profilefit.measured.answer import answered, content
-from profilefit.measured.data import Measured
-from profilefit.measured.fitting import fitted
-from profilefit.measured.law_error import origin
-from profilefit.measured.lengths import length
-from profilefit.measured.limits import LARGEST, SMALLEST
-from profilefit.measured.question import Known, Question, held_albedo
-from profilefit.measured.reading import read
-from profilefit.report.fit_figures import posterior_figure, residual_figure
-from profilefit.report.fit_tables import fit_lines, fit_tables
-
-LOCAL = Path("fits")
-WIDTH = 100
-FAILED = 1
-FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
-WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
-FREE = "free"
+from mcml_sim.lazy import carried_out
+from mcml_sim.setting import ILLUMINATIONS
+from profilefit.cli import words
+from profilefit.cli.options import AsJson, Fits, Quiet
 
 
+@carried_out("profilefit.commands.fit")
 def fit(
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
-    law: Annotated[str, typer.Option(help=f"One of {', '.join(catalogue.names())}.")] = "hazard",
+    law: Annotated[str, typer.Option(help=f"One of {', '.join(words.LAWS)}.", autocompletion=words.laws)] = "hazard",
     constants: Annotated[
-        str, typer.Option(help="regenerated, a printed set (published, corrected) or a record's path (.json).")
+        str,
+        typer.Option(
+            help="regenerated, a printed set (published, corrected) or a record's path (.json).",
+            autocompletion=words.constants,
+        ),
     ] = "regenerated",
     fix: Annotated[
         list[str] | None, typer.Option(help="Hold l=1.2mm, alpha=.9 or A=.8 (total reflectance); may be repeated.")
@@ -60,142 +41,19 @@ def fit(
     r_min: Annotated[str | None, typer.Option(help="Leave out what is nearer to the beam, such as 0.5mm.")] = None,
     r_max: Annotated[str | None, typer.Option(help="Leave out what is farther.")] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for fit.json and the figures.")] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print all that was found as JSON instead.")] = False,
     seed: Annotated[int, typer.Option(help="Seed of the posterior's walkers, >= 0.")] = 0,
-    fits: Annotated[
-        Path | None, typer.Option(help="Folder of the records: ./fits if it has any, else the ones shipped.")
-    ] = None,
+    fits: Fits = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Fit A, alpha, l (mu_s', mu_a) to a measured or simulated profile, with errors, and say what it cannot tell.
+    """Fit A, alpha and l to your own data, with errors.
 
-    A table has columns r, value, sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r
-    for averages over rings. Values are light per area and per incident light, unless the scale is free. Exit status 1
-    if the fit does not converge.
+    That is mu_s' and mu_a, from a measured or simulated profile; and what it cannot tell. A table has columns r, value,
+    sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over rings. Values
+    are light per area and per incident light, unless the scale is free. Exit status 1 if the fit does not converge.
 
-    Example: profilefit fit phantom.csv --unit mm --n 1.4 --scale free --out phantom
+    \b
+    Examples, from a clone:
+      profilefit fit examples/phantom.csv --out phantom
+      profilefit fit examples/phantom.csv --law burley --scale free --json
     """
-    if seed < 0:
-        raise InputError(f"--seed must be a whole number >= 0, got {seed}")
-    folder = fits or (LOCAL if record.available(LOCAL) else catalogue.fits_folder())
-    measured = read(data, unit, scale == FREE)
-    measured = measured.within(_radius("--r-min", r_min, measured), _radius("--r-max", r_max, measured))
-    setting = _setting(measured, light, n)
-    measured = _noted(measured, setting)
-    chosen = _law(law, constants, setting, folder)
-    question = _question(chosen, measured, fix or [], scale, total)
-    if out is not None:
-        record.require_writable(out)
-    with Console(stderr=True).status("fitting") if sys.stderr.isatty() and not as_json else contextlib.nullcontext():
-        answer = answered(fitted(measured, question, origin(law, constants, chosen.setting, folder)), seed)
-        body = content(answer, law, constants)
-    if out is not None:
-        record.write_text(out / "fit.json", json.dumps(body, indent=1, ensure_ascii=False) + "\n")
-        figures = [*residual_figure(answer, out), *posterior_figure(answer, out)]
-    if as_json:
-        typer.echo(json.dumps(body, indent=1, ensure_ascii=False))
-    else:
-        console = Console(highlight=False, width=None if sys.stdout.isatty() else WIDTH)
-        title = (
-            f"{data.name}: {measured.value.size} {'rings' if measured.rings else 'points'}, law {law}, {chosen.setting}"
-        )
-        for part in fit_tables(answer, title):
-            console.print(part)
-            console.print()
-        for line in fit_lines(answer):
-            console.print(line)
-        if out is not None:
-            console.print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
-    if answer.telling is None:
-        raise typer.Exit(FAILED)
-
-
-def _radius(option: str, text: str | None, measured: Measured) -> float | None:
-    return None if text is None else length(option, text, measured.unit)
-
-
-def _setting(measured: Measured, light: str, n: float | None) -> Setting:
-    """The light and the surface: of a simulation its own, where no option says otherwise."""
-    if light not in ILLUMINATIONS:
-        raise InputError(f"--light must be one of {', '.join(ILLUMINATIONS)}, got {light!r}")
-    medium = measured.medium
-    if medium is not None and light != ILLUMINATIONS[0]:
-        raise InputError(
-            f"--light must be {ILLUMINATIONS[0]} for {measured.source}, which was simulated so, got {light!r}"
-        )
-    own = _own_index(measured)
-    return Setting(light, n if n is not None else 1.0 if own is None else own)
-
-
-def _noted(measured: Measured, setting: Setting) -> Measured:
-    """The data, with a note where a simulation's surface is not the one that is fitted."""
-    own = _own_index(measured)
-    if own is None or math.isclose(own, setting.n):
-        return measured
-    return replace(measured, notes=(*measured.notes, f"the file's n is {own:g}, fitted as n = {setting.n:g}"))
-
-
-def _own_index(measured: Measured) -> float | None:
-    """Refractive index of a simulated medium over that above it; None of what was measured."""
-    medium = measured.medium
-    return None if medium is None else medium.layers[0].n / medium.n_above
-
-
-def _law(name: str, constants: str, setting: Setting, folder: Path) -> ProfileLaw:
-    try:
-        return catalogue.load(name, constants, setting, folder)
-    except SettingError as error:
-        raise SettingError(f"{error}; --n and --light choose one of these") from None
-
-
-def _question(law: ProfileLaw, measured: Measured, fix: list[str], scale: str, total: str | None) -> Question:
-    held: dict[str, float] = {}
-    for text in fix:
-        match = FIXED.fullmatch(text.strip())
-        if match is None:
-            raise InputError(f"--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got {text!r}")
-        name = "l" if match[1] == "l" else "alpha"
-        if name in held:
-            raise InputError(f"--fix must hold each of l and alpha (or A) once, got {' and '.join(fix)}")
-        held[name] = (
-            length("--fix l", match[2], measured.unit)
-            if name == "l"
-            else held_albedo(law, match[1], _number(f"--fix {match[1]}", match[2]))
-        )
-    known = None
-    if scale != FREE:
-        known = _known("--scale", scale)
-        if known.error == 0:
-            held["scale"], known = known.value, None
-    return Question(law, held, None if total is None else _total(total), known)
-
-
-def _total(text: str) -> Known:
-    known = _known("--total", text)
-    if known.error == 0 or known.value >= 1:
-        raise InputError(f"--total must be a reflectance in (0, 1) with its error, such as 0.52+-0.01, got {text!r}")
-    return known
-
-
-def _known(option: str, text: str) -> Known:
-    """A number > 0, with or without an error."""
-    match = WITH_ERROR.fullmatch(text.strip())
-    value = _number(option, match["value"] if match else text)
-    error = _number(option, match["error"]) if match else 0.0
-    if not value > 0 or error < 0 or (match is not None and error == 0):
-        accepted = (
-            f"a number > 0, {'free, ' if option == '--scale' else ''}or a number with its error such as 1.0+-0.02"
-        )
-        raise InputError(f"{option} must be {accepted}, got {text!r}")
-    if not SMALLEST <= value <= LARGEST:
-        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {text!r}")
-    return Known(value, error)
-
-
-def _number(option: str, text: str) -> float:
-    try:
-        number = float(text)
-    except ValueError:
-        number = math.nan
-    if not math.isfinite(number):
-        raise InputError(f"{option} must be a number, got {text!r}")
-    return number

@@ -30,8 +30,7 @@ class Hazard(EscapeLaw):
 
     Two exact limits are built in, neither of them fitted: at the source, lambda_0 = lim 2 pi x R_d / A, which sets w =
     lambda_0 - kappa - a + c, and far away the decay rate kappa(alpha). V is a spread of decay lengths from 0 to h: it
-    has the x ln x that light scattered twice leaves near the source, and no sum of exponentials has. The four other
-    shapes are
+    has the x ln x that light leaves near the source, and no sum of exponentials has. The four other shapes are
 
     h = e^{h0 + h1 lambda_0 + h2 kappa}         a = a0 + a1 lambda_0 + a2 lambda_0^2
     c = (c0 + c1 lambda_0 + c2 kappa)^2         b = b0 + b1 lambda_0 + b2 lambda_0^2       [lambda_0, kappa in 1/mfp]

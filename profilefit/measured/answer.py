@@ -88,14 +88,14 @@ def _middle(draws: Floats) -> tuple[float, float]:
     return float(low), float(high)
 
 
-def answered(found: Found, seed: int = 0) -> Answer:
-    """Judge a fit; a chain is walked where the data hold every coordinate."""
+def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
+    """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate."""
     if not (found.minimum.converged or found.minimum.at_edge):
         return Answer(found, None, None, None)
     telling = told(found)
     # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in telling.intervals)
-    walked = None if endless or not found.question.free else chain.posterior(found, seed)
+    walked = chain.posterior(found, seed) if walk and found.question.free and not endless else None
     return Answer(found, telling, advised(_inside(found, telling)), walked)
 
 

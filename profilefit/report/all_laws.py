@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -21,6 +21,8 @@ from profilefit.targets import albedo_values
 
 Floats = NDArray[np.float64]
 Measured = TypeVar("Measured")
+Track = Callable[[Iterator[Any], str, int], Iterator[Any]]
+"""Items as they come, what they are, how many -> the items, as they are shown to come."""
 # Where laws are judged: albedos that were not fitted. Samplers take longer and hardly change with alpha.
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))
 SAMPLED_ALBEDOS = (0.1, 0.5, 0.9)
@@ -43,10 +45,18 @@ class MeasuredSampler:
     exact_error: Floats
 
 
-def for_each(measure: Callable[[Named], Measured], laws: Sequence[Named]) -> list[Measured]:
+def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
+    """Show nobody how far it is."""
+    del title, total
+    return items
+
+
+def for_each(
+    measure: Callable[[Named], Measured], laws: Sequence[Named], track: Track = untracked, title: str = ""
+) -> list[Measured]:
     """`measure` of every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        return list(pool.map(measure, laws))
+        return list(track(pool.map(measure, laws), title, len(laws)))
 
 
 def measured_profile(one: Named, alpha: ArrayLike = ALBEDOS) -> Quality:

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import os
 import tempfile
-from collections.abc import Callable, Mapping
-from functools import wraps
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from contextvars import ContextVar
+from functools import partial, wraps
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -42,10 +44,11 @@ RC: Any = MappingProxyType(  # read only
         "axes.formatter.use_mathtext": True,
         "lines.linewidth": 1.4,
         "savefig.dpi": DPI,
-        "svg.fonttype": "path",
+        "svg.fonttype": "none",  # text stays text: it can be read, searched and set in the page's colour
         "svg.hashsalt": "profilefit",  # without it the ids in an SVG are random
     }
 )
+FORMATS: ContextVar[tuple[str, ...]] = ContextVar("FORMATS", default=("png", "svg"))
 BAND = "95 % of posterior draws, the misfit taken for noise"
 TRUTH_BAND = "95 % of photon noise and model discrepancy together"
 # How each set of constants looks in every figure.
@@ -118,18 +121,29 @@ def albedo_axis(ax: Axes) -> None:
     ax.set_xlabel("single-scattering albedo α [-], even in √(1 − α)")
 
 
+@contextmanager
+def only(*formats: str) -> Iterator[None]:
+    """Let `save` write these formats, of png and svg, and not both."""
+    token = FORMATS.set(formats)
+    try:
+        yield
+    finally:
+        FORMATS.reset(token)
+
+
 def save(figure: Figure, out: Path, name: str) -> list[Path]:
     """Write `name`.png and `name`.svg into folder `out`, each whole or not at all; the SVG carries no date."""
-    png, svg = out / f"{name}.png", out / f"{name}.svg"
+    given: dict[str, Any] = {"png": {"dpi": DPI}, "svg": {"metadata": {"Date": None}}}
+    files = {kind: out / f"{name}.{kind}" for kind in FORMATS.get()}
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # it is laid out now: no need to do so again for each format
     try:
         out.mkdir(parents=True, exist_ok=True)
-        _replace(png, lambda file: figure.savefig(file, format="png", dpi=DPI))
-        _replace(svg, lambda file: figure.savefig(file, format="svg", metadata={"Date": None}))
+        for kind, path in files.items():
+            _replace(path, partial(figure.savefig, format=kind, **given[kind]))
     except OSError as error:
         raise OutputError(f"cannot write figure {name!r} into {out}: {error.strerror or error}") from None
-    return [png, svg]
+    return list(files.values())
 
 
 def _replace(target: Path, fill: Callable[[Any], object]) -> None:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from typing import Any
 
+from profilefit.record import ERRORS
+
 Content = Mapping[str, Any]
+ADDED = ("statistical", "discretisation", "model", "jackknife")  # errors, of which the larger of the last two counts
+TOTAL = "photons, rings, and the larger of model and jackknife"
 SETS = ("published", "corrected", "regenerated")
-# A constant's errors in a record, and what tables call them; records before this had no second and third.
-ERRORS = {
-    "statistical_error": "photons",
-    "discretisation_error": "dr",
-    "model_error": "model",
-    "discrepancy_error": "misfit",
-    "jackknife_error": "jackknife",
-}
 
 
 def converged(content: Content) -> bool:
@@ -25,6 +22,23 @@ def converged(content: Content) -> bool:
 def largest_error(constant: Content) -> float | None:
     """The largest of a constant's errors, in its own unit; None if it was held."""
     return max((constant[key] for key in ERRORS if constant.get(key) is not None), default=None)
+
+
+def total_error(constant: Content) -> float | None:
+    """Photons, ring width, the larger of model and jackknife, together in squares; None if held or without model error.
+
+    Model and jackknife are two views of what the law cannot follow: they do not add.
+    """
+    if constant.get("model_error") is None:
+        return None
+    photons, rings, model, jackknife = (constant.get(f"{name}_error") or 0.0 for name in ADDED)
+    return math.hypot(photons, rings, max(model, jackknife))
+
+
+def z_score(constant: Content) -> float | None:
+    """(published - regenerated) / `total_error`; None where there is no printed value or no error."""
+    error, published = total_error(constant), constant.get("published")
+    return (published - constant["regenerated"]) / error if error and published is not None else None
 
 
 def known_errors(constants: Content) -> dict[str, str]:

@@ -31,7 +31,7 @@ LARGE = 5  # constants beyond which the numbers on the axes must be few
 def corner_figure(record_name: str, source: Source, out: Path, kind: str = "discrepancy", name: str = "") -> list[Path]:
     """The posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
 
-    kind  "discrepancy" or "statistical", as in `profilefit.posterior`
+    kind  "discrepancy" or "statistical", as in `profilefit.chains`
     """
     fitted = source.needed(record_name)
     samples = fitted.arrays[f"samples_{kind}"].astype(float)
@@ -114,7 +114,7 @@ def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any
     if any(value is not None for value in printed):
         label = "as printed" + ("" if not outside else "; outside its panel:\n" + fill(", ".join(outside), 40))
         handles.append(Line2D([], [], color=VERMILION, linestyle="--", linewidth=0.8, label=label))
-    wider = [c.get("jackknife_error", 0.0) / s for c, s in zip(constants, samples.std(axis=0, ddof=1), strict=True)]
+    wider = [(c.get("jackknife_error") or 0.0) / s for c, s in zip(constants, samples.std(axis=0, ddof=1), strict=True)]
     if max(wider) > 1.0:
         note = f"the jackknife errors are up to {significant(max(wider))} times this wide"
         handles.append(Line2D([], [], linestyle="none", label=note))

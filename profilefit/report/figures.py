@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
 from profilefit.report.albedo_figure import albedo_figure
 from profilefit.report.coefficient_figures import a_figure, b_figure, c_figure
-from profilefit.report.content import measures
+from profilefit.report.constants_figure import constants_figure, has_printed
+from profilefit.report.content import converged, measures
 from profilefit.report.corner_figure import corner_figure
 from profilefit.report.inverse_figure import inverse_figure
 from profilefit.report.inversion_figure import inversion_figure
 from profilefit.report.profile_figures import error_figure, profile_figure
-from profilefit.report.quality_figure import quality_figure
+from profilefit.report.quality_figure import quality_figure, record_quality_figure
+from profilefit.report.residual_figure import residual_figure
 from profilefit.report.source import Source
 
 Draw = Callable[..., list[Path]]
@@ -37,6 +39,8 @@ class Plan:
         return names is None or not set(names).isdisjoint(self.needs + self.uses)
 
 
+Track = Callable[[list[Plan]], Iterable[Plan]]
+
 PAPER = (
     Plan("liang-7-profile", ("liang-as-published",), ("liang-whole",), profile_figure),
     Plan("liang-7-error", ("liang-whole",), ("liang-as-published",), error_figure),
@@ -54,19 +58,20 @@ PAPER = (
 )
 
 
-def draw_all(folder: Path, out: Path, names: Sequence[str] | None = None) -> tuple[list[Path], list[str]]:
+def draw_all(
+    folder: Path, out: Path, names: Sequence[str] | None = None, track: Track = iter
+) -> tuple[list[Path], list[str]]:
     """Draw every figure that the records in `folder` allow into folder `out`, as PNG and SVG.
 
     names  records: only figures that show one of them; all if None or empty
+    track  is shown the progress: plans, as a list -> the same, as they are drawn
     Returns the files written, and a line for each figure left out, with the reason. Raises RecordError on a record
     that is damaged, OutputError where `out` cannot be written.
     """
     source = Source(folder)
     drawn: list[Path] = []
     left_out: list[str] = []
-    for plan in plans(source):
-        if not plan.concerns(names or None):
-            continue
+    for plan in track([plan for plan in plans(source) if plan.concerns(names or None)]):
         absent = [name for name in plan.needs if name not in source.paths]
         reason = f"{folder} has no record {', '.join(absent)}" if absent else plan.missing
         if reason:
@@ -77,14 +82,27 @@ def draw_all(folder: Path, out: Path, names: Sequence[str] | None = None) -> tup
 
 
 def plans(source: Source) -> tuple[Plan, ...]:
-    """The paper's figures, the quality of all laws, and a corner plot of each record that has a posterior."""
+    """The paper's figures, those of all laws, and of each record residuals, quality and a corner plot."""
     profiles = tuple(name for name in source.paths if measures(source.content(name), "rel"))
     lacking = "" if profiles else f"{source.folder} has no record of a profile law"
-    corners = (_corner(source, name) for name in source.paths if "constants" in source.content(name))
-    return (*PAPER, Plan("quality", (), profiles, quality_figure, lacking), *corners)
+    printed = has_printed(source)
+    unprinted = "" if printed else f"{source.folder} has no record of constants that were printed"
+    return (
+        *PAPER,
+        Plan("constants", (), printed, constants_figure, unprinted),
+        Plan("quality", (), profiles, quality_figure, lacking),
+        *(plan for name in source.paths for plan in record_plans(source, name)),
+    )
 
 
-def _corner(source: Source, name: str) -> Plan:
+def record_plans(source: Source, name: str) -> tuple[Plan, ...]:
+    """The figures of one record."""
     content = source.content(name)
-    missing = "" if "discrepancy" in content["posterior"] else f"no posterior: {content['fit']['result']}"
-    return Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), missing)
+    if "constants" not in content:
+        return ()
+    failed = "" if converged(content) else f"the fit failed: {content['fit']['result']}"
+    chainless = "" if "discrepancy" in content["posterior"] else f"no posterior: {content['fit']['result']}"
+    residuals = Plan(f"residuals-{name}", (name,), (), partial(residual_figure, name), failed)
+    quality = Plan(f"quality-{name}", (name,), (), partial(record_quality_figure, name), failed)
+    corner = Plan(f"corner-{name}", (name,), (), partial(corner_figure, name), chainless)
+    return (residuals, *([quality] if measures(content, "rel") else []), corner)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain, groupby
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from rich.console import RenderableType
@@ -12,25 +14,29 @@ from rich.text import Text
 
 from mcml_sim.setting import Setting
 from profilefit.inventory import Named, Records, albedo_laws, profile_laws, sampled_laws
-from profilefit.quality import Quality
+from profilefit.quality import AlbedoQuality, Quality
 from profilefit.report.all_laws import (
     ALBEDOS,
     Floats,
     MeasuredSampler,
+    Track,
     for_each,
     measured_map,
     measured_profile,
     measured_samplers,
+    untracked,
 )
 from profilefit.report.check_tables import markdown_check
 from profilefit.report.columns import column_table
 from profilefit.report.digits import significant
 from profilefit.report.markdown import markdown_table
-from profilefit.report.quality_tables import ALBEDO_MEASURES, ROWS, albedo_number, worst
+from profilefit.report.quality_tables import ALBEDO_MEASURES, albedo_number, worst
 from profilefit.report.sampler_tables import CAPTION, COLUMNS, sampler_number, sampler_tables
+from profilefit.report.spark import span, spark
 
 PERCENT, BILLIONTHS = 100.0, 1e9
-# Measure: what it is, and in what unit eleven columns of it fit a line.
+SHOWN, SPARK = 3, 12  # albedos in columns, and characters of a sparkline over all of them
+# Measure: what it is, and in what unit its columns fit a line.
 MEASURES: Mapping[str, tuple[str, float]] = {
     "rel": ("mean |law / exact - 1| of R_d [%]", PERCENT),
     "ks": ("max |cdf - exact cdf| [%]", PERCENT),
@@ -42,28 +48,70 @@ MAP_HEADERS = ("δA", "δα", "√(1-α)", "rises", "α(1)", "fold")
 NOTHING = "None of these records holds a law that can be measured against the exact half space."
 
 
-def every_law(
-    folder: Path, records: Records = None, alpha: Floats = ALBEDOS, sampled_alpha: Sequence[float] | None = None
-) -> Iterator[RenderableType]:
-    """Profiles by setting, a table a measure; then maps; then samplers: as they are measured.
+@dataclass(frozen=True)
+class Measured:
+    """What was measured of the laws of a folder, in the order in which it is shown."""
+
+    profiles: list[tuple[Named, Quality]]
+    maps: list[tuple[Named, AlbedoQuality]]
+    samplers: list[MeasuredSampler]
+
+
+def measured(
+    folder: Path,
+    records: Records = None,
+    alpha: Floats = ALBEDOS,
+    sampled_alpha: Sequence[float] | None = None,
+    track: Track = untracked,
+) -> Measured:
+    """Measure profiles by setting, then maps, then samplers.
 
     records  restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
+    track    is shown the progress
     """
     profiles, maps, sampled = (find(folder, records) for find in (profile_laws, albedo_laws, sampled_laws))
-    for setting, laws in _by_setting(profiles):
-        qualities = for_each(lambda one: measured_profile(one, alpha), laws)
-        measured = dict(zip((one.label for one in laws), qualities, strict=True))
+    profiles, sampled = (sorted(laws, key=lambda one: _order(one.setting)) for laws in (profiles, sampled))
+    qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
+    of_maps = for_each(measured_map, maps, track, "maps")
+    samplers = for_each(lambda one: measured_samplers(one, sampled_alpha), sampled, track, "samplers")
+    return Measured(
+        profiles=list(zip(profiles, qualities, strict=True)),
+        maps=list(zip(maps, of_maps, strict=True)),
+        samplers=list(chain.from_iterable(samplers)),
+    )
+
+
+def every_law(found: Measured, in_detail: bool = False) -> Iterator[RenderableType]:
+    """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
+    for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
+        by_label = {one.label: quality for one, quality in laws}
         for measure in MEASURES:
-            yield _profile_table(measure, setting, measured)
-    if maps:
-        yield _map_table(maps)
-    for setting, laws in _by_setting(sampled):
-        samplers = list(chain.from_iterable(for_each(lambda one: measured_samplers(one, sampled_alpha), laws)))
+            yield _profile_table(measure, setting, by_label)
+    if found.maps:
+        yield _map_table(found.maps)
+    for setting, of_setting in groupby(found.samplers, key=lambda one: one.of.setting):
+        samplers = list(of_setting)
         yield _sampler_table(setting, samplers)
-        if records is not None:
+        if in_detail:
             yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
-    if not (profiles or maps or sampled):
+    if not (found.profiles or found.maps or found.samplers):
         yield Text(NOTHING)
+
+
+def content(found: Measured) -> dict[str, Any]:
+    """The same for JSON: every measure at every albedo."""
+    return {
+        "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],
+        "maps": [{**_whose(one), "quality": quality} for one, quality in found.maps],
+        "samplers": [
+            {**_whose(one.of), "sampler": one.name, "exact_error": one.exact_error, "quality": one.quality}
+            for one in found.samplers
+        ],
+    }
+
+
+def _whose(one: Named) -> dict[str, Any]:
+    return {"law": one.name, "constants": one.constants, "records": list(one.records), "setting": one.setting}
 
 
 def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
@@ -110,20 +158,22 @@ def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
     alpha = next(iter(measured.values())).alpha
-    rows = np.unique(np.linspace(0, alpha.size - 1, ROWS).round().astype(int))
+    rows = np.unique(np.linspace(0, alpha.size - 1, SHOWN).round().astype(int))
     values = [getattr(quality, measure) for quality in measured.values()]
+    wrong = [np.abs(1.0 - row) if measure == "r2" else row for row in values]  # r2 is good where it is near to 1
     columns: dict[str, list[str]] = {"law": list(measured)}
+    columns["over α"] = [spark(list(row), span(map(list, wrong)), SPARK) for row in wrong]
     for i in rows:
         columns[f"{alpha[i]:.3f}"] = [_number(measure, float(row[i])) for row in values]
     columns["mean"] = [_number(measure, float(np.mean(row))) for row in values]
     columns["worst"] = [_number(measure, worst(measure, row)) for row in values]
     title = f"{measure}: {MEASURES[measure][0]}, by α; {setting}"
-    caption = f"mean and worst over {alpha.size} albedos" if measure == "rel" else ""
-    return column_table(title, columns, caption, fold=("law",))
+    caption = f"mean and worst over {alpha.size} albedos; over α: from the least to the worst here, logarithmic"
+    return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
 
 
-def _map_table(maps: Sequence[Named]) -> RenderableType:
-    qualities = for_each(measured_map, maps)
+def _map_table(measured: Sequence[tuple[Named, AlbedoQuality]]) -> RenderableType:
+    maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
     columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
     for header, measure in zip(MAP_HEADERS, ALBEDO_MEASURES, strict=True):
         columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
@@ -162,11 +212,6 @@ def _number(measure: str, value: float) -> str:
     if value < 0.1:
         return f"{value:.3f}" if measure != "mse" else f"{value:.2f}"
     return f"{value:.0f}" if value >= 100.0 else significant(value)
-
-
-def _by_setting(laws: Sequence[Named]) -> list[tuple[Setting, list[Named]]]:
-    ordered = sorted(laws, key=lambda one: _order(one.setting))
-    return [(setting, list(group)) for setting, group in groupby(ordered, key=lambda one: one.setting)]
 
 
 def _order(setting: Setting) -> tuple[bool, float, float]:

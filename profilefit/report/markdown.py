@@ -1,4 +1,4 @@
-"""The README's tables: constants with their errors, and how good each set of constants is, as GitHub markdown."""
+"""The tables of README and documentation, as GitHub markdown: constants with errors, and how good each set is."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
-NAMES |= {"verdict", "law", "light", "sampler"}
+NAMES |= {"verdict", "law", "light", "sampler", "measure"}
+# What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
+SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
 
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
@@ -103,9 +105,10 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
 
 
 def sections(records: Mapping[str, Content]) -> dict[str, str]:
-    """The tables of a README by the names of their marks."""
+    """The tables that are made of records, by the names of their marks in README and documentation."""
     paper = {name: content for name, content in records.items() if _is_of_the_paper(content)}
     found = {
+        "short": _short_quality(records),
         "quality": _profile_quality(paper),
         "constants": markdown_constants(paper),
         "hazard": markdown_hazard(records),
@@ -132,6 +135,18 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
         (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values.get(key))))
         for owner, which, values in _measured(records, "rel")
     ]
+    return markdown_table(header, rows) if rows else ""
+
+
+def _short_quality(records: Mapping[str, Content]) -> str:
+    """A few laws under a searchlight by `rel` and `ks`, the worst first."""
+    searchlight = {name: c for name, c in records.items() if _is_searchlight(c)}
+    found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    rows = [
+        (owner, which, *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])))
+        for owner, which, values in sorted(found, key=lambda item: -worst("rel", item[2]["rel"]))
+    ]
+    header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
 
 
@@ -179,9 +194,12 @@ def _number(measure: str, value: float) -> str:
 
 def _is_of_the_paper(content: Content) -> bool:
     """Its own laws, and those it is compared with, under its own light."""
+    return _is_searchlight(content) and content["law"] in ("liang", "burley", "rational")
+
+
+def _is_searchlight(content: Content) -> bool:
     setting = content.get("setting") or {}
-    same_light = (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
-    return same_light and content["law"] in ("liang", "burley", "rational")
+    return (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
 
 
 def _fits(records: Mapping[str, Content]) -> dict[str, Content]:

@@ -10,6 +10,7 @@ from rich.console import RenderableType
 from profilefit.report.columns import column_table
 from profilefit.report.content import Content, converged, measured_sets, measures
 from profilefit.report.digits import on_the_point, significant
+from profilefit.report.spark import span, spark
 
 SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
 FEW_DIGITS = 0.01  # below it three decimals say too little
@@ -40,6 +41,7 @@ MEANING = {
     "at_one": "α at A = 1",
     "fold": "A where it turns",
 }
+SPARKED = ("rel", "ks", "inversion_error")
 ALBEDO_MEASURES = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold")
 
 
@@ -57,17 +59,31 @@ def values_of(one: Content, measure: str) -> list[float] | None:
     return None if halves is None else [row[half == "far"] for row in halves]
 
 
-def worst_lines(content: Content) -> list[str]:
-    """The worst errors of each set in turn, a line a measure; a failed fit has no regenerated law to measure."""
+def worst_measures(content: Content) -> dict[str, dict[str, float]]:
+    """Measure -> set of constants -> its worst over alpha; a failed fit has no regenerated law to measure."""
     quality = content["quality"]
-    failed = not converged(content)
-    names = [name for name in measured_sets(content) if not (failed and name == "regenerated")]
+    names = [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
     keys = [key for key in ("rel", "ks", "inversion_error", "delta_A", "largest_s") if key in quality["regenerated"]]
-    lines = []
-    for key in keys:
-        numbers = [significant(worst(key, quality[name][key])) for name in names]
-        lines.append(f"{key.replace('inversion_error', 'inversion')} " + " → ".join(numbers + ["failed"] * failed))
-    return lines
+    return {key: {name: worst(key, quality[name][key]) for name in names} for key in keys}
+
+
+def spark_table(content: Content) -> list[RenderableType]:
+    """Every set's errors over alpha as a row of blocks; nothing for what is not measured by albedo."""
+    quality, names = content["quality"], measured_sets(content)
+    keys = [key for key in SPARKED if all(values_of(quality[name], key) for name in names)]
+    if not keys:
+        return []
+    rows = [(key, name, values_of(quality[name], key) or []) for key in keys for name in names]
+    ends = {key: span(values for of, _, values in rows if of == key) for key in keys}
+    alpha = quality["alpha"]
+    columns = {
+        "": [f"{key.replace('inversion_error', 'error')} {name}" for key, name, _ in rows],
+        f"α {alpha[0]:.3f} … {alpha[-1]:.3f}": [spark(values, ends[key]) for key, _, values in rows],
+        "least": on_the_point([significant(min(values)) for _, _, values in rows]),
+        "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
+    }
+    caption = "One logarithmic scale for each measure, from its least to its worst"
+    return [column_table("Errors over α" + _failed(content), columns, caption, left=("", list(columns)[1]))]
 
 
 def quality_tables(content: Content) -> list[RenderableType]:

@@ -56,14 +56,16 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Source:
-    """The records in `folder`."""
+    """The records in `folder`, or those of them that are named."""
 
     folder: Path
+    names: tuple[str, ...] | None = None
 
     @cached_property
     def paths(self) -> dict[str, Path]:
         """Record name -> file."""
-        return record.available(self.folder)
+        found = record.available(self.folder)
+        return found if self.names is None else {name: path for name, path in found.items() if name in self.names}
 
     @cached_property
     def _read(self) -> dict[str, Fitted]:

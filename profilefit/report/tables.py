@@ -5,7 +5,7 @@ Cells are `Text`, so that units in brackets are no markup. Every table fits 80 c
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -13,10 +13,11 @@ from rich.table import Table
 from rich.text import Text
 
 from profilefit.report.columns import column_table
-from profilefit.report.content import Content, converged, known_errors, largest_error
+from profilefit.report.content import TOTAL, Content, converged, known_errors, largest_error, z_score
 from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
-from profilefit.report.evidence_tables import evidence_line, evidence_tables
-from profilefit.report.quality_tables import quality_tables, worst_lines
+from profilefit.report.evidence_tables import evidence_tables
+from profilefit.report.quality_tables import quality_tables, spark_table
+from profilefit.report.summary_tables import summary, truth
 from profilefit.starts import SAME_COST
 
 __all__ = ["constants_table", "record_tables", "summary"]
@@ -33,36 +34,8 @@ DERIVED = {
     "radius": ("r [mfp]", "Radius within which 99.5 % of the light leaves"),
     "reflectance": ("A", "Total reflectance"),
 }
+TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
 KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
-
-
-def summary(records: Mapping[str, Content]) -> Table:
-    """One line a record: what was fitted to what, whether it worked, and the worst error before and after."""
-    table = Table(box=None, header_style="bold", padding=(0, 1, 0, 0), pad_edge=False)
-    table.title, table.title_justify = "Records", "left"
-    table.add_column("record", overflow="fold", min_width=max(map(len, records), default=0))
-    for header in ("truth", "objective, fit", "worst error over α"):
-        table.add_column(header, no_wrap=True)
-    for name, content in records.items():
-        table.add_row(*(_summary_evidence(name, content) if _is_evidence(content) else _summary_fit(name, content)))
-    table.caption = "as printed → corrected, where there is such a set → regenerated"
-    table.caption_justify = "left"
-    return table
-
-
-def _summary_fit(name: str, content: Content) -> tuple[Text, ...]:
-    label = Text.assemble((name, "bold"), "\n", (f"{content['law']}, {content['equations']}", "dim"))
-    if not converged(content):
-        label.append(f"\n{content['fit']['result']}", style="red")
-    objective = content["protocol"]["weighting"]["objective"].replace("_", "\n")
-    verdict = Text("converged", style="green") if converged(content) else Text("FAILED", style="bold red")
-    how = Text.assemble(objective, "\n", verdict)  # below it: names of records need the width
-    return label, Text(truth(content)), how, Text("\n".join(worst_lines(content)))
-
-
-def _summary_evidence(name: str, content: Content) -> tuple[Text, ...]:
-    label = Text.assemble((name, "bold"), "\n", (str(content.get("equations", "")), "dim"))
-    return label, Text(truth(content)), Text(ABSENT), Text(evidence_line(content))
 
 
 def _is_evidence(content: Content) -> bool:
@@ -79,7 +52,7 @@ def record_tables(content: Content) -> list[RenderableType]:
     parts.append(fit_facts(content))
     if "stages" in content:
         parts += stage_tables(content["stages"])
-    parts += quality_tables(content)
+    parts += [*spark_table(content), *quality_tables(content)]
     return _spaced(parts)
 
 
@@ -93,19 +66,28 @@ def constants_table(content: Content) -> RenderableType:
     rows = list(constants.values())
     columns: dict[str, list[str]] = {}
     if any(row.get("published") is not None for row in rows):
-        columns["published"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")])
-    columns["regenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
+        columns["\npublished"] = on_the_point([f"{v:g}" if v is not None else ABSENT for v in _each(rows, "published")])
+    columns["\nregenerated"] = on_the_point([to_error(row["regenerated"], largest_error(row)) for row in rows])
     known = known_errors(constants)
     for place, (key, word) in enumerate(known.items()):
         texts = on_the_point([significant(value) for value in _each(rows, key)])
         if place == 0:
             texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
-        columns[f"± {word}"] = texts
+        columns[f"±\n{word}"] = texts
+    scores = [z_score(row) for row in rows]
+    told = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
+    if any(score is not None for score in scores):
+        columns["\nz"] = [_signed(score) for score in scores]
+        told.append(f"z: published less regenerated, over {TOTAL}, together")
     title = "Constants, lengths in units of the mean free path"
-    caption = "; ".join(f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values())
+    caption = "; ".join(told)
     if not converged(content):
         caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
     return column_table(title, {"": list(constants), **columns}, caption)
+
+
+def _signed(score: float | None) -> str:
+    return ABSENT if score is None else f"{score:+.0f}" if abs(score) >= TENFOLD else f"{score:+.1f}"
 
 
 def intervals_table(content: Content) -> RenderableType:
@@ -219,14 +201,6 @@ def stage_tables(stages: Content) -> list[RenderableType]:
     return [column_table("Stages: coefficient laws through the fits at each albedo", cells), _facts("", states)]
 
 
-def truth(content: Content) -> str:
-    """What a record was fitted to, on two lines where photons were traced."""
-    source = content.get("truth") or {}
-    if source.get("photons") is None:
-        return str(source.get("kind", ABSENT))
-    return f"{source['photons']:.3g}".replace("e+0", "e") + "\nphotons"
-
-
 def _title(content: Content) -> RenderableType:
     head = Text.assemble((content["name"], "bold"), "  ", content["title"])
     return Group(head, Padding(_facts("", _provenance(content)), (0, 0, 0, 2)))
@@ -238,7 +212,7 @@ def _provenance(content: Content) -> list[Line]:
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
-        ("truth", f"{truth(content).replace(chr(10), ' ')}, seed {content['seed']}, preset {content['preset']}"),
+        ("truth", f"{truth(content)}, seed {content['seed']}, preset {content['preset']}"),
     ]
     protocol = content.get("protocol") or {}
     if protocol.get("albedos"):
@@ -279,7 +253,8 @@ def _verdict(result: str) -> Text:
 
 
 def _facts(title: str, lines: Iterable[Line]) -> RenderableType:
-    table = Table(box=None, show_header=False, padding=(0, 1, 0, 0), title=title or None, title_justify="left")
+    table = Table(box=None, show_header=False, padding=(0, 1, 0, 0), title=title or None)
+    table.title_justify, table.title_style = "left", "bold"
     table.add_column(no_wrap=True, style="dim")
     table.add_column(overflow="fold")
     for label, line in lines:

@@ -15,6 +15,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.inventory import PRINTED_MAP, Named
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
+from profilefit.record import ERRORS
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
@@ -28,13 +29,6 @@ TARGETS = {
 }
 TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
-ERRORS = {
-    "statistical_error": "photons",
-    "discretisation_error": "dr",
-    "model_error": "model",
-    "discrepancy_error": "misfit",
-    "jackknife_error": "jackknife",
-}
 MEASURES = {"rel": "mean relative error of R_d", "ks": "error of the cdf", "inversion_error": "error in xi"}
 LIGHT = {
     "searchlight": "a pencil beam along the normal (MCML's)",

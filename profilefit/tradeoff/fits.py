@@ -26,9 +26,9 @@ from numpy.typing import NDArray
 
 from mcml_sim import Grid, exact, simulate_orders
 from profilefit import catalogue, staged
+from profilefit.chains import posterior
 from profilefit.estimate import Fit, fit
 from profilefit.laws.base import ProfileLaw
-from profilefit.posterior import posterior
 from profilefit.profiles import Profiles
 from profilefit.quality import ENERGY_WITHIN, NEAREST
 from profilefit.tradeoff.points import Measured, Panel, Part, Point

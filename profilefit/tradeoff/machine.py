@@ -7,10 +7,10 @@ import os
 import platform
 from collections.abc import Iterator
 from importlib.metadata import version
-from pathlib import Path
 
 import jax
 
+from profilefit.evidence import processor
 from profilefit.tradeoff.stopwatch import cores
 
 LIBRARIES = ("jax", "jaxlib", "numpy", "profilefit")
@@ -42,16 +42,6 @@ def facts(pinned: bool) -> dict[str, str]:
 def caption(known: dict[str, str]) -> str:
     """The facts in one line for a figure."""
     return f"{known['processor']}; cores: {known['cores']}; load before: {known['load before']}; jax {known['jax']}"
-
-
-def processor() -> str:
-    """The processor's name, as the system tells it."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
-    except OSError:  # not Linux
-        return platform.processor() or platform.machine()
-    named = [line.split(":", 1)[1].strip() for line in lines if line.startswith("model name")]
-    return named[0] if named else platform.machine()
 
 
 def _load() -> str:

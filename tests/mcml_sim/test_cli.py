@@ -1,5 +1,6 @@
 """mcml-sim as a user meets it: what it writes and prints, what it refuses, and in how many lines."""
 
+import json
 import os
 import re
 import sys
@@ -8,12 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim import cli, layered
+from mcml_sim import cli, layered, printed
+from mcml_sim import command as doing
 from mcml_sim.errors import ClusterError
+from mcml_sim.grid import Grid
 from mcml_sim.mcml_files import read_mci
-from mcml_sim.quantities import Precision
+from mcml_sim.medium import half_space
+from mcml_sim.quantities import Precision, quantities
 from mcml_sim.results import read_results
-from mcml_sim.simulation import simulate
+from mcml_sim.run import FIRST_LOOK
+from mcml_sim.simulation import batch_photons, simulate
 from mcml_sim.store import RESUMES
 from mcml_sim.version import __version__
 
@@ -391,7 +396,7 @@ def test_a_scheduler_is_passed_on(command, mci, monkeypatch):
         given.append(scheduler)
         return simulate(*what, **options)
 
-    monkeypatch.setattr(cli, "simulate", here)
+    monkeypatch.setattr(doing, "simulate", here)
     assert command("run", mci, "--scheduler", "tcp://10.0.0.1:8786")[0] == 0
     assert given == ["tcp://10.0.0.1:8786"] * 2
 
@@ -400,9 +405,43 @@ def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, m
     def gone(*_, **__):
         raise ClusterError(f"the scheduler at here has gone; {RESUMES}")
 
-    monkeypatch.setattr(cli, "simulate", gone)
+    monkeypatch.setattr(doing, "simulate", gone)
     status, _, err = command("run", mci)
     assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command with --resume goes on\n")
+
+
+def test_json_is_the_totals_with_their_errors_and_nothing_else(command, mci):
+    status, out, err = command("run", mci, "--json")
+    assert (status, err) == (0, "")
+    told = json.loads(out)["runs"]
+    assert [one["mco"] for one in told] == ["first.mco", "second.mco"]
+    for one in told:
+        kept = read_results(one["npz"])
+        assert (one["photons"], one["seed"]) == (kept.photons, 0)
+        assert set(one["estimates"]) == {*printed.TOTALS, "energy"}
+        for name, estimate in one["estimates"].items():
+            assert estimate["value"] == kept.estimates[name].value
+            error = kept.estimates[name].standard_error
+            assert estimate["standard_error"] == (error if np.isfinite(error) else None)
+    status, out, err = command("run", mci, "--json", "--precision", 0.5, "--quantity", "absorbed")
+    assert [one["precision"] for one in json.loads(out)["runs"]] == [
+        {"quantity": "absorbed", "goal": 0.5, "reached": True}
+    ] * 2
+
+
+def test_quiet_is_quiet(command, mci):
+    assert command("run", mci, "--quiet") == (0, "", "")
+    assert names() == {"two.mci", "first.mco", "first.npz", "second.mco", "second.npz"}
+    status, out, err = command("run", mci, "--quiet", "--seed", "x")
+    assert (status, out) == (2, "")
+    assert err.startswith("mcml-sim: seed must be")
+
+
+def test_what_the_help_says_is_what_is_done():
+    assert quantities(Grid(1, 1, 1, 1, na=1)) == cli.QUANTITIES
+    assert doing.QUANTITY == cli.QUANTITY
+    first = [f"{FIRST_LOOK * batch_photons(half_space(0.5, n=n)) / 1e6:.2g} million" for n in (1.4, 1.0)]
+    assert list(cli.FIRST_LOOKS) == first
 
 
 def test_version_and_help(command):

@@ -87,8 +87,8 @@ def test_letters_that_the_terminal_lacks_are_replaced(monkeypatch):
     with pytest.raises(UnicodeEncodeError):
         print("0.5 ± 0.1")
     mend_streams()
-    print("0.5 ± 0.1", flush=True)
-    assert screen.buffer.getvalue() == b"0.5 ? 0.1\n"
+    print("0.5 ± 0.1 \N{SNOWMAN}", flush=True)
+    assert screen.buffer.getvalue() == b"0.5 + 0.1 ?\n"
 
 
 @pytest.mark.usefixtures("python_handles_sigint")

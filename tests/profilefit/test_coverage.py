@@ -5,9 +5,9 @@ import pytest
 from scipy.stats import binom, norm
 
 from mcml_sim import InputError
+from profilefit.chains import posterior
 from profilefit.coverage import LEVELS, binomial_band, counted, coverage, refits
 from profilefit.estimate import fit
-from profilefit.posterior import posterior
 
 REPLICATES = 2000
 
@@ -36,6 +36,7 @@ def known(tallies, toy):
     return refitted(tallies, toy)
 
 
+@pytest.mark.slow
 def test_intervals_of_the_true_law_cover(known):
     one, covariance, again = known
     assert again.failed == 0
@@ -49,6 +50,7 @@ def test_intervals_of_the_true_law_cover(known):
     )
 
 
+@pytest.mark.slow
 def test_noise_taken_for_independent_does_not_cover(known):
     """Negative control: albedos share their photons."""
     one, covariance, again = known
@@ -57,6 +59,7 @@ def test_noise_taken_for_independent_does_not_cover(known):
     assert np.all(found.share[0] < 0.5)
 
 
+@pytest.mark.slow
 def test_errors_a_tenth_off_do_not_cover(known):
     """Negative control: what the band can see."""
     one, covariance, again = known

@@ -58,6 +58,10 @@ def to_srgb(image: ArrayLike, exposure: float = 1.0) -> NDArray[np.uint8]:
     """Linear (h, w, 3) times `exposure`, as 8-bit values for a screen (IEC 61966-2-1); same order of rows."""
     if not exposure > 0:
         raise InputError(f"exposure must be a factor > 0, got {exposure!r}")
-    linear = np.clip(np.asarray(image, float) * exposure, 0.0, 1.0)
-    curved = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    return np.round(255.0 * curved).astype(np.uint8)
+    return np.round(srgb_codes(np.asarray(image, float) * exposure)).astype(np.uint8)
+
+
+def srgb_codes(linear: ArrayLike) -> Floats:
+    """Values of a screen [8-bit steps, 0 to 255] for linear ones, white 1, not rounded: fractions of a step count."""
+    clipped = np.clip(np.asarray(linear, float), 0.0, 1.0)
+    return 255.0 * np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)

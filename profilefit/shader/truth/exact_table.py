@@ -96,12 +96,12 @@ def exact_table(illumination: str) -> ExactTable:
     reflectance = np.asarray(exact.reflectance(alpha, setting))
     within = np.asarray(exact.cdf(x, albedos, setting=setting))
     root = CubicSpline(np.append(0.0, reflectance[-2::-1]), s[::-1])
-    rows = _rows(y, alpha, setting) - np.log(reflectance)[:, None]
+    rows = log_profile(y, alpha, setting) - np.log(reflectance)[:, None]
     return ExactTable(y, RectBivariateSpline(s, y, rows), RectBivariateSpline(s, y, np.log(within / x)), root)
 
 
-def _rows(y: Floats, alpha: Floats, setting: Setting) -> Floats:
-    """ln(R_d l^2) + kappa x (albedos, radii), continued as x^-2 where R_d is faint."""
+def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
+    """ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint: kappa x > FAINT [-]."""
     path = np.asarray(exact.decay_rate(alpha))[:, None] * np.exp(y)
     last = np.sum(path <= FAINT, axis=1) - 1
     held = np.minimum(np.arange(y.size), last[:, None])

@@ -5,11 +5,14 @@ import os
 import shutil
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from profilefit import catalogue
+from profilefit.commands.check import asked
 from profilefit.errors import ShaderError
+from profilefit.evidence import stale
 from profilefit.shader.context import open_context
 
 FITS = catalogue.fits_folder()
@@ -45,16 +48,34 @@ def test_a_good_law_passes_in_100_columns(command, opengl):
     assert "float16 arithmetic: not offered by" in out or "arithmetic" in out
 
 
-def test_json_has_all_of_it(command, opengl):
-    status, out, _ = command("check", "albedo-rational-n1.4", "hazard-n1.4", "--json")
+def test_json_has_all_of_it_and_is_what_a_folder_keeps(command, opengl):
+    status, out, err = command("check", "albedo-rational-n1.4", "hazard-n1.4", "--json", "--out", "kept")
     found = json.loads(out)
-    assert status == 0
+    assert (status, err) == (0, "wrote kept/check.json\n")
+    assert Path("kept/check.json").read_text(encoding="utf-8") == out
+    assert next(iter(found)) == "made"
+    assert found["made"]["command"] == "profilefit check albedo-rational-n1.4 hazard-n1.4 --json --out kept"
+    assert not stale(found["made"], FITS)
+    assert found["of"] == ["albedo-rational-n1.4", "hazard-n1.4"], "not all there is"
     assert found["passed"] is True
     (law,), (mapped,) = found["laws"], found["maps"]
     assert (law["constants"], mapped["constants"]) == ("hazard-n1.4", "albedo-rational-n1.4")
     assert set(law["spreads"]["R_d"]) == {"half", "most", "largest", "where"}
     assert all(bound["value"] <= bound["limit"] for bound in law["bounds"])
     assert set(found["costs"]) == {"burley", "hazard"}
+
+
+@pytest.mark.parametrize(
+    ("names", "constants", "told"),
+    [
+        (None, None, "all"),
+        ([], "regenerated", "all"),
+        (None, "published", "all published"),
+        (["liang"], "published", ["liang"]),
+    ],
+)
+def test_a_part_is_not_told_as_the_whole(names, constants, told):
+    assert asked(names, constants) == told
 
 
 def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
@@ -128,5 +149,6 @@ def test_without_opengl_a_readme_keeps_its_table(blind, folder):
     page.write_text("<!-- check -->\nas it was\n<!-- /check -->\n")
     done = blind("report", "--markdown", str(page), "--fits", str(folder))
     assert done.returncode == 0, done.stderr
-    assert "the table 'check' stays as it was: no OpenGL 3.3" in " ".join(done.stdout.split())
+    assert done.stdout == ""
+    assert "the table 'check' stays as it was: no OpenGL 3.3" in done.stderr
     assert page.read_text() == "<!-- check -->\nas it was\n<!-- /check -->\n"

@@ -42,14 +42,20 @@ def small(recipe: Path, out: str = "out", *more: str) -> tuple[str, ...]:
 
 
 def test_regenerate_writes_a_record_that_loads(command, recipe):
-    status, _, err = command(*small(recipe))
-    assert status == 0, err
+    status, out, err = command(*small(recipe, "out", "--json", "--quiet"))
+    assert (status, err) == (0, "")
     content = json.loads(Path("out/small.json").read_text())
     assert content["truth"]["photons"] == 20000
     assert content["fit"]["result"] == "converged"
     law = catalogue.albedo_law("liang", constants="out/small.json")
     assert law.p == pytest.approx(content["constants"]["p"]["regenerated"])
     assert content["posterior"]["statistical"]["result"] == "converged"
+    told = json.loads(out)["small"]
+    assert (told["path"], told["result"]) == ("out/small.json", "converged")
+    kept = content["constants"]["p"]
+    assert told["constants"]["p"] == {key: kept[key] for key in told["constants"]["p"]}
+    assert told["constants"]["p"]["statistical_error"] > 0
+    assert told["worst"]["delta_A"]["regenerated"] == content["quality"]["regenerated"]["delta_A"]
 
 
 @pytest.mark.slow
@@ -184,7 +190,7 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(command, recipe, change, sa
         (("regenerate", "albedo-liang", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
         (("regenerate", "albedo-rational", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
         (("regenerate", "missing.toml", "--seed", str(2**32)), "seed must be a whole number in [0, 4294967295], got"),
-        (("report", "no-such-record"), "record must be one of albedo-liang,"),
+        (("report", "no-such-record"), "there is no record 'no-such-record' in "),
         (("report", "--fits", "empty"), "empty has no records"),
     ],
 )
@@ -276,8 +282,8 @@ def test_the_photons_of_another_run_are_refused(command, recipe):
 
 
 def test_report_shows_shipped_records_and_draws_figures(command):
-    status, out, err = command("report", "albedo-liang", "--figures", "figures")
-    assert status == 0, err
+    status, out, err = command("report", "albedo-liang", "--figures", "figures", "--quiet")
+    assert (status, err) == (0, "")
     assert "(8)" in out
     assert list(Path("figures").glob("*.png"))
 

@@ -7,6 +7,7 @@ import shutil
 import pytest
 
 from profilefit import catalogue
+from profilefit.evidence import stale
 
 FITS = catalogue.fits_folder()
 
@@ -14,8 +15,11 @@ FITS = catalogue.fits_folder()
 def test_a_map_that_holds_and_one_that_folds(command, tmp_path):
     status, out, err = command("stability", "albedo-rational", "--out", "atlas")
     assert status == 0, err
-    assert err == ""
-    assert out.splitlines()[-1] == "atlas: stability*.png, .svg; stability.csv"
+    assert err == "atlas: stability*.png, .svg; stability.csv, .json\n"
+    kept = json.loads((tmp_path / "atlas" / "stability.json").read_text(encoding="utf-8"))
+    assert list(kept)[:3] == ["made", "of", "passed"]
+    assert kept["of"] == ["albedo-rational"], "not the whole atlas"
+    assert not stale(kept["made"], FITS)
     assert "ours: 1 laws, maps and functions, none has a red cell inside its range" in out
     assert max(map(len, out.splitlines())) <= 100
     with open(tmp_path / "atlas" / "stability.csv", encoding="utf-8") as file:
@@ -32,6 +36,7 @@ def test_json_has_every_region(command):
     status, out, _ = command("stability", "albedo-liang", "--json")
     found = json.loads(out)
     assert status == 0
+    assert next(iter(found)) == "made"
     assert found["passed"] is True
     assert any(one["cause"] == "no A above the fold" for one in found["regions"])
     assert found["subjects"]["albedo-liang"]["right"] > 100

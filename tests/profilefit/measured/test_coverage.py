@@ -20,7 +20,7 @@ from profilefit.measured.replicates import steadied
 
 pytestmark = pytest.mark.slow
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[3] / "examples"
 LAW = catalogue.load("hazard")
 ALPHA, MFP = 0.9, 1.2
 R = np.geomspace(0.1, 9.0, 24)

@@ -21,7 +21,7 @@ from profilefit.measured.reading import read
 from profilefit.measured.solving import FARTHEST_LN, LONGEST
 from profilefit.measured.telling import relative_errors, told
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[3] / "examples"
 LAW = catalogue.load("hazard")
 SOURCE = origin("hazard", "regenerated", Setting(), catalogue.fits_folder())
 ALPHA, MFP = 0.95, 1.1

@@ -11,7 +11,7 @@ from profilefit.errors import InputError
 from profilefit.measured.reading import read
 from profilefit.measured.simulated import FEWEST_PHOTONS, NARROWEST, merged
 
-DATA = Path(__file__).parent / "data"
+DATA = Path(__file__).parents[3] / "examples"
 
 
 def test_rings_are_merged_until_each_holds_enough_photons():

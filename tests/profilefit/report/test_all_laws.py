@@ -13,7 +13,7 @@ from profilefit import catalogue
 from profilefit.inventory import albedo_laws, profile_laws, sampled_laws
 from profilefit.quality import profile_quality
 from profilefit.report.all_laws import for_each, measured_profile, measured_samplers
-from profilefit.report.law_tables import NOTHING, every_law, markdown_laws, markdown_samplers
+from profilefit.report.law_tables import NOTHING, content, every_law, markdown_laws, markdown_samplers, measured
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])
@@ -57,19 +57,20 @@ def test_records_restrict_and_a_failed_one_has_no_law(folder):
     assert [one.label for one in albedo_laws(folder, ["burley-whole"])] == []
     assert "gaussians-2" not in {one.label for one in profile_laws(folder)}, "not in this folder"
     path = folder / "burley-whole.json"
-    content = json.loads(path.read_text())
-    content["fit"]["result"] = "no convergence"
-    path.write_text(json.dumps(content))
+    broken = json.loads(path.read_text())
+    broken["fit"]["result"] = "no convergence"
+    path.write_text(json.dumps(broken))
     assert profile_laws(folder, ["burley-whole"]) == []
-    assert printed(every_law(folder, ["burley-whole"])) == [NOTHING]
+    assert printed(every_law(measured(folder, ["burley-whole"]))) == [NOTHING]
 
 
 def test_tables_of_one_record(folder):
     """What is printed is what was measured."""
-    lines = printed(every_law(folder, ["burley-whole"], ALPHA, [0.9]))
+    found = measured(folder, ["burley-whole"], ALPHA, [0.9])
+    lines = printed(every_law(found, in_detail=True))
     law = catalogue.load("burley")
     quality = profile_quality(law, ALPHA)
-    rows = [line.split()[1:] for line in lines if line.startswith("burley-whole ")]
+    rows = [line.split()[2:] for line in lines if line.startswith("burley-whole ")]  # after name and blocks
     expected = [100 * quality.rel, 100 * quality.ks, 100 * quality.l1, 1e9 * quality.mse, quality.r2]
     assert len(rows) == len(expected)
     for row, values in zip(rows, expected, strict=True):
@@ -78,6 +79,15 @@ def test_tables_of_one_record(folder):
     assert max(map(len, lines)) <= 100
     assert sum(line.startswith("burley-whole: ") for line in lines) == 3  # its samplers
     assert "Sampler: burley-whole: xie" in lines
+    told = content(found)
+    (one,) = told["profiles"]
+    assert (one["law"], one["records"], one["quality"].rel.tolist()) == (
+        "burley",
+        ["burley-whole"],
+        quality.rel.tolist(),
+    )
+    assert [each["sampler"] for each in told["samplers"]] == ["exact", "xie", "unreal"]
+    assert told["maps"] == []
 
 
 def test_samplers_are_held_against_the_exact_cdf(folder):
@@ -108,7 +118,7 @@ def test_markdown_has_a_line_a_law(folder):
 
 
 def test_maps_under_their_own_light(folder):
-    lines = printed(every_law(folder, ["albedo-rational"]))
+    lines = printed(every_law(measured(folder, ["albedo-rational"])))
     [row] = [line.split() for line in lines if line.startswith("albedo-rational ")]
     assert row[1] == "searchlight"
     assert float(row[2]) < 5e-6

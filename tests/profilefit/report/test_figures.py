@@ -12,13 +12,22 @@ import pytest
 from profilefit import catalogue
 from profilefit.errors import OutputError, RecordError
 from profilefit.report import draw_all
+from profilefit.report.canvas import only
 from profilefit.report.figures import PAPER, plans
+from profilefit.report.residual_figure import energy_within
 from profilefit.report.source import DRAWS, Source, coefficients
 
 SHIPPED = catalogue.fits_folder()
 SMALL_CORNER = "corner-albedo-liang"
 # Every kind of figure once: corner plots differ in nothing but their record, nor does (15) from (11) but in its letter.
-EACH_KIND = (*(plan.name for plan in PAPER if plan.name != "liang-15-c"), "quality", SMALL_CORNER)
+OF_RECORDS = (
+    SMALL_CORNER,
+    "residuals-albedo-liang",
+    "residuals-burley-whole",
+    "residuals-quantile",
+    "quality-liang-whole",
+)
+EACH_KIND = (*(plan.name for plan in PAPER if plan.name != "liang-15-c"), "constants", "quality", *OF_RECORDS)
 # Cheap ones of each layout, drawn again.
 AGAIN = ("liang-11-a", "quality", SMALL_CORNER)
 
@@ -65,7 +74,7 @@ def test_png_is_1200_pixels_wide_with_ink_that_nowhere_touches_its_edge(drawn):
     for file in (file for file in drawn[0] if file.suffix == ".png"):
         pixels = matplotlib.image.imread(file)[..., :3]
         assert pixels.shape[1] == 1200, file.name
-        assert 600 <= pixels.shape[0] <= 1300, file.name
+        assert 450 <= pixels.shape[0] <= 1700, file.name
         assert 0.01 < np.mean(pixels.min(axis=2) < 0.9) < 0.6, file.name
         edges = np.concatenate([pixels[0], pixels[-1], pixels[:, 0], pixels[:, -1]])
         assert np.all(edges > 0.99), file.name
@@ -80,6 +89,31 @@ def test_svg_carries_no_date_and_is_the_same_twice(drawn, source, tmp_path):
             assert (tmp_path / f"{plan.name}.svg").read_bytes() == first[f"{plan.name}.svg"]
 
 
+def test_text_in_an_svg_is_text_and_one_format_may_be_enough(drawn, source, tmp_path):
+    (svg,) = (file for file in drawn[0] if file.name == "quality.svg")
+    assert ">gaussians-4</text>" in svg.read_text(encoding="utf-8")
+    (plan,) = (plan for plan in plans(source) if plan.name == SMALL_CORNER)
+    with only("svg"):
+        assert plan.draw(source, tmp_path, name="one") == [tmp_path / "one.svg"]
+    assert [file.name for file in tmp_path.iterdir()] == ["one.svg"]
+
+
+def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
+    folder = folder_with(tmp_path, "albedo-liang")
+    change(folder, "albedo-liang", lambda c: [one.update(jackknife_error=None) for one in c["constants"].values()])
+    with only("svg"):
+        files, _ = draw_all(folder, tmp_path / "out", ["albedo-liang"])
+    assert tmp_path / "out" / f"{SMALL_CORNER}.svg" in files
+
+
+def test_residuals_of_a_profile_are_those_of_its_rings(source):
+    """The slow twin: from the cdf and the reflectance, for a law that conserves energy."""
+    fitted = source.needed("burley-whole")
+    edges, alpha = fitted.arrays["r_edges"], float(fitted.arrays["alpha"][9])
+    energy = np.diff(fitted.law.cdf(edges, alpha)) * float(source.needed("albedo-rational").law.reflectance(alpha))
+    np.testing.assert_allclose(np.diff(energy_within(fitted.law, edges, alpha)), energy, atol=1e-6)
+
+
 def test_drawing_leaves_matplotlib_as_it_was(drawn):
     _, before, after = drawn
     assert before == after
@@ -92,15 +126,17 @@ def test_what_cannot_be_drawn_is_listed(tmp_path):
     change(folder, "burley-whole", lambda content: content.update(posterior={}, fit=fit))
     files, left_out = draw_all(folder, tmp_path / "out")
     assert [file.name for file in files] == ["quality.png", "quality.svg"]
-    assert len(left_out) == len(PAPER) + 1
+    assert len(left_out) == len(PAPER) + 4
     assert f"liang-7-profile: {folder} has no record liang-as-published" in left_out
+    assert f"constants: {folder} has no record of constants that were printed" in left_out
+    assert "residuals-burley-whole: the fit failed: no fit" in left_out
     assert "corner-burley-whole: no posterior: no fit" in left_out
 
 
 def test_names_choose_the_figures_that_show_them(tmp_path):
     folder = folder_with(tmp_path, "burley-whole", "albedo-rational")
     files, left_out = draw_all(folder, tmp_path / "out", ["albedo-rational"])
-    assert {file.stem for file in files} == {"corner-albedo-rational"}
+    assert {file.stem for file in files} == {"residuals-albedo-rational", "corner-albedo-rational"}
     assert left_out == [f"liang-8-albedo: {folder} has no record albedo-liang"]
 
 
@@ -117,7 +153,7 @@ def test_a_damaged_record_is_an_error_and_no_gap(tmp_path):
 def test_a_folder_that_cannot_be_written_is_named(tmp_path):
     folder = folder_with(tmp_path, "burley-whole")
     (tmp_path / "out").write_text("a file")
-    with pytest.raises(OutputError, match=r"cannot write figure 'quality' into .*out"):
+    with pytest.raises(OutputError, match=r"cannot write figure 'constants' into .*out"):
         draw_all(folder, tmp_path / "out")
 
 

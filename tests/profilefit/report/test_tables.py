@@ -2,14 +2,15 @@
 
 import copy
 import io
+import math
 from collections import Counter
 
 import pytest
 from rich.console import Console
 
 from profilefit import catalogue, record
-from profilefit.report import digits, tables
-from profilefit.report.content import converged, known_errors, largest_error
+from profilefit.report import digits, quality_tables, tables
+from profilefit.report.content import converged, known_errors, largest_error, z_score
 from profilefit.report.evidence_tables import evidence_tables
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
@@ -57,13 +58,16 @@ def test_the_summary_fits_and_names_every_record(width):
 def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
     content = FITS[name]
     lines = rendered([tables.constants_table(content)], 100).splitlines()
-    headers = lines[1].replace("± ", "±").split()
+    headers = lines[2].split()
     known = known_errors(content["constants"])
-    assert [header for header in headers if header[0] == "±"] == [f"±{word}" for word in known.values()]
+    assert lines[1].split() == ["±"] * len(known)
+    assert [header for header in headers if header not in ("published", "regenerated", "z")] == list(known.values())
     for constant, values in content["constants"].items():
         cells = next(line.split() for line in lines if line.split()[:1] == [constant])
         shown = dict(zip(headers, cells[1:], strict=True))
-        published, regenerated = shown.pop("published", "–"), shown.pop("regenerated")
+        published, regenerated, z = shown.pop("published", "–"), shown.pop("regenerated"), shown.pop("z", "–")
+        score = z_score(values)
+        assert z == "–" if score is None else float(z) == pytest.approx(score, rel=0.05, abs=0.05)
         value, error = values["regenerated"], largest_error(values)
         # Half of the second digit of the error is at most a twentieth of it; half of the third of the value 1/200.
         assert abs(float(regenerated) - value) <= max(0.05 * (error or 0.0), 0.005 * abs(value))
@@ -97,8 +101,42 @@ def test_a_failed_fit_says_why_wherever_it_is_shown():
     assert "No credible intervals" in detail
     assert "no law" in " ".join(detail.split())
     assert REASON in " ".join(rendered([tables.summary({name: broken})], 200).split())
-    assert "failed" in rendered([tables.summary({name: broken})], 200)
+    assert "→ FAILED" in rendered([tables.summary({name: broken})], 200)
     assert "FAILED" not in rendered([tables.constants_table(content)], 100)
+
+
+def test_z_is_the_distance_in_the_errors_that_add():
+    """The printed b0 is 70 standard errors from the one that was fitted; without a printed value there is no z."""
+    lines = rendered([tables.constants_table(FITS["liang-whole"])], 80).splitlines()
+    b0 = FITS["liang-whole"]["constants"]["b0"]
+    apart = (b0["published"] - b0["regenerated"]) / math.hypot(
+        b0["statistical_error"], b0["discretisation_error"], b0["model_error"]
+    )
+    assert next(line.split()[-1] for line in lines if line.startswith("b0 ")) == f"{apart:+.0f}"
+    assert "z: published less regenerated" in " ".join(" ".join(lines).split())
+    assert "z" not in rendered([tables.constants_table(FITS["hazard"])], 80).splitlines()[2].split()
+
+
+def test_the_summary_has_the_worst_of_each_set_and_a_block_for_every_stretch_of_alpha():
+    text = rendered([tables.summary(RECORDS)], 80)
+    rows = {line.split()[0]: line for line in text.splitlines() if line.split()[:1] and line.split()[0] in RECORDS}
+    assert set(rows) == set(RECORDS)
+    assert "0.79 → 0.13 → 0.14" in rows["liang-whole"]
+    assert set(rows["gaussians-2"].split()[-1]) == {"█"}, "the worst of all, everywhere"
+    assert set(rows["hazard-diffuse"].split()[-1]) <= {"▁", "▂"}
+    assert "5 of 8 reproduced" in rows["reproduction"]
+
+
+def test_a_record_shows_its_errors_over_alpha():
+    (table,) = quality_tables.spark_table(FITS["liang-whole"])
+    rows = [line.split() for line in rendered([table], 80).splitlines()[2:-1]]
+    assert [row[:2] for row in rows[:3]] == [["rel", "published"], ["rel", "corrected"], ["rel", "regenerated"]]
+    quality = FITS["liang-whole"]["quality"]
+    for measure, which, blocks, least, most in rows:
+        assert len(blocks) == len(quality["alpha"])
+        assert float(least) == pytest.approx(min(quality[which][measure]), rel=0.06)
+        assert float(most) == pytest.approx(max(quality[which][measure]), rel=0.06)
+    assert quality_tables.spark_table(FITS["albedo-rational"]) == []
 
 
 def _stages(content):

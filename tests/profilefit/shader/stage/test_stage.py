@@ -9,7 +9,7 @@ import pytest
 from profilefit.errors import InputError
 from profilefit.shader.stage.buffers import flat, step_edge
 from profilefit.shader.stage.camera import Camera
-from profilefit.shader.stage.combining import to_srgb
+from profilefit.shader.stage.combining import srgb_codes, to_srgb
 from profilefit.shader.stage.coverage import covered, covering
 from profilefit.shader.stage.sampling import Sampling
 from profilefit.shader.stage.scene import head_scene
@@ -172,6 +172,7 @@ def test_head_is_lit_and_covers_what_it_must(context, burley):
 def test_srgb():
     np.testing.assert_array_equal(to_srgb([0.0, 0.0025, 0.18, 1.0, 7.0]), [0, 8, 118, 255, 255])
     np.testing.assert_array_equal(to_srgb(0.09, exposure=2.0), 118)
+    np.testing.assert_allclose(srgb_codes([0.0, 0.18, 1.0]), [0.0, 117.65, 255.0], atol=0.005)  # unrounded
     with pytest.raises(InputError, match="exposure must be a factor > 0, got 0"):
         to_srgb(0.5, exposure=0)
 

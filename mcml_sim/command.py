@@ -1,0 +1,232 @@
+"""What `mcml-sim run` does: every run of an MCML input file, its results kept and told."""
+
+from __future__ import annotations
+
+import contextlib
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from mcml_sim import printed
+from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers
+from mcml_sim.compiling import Compiling
+from mcml_sim.errors import InputError
+from mcml_sim.mcml_files import Run, read_mci, write_mco
+from mcml_sim.quantities import Precision, Tally, quantities
+from mcml_sim.results import Results, read_results, write_results
+from mcml_sim.screen import print_json
+from mcml_sim.simulation import batch_photons, require_store, simulate
+from mcml_sim.store import MANIFEST, batches
+from mcml_sim.terminal import without_logs
+from mcml_sim.version import __version__
+from mcml_sim.whole_file import require_writable
+
+QUANTITY = "diffuse_reflectance"
+REPEATS = (
+    "More photons or more repeats? Errors fall as 1/sqrt(photons) either way: k runs of N photons with k seeds are "
+    "worth one run of k N."
+)
+
+
+def run(
+    file: Path,
+    photons: str | None,
+    seed: str,
+    precision: float | None,
+    quantity: str | None,
+    resume: bool,
+    workers: int | None,
+    scheduler: str | None,
+    out: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Do the runs in turn, and print the totals of each."""
+    runs = read_mci(file)
+    number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
+    if quantity is not None and precision is None:
+        raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
+    plan = _Plan(
+        seed=_whole("seed", seed, lowest=0),
+        goal=None if precision is None else Precision(precision, quantity or QUANTITY),
+        resume=resume,
+        workers=checked_workers(workers, scheduler),
+        scheduler=scheduler,
+        progress=False if quiet else None,
+    )
+    jobs = [_Job(one, number or one.photons, *_outputs(one, out)) for one in runs]
+    _require_room(file, jobs, plan)
+    console = Console(highlight=False, soft_wrap=True, quiet=quiet or as_json)
+    found = []
+    with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines
+        for at, job in enumerate(jobs, start=1):
+            console.print(f"run {at} of {len(jobs)}: {job.mco}", markup=False)
+            kept, how = _done(job, plan)
+            found.append(_summary(job, kept, plan.goal))
+            for line in _told(job, kept, how, plan):
+                console.print(f"  {line}", markup=False)
+    if plan.goal is not None:
+        console.print(REPEATS, markup=False)
+    if as_json:
+        print_json({"runs": found})
+
+
+def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
+    """A whole number as people write them, 1e6 included."""
+    number: object = text
+    for read in (int, float):
+        with contextlib.suppress(ValueError):  # the check says what is wrong with it
+            number = read(text)
+            break
+    return checked_whole(name, number, lowest, highest)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """What the options say of all runs alike."""
+
+    seed: int
+    goal: Precision | None
+    resume: bool
+    workers: int | None
+    scheduler: str | None
+    progress: bool | None
+
+
+@dataclass(frozen=True)
+class _Job:
+    """A run, and where its results go, and its batches until then."""
+
+    run: Run
+    photons: int
+    mco: Path
+    npz: Path
+    store: Path
+
+    @property
+    def is_begun(self) -> bool:
+        """True if the store holds batches."""
+        return bool(batches(self.store))
+
+    @property
+    def is_part_of_more(self) -> bool:
+        """True if the store holds batches beyond this run's photons, which are a longer run's."""
+        return any(batch * batch_photons(self.run.medium) >= self.photons for batch in batches(self.store))
+
+    def discard_batches(self) -> None:
+        """Remove what a store keeps, and its folder if nothing else is in it."""
+        with contextlib.suppress(OSError):  # left behind, it is in nobody's way but the next plain run's, which says so
+            for path in (*self.store.glob("batch-*"), *self.store.glob("*.part"), self.store / MANIFEST):
+                path.unlink(missing_ok=True)
+            self.store.rmdir()
+
+
+def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
+    """Paths by the name in the input file, in `folder` or, as MCML does, seen from where we are."""
+    name = Path(run.output)
+    if folder is not None and (name.is_absolute() or ".." in name.parts):
+        raise InputError(f"output files must stay inside --out {folder}, got {run.output}")
+    mco = (folder or Path()) / name
+    bare = mco.with_suffix("") if mco.suffix.lower() == ".mco" else mco
+    return mco, Path(f"{bare}.npz"), Path(f"{bare}.photons")
+
+
+def _require_room(file: Path, jobs: list[_Job], plan: _Plan) -> None:
+    """InputError or OutputError where the results of a run could not be written: better now than hours later."""
+    taken = {file.resolve(): f"the input file {file}"}
+    for job in jobs:
+        if plan.goal is not None and plan.goal.quantity not in (names := quantities(job.run.grid)):
+            raise InputError(f"quantity must be one of {', '.join(names)}, got {plan.goal.quantity!r}")
+        for path in (job.mco, job.npz):
+            require_writable(path)
+            place = path.resolve()
+            if place in taken:
+                raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
+            taken[place] = job.run.output
+        require_store(job.store, job.run.medium, job.run.grid, plan.seed)
+        if job.is_begun and not plan.resume:
+            raise InputError(
+                f"{job.store} holds photons of a run that was not finished: --resume goes on with them, "
+                "or delete that folder"
+            )
+
+
+def _done(job: _Job, plan: _Plan) -> tuple[Results, str]:
+    """The results of the run, which is done unless a resumed command finds it so; and how that went."""
+    kept, how = _finished(job, plan) if plan.resume else None, "finished before"
+    if kept is None:
+        tally, how = _traced(job, plan)
+        write_mco(tally, job.mco)
+        write_results(tally, job.npz)  # the last, by which the run counts as finished
+        kept = read_results(job.npz)
+    is_enough = plan.goal is None or plan.goal.is_reached(kept.estimates[plan.goal.quantity])
+    if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
+        job.discard_batches()
+    return kept, how
+
+
+def _told(job: _Job, kept: Results, how: str, plan: _Plan) -> Iterator[str]:
+    """Lines that tell of a run that is done."""
+    yield f"{kept.photons} photons, seed {plan.seed}, {how}"
+    yield from printed.totals(kept)
+    if plan.goal is not None:
+        yield printed.answer(kept.estimates[plan.goal.quantity], plan.goal, kept.photons)
+    if job.is_part_of_more:
+        yield f"{job.store} is kept, since it holds more photons than these: --resume with more --photons uses them"
+
+
+def _summary(job: _Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
+    """The same for JSON: files, and each share of the light with its standard error."""
+    shares = {name: kept.estimates[name] for name in (*printed.TOTALS, "energy")}
+    summary = {
+        "mco": job.mco,
+        "npz": job.npz,
+        "photons": kept.photons,
+        "seed": kept.seed,
+        "version": kept.version,
+        "cut": kept.cut,
+        "estimates": {name: {"value": one.value, "standard_error": one.standard_error} for name, one in shares.items()},
+    }
+    if goal is not None:
+        reached = goal.is_reached(kept.estimates[goal.quantity])
+        summary["precision"] = {"quantity": goal.quantity, "goal": goal.relative_error, "reached": reached}
+    return summary
+
+
+def _traced(job: _Job, plan: _Plan) -> tuple[Tally, str]:
+    """The run's tally, and how fast it went."""
+    begun, start = job.is_begun, time.perf_counter()
+    with Compiling() as compiling:
+        tally = simulate(
+            job.run.medium,
+            job.run.grid,
+            job.photons,
+            seed=plan.seed,
+            store=job.store,
+            workers=plan.workers,
+            precision=plan.goal,
+            scheduler=plan.scheduler,
+            progress=plan.progress,
+        )
+    seconds = time.perf_counter() - start
+    if begun:  # the batches that were there cost nothing: a rate would be too good
+        return tally, f"{printed.times(seconds, compiling.seconds)}, resumed"
+    there = "" if plan.scheduler is None else ", compiling on the workers included"
+    return tally, printed.speed(tally.photons, seconds, compiling.seconds) + there
+
+
+def _finished(job: _Job, plan: _Plan) -> Results | None:
+    """The run's results, if its files are there and of this very run."""
+    try:
+        found = read_results(job.npz)
+    except InputError:
+        return None
+    if (found.medium, found.grid, found.seed, found.version) != (job.run.medium, job.run.grid, plan.seed, __version__):
+        return None
+    goal = plan.goal
+    is_enough = goal is not None and found.photons < job.photons and goal.is_reached(found.estimates[goal.quantity])
+    return found if (is_enough or found.photons == job.photons) and job.mco.is_file() else None

@@ -1,0 +1,128 @@
+"""Around any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status."""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import typer
+from rich.console import Console
+
+from mcml_sim.terminal import INTERRUPTED, mend_streams
+
+BAD_INPUT = 2
+AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
+NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
+
+
+def accepted() -> str:
+    """How to put right a command that was not understood."""
+    return "--help shows what is accepted"
+
+
+def unchanged(text: str) -> str:
+    """What a library error says, as it says it."""
+    return text
+
+
+@dataclass(frozen=True)
+class Program:
+    """A command with its subcommands.
+
+    mendable  the errors that are the user's to mend; remedied what they say, in words of the command line
+    stopped   what to do after Ctrl-C; hint after a command that was not understood
+    """
+
+    name: str
+    app: typer.Typer
+    mendable: tuple[type[Exception], ...]
+    stopped: Callable[[], str]
+    hint: Callable[[], str] = accepted
+    remedied: Callable[[str], str] = unchanged
+
+    def main(self) -> None:
+        """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
+        mend_streams()
+        with warnings.catch_warnings():  # of a damaged batch, say: a line, without the place in the code
+            warnings.showwarning = lambda message, *_: self.say(message)
+            with _lost_interrupts() as lost:
+                status = self._status()
+            status = INTERRUPTED if lost else status
+            if status == INTERRUPTED:
+                self.say(self.stopped())
+        sys.exit(status)
+
+    def say(self, text: object) -> None:
+        """A line on stderr."""
+        Console(stderr=True, highlight=False, soft_wrap=True).print(f"{self.name}: {text}", markup=False)
+
+    def _status(self) -> int:
+        """Do the subcommand, and say what went wrong."""
+        try:
+            # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
+            status = int(self.app(prog_name=self.name, standalone_mode=False) or 0)
+            sys.stdout.flush()
+            return status
+        except self.mendable as error:
+            self.say(self.remedied(str(error)))
+        except typer.TyperException as error:
+            if message := error.format_message():  # without arguments typer has shown the help and says no more
+                self.say(f"{message} ({self.hint()})")
+            return int(error.exit_code)
+        except (KeyboardInterrupt, typer.Abort):
+            return INTERRUPTED
+        except (BrokenPipeError, SystemExit) as end:  # as in `| head`; typer and rich make an exit of it
+            if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+                raise
+            _let_go_of_stdout()
+            return NOBODY_READS
+        except OSError as error:  # what is printed goes to a full disk
+            self.say(f"cannot print: {error.strerror or error}")
+            _let_go_of_stdout()
+        return BAD_INPUT
+
+
+@contextlib.contextmanager
+def _lost_interrupts() -> Iterator[list[bool]]:
+    """An item for each Ctrl-C that Python dropped, which comes again.
+
+    That is one that falls into a callback of the garbage collector, as jax has one, or into __del__: nothing can be
+    raised from there.
+    """
+    lost: list[bool] = []
+    at_work, here = True, threading.get_ident()
+    before = sys.unraisablehook
+
+    def again() -> None:
+        time.sleep(AGAIN)
+        if at_work and hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(here, signal.SIGINT)  # ends a wait, too
+        elif at_work:
+            _thread.interrupt_main()
+
+    def hook(told: sys.UnraisableHookArgs) -> None:
+        if not issubclass(told.exc_type, KeyboardInterrupt):
+            before(told)
+            return
+        lost.append(True)
+        _thread.start_new_thread(again, ())  # threading's locks may be held by what the collector interrupted
+
+    sys.unraisablehook = hook
+    try:
+        yield lost
+    finally:
+        at_work = False
+        sys.unraisablehook = before
+
+
+def _let_go_of_stdout() -> None:
+    """Have Python not try once more as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

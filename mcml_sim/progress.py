@@ -1,0 +1,105 @@
+"""The one progress bar: how far, how fast, how long still; on stderr, and only where that is a terminal."""
+
+from __future__ import annotations
+
+import contextlib
+import sys
+from collections.abc import Iterable, Iterator, Sized
+from datetime import timedelta
+from typing import TypeVar
+
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    ProgressColumn,
+    SpinnerColumn,
+    Task,
+    TextColumn,
+    TimeElapsedColumn,
+)
+from rich.text import Text
+
+T = TypeVar("T")
+MILLION = 1e6
+MINUTE = 60.0  # [s]
+PERIOD = 300.0  # over which a rate is estimated [s]; rich's own 30 s forget every item that takes longer
+
+
+def is_watched() -> bool:
+    """Whether somebody sees stderr; there is none where a shell has closed it."""
+    return sys.stderr is not None and sys.stderr.isatty()
+
+
+def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
+    """A bar that counts in `unit`, such as "photons".
+
+    shown  None: on a terminal only; True there likewise, as elsewhere it would be a file full of bars
+    kept   stays on the screen when all is done
+    """
+    counted = () if unit == "photons" else (MofNCompleteColumn(),)
+    columns = (TextColumn("{task.description}"), BarColumn(), *counted, TimeElapsedColumn(), _Rate(unit), _Remaining())
+    is_shown = is_watched() if shown is None else shown
+    return Progress(
+        *columns, console=Console(stderr=True), transient=not kept, disable=not is_shown, speed_estimate_period=PERIOD
+    )
+
+
+def tracked(
+    items: Iterable[T], title: str, unit: str = "items", total: int | None = None, quiet: bool = False
+) -> Iterator[T]:
+    """The items as they come, with a bar that goes when all are done; total is their number if they have no length."""
+    count = total if total is not None else len(items) if isinstance(items, Sized) else None
+    with bar(unit, False if quiet else None) as shown:
+        yield from shown.track(items, count, description=title)
+
+
+@contextlib.contextmanager
+def working(what: str, quiet: bool = False) -> Iterator[None]:
+    """A sign of life, and for how long already, while something runs whose length nobody knows."""
+    columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
+    shown = Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet or not is_watched())
+    with shown:
+        shown.add_task(what, total=None)
+        yield
+
+
+class _Rate(ProgressColumn):
+    """How many a second, or how long one takes."""
+
+    def __init__(self, unit: str) -> None:
+        super().__init__()
+        self._unit = unit
+
+    def render(self, task: Task) -> Text:
+        """Blank until there is one."""
+        return Text(rate(_speed(task), self._unit), style="dim")
+
+
+class _Remaining(ProgressColumn):
+    """How long still."""
+
+    def render(self, task: Task) -> Text:
+        """Blank until anything is done, and once all is."""
+        speed = _speed(task)
+        left = 0.0 if task.total is None or not speed else (task.total - task.completed) / speed
+        return Text(f"{timedelta(seconds=round(left))} left" if left > 0 else "", style="cyan")
+
+
+def _speed(task: Task) -> float | None:
+    """Units a second, lately; or since the start, before there are two steps to tell by."""
+    since = task.completed / task.elapsed if task.elapsed else None
+    return task.finished_speed or task.speed or since
+
+
+def rate(speed: float | None, unit: str) -> str:
+    """`speed` [units/s] in words: 2.30 M photons/s, 4.1 laws/s, 1 law in 12 s."""
+    if not speed:
+        return ""
+    if speed >= 0.1 * MILLION:
+        return f"{speed / MILLION:.2f} M {unit}/s"
+    if speed >= 1.0:
+        return f"{speed:.1f} {unit}/s"
+    each = 1.0 / speed
+    return f"1 {unit.removesuffix('s')} in " + (f"{each:.0f} s" if each < MINUTE else f"{each / MINUTE:.1f} min")

@@ -1,0 +1,21 @@
+"""A law as text for a shader, a program or a reader."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from profilefit import record
+from profilefit.folder import records_folder
+from profilefit.inventory import find
+from profilefit.shader.export import export as exported
+
+
+def export(what: str, lang: str, constants: str | None, name: str | None, out: Path | None, fits: Path | None) -> None:
+    """Print the text, or write it."""
+    folder = records_folder(fits)
+    text = exported(find(what, folder, constants), folder, lang, name)
+    if out is None:
+        sys.stdout.write(text)
+    else:
+        record.write_text(out, text)

@@ -1,0 +1,130 @@
+"""Show records as tables, draw their figures, or write all of it as one page."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+from mcml_sim.progress import tracked, working
+from mcml_sim.screen import notes, print_json, put, screen, show
+from profilefit import record
+from profilefit.errors import InputError, RecordError, ShaderError
+from profilefit.folder import evidence_folder, records_folder
+from profilefit.report import every_law, figures, fill, law_tables, markdown_sections, sections, tables
+from profilefit.report.page.document import write_page
+
+Contents = dict[str, dict[str, Any]]
+MEGABYTE = 1e6
+NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
+
+
+def report(
+    names: list[str] | None,
+    quality: bool,
+    figures_to: Path | None,
+    markdown: Path | None,
+    html: Path | None,
+    evidence: Path | None,
+    fits: Path | None,
+    as_json: bool,
+    quiet: bool,
+) -> None:
+    """Print what is asked for, or write it."""
+    _require_one({"--markdown": markdown, "--html": html, "--json": as_json, "--quality": quality and not as_json})
+    folder = records_folder(fits)
+    contents = _contents(folder, names)
+    if markdown is not None:
+        _fill(markdown, contents, folder, quiet)
+    elif html is not None:
+        _page(html, folder, evidence_folder(folder, evidence), names, quiet)
+    elif as_json:
+        told: dict[str, Any] = {"records": contents}
+        if quality:
+            told["quality"] = law_tables.content(_measured(folder, names, quiet))
+        print_json(told)
+    elif quality:
+        show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())
+    else:
+        _show(contents, bool(names))
+    if figures_to is not None:
+        _draw(folder, figures_to, names, quiet)
+
+
+def _require_one(asked: dict[str, object]) -> None:
+    given = [option for option, value in asked.items() if value]
+    if len(given) > 1:
+        raise InputError(f"report takes one of {', '.join(asked)}, or --json with --quality, got {' and '.join(given)}")
+
+
+def _show(contents: Contents, named: bool) -> None:
+    console = screen()
+    if not named:
+        put(tables.summary(contents), console)
+        return
+    for content in contents.values():
+        for part in tables.record_tables(content):
+            put(part, console)
+
+
+def _measured(folder: Path, names: list[str] | None, quiet: bool) -> law_tables.Measured:
+    def track(found: Iterator[Any], title: str, total: int) -> Iterator[Any]:
+        return tracked(found, f"measuring {title}", "laws", total, quiet)
+
+    return law_tables.measured(folder, names or None, track=track)
+
+
+def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
+    record.require_writable(out)
+
+    def track(plans: list[figures.Plan]) -> Iterable[figures.Plan]:
+        return tracked(plans, "drawing", "figures", quiet=quiet)
+
+    drawn, skipped = figures.draw_all(folder, out, names, track)
+    said = notes(quiet)
+    said.print(f"drew {len(drawn)} figures into {out}", markup=False)
+    for line in skipped:
+        said.print(f"left out: {line}", markup=False)
+
+
+def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, quiet: bool) -> None:
+    def track(parts: list[str]) -> Iterator[str]:
+        return tracked(parts, "writing", "parts", quiet=quiet)
+
+    write_page(path, folder, evidence, names, track)
+    notes(quiet).print(f"wrote {path}, {path.stat().st_size / MEGABYTE:.1f} MB", markup=False)
+
+
+def _fill(path: Path, contents: Contents, folder: Path, quiet: bool) -> None:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    measured = {}
+    for name, make in markdown_sections(folder).items():
+        if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
+            try:
+                with working(f"measuring the table {name}", quiet):
+                    measured[name] = make()
+            except ShaderError as error:
+                notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
+    record.write_text(path, fill(text, sections(contents) | measured))
+
+
+def _contents(folder: Path, names: list[str] | None) -> Contents:
+    known = record.available(folder)
+    if not known:
+        raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
+    for name in names or ():
+        if name not in known:
+            raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known))}")
+    return {name: record.read(known[name], whole=True) for name in (names or known)}
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    """What may have been meant: names that begin so, or differ by a few letters."""
+    begun = sorted((one for one in known if one.startswith(name.lower())), key=len)
+    near = begun or get_close_matches(name.lower(), known, n=NEAREST, cutoff=ALIKE)
+    hint = f"did you mean {', '.join(near[:NEAREST])}? " if near else ""
+    return f"{hint}`profilefit report` lists them"

@@ -1,0 +1,117 @@
+"""What is around any subcommand: exit statuses, one line for what can be mended, a quiet end in a pipe."""
+
+import subprocess
+import sys
+
+import pytest
+
+SMALL = """
+import gc
+import signal
+import sys
+import time
+import typer
+from rich.console import Console
+from mcml_sim.errors import InputError
+from mcml_sim.program import Program
+
+app = typer.Typer()
+
+@app.command()
+def printed():
+    for _ in range(20000):
+        print("a line of a table, and another")
+
+@app.command()
+def shown():
+    console = Console()
+    for _ in range(2000):
+        console.print("a line of a table, and another")
+
+@app.command()
+def short():
+    print("one line")
+
+@app.command()
+def wrong():
+    raise InputError("x must be 1, got 2")
+
+@app.command()
+def stopped():
+    raise KeyboardInterrupt
+
+@app.command()
+def dropped(seconds: float):
+    def callback(*_):
+        gc.callbacks.remove(callback)
+        signal.raise_signal(signal.SIGINT)
+    gc.callbacks.append(callback)
+    gc.collect()
+    time.sleep(seconds)
+    print("slept")
+
+@app.command()
+def unraisable():
+    class Dying:
+        def __del__(self):
+            raise ValueError("dying")
+    Dying()
+
+Program("small", app, (InputError,), lambda: "stopped; begin again", remedied=lambda text: text.upper()).main()
+"""
+
+
+@pytest.fixture
+def small():
+    """Start it with WORDS."""
+
+    def start(*words, stdout=subprocess.PIPE):
+        return subprocess.Popen([sys.executable, "-c", SMALL, *words], stdout=stdout, stderr=subprocess.PIPE)
+
+    return start
+
+
+@pytest.mark.parametrize("words", ["printed", "shown", "--help"])
+def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
+    """As in `| head`: the status that a shell gives what SIGPIPE ended, and no traceback."""
+    with small(words) as run:
+        run.stdout.close()
+        said = run.stderr.read()
+    assert (run.returncode, said) == (141, b"")
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "said"),
+    [
+        ("wrong", 2, "small: X MUST BE 1, GOT 2\n"),
+        ("stopped", 130, "small: stopped; begin again\n"),
+        ("wrnog", 2, "small: No such command 'wrnog'. Did you mean 'wrong'? (--help shows what is accepted)\n"),
+    ],
+)
+def test_what_a_user_can_mend_is_one_line(small, words, status, said):
+    with small(words) as run:
+        out, err = run.communicate(timeout=60)
+    assert (run.returncode, err.decode()) == (status, said)
+    assert out == b""
+
+
+@pytest.mark.parametrize(("seconds", "printed"), [("50", (b"",)), ("0", (b"", b"slept\n"))])
+def test_ctrl_c_in_a_callback_of_the_collector_is_not_lost(small, seconds, printed):
+    """Python drops what is raised there: it comes again, or the command had just ended by then."""
+    with small("dropped", seconds) as run:
+        out, err = run.communicate(timeout=40)
+    assert (run.returncode, err) == (130, b"small: stopped; begin again\n")
+    assert out in printed
+
+
+def test_other_errors_that_cannot_be_raised_are_told_as_ever(small):
+    with small("unraisable") as run:
+        _, err = run.communicate(timeout=60)
+    assert run.returncode == 0
+    assert b"ValueError: dying" in err
+
+
+def test_a_full_disk_is_one_line(small):
+    with open("/dev/full", "w") as disk, small("short", stdout=disk) as run:
+        said = run.stderr.read()
+    assert (run.returncode, said) == (2, b"small: cannot print: No space left on device\n")

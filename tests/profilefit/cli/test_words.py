@@ -1,0 +1,93 @@
+"""What a shell completes, and how fast."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+
+from profilefit import catalogue, recipe, record
+from profilefit.cli import words
+from profilefit.cli.check import Precision
+from profilefit.commands.check import HALF
+from profilefit.shader.export import LANGUAGES
+from profilefit.stability.atlas import FUNCTIONS
+from profilefit.tradeoff.parts import PARTS
+
+FITS = catalogue.fits_folder()
+HEAVY = ("jax", "scipy", "matplotlib", "moderngl", "optimistix")  # take seconds together, which no shell has
+PATIENCE = 1.0  # [s] of processor time, so that a busy machine does not count
+
+
+def test_what_is_written_out_is_what_there_is():
+    assert catalogue.names() == words.LAWS
+    assert {*words.MAPS, "liang"} == set(catalogue.ALBEDO_LAWS)
+    assert LANGUAGES == words.LANGUAGES
+    assert tuple(PARTS) == words.PARTS
+    assert set(FUNCTIONS) == set(words.FUNCTIONS)
+    assert HALF == Precision.HALF
+
+
+@pytest.fixture
+def completed(command, monkeypatch):
+    """Words that bash is offered in place of the last of WORDS."""
+
+    def run(*typed):
+        monkeypatch.setenv("_PROFILEFIT_COMPLETE", "complete_bash")
+        monkeypatch.setenv("COMP_WORDS", " ".join(("profilefit", *typed)))
+        monkeypatch.setenv("COMP_CWORD", str(len(typed)))
+        status, out, err = command()
+        assert (status, err) == (0, "")
+        return set(out.split())
+
+    return run
+
+
+@pytest.mark.parametrize(
+    ("typed", "offered"),
+    [
+        (("ch",), {"check", "choose"}),
+        (("report", "burley"), {name for name in record.available(FITS) if name.startswith("burley")}),
+        (("report", "--fits", str(FITS), "reproduct"), {"reproduction"}),
+        (("report", "--fits", "nowhere", "reproduct"), set()),
+        (("export", "hazard", "--lang", "glsl"), {"glsl", "glsl-es"}),
+        (("fit", "x.csv", "--law", "quan"), {"quantile"}),
+        (("check", "--constants", "c"), {"corrected"}),
+        (("regenerate", "reprod"), {name for name in recipe.available(FITS) if name.startswith("reprod")}),
+        (("stability", "sol"), {"solver"}),
+        (("tradeoff", "l"), {"laws"}),
+    ],
+)
+def test_a_shell_is_offered_names(completed, typed, offered):
+    assert completed(*typed) == offered
+
+
+def test_a_shell_is_answered_within_a_second(tmp_path):
+    words_so_far = {"COMP_WORDS": "profilefit report haz", "COMP_CWORD": "2"}
+    before = os.times()
+    done = subprocess.run(
+        [sys.executable, "-m", "profilefit"], cwd=tmp_path, capture_output=True, text=True, timeout=60,
+        env={**os.environ, "_PROFILEFIT_COMPLETE": "complete_bash", **words_so_far},
+    )  # fmt: skip
+    after = os.times()
+    assert "hazard-diffuse" in done.stdout.split()
+    spent = after.children_user + after.children_system - before.children_user - before.children_system
+    assert spent < PATIENCE
+
+
+def test_help_and_mistakes_import_nothing_that_takes_long(tmp_path):
+    """Of every subcommand: only what is done needs it, and it is imported then."""
+    code = f"""
+import sys
+from profilefit.cli import PANELS, PROGRAM
+for command in (*(c for panel in PANELS.values() for c in panel), None):
+    sys.argv = ["profilefit", *([command.__name__] if command else []), "--help"]
+    assert PROGRAM._status() == 0
+sys.argv = ["profilefit", "report", "--nonsense"]
+assert PROGRAM._status() == 2
+import mcml_sim.cli
+print("LOADED", [name for name in {HEAVY!r} if name in sys.modules])
+"""
+    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.splitlines()[-1] == "LOADED []"

@@ -1,0 +1,178 @@
+"""Chains on a problem whose posterior is known in closed form."""
+
+from dataclasses import replace
+
+import equinox as eqx
+import numpy as np
+import pytest
+
+from mcml_sim import Setting
+from profilefit.chains import _curvature_adjustment, posterior
+from profilefit.errors import InputError
+from profilefit.estimate import Problem, curvature, fit
+from profilefit.laws.base import AlbedoLaw
+from profilefit.profiles import Covariance, Profiles
+
+# A chain of 50 autocorrelation times and 32 walkers holds 1600 independent points, thinned to 1000; 500 to be safe.
+INDEPENDENT = 500
+
+
+class Line(AlbedoLaw):
+    """A = u + v alpha: its misfit is a quadratic form, and its posteriors are normal."""
+
+    setting: Setting = eqx.field(static=True)
+    u: float = 0.3
+    v: float = 0.5
+
+    def alpha(self, reflectance):
+        return (reflectance - self.u) / self.v
+
+    def reflectance(self, alpha):
+        return self.u + self.v * alpha
+
+
+@pytest.fixture(scope="module")
+def line_fit():
+    """Twelve noisy points whose photon noise is correlated, and nothing like their misfit."""
+    rng = np.random.default_rng(8)
+    alpha = np.linspace(0.1, 0.9, 12)
+    energy = (0.2 + 0.6 * alpha + 0.02 * rng.standard_normal(12))[:, None]
+    factor = 0.01 * rng.standard_normal((1, 12, 12)) * np.linspace(0.2, 2.0, 12)[:, None]
+    plenty, rest = np.full_like(energy, np.inf), np.zeros(12)
+    profiles = Profiles(
+        alpha,
+        np.array([0.0, 1.0]),
+        energy,
+        0 * energy,
+        plenty,
+        rest,
+        "test",
+        Setting(),
+        1000,
+        Covariance(factor, energy, 1000, 0.0),
+    )
+    return fit(profiles, Line(Setting()), "reflectance")
+
+
+def whitened(samples, covariance):
+    """z of the sample covariance about the identity, where `covariance` is 1."""
+    root = np.linalg.inv(np.linalg.cholesky(covariance))
+    sample = np.cov(samples @ root.T, rowvar=False)
+    return (sample - np.eye(len(sample))) / np.sqrt((1 + np.eye(len(sample))) / INDEPENDENT)
+
+
+@pytest.mark.parametrize("kind", ["statistical", "discrepancy"])
+def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
+    found = posterior(line_fit, kind, seed=1, max_steps=4000)
+    expected = getattr(line_fit, kind)
+    assert found.result == "converged"
+    assert found.steps >= 50 * found.tau
+    assert found.kind == kind
+    assert found.names == ("u", "v")
+    assert np.abs(whitened(found.samples, expected)).max() < sidak(3)
+    z = (found.samples.mean(axis=0) - line_fit.solution.parameters) / np.sqrt(np.diag(expected) / INDEPENDENT)
+    assert np.abs(z).max() < sidak(2)
+    # Negative control: the other kind's covariance is not this one.
+    other = line_fit.discrepancy if kind == "statistical" else line_fit.statistical
+    assert np.abs(whitened(found.samples, other)).max() > 3 * sidak(3)
+    assert np.abs(whitened(found.samples, 2 * expected)).max() > 1.5 * sidak(3)
+
+
+def test_intervals_and_deviations_are_those_of_a_normal(line_fit):
+    found = posterior(line_fit, "statistical", seed=2, max_steps=4000)
+    sigma = np.sqrt(np.diag(line_fit.statistical))
+    # The deviation of 500 independent draws is known to 1 / sqrt(1000) = 3 %, a 16 % quantile to 5 %; 4 of each.
+    np.testing.assert_allclose(found.standard_deviation, sigma, rtol=0.13)
+    inner, outer = found.interval(0.68), found.interval(0.95)
+    np.testing.assert_allclose(np.diff(inner, axis=1)[:, 0], 2 * 0.9945 * sigma, rtol=0.2)
+    assert np.all(outer[:, 0] < inner[:, 0])
+    assert np.all(inner[:, 1] < outer[:, 1])
+    assert np.all((inner[:, 0] < line_fit.solution.parameters) & (line_fit.solution.parameters < inner[:, 1]))
+
+
+def test_curvature_adjustment_is_the_identity_it_claims():
+    """C^T (J^T J) C / s^2 = V^-1 with det C = 1, for constants of very different size."""
+    rng = np.random.default_rng(9)
+    for size in (1, 3, 8):
+        scale = 10.0 ** rng.uniform(-4, 2, size)
+        jacobian = rng.standard_normal((40, size)) / scale
+        root = rng.standard_normal((size, size)) * scale[:, None]
+        covariance = root @ root.T
+        adjust, variance = _curvature_adjustment(jacobian.T @ jacobian, covariance)
+        identity = adjust.T @ jacobian.T @ jacobian @ adjust / variance @ covariance
+        # In scaled constants, where rounding is alike everywhere.
+        np.testing.assert_allclose(identity * scale[:, None] / scale, np.eye(size), atol=1e-6)
+        assert np.linalg.slogdet(adjust)[1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_same_seed_same_samples_other_seed_others(line_fit):
+    first, again, other = (posterior(line_fit, "statistical", seed, max_steps=1000) for seed in (3, 3, 4))
+    np.testing.assert_array_equal(first.samples, again.samples)
+    assert np.any(first.samples != other.samples)
+
+
+def test_a_chain_that_is_too_short_says_so(line_fit):
+    """tau is about ten steps here: 100 are no chain."""
+    found = posterior(line_fit, "discrepancy", max_steps=100)
+    assert found.steps == 100
+    assert found.result.startswith("chain of 100 steps is under 50 autocorrelation times")
+    assert np.all(np.isfinite(found.samples))
+
+
+def test_chain_facts(line_fit):
+    found = posterior(line_fit, "statistical", max_steps=1000)
+    assert found.walkers == 32
+    assert found.samples.shape[1] == 2
+    assert len(found.samples) <= 1000
+    assert 0.1 < found.acceptance < 0.9
+
+
+def test_draws_go_to_arviz_and_back(line_fit):
+    """A walker a chain, the log density beside it, and the fit's name on it."""
+    pytest.importorskip("arviz_base")
+    found = posterior(line_fit, "statistical", seed=2, max_steps=1000)
+    tree = found.to_arviz()
+    draws = tree["posterior"]
+    assert dict(draws.sizes) == {"chain": 32, "draw": 31}
+    np.testing.assert_array_equal(draws["u"].values.T.ravel(), found.samples[:, 0])
+    np.testing.assert_allclose(draws["v"].mean(), found.samples[:, 1].mean(), rtol=1e-12)
+    np.testing.assert_array_equal(tree["sample_stats"]["lp"].values.T.ravel(), found.log_density)
+    assert {tree.attrs[key] for key in ("law", "objective", "kind")} == {"Line", "reflectance", "statistical"}
+    assert tree.attrs["result"] == "converged"
+    # The density is that of the draws: highest where they are nearest to the optimum.
+    off = found.samples - line_fit.solution.parameters
+    expected = -0.5 * np.sum(off @ np.linalg.inv(line_fit.statistical) * off, axis=1)
+    np.testing.assert_allclose(found.log_density, expected, rtol=1e-6, atol=1e-8)
+
+
+def test_kind_must_be_known(line_fit):
+    with pytest.raises(InputError, match="kind must be 'statistical' or 'discrepancy', got 'both'"):
+        posterior(line_fit, "both")
+
+
+def test_without_photon_noise_only_the_misfit_is_left(line_fit):
+    with pytest.raises(InputError, match=r"no photon noise: only kind='discrepancy' applies, got 'statistical'"):
+        posterior(replace(line_fit, statistical=None))
+
+
+@pytest.mark.slow
+def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
+    """The chain has the sandwich's width although residuals are large and curved: there J^T J is not the curvature."""
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))
+    chain = posterior(one, "statistical", seed=4)
+    assert chain.result == "converged"
+    expected = np.sqrt(np.diag(one.statistical))
+    # 1000 thinned draws know a standard deviation to 1/sqrt(2000) = 2.2 %: four of these, and 2 % of curvature.
+    np.testing.assert_allclose(chain.standard_deviation / expected, 1.0, atol=0.11)
+    # A negative control: with J^T J for the curvature the width is wrong by more than that.
+    jacobian = one.solution.jacobian
+    short, variance = _curvature_adjustment(jacobian.T @ jacobian, one.statistical)
+    full = curvature(Problem(one.objective, one.free), one.solution, one.law, one.rings)
+    width = np.sqrt(np.diag(np.linalg.inv(short.T @ full @ short / variance)))
+    assert np.max(np.abs(width / expected - 1.0)) > 0.02
+
+
+def test_no_posterior_of_a_fit_that_failed(tallies, liang):
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "g1"))
+    with pytest.raises(InputError, match="a posterior needs a fit that converged, got: degenerate"):
+        posterior(one)
