@@ -7,9 +7,11 @@ PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
 # A file's tests stay in one process, which compiles what they share once; the files go to every core.
 PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile
 ARGS ?=
+# Pages with tables of what was fitted, between marks.
+TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/howto/shader.md
 
 .DEFAULT_GOAL := help
-.PHONY: help fits readme test test-all benchmark opengl lint format wheel clean
+.PHONY: help fits evidence readme docs test test-all benchmark programs lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
@@ -18,21 +20,29 @@ fits: $(VENV)/.installed  ## simulate, fit every recipe, write the records and t
 	$(VENV)/bin/profilefit regenerate --preset quick --out fits
 	$(VENV)/bin/profilefit report --fits fits --figures fits/figures
 
-readme: fits  ## make fits, and put its tables into the README
-	$(VENV)/bin/profilefit report --fits fits --markdown README.md
+evidence: $(VENV)/.installed programs  ## measure what reports show beside the fits, on an idle machine: shader check, atlas, times; fifteen minutes
+	$(VENV)/bin/profilefit check --fits fits --out fits/evidence
+	$(VENV)/bin/profilefit stability --fits fits --out fits/evidence
+	$(VENV)/bin/profilefit tradeoff --fits fits --out fits/evidence
 
-test: lint opengl  ## what CI runs: lint, and all tests but the slow ones
+readme: fits  ## make fits, and put its tables into the README and the docs
+	for page in $(TABLES); do $(VENV)/bin/profilefit report --fits fits --markdown $$page || exit; done
+
+test: lint programs  ## what CI runs: lint, and all tests but the slow ones
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-all: lint opengl  ## lint, and all tests
+test-all: lint programs  ## lint, and all tests
 	$(PYTEST) $(ARGS)
 
 benchmark: $(VENV)/.installed-test  ## speed and accuracy of the tracer, over scalar tracers, in one run
 	@$(PIP) install --editable '.[benchmark]'
 	$(PY) benchmarks/tracer.py $(ARGS)
 
-opengl: $(VENV)/.installed  ## a software OpenGL and an HLSL compiler, as root on Debian; elsewhere tests that need them are skipped
-	@sh -c "$$FIND_OPENGL"
+docs: $(VENV)/.installed-test  ## build the site into docs/_build/html; a warning is an error
+	$(PY) -m sphinx --fail-on-warning --keep-going --builder html docs docs/_build/html
+
+programs: $(VENV)/.installed  ## OpenGL, an HLSL compiler, a browser, as root on Debian; elsewhere tests of them are skipped
+	@sh -c "$$FIND_PROGRAMS"
 
 lint: $(VENV)/.installed-test  ## ruff and mypy; changes nothing
 	$(PY) -m ruff check
@@ -47,7 +57,7 @@ wheel: $(VENV)/.installed-test  ## build the sdist, and from it the wheel, into 
 	$(PY) -m build
 
 clean:  ## remove build products and caches; .venv and fits/ stay
-	rm -rf dist build .pytest_cache .mypy_cache .ruff_cache
+	rm -rf dist build docs/_build docs/laws .pytest_cache .mypy_cache .ruff_cache
 	find . -path ./$(VENV) -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
 
 # A stamp is as new as the last installation from pyproject.toml. The second waits for the first, so `make -j` is safe.
@@ -92,23 +102,25 @@ echo "creating $(VENV) with $$python"
 endef
 export CREATE_VENV
 
-# libEGL with a rasteriser behind it, without which the shader's tests are skipped by name, as is HLSL's without a compiler.
-define FIND_OPENGL
+# What tests need beside Python; without it they are skipped by name: libEGL with a rasteriser behind it, a compiler of HLSL,
+# a browser.
+define FIND_PROGRAMS
 set -eu
 packages=
 if ! $(PY) -c 'import moderngl; moderngl.create_context(standalone=True, backend="egl", require=330)' >/dev/null 2>&1; then
     packages=" libegl1 libgl1 libgl1-mesa-dri"
 fi
 if ! command -v glslangValidator >/dev/null; then packages="$$packages glslang-tools"; fi
+if ! command -v chromium >/dev/null && ! command -v google-chrome >/dev/null; then packages="$$packages chromium"; fi
 if [ -z "$$packages" ]; then exit 0; fi
 if [ "$$(id -u)" != 0 ] || ! command -v apt-get >/dev/null; then
-    echo "tests of the shader will be skipped where they need what is missing (Debian:$$packages)" >&2
+    echo "tests of the shader and of reports will be skipped where they need what is missing (Debian:$$packages)" >&2
     exit 0
 fi
-echo "installing with apt-get, for the tests of the shader:$$packages"
+echo "installing with apt-get, for the tests of the shader and of reports:$$packages"
 export DEBIAN_FRONTEND=noninteractive
 if ! { apt-get -qq update && apt-get -qq -y --no-install-recommends install $$packages >/dev/null; }; then
-    echo "apt-get failed: tests of the shader will be skipped where they need what is missing" >&2
+    echo "apt-get failed: tests will be skipped where they need what is missing" >&2
 fi
 endef
-export FIND_OPENGL
+export FIND_PROGRAMS

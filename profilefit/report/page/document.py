@@ -1,0 +1,138 @@
+"""The whole page: what is on it, in which order."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+from mcml_sim.version import __version__
+from profilefit import record
+from profilefit.report.explorer import explorer_section
+from profilefit.report.page import fits
+from profilefit.report.page.failures import failures
+from profilefit.report.page.lettering import font_face
+from profilefit.report.page.markup import element, section
+from profilefit.report.page.measured import Measured
+from profilefit.report.page.provenance import provenance
+from profilefit.report.page.shader import shader
+from profilefit.report.page.speed import speed
+from profilefit.report.source import Source
+
+Tracked = Callable[[list[str]], Iterable[str]]
+TITLE = "Reflectance profiles, refitted"
+LEAD = (
+    "How much light leaves a translucent surface at distance r from where it entered, R_d(r), as closed forms: fitted "
+    "to simulated or exactly solved light, every constant with its errors, every law with its distance from the truth."
+)
+CONVENTIONS = (
+    "alpha: single-scattering albedo; A: total diffuse reflectance; l or mfp: mean free path, the unit of r. Errors "
+    "are one standard error."
+)
+PARTS = {
+    "fits": "What was fitted, from what",
+    "explorer": "Explore",
+    "constants": "Published against regenerated",
+    "quality": "How good, by albedo",
+    "paper": "The paper's figures again",
+    "records": "Each record",
+    "stability": "Where methods fail",
+    "tradeoff": "Speed against accuracy",
+    "check": "In a shader",
+    "provenance": "Where it comes from",
+}
+# Section -> the command that measures it, its parts.
+MEASURED = {"stability": ("stability", failures), "tradeoff": ("tradeoff", speed), "check": ("check", shader)}
+RECORD = "record "  # begins the key of a part that is one record
+PAGE = Template("""<!DOCTYPE html>
+<html lang="en">
+<head>
+<meta charset="utf-8">
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<meta name="color-scheme" content="light dark">
+<title>$title</title>
+<link rel="icon" href="data:,">
+<style>
+$font
+$style
+</style>
+</head>
+<body>
+<header>
+<h1>$title</h1>
+<p class="lead">$lead</p>
+<p class="dim">$count. $conventions</p>
+<button id="theme" type="button" hidden>light or dark</button>
+</header>
+<nav aria-label="Contents"><ul>$links</ul></nav>
+<main>
+$sections
+</main>
+<script>
+$script
+</script>
+</body>
+</html>
+""")
+
+
+def write_page(
+    path: Path, folder: Path, evidence: Path, names: Sequence[str] | None = None, tracked: Tracked | None = None
+) -> None:
+    """Write the report of the records in `folder` as one HTML file that needs no other and no network.
+
+    evidence  folder of what `profilefit check`, `stability` and `tradeoff` wrote with `--out`; what is not there is
+              told, with the command that makes it
+    names     of records; all if None
+    tracked   wraps the keys of the parts as these are made: in a bar, say
+    RecordError, InputError on files that are damaged; OutputError where `path` cannot be written.
+    Thirty records take two minutes.
+    """
+    record.require_writable(path.parent)
+    source = Source(folder, tuple(names) if names else None)
+    found = Measured(evidence, folder)
+    for file in source.paths.values():  # what is damaged is better said now than after a minute
+        record.read(file, whole=True)
+    measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
+    makers = _makers(source, path.name) | {key: partial(str, text) for key, text in measured.items()}
+    made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
+    record.write_text(path, _document(made, len(source.paths)))
+
+
+def _makers(source: Source, page: str) -> dict[str, Callable[[], str]]:
+    """Part -> what makes it; each record is a part of its own, since they take longest."""
+    return {
+        "fits": lambda: fits.overview(source),
+        "explorer": lambda: explorer_section(source.folder),
+        "constants": lambda: fits.whole_figure(source, "constants"),
+        "quality": lambda: fits.whole_figure(source, "quality"),
+        "paper": lambda: "\n".join(fits.paper_figures(source)),
+        **{f"{RECORD}{name}": partial(fits.record_part, source, name) for name in source.paths},
+        "provenance": lambda: "\n".join(provenance(source, page)),
+    }
+
+
+def _document(made: Mapping[str, str], count: int) -> str:
+    records = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
+    inside = {**made, "records": records}
+    shown = {key: title for key, title in PARTS.items() if inside[key]}
+    sections = "\n".join(section(key, title, [inside[key]]) for key, title in shown.items())
+    links = "".join(element("li", element("a", escape(title), href=f"#{key}")) for key, title in shown.items())
+    return PAGE.substitute(
+        title=escape(TITLE),
+        lead=escape(LEAD),
+        conventions=escape(CONVENTIONS),
+        count=f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}",
+        font=font_face(inside.values()),
+        style=_asset("page.css"),
+        script=_asset("page.js"),
+        links=links,
+        sections=sections,
+    )
+
+
+def _asset(name: str) -> str:
+    return files("profilefit.report.page").joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,106 @@
+"""HTML of what the terminal prints: one table, two media."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+
+from rich.console import Console, Group, RenderableType
+from rich.padding import Padding
+from rich.style import Style
+from rich.table import Column, Table
+from rich.text import Text
+
+# Text is laid out by the browser: this console only says which letters have which style.
+LETTERS = Console(file=None, color_system=None, highlight=False, markup=False)
+
+
+def element(tag: str, inside: str, **attributes: str) -> str:
+    """`<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens."""
+    told = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
+    return f"<{tag}{told}>{inside}</{tag}>"
+
+
+def paragraph(text: str, class_: str = "") -> str:
+    """A paragraph of plain text."""
+    return element("p", escape(text), **({"class_": class_} if class_ else {}))
+
+
+def command(line: str) -> str:
+    """A command to type."""
+    return element("pre", element("code", escape(line)), class_="command", tabindex="0")
+
+
+def details(summary: str, inside: str, id_: str = "", is_open: bool = False) -> str:
+    """What a click opens."""
+    given = ({"id_": id_} if id_ else {}) | ({"open": ""} if is_open else {})
+    return element("details", f"<summary>{summary}</summary>\n{inside}", **given)
+
+
+def section(id_: str, title: str, parts: Iterable[str]) -> str:
+    """A section with its heading."""
+    return element("section", f"<h2>{escape(title)}</h2>\n" + "\n".join(parts), id_=id_)
+
+
+def markup(part: RenderableType) -> str:
+    """The HTML of a text, a table, or a group of them, as `profilefit.report` makes them for the terminal."""
+    if isinstance(part, str):
+        return paragraph(part)
+    if isinstance(part, Text):
+        return element("p", _letters(part, _style(part)), **_classes(_style(part)))
+    if isinstance(part, Padding):
+        return markup(part.renderable)
+    if isinstance(part, Group):
+        return "\n".join(markup(one) for one in part.renderables)
+    if isinstance(part, Table):
+        return _table(part)
+    raise TypeError(f"a report is made of texts, tables and groups, got {type(part).__name__}")
+
+
+def _table(table: Table) -> str:
+    rows = [_row(table.columns, [str(column.header) for column in table.columns], "th")] if table.show_header else []
+    head = element("thead", "".join(rows)) if rows and any(str(column.header) for column in table.columns) else ""
+    cells = zip(*(list(column.cells) for column in table.columns), strict=True)
+    body = element("tbody", "\n".join(_row(table.columns, row, "td") for row in cells))
+    title = element("p", escape(str(table.title)), class_="bold") if table.title else ""
+    caption = element("p", escape(str(table.caption)), class_="dim") if table.caption else ""
+    return title + element("div", element("table", f"{head}\n{body}"), class_="wide", tabindex="0") + caption
+
+
+def _row(columns: Iterable[Column], cells: Iterable[RenderableType], tag: str) -> str:
+    filled = zip(columns, cells, strict=True)
+    return element("tr", "".join(element(tag, _cell(cell), **_side(column)) for column, cell in filled))
+
+
+def _side(column: Column) -> dict[str, str]:
+    if column.justify == "right":
+        return {"class_": "number"}
+    return {} if column.no_wrap else {"class_": "text"}
+
+
+def _cell(cell: RenderableType) -> str:
+    if isinstance(cell, str | Text):
+        return _letters(cell if isinstance(cell, Text) else Text(cell), Style.null())
+    return markup(cell)
+
+
+def _letters(text: Text, around: Style) -> str:
+    """The text, each stretch with its style unless it is that of what stands around; a new line is a break."""
+    own, stretches = _style(text), []
+    for letters, stretch, _ in text.render(LETTERS):
+        inside, style = escape(letters).replace("\n", "<br>"), stretch or own  # a text of one style names none
+        classes = _classes(style) if style != around else {}
+        stretches.append(element("span", inside, **classes) if classes else inside)
+    return "".join(stretches)
+
+
+def _style(text: Text) -> Style:
+    return text.style if isinstance(text.style, Style) else LETTERS.get_style(text.style or "none")
+
+
+def _classes(style: Style) -> dict[str, str]:
+    """Class names for a style's weight and colour."""
+    words = [word for word in ("bold", "dim") if getattr(style, word)]
+    if style.color is not None:
+        words.append(style.color.name)
+    return {"class_": " ".join(words)} if words else {}

@@ -1,0 +1,78 @@
+"""What other commands measured on some machine, as far as their files are there."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from profilefit import evidence
+from profilefit.errors import InputError
+from profilefit.report.page.markup import command, paragraph
+from profilefit.report.page.vector import inline
+
+Told = dict[str, Any]
+ALL = "all"
+
+
+@dataclass(frozen=True)
+class Measured:
+    """A folder that `profilefit check`, `stability` and `tradeoff` wrote into with `--out`.
+
+    records  the folder whose records the page shows
+    """
+
+    folder: Path
+    records: Path
+
+    def section(self, name: str, parts: Callable[[Measured], Iterator[str]]) -> str:
+        """The parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
+        try:
+            return "\n".join(parts(self))
+        except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
+            given = f"{type(error).__name__}: {error}"
+            raise InputError(
+                f"{self.folder / name}.json: expected what `profilefit {name} --out` writes, got {given}"
+            ) from error
+
+    def told(self, name: str) -> Told | None:
+        """What `name`.json says; None if it is not there. InputError on a file that is none of ours."""
+        path = self.folder / f"{name}.json"
+        expected = f"{path}: expected what `profilefit {name} --out` writes"
+        try:
+            content = json.loads(path.read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return None
+        except (OSError, ValueError, RecursionError) as error:
+            raise InputError(f"{expected}, got: {error}") from None
+        if not isinstance(content, dict) or not isinstance(content.get("made"), dict):
+            raise InputError(f"{expected}, got no key 'made'")
+        return content
+
+    def drawing(self, name: str, title: str, on_paper: bool = False) -> str:
+        """The figure `name`.svg beside it, or nothing."""
+        path = self.folder / f"{name}.svg"
+        return inline(path.read_text(encoding="utf-8"), name, title, on_paper) if path.exists() else ""
+
+    def origin(self, told: Told) -> str:
+        """When, where and by which command; and whether the records have changed since."""
+        made = told["made"]
+        machine = made.get("machine") or {}
+        when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
+        parts = [paragraph(when, "dim"), command(str(made.get("command")))]
+        if told.get("of", ALL) != ALL:
+            parts.append(paragraph(f"Not of everything: of {_listed(told['of'])}.", "red"))
+        if evidence.stale(made, self.records):
+            parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
+        return "\n".join(parts)
+
+
+def _listed(of: Any) -> str:
+    return ", ".join(of) if isinstance(of, list) else str(of)
+
+
+def missing(name: str) -> str:
+    """What stands where nothing was measured."""
+    return paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")

@@ -1,0 +1,81 @@
+"""matplotlib's SVG as part of a page: text stays text, colours follow the page, no two figures share an id."""
+
+from __future__ import annotations
+
+import re
+from html import escape
+from itertools import groupby
+from types import MappingProxyType
+
+from profilefit.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
+from profilefit.report.page.markup import element
+
+# A colour of the figures -> the page's variable for it, which has another value on a dark page.
+VARIABLES = MappingProxyType(
+    {
+        BLACK: "fg", "#ffffff": "panel", RC["grid.color"]: "line", GREY: "muted", ORANGE: "orange", SKY: "sky",
+        GREEN: "green", YELLOW: "yellow", BLUE: "blue", VERMILION: "vermilion", PURPLE: "purple",
+    }
+)  # fmt: skip
+COLOUR = re.compile("|".join(VARIABLES), re.IGNORECASE)
+BY_LETTERS = {colour.lower(): name for colour, name in VARIABLES.items()}
+PLACE = re.compile(r' (?:d|x|y|points|transform)="[^"]*"')
+DECIMALS = re.compile(r"(\d\.\d)\d+")  # of a place: a tenth of a point is less than a screen shows
+CURVED = re.compile("[CQScqsAaHhVv]")
+INVISIBLE = re.compile(r'<path [^>]*style="fill: none"[^>]*/>')  # as under the contours of a corner plot
+LETTER = re.compile(r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan>')
+ROW = re.compile(rf"{LETTER.pattern}(?:\s*{LETTER.pattern})+")
+ALONE = 560  # [px] below which a figure is scrolled, not shrunk
+
+
+def inline(svg: str, prefix: str, title: str, on_paper: bool = False) -> str:
+    """A figure for a page from what matplotlib wrote.
+
+    prefix    of every id in it; title what a screen reader says
+    on_paper  keeps its own light colours, also on a dark page: pictures of pixels have no variables
+    """
+    body = svg[svg.index("<svg") :]
+    body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", body, flags=re.DOTALL)
+    body = PLACE.sub(_shortened, INVISIBLE.sub("", body))
+    body = ROW.sub(_together, body)
+    body = COLOUR.sub(lambda found: f"var(--{BY_LETTERS[found[0].lower()]})", _own_ids(body, prefix))
+    body = re.sub(r"\s*\n\s*", " ", body).replace("> <", "><").strip()
+    frame = re.search(r'viewBox="([^"]*)"', body)
+    if frame is None:
+        raise ValueError(f"figure {prefix!r} has no viewBox")
+    head = (
+        f'<svg viewBox="{frame[1]}" role="img" aria-label="{escape(title)}" fill="var(--fg)" '
+        'xmlns:xlink="http://www.w3.org/1999/xlink">'
+    )
+    wide = "paper" if on_paper else ""
+    inside = element("div", head + body[body.index(">") + 1 :], class_=f"wide {wide}".strip(), tabindex="0")
+    return element("figure", f"{inside}<figcaption>{escape(title)}</figcaption>")
+
+
+def _shortened(place: re.Match[str]) -> str:
+    """To a tenth of a point; of straight lines only the first is announced, the others follow."""
+    text = DECIMALS.sub(r"\1", place[0])
+    return re.sub(r"\s*L\s*", " ", text) if text.startswith(" d=") and not CURVED.search(text) else text
+
+
+def _own_ids(svg: str, prefix: str) -> str:
+    """Ids that something points to, with a prefix; the others are names of matplotlib's own."""
+    used = set(re.findall(r"(?:url\(|href=\")#([^)\"]+)", svg))
+
+    def renamed(found: re.Match[str]) -> str:
+        return f' id="{prefix}-{found[1]}"' if found[1] in used else ""
+
+    svg = re.sub(r' id="([^"]*)"', renamed, svg)
+    return re.sub(r"(url\(|href=\")#", rf"\1#{prefix}-", svg)
+
+
+def _together(found: re.Match[str]) -> str:
+    """Letters of one line and style, which mathtext places one by one, as one text, each in its place."""
+    letters = [one.groups() for one in LETTER.finditer(found[0])]
+    lines = groupby(letters, key=lambda one: one[1:3])
+    told = []
+    for (y, style), line in lines:
+        row = list(line)
+        places = " ".join(one[0] for one in row)
+        told.append(f'<tspan x="{places}" y="{y}" style="{style}">{"".join(one[3] for one in row)}</tspan>')
+    return "".join(told)

@@ -1,0 +1,243 @@
+"""The explorer in a browser, from file://: what it computes by the exported texts is what Python computes."""
+
+import re
+import shutil
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting, exact
+from profilefit import catalogue
+from profilefit.quality import profile_quality
+from profilefit.report.explorer.laws import first, offered
+from profilefit.shader.stage.combining import srgb_codes
+from profilefit.shader.truth.step_edge import step_response
+
+ROUNDING = 1e-5  # relative, of R_d in float32: `profilefit check` finds at most 2.3e-6; this is another float32
+TABLE = 2e-5  # of the exact solution between the knots of the explorer's table
+# One law of each kind: the first call of a law in Python takes as long as ten in the browser.
+COMPARED = (
+    "hazard-diffuse",
+    "quantile",
+    "burley-published",
+    "liang-corrected",
+    "gaussians-4",
+    "dipole",
+    "better_dipole",
+)
+REFLECTANCE, MFP = [0.2, 0.6, 0.97], [0.4, 1.0, 2.5]
+NO_WEBGL = "HTMLCanvasElement.prototype.getContext = () => null"
+
+
+@pytest.fixture(scope="module")
+def explorer(open_shared_page, file):
+    return open_shared_page(file)
+
+
+def chosen(page, law):
+    """What is measured of each channel after a choice of the law: arrays (channels, ...) by name, radii thinned out."""
+    told = page.evaluate(
+        """([id, A, l]) => {
+          const { state } = explorer;
+          state.choose(state.laws.find((law) => law.id === id));
+          [0, 1, 2].forEach((c) => { state.set("reflectance", c, A[c]); state.set("mfp", c, l[c]); });
+          explorer.update();
+          const some = (values) => values.filter((_, i) => i % 16 === 0);
+          return explorer.values.channels.map(({ alpha, mfp, rel, ks, r, profile }) =>
+            ({ alpha, mfp, rel, ks, r: some(r), profile: some(profile) }));
+        }""",
+        [law, REFLECTANCE, MFP],
+    )
+    return {key: np.array([one[key] for one in told]) for key in told[0]}
+
+
+def pixels(page, part):
+    """(columns, 3) 8-bit values of a strip."""
+    data = page.evaluate(
+        """(part) => {
+          const canvas = document.querySelector(`[data-part="${part}"]`);
+          return Array.from(canvas.getContext("2d").getImageData(0, 0, canvas.width, 1).data);
+        }""",
+        part,
+    )
+    return np.array(data).reshape(-1, 4)[:, :3]
+
+
+def test_fragment_stands_alone(fragment):
+    assert len(fragment.encode()) < 600_000
+    addresses = set(re.findall(r"https?://[^\s\"'<\\]*", fragment))
+    assert addresses <= {"http://www.w3.org/1999/xlink"}
+    ids = re.findall(r'\sid="([^"]*)"', fragment)
+    assert len(ids) == len(set(ids))
+
+
+def test_a_slider_moves_pixels_and_curves_to_the_value_of_python(open_page, file, laws):
+    explorer = open_page(file, fragment="#explorer?law=dipole")
+    explorer.locator("#explorer-A-red").fill("0.3")
+    explorer.locator("#explorer-l-red").fill("0.25")
+    explorer.wait_for_function("explorer.values.channels[0].mfp > 1.7")
+    red = explorer.evaluate("(({ exact, ...one }) => one)(explorer.values.channels[0])")
+    mfp, law = red["mfp"], laws["dipole"]
+    assert (red["reflectance"], mfp) == (0.3, pytest.approx(10**0.25, rel=1e-5))
+    assert red["alpha"] == pytest.approx(catalogue.albedo_law("rational").alpha(0.3), abs=1e-5)
+    np.testing.assert_allclose(red["profile"], law.profile(red["r"], red["alpha"], mfp), rtol=ROUNDING)
+    np.testing.assert_allclose(red["cdf"], law.cdf(red["r"], red["alpha"], mfp), atol=1e-6)
+    x = np.array(explorer.evaluate("explorer.values.x"))
+    by_law = 0.3 * step_response(x, red["alpha"], mfp, law=law)
+    truth = 0.3 * step_response(x, red["alpha"], mfp)
+    for part, expected in (("edge-law", by_law), ("edge-exact", truth)):
+        np.testing.assert_allclose(pixels(explorer, part)[:, 0], srgb_codes(expected), atol=0.51)
+    assert np.max(np.abs(srgb_codes(by_law) - srgb_codes(truth))) > 5  # so that neither stands in for the other
+    assert explorer.locator("#explorer-A-red + output").inner_text() == "0.300"
+    assert explorer.locator("#explorer-material").input_value() == ""
+
+
+def test_keys_move_sliders_and_the_light(open_page, file):
+    explorer = open_page(file)
+    before = explorer.evaluate("[explorer.state.mfp[1], ...explorer.state.turn]")
+    explorer.locator("#explorer-l-green").press("ArrowRight")
+    explorer.locator("canvas.ball").press("ArrowUp")
+    after = explorer.evaluate("[explorer.state.mfp[1], ...explorer.state.turn]")
+    assert after[0] == pytest.approx(before[0] * 10**0.01, rel=0.02)
+    assert after[1:] == [before[1], before[2] + 5]
+    box = explorer.locator("canvas.ball").bounding_box()
+    # Between the middle of the law's ball and its rim: a radius of 0.94 quarters of the width.
+    right = {"x": box["width"] * (0.75 + 0.94 / 4 * np.sin(np.radians(30.0))), "y": box["height"] / 2}
+    explorer.locator("canvas.ball").click(position=right)
+    assert explorer.evaluate("explorer.state.turn") == pytest.approx([30, 0], abs=1)
+
+
+def test_every_law_runs_as_it_does_in_python(explorer, laws):
+    there = explorer.evaluate("explorer.state.laws.map((law) => law.id)")
+    assert set(there) == {name for name in laws if name != "beam_diffusion"}
+    for name in there:
+        found = chosen(explorer, name)
+        assert np.all(found["rel"] < 1) or name in ("liang-published", "gaussians-2"), name
+        if name not in COMPARED:
+            continue
+        alpha, mfp = (np.float32(found[key]).astype(float)[:, None] for key in ("alpha", "mfp"))  # as the GPU gets them
+        truth = laws[name].profile(found["r"], alpha, mfp)
+        seen = truth > 1e-12 * truth.max()  # Gaussians underflow far out
+        np.testing.assert_allclose(found["profile"][seen], truth[seen], rtol=ROUNDING, err_msg=name)
+    assert explorer.locator("[data-part='fault']").is_hidden()
+
+
+@pytest.mark.parametrize("name", ["hazard-diffuse", "burley-diffuse"])
+def test_errors_are_those_of_quality(explorer, laws, name):
+    found = chosen(explorer, name)
+    truth = profile_quality(laws[name], found["alpha"])
+    np.testing.assert_allclose(found["rel"], truth.rel, atol=TABLE)
+    np.testing.assert_allclose(found["ks"], truth.ks, atol=TABLE)
+    shown = [float(text) for text in explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()]
+    np.testing.assert_allclose(shown, truth.rel, rtol=0.05)  # two digits
+
+
+@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+def test_table_is_the_exact_half_space(explorer, light):
+    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99999, 1.0])[:, None], Setting(light)
+    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
+    x = outer * np.geomspace(1e-4, 1.0, 20)
+    told = explorer.evaluate(
+        """([light, alphas, radii]) => alphas.map((alpha, i) => {
+          const curve = explorer.state.tables[light].curve(alpha);
+          return radii[i].map((x) => [curve.profile(x), curve.cdf(x), curve.edge(-x)]);
+        })""",
+        [light, alpha[:, 0].tolist(), x.tolist()],
+    )
+    profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
+    np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=TABLE)
+    np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=TABLE)
+    np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
+
+
+def test_without_webgl_a_picture_stands_in(open_page, file):
+    page = open_page(file, before=NO_WEBGL)
+    assert page.locator(".still svg").is_visible()
+    assert page.locator(".live").is_hidden()
+    assert "no WebGL2" in page.locator("[data-part='why']").inner_text()
+
+
+def test_a_lost_context_shows_the_picture_until_it_is_back(open_page, file):
+    explorer = open_page(file)
+    explorer.evaluate("window.lost = explorer.device.gl.getExtension('WEBGL_lose_context'); lost.loseContext()")
+    explorer.locator(".still svg").wait_for(state="visible")
+    explorer.evaluate("lost.restoreContext()")
+    explorer.locator(".controls").wait_for(state="visible")
+    assert np.all(chosen(explorer, "hazard-diffuse")["rel"] > 0)
+
+
+def test_a_shader_that_does_not_compile_says_where(open_page, file, tmp_path):
+    broken = tmp_path / "broken.html"
+    text = file.read_text()
+    assert "float law_density(float x, law_Shape s) {" in text
+    broken.write_text(
+        text.replace("float law_density(float x, law_Shape s) {", "float law_density(float x, law_Shape s) { int x")
+    )
+    page = open_page(broken)
+    told = page.locator("[data-part='fault']").inner_text()
+    assert re.match(r"hazard: values does not compile, line \d+, `float law_density.* int x`: ERROR", told)
+    assert page.locator(".measured").is_hidden()
+
+
+def test_the_address_keeps_what_was_chosen(open_page, file):
+    page = open_page(file, fragment="#explorer?law=quantile&A=0.5,0.4,0.3&l=2,1,0.5&view=error&samples=16")
+    page.locator("#explorer-radius").fill("0.7")
+    page.wait_for_function("location.hash.includes('radius=5')")
+    kept = page.evaluate("location.hash")
+    assert "law=quantile&A=0.5,0.4,0.3&l=2,1,0.5&samples=16" in kept
+    assert "view=error" in kept
+    assert page.locator("#explorer-law").input_value() == "quantile"
+    assert page.locator("[name='explorer-view'][value='error']").is_checked()
+
+
+def test_an_address_that_comes_later_is_followed(explorer):
+    explorer.evaluate("location.hash = '#explorer?law=burley-published&view=constructor&samples=16'")
+    explorer.wait_for_function("explorer.values.law === 'burley-published'")
+    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["rr", 16]
+    explorer.evaluate("location.hash = '#explorer?law=dipole&view=error&l=2,1,0.5'")
+    explorer.wait_for_function("explorer.values.law === 'dipole'")
+    begun_anew = 64
+    assert explorer.evaluate("[explorer.state.view, explorer.state.samples]") == ["error", begun_anew]
+    assert explorer.locator("#explorer-law").input_value() == "dipole"
+    assert explorer.locator("#explorer-l-red + output").inner_text() == "2.00"
+
+
+@pytest.mark.parametrize("view", ["rr", "rd", "error"])
+@pytest.mark.parametrize("channels", [(REFLECTANCE, MFP), ([0.5, 0.5, 0.5], [1, 1, 1])])
+def test_curves_can_be_told_apart_without_colour(explorer, view, channels):
+    told = explorer.evaluate(
+        """([view, A, l]) => {
+          Object.assign(explorer.state, { view, reflectance: A, mfp: l, material: null });
+          explorer.update();
+          const letters = (part) => [...document.querySelectorAll(`[data-part="${part}"] .letter.law`)];
+          const told = (one) => [one.textContent, Number(one.getAttribute("x")), Number(one.getAttribute("y"))];
+          return ["profile", "cdf", "edge"].map((part) => letters(part).map(told));
+        }""",
+        [view, *channels],
+    )
+    for letters in told:
+        assert [letter for letter, _, _ in letters] == ["R", "G", "B"]
+        places = np.array([place for _, *place in letters])
+        assert np.min(np.linalg.norm(places - np.roll(places, 1, axis=0), axis=1)) >= 15
+
+
+def test_nothing_is_wider_than_a_phone(open_page, file):
+    page = open_page(file, width=400, has_touch=True)
+    wide = page.evaluate(
+        """() => [...document.querySelectorAll(".explorer .live *")].filter((one) => !one.closest("svg, pre, .table"))
+          .filter((one) => one.getBoundingClientRect().right > 400.5 || one.getBoundingClientRect().left < 0)
+          .map((one) => one.outerHTML)"""
+    )
+    assert wide == []
+    assert page.evaluate("document.documentElement.scrollWidth") <= 400
+
+
+def test_a_folder_with_one_record_has_its_law_beside_the_printed_ones(fits, tmp_path):
+    bare = {law.id for law in offered(tmp_path)}
+    assert {"liang-published", "burley-diffuse", "dipole"} <= bare
+    for ending in ("json", "npz"):
+        shutil.copy(fits / f"quantile.{ending}", tmp_path)
+    found = offered(tmp_path)
+    assert {law.id for law in found} - bare == {"quantile"}
+    assert first(found) == "quantile"
+    assert "float law_profile(float r, float alpha, float mfp)" in found[0].text

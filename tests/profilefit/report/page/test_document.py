@@ -1,0 +1,237 @@
+"""The page as a colleague opens it: from a file, without a network, on a phone and a desk, light and dark."""
+
+import html.parser
+import json
+import re
+import shutil
+from pathlib import Path
+
+import pytest
+
+from profilefit import catalogue, evidence
+from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.report.page.document import PARTS, write_page
+from profilefit.report.page.failures import failures
+from profilefit.report.page.fits import record_part
+from profilefit.report.page.measured import Measured
+from profilefit.report.page.shader import shader
+from profilefit.report.page.speed import speed
+from profilefit.report.source import Source
+
+SHIPPED = catalogue.fits_folder()
+DATA = Path(__file__).parent / "data"
+GOLDEN = DATA / "tables.html"
+NAMES = ("albedo-liang", "burley-whole")
+SECTIONS = (failures, speed, shader)
+BACKGROUND = "getComputedStyle(document.body).backgroundColor"
+SPOILED = (
+    "document.querySelector('main p').style.width = '900px'",
+    "document.querySelector('main').append(Object.assign(document.createElement('p'), {style: 'overflow: hidden; "
+    "width: 50px; white-space: pre', textContent: 'much more than fits into it'}))",
+    "document.querySelector('figure svg text').setAttribute('transform', 'translate(-900 0)')",
+)
+# What stands outside the window and is not scrolled to; text of a figure outside its frame; what is wider than its box.
+CLIPPED = (DATA / "clipped.js").read_text(encoding="utf-8")
+
+
+@pytest.fixture(scope="module")
+def records(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("records")
+    for name in NAMES:
+        for suffix in (".json", ".npz"):
+            shutil.copy(SHIPPED / f"{name}{suffix}", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def measured(tmp_path_factory, records):
+    """What the other commands write, in small."""
+    folder = tmp_path_factory.mktemp("evidence")
+    for name, content in MEASURED.items():
+        made = evidence.made(f"profilefit {name} --out {folder}", records)
+        (folder / f"{name}.json").write_text(json.dumps({"made": made, **content}), encoding="utf-8")
+    return folder
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory, records, measured):
+    path = tmp_path_factory.mktemp("page") / "report.html"
+    write_page(path, records, measured)
+    return path
+
+
+MEASURED = {
+    "check": {
+        "of": ["burley"],
+        "device": "some <GPU>",
+        "passed": False,
+        "laws": [
+            {
+                "name": "burley", "constants": "burley-whole", "model": {"values": {"rel": 0.14, "ks": 0.025}},
+                "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}, "rounding": {"rel": 1.2e-7, "ks": 3e-7},
+                "inside": {"nan": 0, "where": ""}, "outside": {"negative": 3, "where": "r 1"},
+                "broken": ["ks: 1; bound 0.5, 2 times that"],
+            }
+        ],
+        "maps": [],
+        "costs": {"burley": {"ns": {"profile": 0.45}, "ratio": {"profile": 1.0}}},
+    },
+    "stability": {
+        "passed": True,
+        "regions": [
+            {"cause": "misprint", "law": "liang, published", "count": "412", "class": "inaccurate", "remedy": "b0"},
+            {"cause": "misprint", "law": "liang, other", "count": "8", "class": "negative", "remedy": "b0"},
+        ],
+    },
+    "tradeoff": {
+        "laws": {
+            "notes": ["alone on its core"],
+            "panels": {
+                "laws": {
+                    "title": "R$_d$", "cost": "time [ns]", "error": "error [-]",
+                    "points": [
+                        {
+                            "method": "hazard", "label": "two steps", "standing": "front", "worst": None,
+                            "cost": {"value": 9.0, "low": 8.0, "high": 10.0},
+                            "error": {"value": 0.002, "low": 0.002, "high": 0.002},
+                        }
+                    ],
+                }
+            },
+        }
+    },
+}  # fmt: skip
+
+
+class Balance(html.parser.HTMLParser):
+    """Every element that is opened is closed, in order."""
+
+    VOID = frozenset({"meta", "link", "br", "img", "input", "!doctype", "hr"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.loads: list[str] = []
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in self.VOID:
+            self.open.append(tag)
+        known = dict(attrs)
+        self.ids += [known["id"]] if "id" in known else []
+        self.loads += [known[key] for key in ("src", "href", "xlink:href") if known.get(key)]
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in self.VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag, self.getpos()
+
+
+def test_it_is_whole_and_loads_nothing(page):
+    found = Balance()
+    found.feed(page.read_text(encoding="utf-8"))
+    assert found.open == []
+    assert len(found.ids) == len(set(found.ids))
+    assert set(PARTS) - {"paper"} <= set(found.ids)
+    assert all(one.startswith(("#", "data:")) for one in found.loads)
+    assert {one[1:] for one in found.loads if one.startswith("#")} <= set(found.ids)
+    assert not re.search(r"url\((?!data:|#|&quot;|\"data:)", page.read_text(encoding="utf-8"))
+
+
+def test_tables_are_those_of_the_golden_file(tmp_path):
+    """Frozen records, so that only a change of the tables themselves changes them."""
+    source = Source(DATA)
+    found = "\n".join(re.findall(r"<table>.*?</table>", tables(source), re.DOTALL)) + "\n"
+    (tmp_path / "tables.html").write_text(found, encoding="utf-8")
+    assert found == GOLDEN.read_text(encoding="utf-8"), f"look, and if it is right: cp {tmp_path}/tables.html {GOLDEN}"
+
+
+def tables(source: Source) -> str:
+    return "\n".join(record_part(source, name, figures=False) for name in source.paths)
+
+
+def test_it_says_what_was_measured_where_and_what_is_missing(page, records, measured, tmp_path):
+    text = page.read_text(encoding="utf-8")
+    for told in (
+        "some &lt;GPU&gt;",
+        "misprint",
+        "420",
+        "hazard, two steps",
+        "alone on its core",
+        "bounds are broken",
+        "Not of everything: of burley.",
+    ):
+        assert told in text
+    assert "Not measured here" not in text
+    assert "run it again" not in text
+    bare = "\n".join(text for part in SECTIONS for text in part(Measured(tmp_path, records)))
+    assert [f"profilefit {name} --out evidence" in bare for name in MEASURED] == [True] * 3
+    # Measured with the constants of other records, and told so.
+    other = tmp_path / "other"
+    shutil.copytree(records, other)
+    (other / "albedo-liang.json").unlink()
+    old = "\n".join(text for part in SECTIONS for text in part(Measured(measured, other)))
+    assert old.count("run it again") == 3
+
+
+def test_what_the_commands_wrote_last_can_be_read():
+    found = Measured(SHIPPED / "evidence", SHIPPED)
+    told = ["\n".join(part(found)) for part in SECTIONS]
+    assert not any("Not measured here" in text for text in told)
+    assert [name in text for name, text in zip(("misprint of b0", "quantile", "hazard"), told, strict=True)] == [
+        True
+    ] * 3
+
+
+def test_damage_is_one_line_and_leaves_the_old_page(page, records, tmp_path):
+    (tmp_path / "check.json").write_text("[1]", encoding="utf-8")
+    path = tmp_path / "report.html"
+    path.write_text("old", encoding="utf-8")
+    with pytest.raises(
+        InputError, match=r"check\.json: expected what `profilefit check --out` writes, got no key 'made'"
+    ):
+        write_page(path, records, tmp_path)
+    for name in MEASURED:
+        (tmp_path / f"{name}.json").write_text('{"made": {}, "laws": {}}', encoding="utf-8")
+        with pytest.raises(InputError, match=rf"expected what `profilefit {name} --out` writes, got KeyError"):
+            write_page(path, records, tmp_path)
+        (tmp_path / f"{name}.json").unlink()
+    shutil.copytree(records, tmp_path / "records")
+    (tmp_path / "records/albedo-liang.json").write_text('{"format": 1}', encoding="utf-8")
+    with pytest.raises(RecordError, match="damaged"):
+        write_page(path, tmp_path / "records", tmp_path)
+    assert path.read_text(encoding="utf-8") == "old"
+    (tmp_path / "file").write_text("", encoding="utf-8")
+    with pytest.raises(OutputError, match="cannot write into"):
+        write_page(tmp_path / "file" / "report.html", records, tmp_path)
+
+
+@pytest.mark.parametrize("width", [400, 1400])
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_it_opens_without_a_complaint_and_nothing_is_clipped(open_page, page, width, scheme):
+    window = open_page(page, width, color_scheme=scheme)
+    window.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
+    assert window.evaluate("document.documentElement.scrollWidth") <= width
+    assert window.evaluate(CLIPPED) == []
+    background = window.evaluate(BACKGROUND)
+    assert background == ("rgb(255, 255, 255)" if scheme == "light" else "rgb(22, 24, 28)")
+    window.click("#theme")
+    assert window.evaluate(BACKGROUND) != background
+
+
+def test_the_check_of_clipping_sees_what_is_clipped(open_page, page):
+    """The negative control: too wide a paragraph, a hidden overflow, a label outside its figure."""
+    window = open_page(page, 400)
+    assert window.evaluate(CLIPPED) == []
+    for spoil in SPOILED:
+        window.evaluate(spoil)
+    assert len(window.evaluate(CLIPPED)) >= len(SPOILED)
+
+
+def test_a_link_to_a_record_opens_it(open_page, page):
+    window = open_page(page, fragment="#record-burley-whole")
+    assert window.evaluate("document.getElementById('record-burley-whole').open")
+    assert not window.evaluate("document.getElementById('record-albedo-liang').open")
