@@ -1,41 +1,94 @@
-"""What the README claims is what the records say."""
+"""What README and documentation claim is what the records say."""
 
+import json
 from pathlib import Path
+
+import pytest
 
 from profilefit import record
 from profilefit.inventory import profile_laws
 from profilefit.report import fill, sections
 from profilefit.report.all_laws import measured_profile
-from profilefit.report.law_tables import markdown_laws
+from profilefit.report.law_tables import markdown_laws, markdown_sections
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = ROOT / "README.md"
+# Where each table stands; `make readme` fills these files.
+PLACES = {
+    "short": README,
+    **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/guide/laws.md"),
+    **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/guide/paper.md"),
+    "check": ROOT / "docs/howto/shader.md",
+}
+MEASURED = ("laws", "check")
+WRITTEN = [README, *(path for part in ("start", "guide", "howto", "theory") for path in ROOT.glob(f"docs/{part}/*.md"))]
+
+
+def text_of(path: Path) -> str:
+    return path.read_text(encoding="utf-8")
 
 
 def shipped() -> dict[str, dict]:
     return {name: record.read(path) for name, path in record.available(ROOT / "fits").items()}
 
 
+def rows_of(name: str) -> list[list[str]]:
+    """The cells of a table, line by line."""
+    inside = text_of(PLACES[name]).split(f"<!-- {name} -->")[1].split(f"<!-- /{name} -->")[0]
+    return [[c.strip() for c in line.strip("|").split("|")] for line in inside.splitlines() if line.startswith("|")]
+
+
 def test_every_table_is_the_records_own():
     tables = sections(shipped())
-    assert set(tables) == {"quality", "constants", "hazard", "readings", "inversion", "maps"}
+    assert set(tables) == set(PLACES) - set(MEASURED)
     for name, table in tables.items():
-        assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in README, f"{name}: run make readme"
+        assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in text_of(PLACES[name]), f"{name}: run make readme"
+
+
+def test_every_table_stands_in_one_place_and_no_other():
+    known = {*sections(shipped()), *markdown_sections(ROOT / "fits")}
+    found = {(name, path) for path in WRITTEN for name in known if f"<!-- {name} -->" in text_of(path)}
+    assert found == set(PLACES.items())
 
 
 def test_filling_again_changes_nothing_and_a_stale_table_is_replaced():
     tables = sections(shipped())
-    assert fill(README, tables) == README
+    for path in set(PLACES.values()):
+        assert fill(text_of(path), tables) == text_of(path)
     assert fill("<!-- maps -->\nold\n<!-- /maps -->\n", {"maps": "new"}) == "<!-- maps -->\nnew\n<!-- /maps -->\n"
     assert fill("no marks", {"maps": "new"}) == "no marks"
 
 
-def test_every_picture_and_page_it_names_is_there():
-    names = [part.split(")")[0] for part in README.split("](")[1:]]
-    assert len(names) >= 5
-    missing = [name for name in names if not name.startswith("https://") and not (ROOT / name).exists()]
-    assert missing == []
+@pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_every_picture_and_page_it_names_is_there(page):
+    names = [part.split(")")[0].split("#")[0] for part in text_of(page).split("](")[1:]]
+    local = [name for name in names if name and not name.startswith("https://")]
+    # A page of docs/laws is made when the documentation is built, which tells if one is missing.
+    assert [name for name in local if "../laws/" not in name and not (page.parent / name).exists()] == []
+    assert page != README or len(local) >= 12
+
+
+def test_the_readme_is_two_screens_and_its_numbers_are_the_records_own():
+    lines, words = text_of(README).splitlines(), " ".join(text_of(README).split())
+    assert len(lines) <= 110
+    shown = {(row[0], row[1]): row[2:] for row in rows_of("short")}
+    hazard, burley = (shown[key] for key in (("hazard", "regenerated"), ("burley", "published")))
+    assert f"**{100 * float(hazard[1]):.2f} %**" in words
+    assert f"is {100 * float(burley[1]):.0f} %, and {100 * float(burley[0]):.1f} % on average" in words
+
+
+def test_times_in_prose_are_those_that_were_measured_last():
+    told = json.loads((ROOT / "fits/evidence/tradeoff.json").read_text(encoding="utf-8"))["laws"]["panels"]
+    both, alone = (
+        {one["method"]: one["facts"]["times_yardstick"] for one in told[panel]["points"] if "steps" not in one["label"]}
+        for panel in ("both", "profile")
+    )
+    assert f"**{both['hazard']:.2f} times** the time of normalized diffusion" in " ".join(text_of(README).split())
+    for page in ("laws", "tradeoff"):
+        words = " ".join(text_of(ROOT / f"docs/guide/{page}.md").split())
+        for ratio in (f"{both['hazard']:.2f}", f"{both['quantile']:.2f}", f"{alone['hazard']:.1f} times as long"):
+            assert ratio in words, page
 
 
 def test_every_record_has_its_recipe_and_ended_well():
@@ -51,8 +104,7 @@ def test_every_record_has_its_recipe_and_ended_well():
 
 def test_measured_tables_name_every_law_and_two_are_measured_again():
     """All of them would take a minute."""
-    text = README.split("<!-- laws -->")[1].split("<!-- /laws -->")[0]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.strip().splitlines()[2:]]
+    rows = rows_of("laws")[2:]
     laws = profile_laws(ROOT / "fits")
     assert {(r[0], r[1], r[2]) for r in rows} == {(o.name, o.constants or "none", o.setting.illumination) for o in laws}
     for one in [o for o in laws if o.label in ("burley, published", "liang-whole")]:
@@ -61,8 +113,6 @@ def test_measured_tables_name_every_law_and_two_are_measured_again():
 
 
 def test_all_that_was_regenerated_passes_the_check_and_what_was_printed_by_liang_does_not():
-    text = README.split("<!-- check -->")[1].split("<!-- /check -->")[0]
-    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in text.splitlines() if line.startswith("|")]
     laws, maps = chosen([], REGENERATED, ROOT / "fits")
-    listed = {row[0]: row[-1] for row in rows if row[-1] in ("pass", "FAIL")}
+    listed = {row[0]: row[-1] for row in rows_of("check") if row[-1] in ("pass", "FAIL")}
     assert listed == {**dict.fromkeys([one.label for one in (*laws, *maps)], "pass"), "liang, published": "FAIL"}

@@ -1,0 +1,9 @@
+#!/bin/bash
+#SBATCH --job-name=shares
+#SBATCH --array=0-15
+#SBATCH --mem=2G
+#SBATCH --time=04:00:00
+#SBATCH --requeue
+# sbatch array.sh, and when all tasks have ended: python share.py
+set -eu
+python share.py "$SLURM_ARRAY_TASK_ID" "$SLURM_ARRAY_TASK_COUNT"

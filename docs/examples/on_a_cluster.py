@@ -1,0 +1,16 @@
+"""One run on the workers of a Dask scheduler: python on_a_cluster.py tcp://host:8786 [photons]."""
+
+import sys
+
+from mcml_sim import Grid, Setting, simulate_orders
+
+address, photons = sys.argv[1], int(float(sys.argv[2])) if len(sys.argv) > 2 else 1_000_000_000
+light = simulate_orders(
+    Grid(dr=0.05, nr=400),  # rings [mfp]
+    photons,
+    setting=Setting("diffuse", n=1.4),
+    store="skin.photons",  # each finished batch; the same command goes on from here
+    scheduler=address,
+)
+found = light.reflectance(0.9)
+print(f"A {found.value:.6f} ± {found.standard_error:.6f} from {light.photons} photons")

@@ -1,0 +1,216 @@
+"""The documentation: every name has its place, examples run as they are printed, the site needs no network."""
+
+import importlib
+import os
+import re
+import runpy
+import shutil
+import subprocess
+import sys
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+
+import mcml_sim
+import profilefit
+from mcml_sim import cli as mcml_sim_cli
+from profilefit import cli, inventory
+from profilefit.shader.export import export
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS, FITS = ROOT / "docs", ROOT / "fits"
+EXAMPLES = DOCS / "examples"
+
+
+# The reference
+
+
+def test_every_public_name_has_its_place():
+    for package in (mcml_sim, profilefit):
+        text = (DOCS / f"api/{package.__name__}.md").read_text(encoding="utf-8")
+        other = (DOCS / "api/mcml_sim.md").read_text(encoding="utf-8")  # whose errors profilefit raises too
+        for name in set(package.__all__) - {"__version__"}:
+            assert re.search(rf"mcml_sim\.{name}\b", other) or re.search(rf"{package.__name__}\.{name}\b", text), name
+
+
+def test_docstrings_become_lists_formulas_and_prose(monkeypatch):
+    monkeypatch.syspath_prepend(DOCS / "ext")
+    restructured = importlib.import_module("docstrings").restructured
+    lines = [
+        "A law of |x| and `y*`.",
+        "",
+        "alpha  albedo [-], in",
+        "       [0, 1]",
+        "r, s   radii",
+        "",
+        "V(z) = z - z^2 ln(1 + 1/z)",
+    ]
+    assert restructured(lines) == [
+        r"A law of \|x\| and `y*`.",
+        "",
+        *("**alpha**", "    albedo [-], in", "    [0, 1]", "**r, s**", "    radii"),
+        "",
+        *("::", "", "    V(z) = z - z^2 ln(1 + 1/z)", ""),
+    ]
+
+
+# What is to be typed
+
+COMMANDS = {"profilefit": typer.main.get_command(cli.app), "mcml-sim": typer.main.get_command(mcml_sim_cli.app)}
+PAGES = ["README.md", *sorted(path.relative_to(ROOT).as_posix() for path in DOCS.glob("[gsh]*/*.md"))]
+
+
+def commands_of(page):
+    """What a page tells to type, in a block or between backticks, without its remark."""
+    text = (ROOT / page).read_text(encoding="utf-8")
+    typed = re.findall(r"(?:^(?:\$ )?|`)((?:profilefit|mcml-sim) [a-z-][^`\n#]*)", text, re.MULTILINE)
+    return [re.sub(r"[\[\]]|\.\.\.", "", one).split() for one in typed]
+
+
+@pytest.mark.parametrize("page", PAGES)
+def test_commands_and_options_exist(page):
+    for program, command, *words in commands_of(page):
+        if command.startswith("--"):
+            known, words = {"--help", "--version"}, [command, *words]
+        else:
+            assert command in COMMANDS[program].commands, f"{page}: {program} {command}"
+            known = {option for one in COMMANDS[program].commands[command].params for option in one.opts} | {"--help"}
+        assert {word for word in words if word.startswith("--")} <= known, f"{page}: {program} {command} {words}"
+
+
+def test_commands_are_found():
+    assert sum(len(commands_of(page)) for page in PAGES) > 30
+    assert ["profilefit", "check"] in commands_of("docs/howto/shader.md")
+
+
+# The examples
+
+
+def test_the_law_of_thirty_lines_is_one(monkeypatch, capsys):
+    lines = (EXAMPLES / "one_exponential.py").read_text(encoding="utf-8").splitlines()
+    assert sum(bool(line.strip()) for line in lines) <= 33
+    monkeypatch.syspath_prepend(EXAMPLES)
+    fitted = runpy.run_path(str(EXAMPLES / "fit_one_exponential.py"))
+    printed = capsys.readouterr().out
+    assert printed in (DOCS / "howto/add-a-law.md").read_text(encoding="utf-8")
+    law = fitted["fit"].law
+    x = np.linspace(0.0, 40.0, 4001)[1:]
+    inside = np.cumsum(2 * np.pi * x * law.profile(x, 0.9)) * (x[1] - x[0])
+    assert inside[-1] == pytest.approx(law.albedo.reflectance(0.9), rel=5e-3)  # the source's half step is left out
+    assert law.cdf(law.sampler.sample(0.3, 0.9), 0.9) == pytest.approx(0.3)
+
+
+@pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not there (glslang-tools)")
+def test_the_shader_that_is_printed_compiles(tmp_path):
+    law = export(inventory.find("hazard-diffuse", FITS), FITS)
+    main = "in vec2 uv;\nout vec4 colours;\nvoid main() { colours = vec4(radiance(uv)); }\n"
+    path = tmp_path / "scatter.frag"
+    path.write_text(f"#version 330\n{law}{(EXAMPLES / 'scatter.glsl').read_text()}{main}", encoding="utf-8")
+    told = subprocess.run(["glslangValidator", path], capture_output=True, text=True, check=False)
+    assert told.returncode == 0, told.stdout
+
+
+SRUN = """#!/bin/sh
+# What srun does with a step of two tasks, without a cluster.
+"$@" & "$@" & wait
+"""
+
+
+@pytest.mark.slow
+def test_the_slurm_script_runs_its_command_on_its_workers(tmp_path):
+    (tmp_path / "srun").write_text(SRUN)
+    (tmp_path / "srun").chmod(0o755)
+    path = f"{tmp_path}{os.pathsep}{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+    command = ["bash", EXAMPLES / "slurm.sh", sys.executable, EXAMPLES / "on_a_cluster.py", "@", "2e6"]
+    environment = {**os.environ, "PATH": path, "SLURM_JOB_ID": "7"}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=240, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert re.match(r"A 0\.\d{6} ± 0\.000\d{3} from 2000000 photons", done.stdout)
+    assert len(list((tmp_path / "skin.photons").glob("batch-*.npz"))) == 2
+
+
+@pytest.mark.slow
+def test_the_array_of_shares_is_the_run(tmp_path):
+    """Three tasks of four batches, one of them sent twice."""
+    text = (EXAMPLES / "share.py").read_text(encoding="utf-8").replace("1_000_000_000", "4_000_000")
+    (tmp_path / "share.py").write_text(text, encoding="utf-8")
+
+    def told(task=None):
+        path = f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}"
+        names = {"PATH": path, "SLURM_ARRAY_TASK_ID": str(task), "SLURM_ARRAY_TASK_COUNT": "3"}
+        command = [sys.executable, "share.py"] if task is None else ["bash", EXAMPLES / "array.sh"]
+        run = partial(subprocess.run, command, cwd=tmp_path, env={**os.environ, **names}, timeout=240)
+        return run(capture_output=True, text=True, check=True).stdout
+
+    assert [told(task) for task in (0, 1, 1, 2)] == [f"{n} batches traced\n" for n in (2, 1, 0, 1)]
+    before = {path: path.stat().st_mtime_ns for path in tmp_path.glob("shares.photons/batch-*")}
+    assert "Estimate(value=" in told()
+    assert {path: path.stat().st_mtime_ns for path in tmp_path.glob("shares.photons/batch-*")} == before
+    assert len(before) == 4
+
+
+@pytest.mark.slow
+def test_the_cluster_of_two_processes_traces():
+    command = [sys.executable, EXAMPLES / "local_cluster.py"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
+    assert done.returncode == 0, done.stderr
+    assert "Estimate(value=" in done.stdout
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["README.md", "docs/start/index.md"])
+def test_the_python_that_is_printed_runs(page):
+    """With a hundredth of the photons."""
+    blocks = re.findall(r"```python\n(.+?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
+    exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
+
+
+# The site
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    out = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "sphinx", "-W", "--keep-going", "-q", "-b", "html", DOCS, out]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    return out
+
+
+@pytest.mark.slow
+def test_the_site_needs_no_network(site):
+    """No script, style, font or picture from elsewhere; links for readers are no part of a page."""
+    for page in site.rglob("*.html"):
+        text = page.read_text(encoding="utf-8")
+        assert not re.search(r"""<(?:script|img|iframe)[^>]+src=["'](?:https?:)?//""", text), page
+        assert not re.search(r"""<link[^>]+rel=["']stylesheet["'][^>]+href=["'](?:https?:)?//""", text), page
+    assert "<math" in (site / "theory/exact.html").read_text(encoding="utf-8")
+
+
+# Tables, code and numbered formulas scroll by themselves; nothing else is to be wider than its place.
+FITS_THE_WINDOW = """() => [document.documentElement, ...document.querySelectorAll('article p, article li')]
+    .every(one => one.scrollWidth <= one.clientWidth + 1 || getComputedStyle(one).display == 'inline')"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1400])
+def test_nothing_of_the_site_is_cut_off(site, width):
+    playwright = pytest.importorskip("playwright.sync_api")
+    chromium = shutil.which("chromium") or shutil.which("chromium-browser")
+    if chromium is None:
+        pytest.skip("there is no chromium")
+    with playwright.sync_playwright() as tool:
+        browser = tool.chromium.launch(executable_path=chromium, args=["--no-sandbox"])
+        page = browser.new_page(viewport={"width": width, "height": 900})
+        errors = []
+        page.on("console", lambda message: errors.append(message.text) if message.type == "error" else None)
+        for path in sorted(site.rglob("*.html")):
+            page.goto(path.as_uri())
+            assert page.evaluate(FITS_THE_WINDOW), path
+        browser.close()
+    assert errors == []
