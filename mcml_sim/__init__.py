@@ -62,3 +62,8 @@ __all__ = [
     "write_mco",
     "write_results",
 ]
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that nobody has asked for yet, too."""
+    return [*globals(), *__all__]

@@ -41,3 +41,8 @@ __all__ = [
     "posterior",
     "profile_quality",
 ]
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that nobody has asked for yet, too."""
+    return [*globals(), *__all__]

@@ -12,6 +12,7 @@ from profilefit.tradeoff.laws import Sizes
 SMALL = Sizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 
 
+@pytest.mark.slow
 def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
     absent = ("absent", "gaussians", "no-such-set")

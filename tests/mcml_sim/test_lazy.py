@@ -16,7 +16,7 @@ def test_every_name_is_there_and_is_the_one_that_is_typed(package):
     """What type checkers are told is what `__getattr__` gives."""
     (branch,) = [one for one in ast.parse(Path(package.__file__).read_text()).body if isinstance(one, ast.If)]
     homes = {alias.name: one.module for one in branch.body for alias in one.names}
-    assert set(homes) <= set(package.__all__)
+    assert set(homes) <= set(package.__all__) <= set(dir(package))
     for name in package.__all__:
         assert getattr(package, name) is not None
     for name, home in homes.items():

@@ -27,7 +27,8 @@ OF_RECORDS = (
     "residuals-quantile",
     "quality-liang-whole",
 )
-EACH_KIND = (*(plan.name for plan in PAPER if plan.name != "liang-15-c"), "constants", "quality", *OF_RECORDS)
+DEAR = ("liang-7-error", "liang-8-albedo", "liang-19-inverse", "inversion-error")
+EACH_KIND = ("liang-7-profile", "liang-11-a", "liang-13-b", "constants", "quality", *OF_RECORDS)
 # Cheap ones of each layout, drawn again.
 AGAIN = ("liang-11-a", "quality", SMALL_CORNER)
 
@@ -70,8 +71,20 @@ def test_every_kind_is_there_as_png_and_svg_and_nothing_else(drawn):
 
 
 def test_png_is_1200_pixels_wide_with_ink_that_nowhere_touches_its_edge(drawn):
+    require_whole(drawn[0])
+
+
+@pytest.mark.slow
+def test_the_dear_ones_are_whole_too(source, tmp_path):
+    assert {*DEAR, *EACH_KIND} >= {plan.name for plan in PAPER if plan.name != "liang-15-c"}
+    chosen = [plan for plan in plans(source) if plan.name in DEAR]
+    assert len(chosen) == len(DEAR)
+    require_whole([file for plan in chosen for file in plan.draw(source, tmp_path, name=plan.name)])
+
+
+def require_whole(files):
     """Text that did not fit would be cut at the edge, and leave ink there."""
-    for file in (file for file in drawn[0] if file.suffix == ".png"):
+    for file in (file for file in files if file.suffix == ".png"):
         pixels = matplotlib.image.imread(file)[..., :3]
         assert pixels.shape[1] == 1200, file.name
         assert 450 <= pixels.shape[0] <= 1700, file.name

@@ -59,6 +59,7 @@ def test_a_page_changes_with_its_record(pages, tmp_path):
     assert "No constants: did not converge." in after
 
 
+@pytest.mark.slow
 def test_what_a_page_tells_to_type_gives_that_law(pages):
     """Every call of `load` and `albedo_law` on every page."""
     for page in pages:
