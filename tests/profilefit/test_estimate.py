@@ -106,6 +106,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
         np.testing.assert_allclose(found[:, a, i], slope, rtol=1e-3, atol=1e-4 * np.abs(found).max())
 
 
+@pytest.mark.slow
 def test_sensitivity_without_the_residuals_curvature_would_be_wrong(tallies, burley):
     """Negative control for the one above: Gauss and Newton's (J^T J)^-1 in place of the full Hessian."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))

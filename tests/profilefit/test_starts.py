@@ -93,6 +93,7 @@ def test_many_outcomes_are_counted_but_not_all_listed():
     assert told.others == 20 - starts.MOST_OUTCOMES
 
 
+@pytest.mark.slow
 def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
     alpha = 1 - np.linspace(0.05, 0.95, 5) ** 2  # too few for a jackknife, which takes time to compile
     truth = normalisation.reflectance(alpha) * (1 + 1e-3 * np.sin(9 * alpha))  # not quite the law's

@@ -89,6 +89,7 @@ def test_commands_are_found():
 # The examples
 
 
+@pytest.mark.slow
 def test_the_law_of_thirty_lines_is_one(monkeypatch, capsys):
     lines = (EXAMPLES / "one_exponential.py").read_text(encoding="utf-8").splitlines()
     assert sum(bool(line.strip()) for line in lines) <= 33

@@ -35,6 +35,7 @@ def folder(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_a_good_law_passes_in_100_columns(command, opengl):
     status, out, err = command("check", "hazard-n1.4", "albedo-rational-n1.4", "--precision", "float16")
     assert status == 0, err

@@ -166,6 +166,7 @@ def test_series_takes_over_where_the_logarithm_cancels(x64):
     assert float(_early(jnp.array(1e6), jnp.array(1e-6), 1.0, jnp.array(1.0))[0]) == pytest.approx(0.5, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_differentiable_in_albedo_and_radius(law):
     with jax.enable_x64(True):
         by_alpha = jax.vmap(jax.grad(lambda a: law.profile(0.5, a)))(jnp.linspace(0.01, 0.99, 9))

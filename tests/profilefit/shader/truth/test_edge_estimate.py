@@ -69,6 +69,7 @@ def test_quantile_curve():
         np.testing.assert_allclose(by_quantile(alpha).sample(xi), exact.quantile(xi, alpha), rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_mean_tends_to_the_law_and_not_to_the_truth(sidak):
     law = profilefit.load("liang", "corrected")
     found = edge_estimate(by_law(law, 0.8), random_points(256, 2000, seed=3), PLACES, 0.8, SEARCHLIGHT, law)
