@@ -5,6 +5,10 @@ ELSEWHERE = "delete it, or use another folder"
 RESUMES = "the same run with its store resumes"
 
 
+class Notice(UserWarning):
+    """Something to know besides the answer; a command line says it on stderr, beside what it prints."""
+
+
 class InputError(ValueError):
     """An argument that no physics or file format allows."""
 

@@ -16,8 +16,10 @@ from dataclasses import dataclass
 import typer
 from rich.console import Console
 
+from mcml_sim.errors import Notice
 from mcml_sim.terminal import INTERRUPTED, mend_streams
 
+ANSWERS = (0, 1)
 BAD_INPUT = 2
 AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
 NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
@@ -51,11 +53,15 @@ class Program:
     def main(self) -> None:
         """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
         mend_streams()
-        with warnings.catch_warnings():  # of a damaged batch, say: a line, without the place in the code
-            warnings.showwarning = lambda message, *_: self.say(message)
+        notices: dict[str, None] = {}
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", Notice)
+            warnings.showwarning = lambda message, *_: notices.setdefault(str(message))
             with _lost_interrupts() as lost:
                 status = self._status()
             status = INTERRUPTED if lost else status
+            for text in notices if status in ANSWERS else ():  # an error is one line
+                self.say(text)
             if status == INTERRUPTED:
                 self.say(self.stopped())
         sys.exit(status)

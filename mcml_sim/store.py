@@ -24,7 +24,7 @@ import jaxlib.version
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.errors import ELSEWHERE, RESUMES, StoreError
+from mcml_sim.errors import ELSEWHERE, RESUMES, Notice, StoreError
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import replace_whole
 
@@ -36,7 +36,7 @@ LONGEST_SHOWN = 60  # characters of a value in a message
 SHARED_SHOWN = 12  # of them, those before the first that differs
 
 
-class DamagedBatch(UserWarning):
+class DamagedBatch(Notice):
     """A batch in a store is not what was written there; it is traced again."""
 
 

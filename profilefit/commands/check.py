@@ -58,7 +58,7 @@ def check(
     quiet: bool,
 ) -> None:
     """Measure, print or keep, and exit with status 1 if a bound is broken."""
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     laws, maps = chosen(names or [], constants, folder)
     if out is not None:
         require_apart(out, folder)

@@ -56,7 +56,7 @@ def fit(
     """Fit, print or keep, and exit with status 1 if the fit does not converge."""
     if seed < 0:
         raise InputError(f"--seed must be a whole number >= 0, got {seed}")
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     measured = read(data, unit, scale == FREE)
     measured = measured.within(_radius("--r-min", r_min, measured), _radius("--r-max", r_max, measured))
     setting = _setting(measured, light, n)

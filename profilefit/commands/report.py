@@ -33,7 +33,7 @@ def report(
 ) -> None:
     """Print what is asked for, or write it."""
     _require_one({"--markdown": markdown, "--html": html, "--json": as_json, "--quality": quality and not as_json})
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     contents = _contents(folder, names)
     if markdown is not None:
         _fill(markdown, contents, folder, quiet)

@@ -34,7 +34,7 @@ def stability(
     names: list[str] | None, out: Path | None, quick: bool, fits: Path | None, as_json: bool, quiet: bool
 ) -> None:
     """Look, print or keep, and exit with status 1 if something of this project broke its word."""
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     todo = jobs(names or [], folder, quick)
     if out is not None:
         require_apart(out, folder)

@@ -29,7 +29,7 @@ SAME = ("version", "sha256", "machine")  # of `made`: what parts beside each oth
 def tradeoff(parts: list[str] | None, out: Path, quick: bool, fits: Path | None, as_json: bool, quiet: bool) -> None:
     """Measure each part, write it at once, and print it."""
     names = chosen(parts or [])
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     require_apart(out, folder)
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": made(typed(), folder)}
