@@ -21,7 +21,7 @@ from mcml_sim.whole_file import read_whole
 MOST_JSON = 2**21  # bytes; the largest file that ships, where arithmetic fails, has two fifths of it
 MOST_TOML = 2**18  # a thousand layers are a third of it
 MOST_LEVELS = 32  # records nest seven deep
-MOST_DIGITS = 100  # of a whole number in JSON; 19 are what other programs hold
+MOST_DIGITS = 300  # of a whole number in JSON, which floating point can hold
 # The time of tomllib goes with the square of the names in a key: a.a.a.a = 1.
 LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MOST_LEVELS  # noqa: UP031
@@ -30,21 +30,21 @@ LONGEST_SHOWN = 40  # characters of a number or key in a message
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
-    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: expected ..., got ...`."""
+    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: is not JSON: ...`."""
     content = read_whole(path, most)
     try:
         return parse_json(content, most)
     except ValueError as error:
-        raise InputError(f"{path}: expected JSON, got: {error}") from None
+        raise InputError(f"{path}: is not JSON: {error}") from None
 
 
 def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, Any]:
-    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: expected ..., got ...`."""
+    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: is not TOML: ...`."""
     content = read_whole(path, most)
     try:
         return parse_toml(content, most)
     except ValueError as error:
-        raise InputError(f"{path}: expected TOML, got: {error}") from None
+        raise InputError(f"{path}: is not TOML: {error}") from None
 
 
 def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) -> Any:
