@@ -16,7 +16,7 @@ from mcml_sim.mci import DECIMAL, Lines, Run, read_run
 from mcml_sim.whole_file import read_whole
 
 Floats = NDArray[np.float64]
-MAX_BYTES = 2**28  # tables of 2^21 cells take 30 MB each
+MAX_BYTES = 2**27  # tables of 2^21 cells take 30 MB each
 LARGEST = 1e30  # of a printed number
 
 
@@ -45,7 +45,7 @@ def parse_mco(content: bytes, name: str) -> Output:
     """What `read_mco` gives for a file of this name and content."""
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
-    lines = Lines(name, content.replace(b"\x00", b"\xff").decode("utf-8", errors="surrogateescape"))
+    lines = Lines(name, content.replace(b"\x00", b"\xff"))
     (version,) = lines.take(1, "the file version, A1")
     if version != "A1":
         raise lines.error("the file version, A1", repr(version[:8]))

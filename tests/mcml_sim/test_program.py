@@ -5,7 +5,7 @@ import sys
 
 import pytest
 
-SMALL = """
+SMALL = r"""
 import gc
 import signal
 import sys
@@ -35,6 +35,10 @@ def short():
 @app.command()
 def wrong():
     raise InputError("x must be 1, got 2")
+
+@app.command()
+def hostile():
+    raise InputError("\x1b[2Jone\r\ntwo\u202e\x9b\u2028" + "x" * 10**6 + ", got 2")
 
 @app.command()
 def stopped():
@@ -93,6 +97,17 @@ def test_what_a_user_can_mend_is_one_line(small, words, status, said):
         out, err = run.communicate(timeout=60)
     assert (run.returncode, err.decode()) == (status, said)
     assert out == b""
+
+
+def test_whatever_a_message_holds_it_is_one_line_that_is_only_printed(small):
+    with small("hostile") as run:
+        _, err = run.communicate(timeout=60)
+    said = err.decode()
+    assert run.returncode == 2
+    assert said.startswith(r"small: \X1B[2JONE\r\nTWO\u202e\x9b\u2028XXX".replace(r"\X1B", r"\x1b"))
+    assert said.endswith("XXX, GOT 2\n")
+    assert said[:-1].isprintable()
+    assert len(said) < 2100
 
 
 @pytest.mark.parametrize(("seconds", "printed"), [("50", (b"",)), ("0", (b"", b"slept\n"))])

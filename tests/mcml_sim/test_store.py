@@ -1,5 +1,7 @@
 """The folder of batches: what it keeps, refuses and finds damaged."""
 
+import hashlib
+import io
 import json
 import os
 import time
@@ -193,7 +195,17 @@ def test_a_batch_whose_photons_do_not_add_up_is_damaged(store):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"cells": np.array([6, 1])}, {"rest": np.array([1, 2])}, {"exits": np.array([1, 2])}]
+    "wrong",
+    [
+        {"cells": np.array([6, 1])},
+        {"cells": np.array([0, 2, -1])},
+        {"cells": np.array([0.0, 2.0, 5.0])},
+        {"rest": np.array([1, 2])},
+        {"rest": np.array([4, 5, np.inf])},
+        {"rest": np.array([-1, 10, 15])},
+        {"exits": np.array([1, 2])},
+        {"exits": np.array([1, np.nan, 2])},
+    ],
 )
 def test_arrays_that_are_no_counts_are_refused(wrong):
     with pytest.raises(ValueError, match=r"."):
@@ -203,13 +215,35 @@ def test_arrays_that_are_no_counts_are_refused(wrong):
     assert READ(COUNTS.arrays()).ledger == COUNTS.ledger
 
 
+@pytest.mark.parametrize(
+    ("arrays", "reason"),
+    [
+        ({"exits": np.zeros(2**26, np.int8)}, r"its arrays claim 6710\d+ bytes, more than the 1048576 that are read"),
+        ({"made_by": np.array(3)}, "'made_by' must be one text, got int64"),
+        ({"exits": np.array([None])}, "'exits' is no array of numbers or text"),
+    ],
+)
+def test_a_seal_is_no_proof(store, tmp_path, monkeypatch, arrays, reason):
+    """Anybody can seal a batch: what it claims is checked, and one that claims too much is not unpacked."""
+    monkeypatch.setattr("mcml_sim.store.MAX_BATCH", 2**20)
+    store.save(0, COUNTS)
+    with np.load(tmp_path / "batch-00000000.npz") as whole:
+        fields = {**whole, **arrays}
+    file = io.BytesIO()
+    np.savez_compressed(file, **fields)
+    body = file.getvalue()[:-2] + (64).to_bytes(2, "little")
+    (tmp_path / "batch-00000000.npz").write_bytes(body + hashlib.sha256(body).hexdigest().encode())
+    with pytest.warns(DamagedBatch, match=rf"is damaged \({reason}"):
+        assert store.load(0) is None
+
+
 def test_a_batch_that_cannot_be_read_is_damaged(store, tmp_path):
     (tmp_path / "batch-00000000.npz").mkdir()
     with pytest.warns(DamagedBatch, match=r"batch-00000000.npz is damaged \(Is a directory\)"):
         assert store.load(0) is None
 
 
-@pytest.mark.parametrize("text", ["", "{", "[1]", "\x00"])
+@pytest.mark.parametrize("text", ["", "{", "[1]", "\x00", "[" * 10**5, '{"seed": 1, "seed": 2}'])
 def test_a_damaged_manifest_is_named_and_rewritten_once_deleted(store, tmp_path, text):
     store.save(0, COUNTS)
     (tmp_path / "run.json").write_text(text)

@@ -95,7 +95,7 @@ WRONG = [
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a number, got nothing"),
     ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0, got -1"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
-    ("[view]", "[view", "scene must be a TOML file, got:"),
+    ("[view]", "[view", "is not TOML: "),
 ]
 
 
@@ -111,5 +111,5 @@ def test_mistakes_are_one_line(written, old, new, message):
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"absent.toml: scene must be a TOML file, got: No such file"):
+    with pytest.raises(InputError, match=r"absent.toml: expected a file that can be read, got: No such file"):
         read(tmp_path / "absent.toml")
