@@ -40,5 +40,13 @@ def known_folder(asked: Path | None = None) -> Path:
 
 
 def evidence_folder(records: Path, asked: Path | None = None) -> Path:
-    """The folder that was asked for, or ./evidence if it is there, or the one beside the records."""
+    """The folder that was asked for, or ./evidence if it is there, or the one beside the records.
+
+    One that nobody named is told of by an OtherRecords warning. InputError if it was asked for and is no folder.
+    """
+    if asked is not None and not asked.is_dir():
+        raise InputError(f"--evidence must be a folder, got {str(asked)!r}, which is none")
+    if asked is None and EVIDENCE.is_dir():
+        where = f"measurements of {str(EVIDENCE)!r} in the folder that you are in; --evidence chooses others"
+        warnings.warn(where, OtherRecords, stacklevel=2)
     return asked or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)

@@ -19,6 +19,7 @@ import numpy as np
 
 from mcml_sim.npz import read_npz
 from mcml_sim.plain import plain as to_plain
+from mcml_sim.text_file import MOST_JSON, parse_json
 from mcml_sim.whole_file import read_whole
 from profilefit import schema
 from profilefit.errors import InputError, OutputError, RecordError
@@ -26,7 +27,6 @@ from profilefit.errors import InputError, OutputError, RecordError
 FORMAT = 1
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
-LONGEST_FILE = 4 * 2**20  # bytes of a record; ours have 4e4
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
@@ -72,13 +72,10 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:
-        data = read_whole(path, LONGEST_FILE)
-        if len(data) > LONGEST_FILE:
-            raise ValueError(f"longer than {LONGEST_FILE} bytes")
-        content = json.loads(data.decode("utf-8"), parse_constant=_refused)
+        content = parse_json(read_whole(path, MOST_JSON))
     except InputError as error:
         raise RecordError(f"{path}: cannot be read ({str(error).rpartition('got: ')[2]})") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
@@ -86,10 +83,6 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     if text := schema.problem(content, whole):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     return content
-
-
-def _refused(word: str) -> float:
-    raise ValueError(f"{word} is no number in JSON")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
