@@ -24,9 +24,9 @@ import jaxlib.version
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.errors import ELSEWHERE, RESUMES, StoreError
+from mcml_sim.errors import ELSEWHERE, RESUMES, OutputError, StoreError
 from mcml_sim.version import __version__
-from mcml_sim.whole_file import replace_whole
+from mcml_sim.whole_file import write_whole
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
@@ -115,11 +115,9 @@ class Store(Generic[R]):
 
     def _write(self, path: Path, data: bytes) -> None:
         try:
-            replace_whole(path, data)
-        except OSError as error:
-            raise StoreError(
-                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, {RESUMES}"
-            ) from error
+            write_whole(path, data)
+        except OutputError as error:
+            raise StoreError(f"{error}; what the store holds is whole, {RESUMES}") from error
 
 
 def require_ours(folder: Path, made_by: dict[str, object]) -> None:
