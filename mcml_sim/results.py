@@ -57,7 +57,11 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
     """
     if not isinstance(tally, Tally):
         raise InputError(f"tally must be what simulate gave, got {reprlib.repr(tally)}")
-    file = checked_path(path)
+    write_whole(checked_path(path), results_bytes(tally))
+
+
+def results_bytes(tally: Tally) -> bytes:
+    """What `write_results` writes."""
     header = {
         "format": FORMAT,
         "mcml_sim": __version__,
@@ -74,7 +78,7 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
         arrays |= {name + end: np.asarray(part) for end, part in zip(ENDS, parts, strict=True)}
     contents = io.BytesIO()
     np.savez_compressed(contents, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
-    write_whole(file, contents.getvalue())
+    return contents.getvalue()
 
 
 def read_results(path: str | os.PathLike[str]) -> Results:
