@@ -1,7 +1,7 @@
 """What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
 
 # What errors tell to do about them; a command line has other words for it.
-ELSEWHERE = "delete it, or use another folder"
+ELSEWHERE = "use another folder"
 RESUMES = "the same run with its store resumes"
 
 

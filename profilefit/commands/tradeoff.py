@@ -10,7 +10,7 @@ from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import tracked
 from mcml_sim.screen import notes, print_json, screen, show, typed
 from mcml_sim.text_file import read_json
-from profilefit import record
+from mcml_sim.whole_file import write_whole
 from profilefit.errors import InputError
 from profilefit.evidence import made, require_apart
 from profilefit.folder import records_folder
@@ -66,7 +66,7 @@ def keep(file: Path, told: Mapping[str, Any]) -> None:
         kept = {name: {**own, **before[name]} for name in PARTS if isinstance(before.get(name), dict)}
     parts = {**kept, **told}
     heads = {name: value for name, value in told.items() if name not in PARTS}
-    record.write_text(file, json_text({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
+    write_whole(file, json_text({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
 
 
 def read(file: Path) -> Told:
@@ -85,5 +85,5 @@ def is_alike(before: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
 
 def _written(found: Part, known: dict[str, str], out: Path) -> list[Path]:
     data = out / f"tradeoff-{found.name}.csv"
-    record.write_text(data, as_csv(found, known))
+    write_whole(data, as_csv(found, known))
     return [*tradeoff_figure(found, machine.caption(known), out), data]

@@ -76,7 +76,7 @@ def test_manifest_says_what_decides_the_bits(tmp_path):
 
 def test_another_runs_store_is_refused_with_both_values(tmp_path):
     simulate_orders(GRID, 100, seed=4, store=tmp_path)
-    remedy = "delete it, or use another folder"
+    remedy = "use another folder, or delete it if that run is over"
     with pytest.raises(StoreError, match=rf"made by another run: seed is 4 there, 5 here; {remedy}$"):
         simulate_orders(GRID, 100, seed=5, store=tmp_path)
     with pytest.raises(StoreError, match=r'made by another run: grid is "'):
@@ -135,7 +135,9 @@ def test_a_batch_from_another_store_is_refused(store, tmp_path):
     other.save(0, COUNTS)
     (tmp_path / "other" / "batch-00000000.npz").rename(tmp_path / "batch-00000000.npz")
     with pytest.raises(
-        StoreError, match=r"batch-00000000.npz was made by another run; delete it to redo just that batch"
+        StoreError,
+        match=r"batch-00000000.npz was made by another run; if that is still at work, use another folder; "
+        "if not, delete that file to redo just that batch",
     ):
         store.load(0)
 
@@ -258,7 +260,10 @@ def test_a_full_disk_is_named_and_leaves_nothing_half_written(store, tmp_path, m
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StoreError, match=r"cannot write to store .*: No space left on device; .* resumes"):
+    with pytest.raises(
+        StoreError,
+        match=r"cannot write .*batch-0+.npz: No space left on device; what the store holds is whole, .* resumes",
+    ):
         store.save(0, COUNTS)
     assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
 
