@@ -10,10 +10,13 @@ import gc
 import signal
 import sys
 import time
+import warnings
+import numpy
 import typer
 from rich.console import Console
 from mcml_sim.errors import InputError
 from mcml_sim.program import Program
+from mcml_sim.store import DamagedBatch
 
 app = typer.Typer()
 
@@ -61,6 +64,19 @@ def unraisable():
             raise ValueError("dying")
     Dying()
 
+@app.command()
+def fault():
+    raise KeyError("first line\\nsecond line")
+
+@app.command()
+def overflow():
+    print(numpy.float64(1e300) * numpy.float64(1e300))
+
+@app.command()
+def library():
+    warnings.warn("jax has something to say", UserWarning)
+    warnings.warn("a batch is damaged", DamagedBatch)
+
 Program("small", app, (InputError,), lambda: "stopped; begin again", remedied=lambda text: text.upper()).main()
 """
 
@@ -89,6 +105,14 @@ def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
     [
         ("wrong", 2, "small: X MUST BE 1, GOT 2\n"),
         ("stopped", 130, "small: stopped; begin again\n"),
+        (
+            "fault",
+            70,
+            "small: a fault of this program, please report it: KeyError in <string>:58: 'first line\\nsecond line' "
+            "(PYTHONDEVMODE=1 shows where)\n",
+        ),
+        ("overflow", 2, "small: no answer: a number on the way is beyond double precision; check units and sizes\n"),
+        ("library", 0, "small: a batch is damaged\n"),
         ("wrnog", 2, "small: No such command 'wrnog'. Did you mean 'wrong'? (--help shows what is accepted)\n"),
     ],
 )

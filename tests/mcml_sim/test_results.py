@@ -154,8 +154,8 @@ FIELDS = {
     "value": ({"reflectance_r": np.array([1, np.nan, 1, 1])}, "reflectance_r must be finite"),
     "truth": ({"reflectance_r": np.ones(4, bool)}, "'reflectance_r' is no array of numbers or text"),
     "objects": ({"reflectance_r": np.array([None] * 4)}, "'reflectance_r' is no array of numbers or text"),
-    "error": ({"absorbed_standard_error": np.array(-1.0)}, "absorbed_standard_error must be finite and >= 0"),
-    "error inf": ({"absorbed_standard_error": np.array(np.inf)}, "absorbed_standard_error must be finite and >= 0"),
+    "error": ({"absorbed_standard_error": np.array(-1.0)}, "absorbed_standard_error must be >= 0"),
+    "error nan": ({"absorbed_standard_error": np.array(np.nan)}, "absorbed_standard_error must be >= 0"),
     "samples": ({"energy_effective_samples": np.array(np.nan)}, "energy_effective_samples must be >= 0"),
 }  # fmt: skip
 
