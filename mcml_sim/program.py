@@ -69,25 +69,20 @@ class Program:
     def main(self) -> None:
         """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
         mend_streams()
-        notices: dict[str, None] = {}
-
-        def noted(message: Warning | str, *_: object) -> None:  # what a library tells its caller is not shown
-            if isinstance(message, Notice):
-                notices.setdefault(str(message))
-
+        found: list[Warning | str] = []
         with warnings.catch_warnings():
-            warnings.filterwarnings(
-                "error", category=RuntimeWarning
-            )  # of arithmetic: no answer is made of such numbers
+            warnings.filterwarnings("error", category=RuntimeWarning)  # of arithmetic: such numbers make no answer
             warnings.simplefilter("always", Notice)
-            warnings.showwarning = noted
+            warnings.showwarning = lambda message, *_: found.append(message)
             with _lost_interrupts() as lost:
                 status = self._status()
             status = INTERRUPTED if lost else status
-            for text in notices if status in ANSWERS else ():  # an error is one line
-                self.say(text)
             if status == INTERRUPTED:
                 self.say(self.stopped())
+            # What libraries tell their callers is not shown; and an error is one line.
+            notices = dict.fromkeys(str(one) for one in found if isinstance(one, Notice))
+            for text in notices if status in ANSWERS else ():
+                self.say(text)
         sys.exit(status)
 
     def say(self, text: object) -> None:

@@ -51,6 +51,8 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     Its law, pipeline, setting and constants must be there: that is what a law is made from. A `whole` record holds
     everything that `profilefit report` shows.
     """
+    if not schema.is_line(path.stem):  # it is shown, and stands in exported texts
+        raise RecordError(f"{str(path)!r}: the name of a record must be {schema.TEXT.words}")
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:

@@ -122,7 +122,9 @@ PARTS: Kinds = {
     "left_out?.rings": COUNT,
     "left_out?.albedos": COUNT,
     "derived?": TABLE,
-    "derived?.quantity": Kind("radius or reflectance", lambda value: value in ("radius", "reflectance")),
+    "derived?.quantity": Kind(
+        "radius or reflectance", lambda value: isinstance(value, str) and value in ("radius", "reflectance")
+    ),
     "derived?.alpha": NUMBERS,
     **{f"derived?.{name}": MEASURES for name in ("value", "statistical", "model")},
     "discrepancy?": TABLE,
@@ -242,9 +244,9 @@ def problem(content: dict[str, Any], whole: bool) -> str | None:
     """What is wrong with a record, in one line, or None; of a `whole` one with anything that a report shows."""
     pipeline = content.get("pipeline")
     kinds = [NAMED if pipeline == "evidence" else {**NAMED, **CONSTANTS}]
-    if whole and pipeline not in PIPELINES and is_line(pipeline):
-        return f"pipeline must be one of {', '.join(PIPELINES)}, got {pipeline!r}"
     if whole and is_line(pipeline):
+        if pipeline not in PIPELINES:
+            return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
         kinds += [TOLD, PIPELINES[str(pipeline)]]
     found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -19,6 +20,7 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
 NAMES |= {"verdict", "law", "light", "sampler", "measure"}
+MARKUP = re.compile(r"(?<!\\)[<|\[`]")  # begins an element, a column, a link or code
 # What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
 SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
 
@@ -207,7 +209,11 @@ def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A GitHub table, names to the left and numbers to the right, every line filled to the same width."""
+    """A GitHub table, names to the left and numbers to the right, every line filled to the same width.
+
+    What is in its cells is text: no element, no link and no further column.
+    """
+    rows = [[MARKUP.sub(r"\\\g<0>", cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
     rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
     lines = [header, rule, *rows]

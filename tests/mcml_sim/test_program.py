@@ -66,7 +66,7 @@ def unraisable():
 
 @app.command()
 def fault():
-    raise KeyError("first line\\nsecond line")
+    raise KeyError("first line\nsecond line")
 
 @app.command()
 def overflow():
@@ -108,7 +108,7 @@ def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
         (
             "fault",
             70,
-            "small: a fault of this program, please report it: KeyError in <string>:58: 'first line\\nsecond line' "
+            "small: a fault of this program, please report it: KeyError in <string>:62: 'first line\\nsecond line' "
             "(PYTHONDEVMODE=1 shows where)\n",
         ),
         ("overflow", 2, "small: no answer: a number on the way is beyond double precision; check units and sizes\n"),
