@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,9 @@ from typing import Any
 from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import tracked
 from mcml_sim.screen import notes, print_json, screen, show, typed
+from mcml_sim.text_file import read_json
 from profilefit import record
+from profilefit.errors import InputError
 from profilefit.evidence import made, require_apart
 from profilefit.folder import records_folder
 from profilefit.report.tradeoff_figure import tradeoff_figure
@@ -71,8 +72,8 @@ def keep(file: Path, told: Mapping[str, Any]) -> None:
 def read(file: Path) -> Told:
     """What a tradeoff.json says, which is nothing if it is damaged or not there: it is only added to, or replaced."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = read_json(file)
+    except InputError:
         return {}
     return content if isinstance(content, dict) and isinstance(content.get("made"), dict) else {}
 

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mcml_sim.text_file import MOST_JSON, parse_json
+from mcml_sim.whole_file import read_whole
 from profilefit import evidence
 from profilefit.errors import InputError
 from profilefit.report.page.markup import command, paragraph
@@ -41,11 +42,11 @@ class Measured:
         """What `name`.json says; None if it is not there. InputError on a file that is none of ours."""
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
-        try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
+        if not path.exists():
             return None
-        except (OSError, ValueError, RecursionError) as error:
+        try:
+            content = parse_json(read_whole(path, MOST_JSON))
+        except ValueError as error:
             raise InputError(f"{expected}, got: {error}") from None
         if not isinstance(content, dict) or not isinstance(content.get("made"), dict):
             raise InputError(f"{expected}, got no key 'made'")
