@@ -27,7 +27,9 @@ def fit(
     fix: Annotated[
         list[str] | None, typer.Option(help="Hold l=1.2mm, alpha=.9 or A=.8 (total reflectance); may be repeated.")
     ] = None,
-    unit: Annotated[str | None, typer.Option(help="Unit of r, if the header has none: um, mm, cm, m, in.")] = None,
+    unit: Annotated[
+        str | None, typer.Option(help="Unit of r, if the header has none: nm, um, mm, cm, m, inch.")
+    ] = None,
     scale: Annotated[
         str, typer.Option(help="What the values are multiplied by: a number, 1.0+-0.02 if known so well, or free.")
     ] = "1",

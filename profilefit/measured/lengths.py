@@ -7,9 +7,22 @@ import re
 from profilefit.errors import InputError
 
 # In millimetres.
-UNITS = {"um": 1e-3, "µm": 1e-3, "μm": 1e-3, "mm": 1.0, "cm": 10.0, "m": 1000.0, "in": 25.4}
+UNITS = {
+    "nm": 1e-6,
+    "um": 1e-3,
+    "µm": 1e-3,  # the micro sign
+    "μm": 1e-3,  # the Greek letter, which looks alike
+    "mm": 1.0,
+    "cm": 10.0,
+    "m": 1000.0,
+    "in": 25.4,
+    "inch": 25.4,
+}
 NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D*)")
-PER_AREA = re.compile(r"(?:1\s*/\s*(?P<over>[^\W\d_]+)\s*\^?2|(?P<power>[^\W\d_]+)\s*\^?-2)")
+PER_AREA = re.compile(
+    r"1?\s*/\s*\(?\s*(?P<over>[^\W\d_]+)\s*(?:(?:\^|\*\*)?\s*2|²)\s*\)?"
+    r"|(?P<power>[^\W\d_]+)\s*(?:(?:\^|\*\*)?\s*\(?[-−]2\)?|⁻²)"
+)
 
 
 def checked_unit(name: str, unit: str) -> str:
@@ -37,7 +50,7 @@ def factor(source: str, target: str) -> float:
 
 
 def area_unit(text: str) -> str | None:
-    """The unit of length in 1/mm^2, 1/mm2 or mm^-2; None if the text is no such thing."""
+    """The unit of length in 1/mm^2, 1/mm², 1/mm2, mm^-2 or mm⁻²; None if the text is no such thing."""
     match = PER_AREA.fullmatch(text.strip())
     unit = (match["over"] or match["power"]) if match else None
     return unit if unit in UNITS else None

@@ -22,6 +22,7 @@ Floats = NDArray[np.float64]
 FEWEST = 3  # replicates of a row
 MOST_PRIOR = 1e6  # degrees of freedom that stand for infinitely many: all variances lie on the trend
 LEAST_POOLED = 1.0
+LEAST_RISE = 1e-6  # of ln |mean|, which a trend is taken over
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,13 +55,15 @@ def steadied(samples: Floats) -> Steadied:
     # ln s^2 of own degrees of freedom lies below ln sigma^2 by this much, on average.
     level = np.log(variance[usable]) - digamma(own / 2) + np.log(own / 2)
     height = np.log(np.maximum(np.abs(mean), np.abs(mean).max() * 1e-12))
-    slope, start = np.polyfit(height[usable], level, 1)
+    # Rows of one height have a level, and no slope.
+    slope, start = np.polyfit(height[usable], level, 1) if np.ptp(height[usable]) > LEAST_RISE else (0.0, level.mean())
     trend = start + slope * height
     left = level - trend[usable]
     spread = float(left @ left) / max(left.size - 2, 1) - float(polygamma(1, own / 2))
     prior = _freedom(spread)
     # The mean of ln sigma^2 over the rows stands for s0^2 by the same rule.
-    centre = np.exp(trend + digamma(prior / 2) - np.log(prior / 2))
+    with np.errstate(over="ignore"):  # of a row far outside of the others, which tell nothing of it then
+        centre = np.exp(trend + digamma(prior / 2) - np.log(prior / 2))
     both = (prior * centre + own * variance) / (prior + own)
     return Steadied(mean, np.sqrt(both / count), np.full(mean.size, min(prior, pooled) + own), pooled)
 

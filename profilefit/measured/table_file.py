@@ -4,12 +4,15 @@
     r, value1, value2, value3            three replicates or more: mean and standard error are made from them
     r_in, r_out, value, sigma            averages over rings
 
-Cells are separated by tabs, else semicolons, else commas, by what the header has. A # starts a comment. The value's
-unit, if it is not the one of r, is converted; [a.u.] or any other word needs an unknown scale.
+Cells are separated by tabs, else semicolons, else commas, else spaces, by what the header has. Units stand in brackets,
+in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment. The value's unit, if it is not the one of
+r, is converted; [a.u.] or any other word needs an unknown scale. Numbers have decimal points: a comma may part
+thousands as well, so it is an error and no guess.
 """
 
 from __future__ import annotations
 
+import contextlib
 import csv
 import hashlib
 import math
@@ -26,18 +29,35 @@ from profilefit.measured.data import Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
 from profilefit.measured.replicates import FEWEST, Steadied, steadied
 
-MAX_BYTES = 2**26  # far beyond any profile, near enough that a wrong file fails at once
+MAX_BYTES = 2**22  # far beyond any profile, near enough that a wrong file fails at once
+MOST_LINES = 20_000  # a fit takes five hundred rows of them
+MOST_COLUMNS = 1000  # replicates, nearly all
 FEWEST_ROWS = 3
-DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma"}
-HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
-REPLICATE = re.compile(r"value_?\d+")
+DELIMITERS = {"\t": "tab", ";": "semicolon", ",": "comma", " ": "space"}
+HEADING = re.compile(
+    r"(?P<name>[^\[\]()/]*?)\s*(?:\[(?P<square>[^\[\]]*)\]|\((?P<round>.*)\)|/\s*(?P<over>[^\[\]]+))?", re.DOTALL
+)
+WORD = re.compile(r"[^\s\[\](]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?|\S")  # of a header between spaces, with its unit
+LONGEST_HEADING = 100  # characters
+# What people call the columns.
+NAMES = {
+    **dict.fromkeys(("r", "rho", "ρ", "radius", "distance"), "r"),
+    **dict.fromkeys(("value", "reflectance", "rd", "r_d"), "value"),
+    **dict.fromkeys(("sigma", "σ", "error", "standard_error", "standard error"), "sigma"),
+    **{name: name for name in ("r_in", "r_out")},
+}
+REPLICATE = re.compile(r"value[_ ]?\d+")
+DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
+SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
 LONGEST_SHOWN = 40  # characters of a cell in a message
 
 
 def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Measured:
     """Read a table; `unit` is that of r if the header has none, `scaled` whether the scale of the values is unknown."""
-    content = read_bytes(path)
+    content = read_whole(path, MAX_BYTES)
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     header, rows = _cells(path, lines)
     numbers = _numbers(path, header, rows)
@@ -58,14 +78,6 @@ def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Mea
         length,
         pooled=found.pooled,
     )
-
-
-def read_bytes(path: Path) -> bytes:
-    """A file's bytes; InputError if it cannot be read or is too long for a profile."""
-    content = read_whole(path, MAX_BYTES)
-    if len(content) > MAX_BYTES:
-        raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
-    return content
 
 
 @dataclass(frozen=True)
@@ -108,24 +120,41 @@ def _text(path: Path, content: bytes) -> str:
 
 
 def _cells(path: Path, lines: list[str]) -> tuple[_Header, list[_Row]]:
+    if len(lines) > MOST_LINES:
+        raise InputError(f"{path}: expected a profile of at most {MOST_LINES} lines, got {len(lines)}")
     kept = [(at, line.partition("#")[0]) for at, line in enumerate(lines, start=1)]
     kept = [(at, line) for at, line in kept if line.strip()]
     if not kept:
         raise InputError(f"{path}: expected a header and rows ({ACCEPTED}), got an empty file")
     at, first = kept[0]
-    delimiter = next((one for one in DELIMITERS if one in first), ",")
-    header = _header(path, at, _split(path, at, first, delimiter), delimiter)
-    rows = [_Row(line, _split(path, line, text, delimiter)) for line, text in kept[1:]]
-    for row in rows:
-        if len(row.cells) != len(header.names):
-            expected = f"{len(header.names)} cells between {DELIMITERS[delimiter]}s, as the header has"
-            raise InputError(f"{path}:{row.line}: expected {expected}, got {len(row.cells)}")
+    delimiter = next((one for one in DELIMITERS if one in first.strip()), ",")
+    names = tuple(WORD.findall(first)) if delimiter == " " else _split(path, at, first, delimiter)
+    # The columns after the last one with a name are those that spreadsheets leave empty.
+    header = _header(path, at, names[: max((i for i, name in enumerate(names, 1) if name), default=0)], delimiter)
+    rows = [_row(path, header, line, text) for line, text in kept[1:]]
     if len(rows) < FEWEST_ROWS:
         raise InputError(f"{path}: expected at least {FEWEST_ROWS} rows under the header, got {len(rows)}")
     return header, rows
 
 
+def _row(path: Path, header: _Header, at: int, line: str) -> _Row:
+    cells = _split(path, at, line, header.delimiter)
+    wanted = len(header.names)
+    if not any(cells[wanted:]):
+        cells = cells[:wanted]
+    if len(cells) != wanted:
+        expected = f"{wanted} cells between {DELIMITERS[header.delimiter]}s, as the header has"
+        pairs = (
+            header.delimiter == "," and wanted < len(cells) <= 2 * wanted and all(_is_number(cell) for cell in cells)
+        )
+        hint = ": if its numbers have decimal commas, write 0.5 for 0,5" if pairs else ""
+        raise InputError(f"{path}:{at}: expected {expected}, got {len(cells)}{hint}")
+    return _Row(at, cells)
+
+
 def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
+    if delimiter == " ":
+        return tuple(line.split())
     try:
         return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, strict=True)))
     except csv.Error as error:
@@ -133,19 +162,27 @@ def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
 
 
 def _header(path: Path, at: int, cells: tuple[str, ...], delimiter: str) -> _Header:
-    matches = [HEADING.fullmatch(cell) for cell in cells]
-    names = tuple(match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True))
-    units = tuple((match["unit"] or "").strip() if match else "" for match in matches)
+    if len(cells) > MOST_COLUMNS:
+        raise InputError(f"{path}:{at}: expected at most {MOST_COLUMNS} columns, got {len(cells)}")
+    matches = [HEADING.fullmatch(cell) if len(cell) <= LONGEST_HEADING else None for cell in cells]
+    words = [match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True)]
+    names = tuple(NAMES.get(word, word) for word in words)
+    units = tuple(_unit(match) for match in matches)
     header = _Header(names, units, at, delimiter)
-    for name in names:
+    for word, name in zip(words, names, strict=True):
         if names.count(name) > 1:
-            raise InputError(f"{path}:{at}: expected each column once, got {name!r} {names.count(name)} times")
-        if name not in ("r", "r_in", "r_out", "value", "sigma") and not REPLICATE.fullmatch(name):
-            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got the column {_shown(name)}")
+            raise InputError(f"{path}:{at}: expected each column once, got {_shown(name)} {names.count(name)} times")
+        if name not in NAMES and not REPLICATE.fullmatch(name):
+            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got the column {_shown(word)}")
     missing = next(_missing(header), None)
     if missing:
         raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {missing}")
     return header
+
+
+def _unit(match: re.Match[str] | None) -> str:
+    unit = next(filter(None, match.groups()[1:]), "").strip() if match else ""
+    return unit[1:-1].strip() if unit[:1] == "(" and unit[-1:] == ")" else unit  # value / (1/mm^2)
 
 
 def _missing(header: _Header) -> Iterator[str]:
@@ -175,13 +212,25 @@ def _numbers(path: Path, header: _Header, rows: list[_Row]) -> dict[str, Floats]
 
 
 def _number(path: Path, line: int, name: str, cell: str) -> float:
+    if _is_number(cell):
+        return float(cell)
+    place, expected = f"{path}:{line}: column {name}", "a finite number"
+    if DECIMAL_COMMA.fullmatch(cell):
+        raise InputError(f"{place}: expected a decimal point, as in 0.5 for 0,5, got the decimal comma {_shown(cell)}")
+    with contextlib.suppress(ValueError):
+        if math.isfinite(float(cell)) and "_" not in cell:
+            expected = f"a number between {SMALLEST:g} and {LARGEST:g} in size, or 0"
+    if not cell and REPLICATE.fullmatch(name):
+        expected += ", since every row has all replicates"
+    raise InputError(f"{place}: expected {expected}, got {_shown(cell)}")
+
+
+def _is_number(cell: str) -> bool:
     try:
-        number = float(cell)
+        size = abs(float(cell))
     except ValueError:
-        number = math.nan
-    if not math.isfinite(number) or "_" in cell:
-        raise InputError(f"{path}:{line}: column {name}: expected a finite number, got {_shown(cell)}")
-    return number
+        return False
+    return (size == 0 or SMALLEST <= size <= LARGEST) and "_" not in cell
 
 
 def _radii(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Floats]) -> tuple[Floats, Floats]:
@@ -200,7 +249,8 @@ def _radii(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Flo
             expected = (
                 f"at least the r_out {outer[i - 1]:g} before" if header.rings else f"r to rise above {outer[i - 1]:g}"
             )
-            raise InputError(f"{place}: expected {expected}, got {inner[i]:g}")
+            again = ": replicates stand in one row, as value1, value2, value3" if inner[i] == inner[i - 1] else ""
+            raise InputError(f"{place}: expected {expected}, got {inner[i]:g}{again}")
     return inner, outer
 
 
@@ -208,19 +258,26 @@ def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Fl
     """Values with their standard errors, and in words what the errors are."""
     if header.replicates:
         samples = np.stack([numbers[name] for name in header.replicates], axis=1)
+        _require_light(path, samples.mean(axis=1))
         found = steadied(samples)
         errors = f"standard errors of the means of {samples.shape[1]} replicates, steadied by their trend"
         named = header.replicates[0]
     else:
+        _require_light(path, numbers["value"])
         found = Steadied(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
         named, errors = "sigma", "as given"
     for row, one in zip(rows, found.sigma, strict=True):
+        if not 0 < one < np.inf and header.replicates:
+            expected = f"replicates that differ, here or in {FEWEST} other rows, to know their standard error"
+            raise InputError(f"{path}:{row.line}: column {named}: expected {expected}, got the same value in all")
         if not one > 0:
-            expected = "replicates that differ" if header.replicates else "a standard error > 0"
-            raise InputError(f"{path}:{row.line}: column {named}: expected {expected}, got {one:g}")
-    if not np.any(found.value > 0):
-        raise InputError(f"{path}: expected some light, got no value above 0")
+            raise InputError(f"{path}:{row.line}: column {named}: expected a standard error > 0, got {one:g}")
     return found, errors
+
+
+def _require_light(path: Path, value: Floats) -> None:
+    if not np.any(value > 0):
+        raise InputError(f"{path}: expected some light, got no value above 0")
 
 
 def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
@@ -229,9 +286,9 @@ def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
     for one in found:
         if one not in UNITS:
             raise InputError(
-                f"{path}:{header.line}: column {names[0]}: expected a unit of {', '.join(UNITS)}, got {one!r}"
+                f"{path}:{header.line}: column {names[0]}: expected a unit of {', '.join(UNITS)}, got {_shown(one)}"
             )
-    if len(found | ({unit} if unit else set())) > 1:
+    if len({UNITS.get(one) for one in found | ({unit} if unit else set())}) > 1:
         told = ", ".join(sorted(found | ({unit} if unit else set())))
         raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in --unit, got {told}")
     return found.pop() if found else checked_unit("--unit", unit) if unit else ""
@@ -241,9 +298,15 @@ def _require_one_measure(path: Path, header: _Header) -> None:
     """InputError where an error, or another replicate, has a unit that is not the first value's."""
     first, *others = header.replicates or ("value", "sigma")
     for name in others:
-        if header.unit(name) not in ("", header.unit(first)):
+        if not _alike(header.unit(name) or header.unit(first), header.unit(first)):
             expected = f"the unit of {first}, [{header.unit(first)}], or none"
             raise InputError(f"{path}:{header.line}: column {name}: expected {expected}, got [{header.unit(name)}]")
+
+
+def _alike(one: str, other: str) -> bool:
+    """Whether two texts are one measure, however spelled."""
+    areas = area_unit(one), area_unit(other)
+    return one == other or (None not in areas and UNITS[str(areas[0])] == UNITS[str(areas[1])])
 
 
 def _value_factor(path: Path, header: _Header, length: str) -> float:

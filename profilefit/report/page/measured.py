@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.text_file import read_json
+from mcml_sim.text_file import MOST_JSON, parse_json
 from mcml_sim.whole_file import read_whole
 from profilefit import evidence
 from profilefit.errors import InputError
@@ -43,12 +43,12 @@ class Measured:
         """What `name`.json says; None if it is not there. InputError on a file that is none of ours."""
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
-        try:
-            content = read_json(path) if path.exists() else None
-        except InputError as error:
-            raise InputError(f"{expected}, got: {str(error).removeprefix(f'{path}: ')}") from None
-        if content is None:
+        if not path.exists():
             return None
+        try:
+            content = parse_json(read_whole(path, MOST_JSON))
+        except ValueError as error:
+            raise InputError(f"{expected}, got: {error}") from None
         if not isinstance(content, dict) or not isinstance(content.get("made"), dict):
             raise InputError(f"{expected}, got no key 'made'")
         return content

@@ -1,6 +1,8 @@
 """Simulated profiles: what is left out, what is merged, which errors they get."""
 
 import dataclasses
+import json
+import re
 from pathlib import Path
 
 import numpy as np
@@ -70,6 +72,33 @@ def test_files_with_too_little_light(tmp_path):
     (tmp_path / "bad.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"bad.npz: expected results of mcml_sim, got: not a whole .npz file"):
         read(tmp_path / "bad.npz")
+
+
+def test_light_that_no_run_gives_is_one_line(tmp_path):
+    text = (DATA / "half_space.mco").read_text()
+    (tmp_path / "mirror.mco").write_text(re.sub(r"0\s*\t#Specular", "1 \t#Specular", text))
+    with pytest.raises(InputError, match=r"mirror.mco: expected a specular reflectance below 1, got 1$"):
+        read(tmp_path / "mirror.mco")
+    with np.load(DATA / "half_space.npz") as whole:
+        arrays = dict(whole)
+
+    def changed(name, times):
+        np.savez(tmp_path / "bad.npz", **{**arrays, name: arrays[name] * times})
+        return tmp_path / "bad.npz"
+
+    for name, times, message in (
+        ("reflectance_r", 1e300, "expected rings of no less than 0 and, in all, no more than 1 of the light"),
+        ("reflectance_r", -1, "expected rings of no less than 0"),
+        ("reflectance_r_standard_error", 1e300, "expected standard errors of no more than all of the light"),
+        ("reflectance_r_standard_error", 0, r"expected a standard error > 0 of the light from r = [\d.]+ to [\d.]+$"),
+    ):
+        with pytest.raises(InputError, match=f"bad.npz: {message}"):
+            read(changed(name, times))
+    header = json.loads(str(arrays["header"])) | {"photons": 1}
+    np.savez(tmp_path / "bad.npz", **{**arrays, "header": np.array(json.dumps(header))})
+    with pytest.raises(InputError, match=r"bad.npz: expected two photons or more, .*, got 1"):
+        read(tmp_path / "bad.npz")
+    assert read(changed("reflectance_r", 1)).photons > 2
 
 
 def test_rows_can_be_chosen_and_added():

@@ -1,9 +1,12 @@
 """Tables of measured light: every form that is read, and every fault by file, row and column."""
 
+import time
+
 import numpy as np
 import pytest
 
 from profilefit.errors import InputError
+from profilefit.measured.lengths import UNITS
 from profilefit.measured.table_file import read_table
 
 GOOD = "r,value,sigma\n1,0.5,0.01\n2,0.2,0.01\n3,0.1,0.01\n"
@@ -73,7 +76,111 @@ def test_replicates(table):
     assert found.errors.startswith("standard errors of the means of 3 replicates")
 
 
+SAME = [
+    "rho (mm);value [1/mm²];sigma\n1;0.5;0.01\n2;0.2;0.01\n3;0.1;0.01\n",
+    "ρ/mm\tvalue / mm^-2\tσ\n1\t0.5\t0.01\n2\t0.2\t0.01\n3\t0.1\t0.01\n",
+    "Radius [mm]  Reflectance [1 / mm ^2]   error\n  1  0.5  0.01\n 2\t0.2 0.01\n3 0.1 0.01  \n",
+    "distance (mm) R_d (mm⁻²) standard_error\n1 0.5 0.01\n2 0.2 0.01\n3 0.1 0.01\n",
+    "\ufeffr [cm];value [1/cm2];standard error;;\r\n0.1;50;1;;\r\n0.2;20;1;;\r\n0.3;10;1;;\r\n",
+    "r [nm],value (1/(µm**2)),sigma\n1e6,.5e-6,.01e-6\n2e6,.2e-6,.01e-6\n3e6,.1e-6,.01e-6\n",
+    "r (inch),value [1/mm^2],sigma [1/mm²]\n%r,.5,.01\n%r,.2,.01\n%r,.1,.01\n" % (1 / 25.4, 2 / 25.4, 3 / 25.4),  # noqa: UP031
+    "r [m],value [1/μm^2],sigma\n1e-3,.5e-6,1e-8\n2e-3,.2e-6,1e-8\n3e-3,.1e-6,1e-8\n",
+]
+
+
+@pytest.mark.parametrize("text", SAME, ids=[text.splitlines()[0] for text in SAME])
+def test_headers_as_people_write_them(table, text):
+    """All of them the same profile, in units that are converted."""
+    found = table(text)
+    scale = UNITS[found.unit]
+    np.testing.assert_allclose(found.r * scale, [1, 2, 3])
+    np.testing.assert_allclose(found.value / scale**2, [0.5, 0.2, 0.1])
+    np.testing.assert_allclose(found.sigma / scale**2, 0.01)
+
+
+def test_rings_may_spell_one_unit_in_two_ways(table):
+    found = table("r_in [µm],r_out (um),value,sigma\n0,1,.5,.01\n1,2,.2,.01\n4,5,.1,.01\n")
+    assert UNITS[found.unit] == UNITS["um"]
+
+
+def test_replicates_that_agree_by_accident(table):
+    """Coarse numbers far out: their errors are those of the trend. And rows that all have one mean have no trend."""
+    rows = "1,.4,.5,.6\n2,.2,.3,.25\n3,.1,.12,.11\n4,.05,.05,.05\n"
+    assert 0 < table("r,value1,value2,value3\n" + rows).sigma[3] < 0.01
+    flat = "".join(f"{r},.4,.5,.6\n" for r in range(1, 9))
+    assert np.all(table("r,value1,value2,value3\n" + flat).sigma > 0)
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "r," + ",".join(f"value{i}" for i in range(60_000)) + "\n",
+        "r," + "," * 4_000_000,
+        " ".join("r" for _ in range(2_000_000)),
+        "r [ " * 1_000_000,
+        "r( " * 1_000_000,
+        "r," + " " * 4_000_000 + "value",
+        "r," + "a " * 60_000 + "b,value,sigma",
+        "\n" * 4_000_000,
+        GOOD + "4" + ",5" * 2_000_000,
+        GOOD + "4,0.1,0.1\n" * 300_000,
+        "r,value,sigma\n" + "".join(f"{i},1,1\n" for i in range(1, 19_000)),
+        "r," + ",".join(f"value{i}" for i in range(1, 1000)) + "\n" + ("1" + ",1" * 999 + "\n") * 2000,
+    ],
+    ids=[
+        "columns",
+        "empty",
+        "words",
+        "square",
+        "round",
+        "blank",
+        "long",
+        "lines",
+        "cells",
+        "rows",
+        "long profile",
+        "many replicates",
+    ],
+)
+def test_no_file_takes_long(table, text):
+    """All of them as long as a file may be, or nearly so; the slowest reads half a million numbers."""
+    started = time.process_time()
+    try:
+        table(text)
+    except InputError as error:
+        said = str(error)
+        assert (len(said) < 500, "\n" in said) == (True, False)
+    assert time.process_time() - started < 5
+
+
+def test_the_most_columns_are_read(table):
+    replicates = ",".join(f"value{i}" for i in range(1, 1000))
+    rows = "".join(f"{r}," + ",".join(str(1 / r + i % 7 / 100) for i in range(999)) + "\n" for r in (1, 2, 3, 4))
+    assert table(f"r,{replicates}\n{rows}").errors.startswith("standard errors of the means of 999 replicates")
+
+
 BAD = {
+    f"r,{','.join(f'value{i}' for i in range(1, 1001))}\n": r":1: expected at most 1000 columns, got 1001$",
+    "r;value;sigma\n" + "0,5;0,12;0,01\n" * 3: r":2: column r: expected a decimal point, as in .* comma '0,5'",
+    "r\tvalue\tsigma\n" + "1\t0,12\t0,01\n" * 3: r":2: column value: expected a decimal point, .* comma '0,12'",
+    "r value sigma\n" + "1 .1 0,01\n" * 3: r":2: column sigma: expected a decimal point, .* comma '0,01'",
+    "r,value,sigma\n" + '1,"1,5e-3",1\n' * 3: r":2: column value: expected a decimal point, .* comma '1,5e-3'",
+    "r,value,sigma\n0,5,0,12,0,01\n": r":2: expected 3 .*, got 6: if its numbers have decimal commas, write 0.5",
+    "r,value,sigma\n1,2,3,x\n": r":2: expected 3 cells .*, got 4$",
+    "r value sigma\n1 2\n": r":2: expected 3 cells between spaces, as the header has, got 2",
+    "r,value1,value2,value3\n" + "1,2,,3\n" * 3: r":2: column value2: expected a finite number, since every row has",
+    "r,value1,value2,value3\n1,1,2,3\n1,2,3,4\n2,1,1,2\n": r":3: column r: .*: replicates stand in one row, as value1,",
+    "r,value1,value2,value3\n1,-1,0,1\n2,-1,0,1\n3,-1,0,1\n4,-1,0,1\n": r": expected some light",
+    "r,rho,value,sigma\n": r":1: expected each column once, got 'r' 2 times",
+    "r [1/mm^2],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of nm, .*, got '1/mm\^2'",
+    "r [mm],value [1/mm],sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column value: expected light per area .*, got \[1/mm\]",
+    f"r,{'v' * 1000},sigma\n": r":1: .*, got the column 'v{37}\.\.\.'$",
+    GOOD.replace("0.2", "1e400"): r":3: column value: expected a finite number, got '1e400'",
+    GOOD.replace(
+        "0.2", "1e300"
+    ): r":3: column value: expected a number between 1e-100 and 1e\+100 in size, or 0, got '1e300'",
+    GOOD.replace("0.2", "9" * 400): r":3: column value: expected a finite number, got '9+\.\.\.'$",
+    "#" + "x" * 2**22: r": expected a profile of at most 4194304 bytes, got a longer file",
     "": r": expected a header and rows .*, got an empty file",
     "# only words\n": r": expected a header and rows .*, got an empty file",
     "r,value\n1,2\n": r":1: expected a header of r .*, got no column sigma",
@@ -103,8 +210,8 @@ BAD = {
     GOOD.replace("0.5", "-1").replace("0.2", "-1").replace("0.1", "0"): r": expected some light, got no value above 0",
     "r_in,r_out,value,sigma\n1,1,2,.1\n2,3,1,.1\n3,4,1,.1\n": r":2: column r_out: expected more than r_in 1, got 1",
     "r_in,r_out,value,sigma\n0,2,2,.1\n1,3,1,.1\n3,4,1,.1\n": r":3: column r_in: expected at least the r_out 2 before",
-    "r,value1,value2,value3\n1,2,2,2\n2,1,1,1\n3,1,1,1\n": r":2: column value1: expected replicates that differ, got 0",
-    "r [furlong],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of um, .*, got 'furlong'",
+    "r,value1,value2,value3\n1,2,2,2\n2,1,1,1\n3,1,1,1\n": r":2: column value1: expected replicates that differ, here",
+    "r [furlong],value,sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit of nm, .*, got 'furlong'",
     "r,value [1/mm^2],sigma\n1,1,1\n2,1,1\n3,1,1\n": r":1: column r: expected a unit, as value has one",
     'r,value,sigma\n1,"2,3\n2,1,1\n3,1,1\n': r":2: expected cells between commas, got: unexpected end of data",
     b"\x89PNG\r\n\x1a\n\x00\x00": r":1: expected text in UTF-8, got the byte 0x89",
@@ -112,7 +219,7 @@ BAD = {
 }
 
 
-@pytest.mark.parametrize(("text", "message"), BAD.items(), ids=range(len(BAD)))
+@pytest.mark.parametrize(("text", "message"), BAD.items(), ids=[f"{i}" for i in range(len(BAD))])
 def test_faults_are_one_line_with_file_row_and_column(table, tmp_path, text, message):
     with pytest.raises(InputError, match=message) as error:
         table(text)
