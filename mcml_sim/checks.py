@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TypeGuard
 
 import numpy as np
+from numpy.typing import NDArray
 
-from mcml_sim.errors import InputError
+from mcml_sim.errors import ForkError, InputError
 
 MAX_PHOTONS = 10**13  # weeks on the largest machines; more is a slip of the pen
 MAX_WORKERS = 4096
@@ -35,6 +36,49 @@ def is_number(value: object) -> TypeGuard[float]:
     if isinstance(value, int):
         return not isinstance(value, bool) and abs(value) <= sys.float_info.max
     return isinstance(value, (float, np.integer, np.floating)) and not math.isnan(value)
+
+
+def checked_numbers(name: str, value: object, accepted: str) -> NDArray[np.float64]:
+    """Real numbers as float64, of any shape; `accepted` says what they are.
+
+    InputError on text, complex numbers, other objects, ragged lists and what is masked: none is silently made a number.
+    """
+    if np.ma.is_masked(value):
+        raise InputError(f"{name} must be {accepted}, got an array with masked values: fill them or leave them out")
+    try:
+        numbers = np.asarray(value)
+        if numbers.dtype.kind in "biuf" or numbers.size == 0:
+            return np.asarray(numbers, np.float64)
+    except (TypeError, ValueError):
+        pass
+    raise InputError(f"{name} must be {accepted}, got {shown(value)}")
+
+
+def require_one_shape(**arrays: object) -> None:
+    """InputError unless the arguments broadcast to one shape."""
+    try:
+        np.broadcast_shapes(*(np.shape(one) for one in arrays.values()))  # type: ignore[arg-type]
+    except ValueError:
+        got = ", ".join(f"{name} {np.shape(one)}" for name, one in arrays.items())  # type: ignore[arg-type]
+        raise InputError(f"the shapes of the arguments must broadcast to one, got {got}") from None
+
+
+_worked_in: int | None = None  # the process whose JAX has worked
+
+
+def require_own_process() -> None:
+    """ForkError in a fork of a process that had called this: the threads of JAX that it would wait for are not there.
+
+    A process that was forked before may go on, as may one that was spawned.
+    """
+    global _worked_in
+    if _worked_in is None:
+        _worked_in = os.getpid()
+    elif _worked_in != os.getpid():
+        raise ForkError(
+            "this process was forked after JAX had worked in its parent, and would wait for threads that were not "
+            "forked: start it by multiprocessing.get_context('spawn')"
+        )
 
 
 def checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:

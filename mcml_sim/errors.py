@@ -27,3 +27,7 @@ class ClusterError(RuntimeError):
 
 class OutputError(RuntimeError):
     """A file of results that cannot be written."""
+
+
+class ForkError(RuntimeError):
+    """Work in a process that was forked from one where JAX had worked: it would wait for ever."""

@@ -13,7 +13,8 @@ Every function takes lengths in any one unit with `mfp` in that unit, and broadc
 Numbers, lists and numpy arrays give float64 numpy arrays, a float for scalars; what is out of range is an InputError.
 An albedo's transform is kept, so that further radii cost little. Where an argument is a jax array, concrete or traced,
 so is the answer, which can be jitted, vmapped and differentiated in every argument but `setting`, forwards and
-backwards; double precision must be on then (`jax.enable_x64(True)`), and what is out of range gives nan.
+backwards; double precision must be on then (`jax.enable_x64(True)`), and what is out of range gives nan. Derivatives by
+alpha are infinite at alpha = 1, where everything is smooth in sqrt(1 - alpha) only: A is 1 - c sqrt(1 - alpha) there.
 
 Relative error of `profile`, for alpha in [0.05, 1]: below 1e-10 for r in [1e-3, 35] mfp, below 2e-7 up to 100 mfp,
 where the profile of alpha = 0.05 has fallen to 1e-51. Closer than 1e-6 mfp to the source the profile is taken for its
@@ -33,6 +34,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import dispersion, hankel
 from mcml_sim.by_albedo import by_alpha, elementwise
+from mcml_sim.checks import checked_numbers, require_one_shape, require_own_process
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.half_space_transform import STANDARD, Transform, reflectance_over_alpha
 from mcml_sim.setting import ILLUMINATIONS, Setting
@@ -56,26 +58,27 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
     """Total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
 
     R^(0), which equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu) mu dmu
-    under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12.
+    under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12. Its
+    derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
     """
     _require_solved(setting)
-    albedo = _checked("alpha", alpha)
+    (albedo,) = _all_checked(alpha=alpha)
     return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo))
 
 
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A. 2 pi r R_d tends to alpha/2 at r = 0."""
     _require_solved(setting)
-    length = _checked("mfp", mfp)
-    values = by_alpha(hankel.profile, _checked("r", r) / length, _checked("alpha", alpha), setting.illumination)
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    values = by_alpha(hankel.profile, radius / length, albedo, setting.illumination)
     return _scalar_or_array(values / length**2)
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
     _require_solved(setting)
-    x = _checked("r", r) / _checked("mfp", mfp)
-    return _scalar_or_array(by_alpha(_cdf, x, _checked("alpha", alpha), setting.illumination))
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting.illumination))
 
 
 def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -84,15 +87,15 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
     The derivative at xi = 1, infinite, is given as 0.
     """
     _require_solved(setting)
-    share, albedo = _checked("xi", xi), _checked("alpha", alpha)
+    share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
     traced = isinstance(share, jax.Array) or isinstance(albedo, jax.Array)
     values = (_radius_within if traced else partial(by_alpha, _radius))(share, albedo, setting.illumination)
-    return _scalar_or_array(values * _checked("mfp", mfp))
+    return _scalar_or_array(values * length)
 
 
 def decay_rate(alpha: Numbers) -> float | Floats:
     """kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls off as e^{-kappa r / mfp} r^-2 [-]."""
-    return _scalar_or_array(elementwise(dispersion.decay_rate, _checked("alpha", alpha)))
+    return _scalar_or_array(elementwise(dispersion.decay_rate, *_all_checked(alpha=alpha)))
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -103,7 +106,8 @@ def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Sett
     equation of transfer, and the limit closer to the source than 1e-6 mfp. 0 where the profile is 0 or infinite.
     """
     _require_solved(setting)
-    x, albedo = _checked("r", r) / _checked("mfp", mfp), _checked("alpha", alpha)
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    x = radius / length
     coarse, fine = (by_alpha(hankel.profile, x, albedo, setting.illumination, rule) for rule in (STANDARD, FINER))
     xp = jnp if isinstance(fine, jax.Array) else np
     same = coarse == fine
@@ -146,16 +150,21 @@ def _require_solved(setting: Setting) -> None:
         raise SettingError(f"the exact half space has n = 1 and g = 0, got {setting}: simulate it instead")
 
 
+def _all_checked(**given: Any) -> list[Any]:
+    """Each as `_checked`; InputError if their shapes do not broadcast."""
+    require_own_process()
+    values = {name: _checked(name, value) for name, value in given.items()}
+    require_one_shape(**values)
+    return list(values.values())
+
+
 def _checked(name: str, value: Any) -> Any:
     """A float64 array: of numpy, with InputError for what is out of range, or as it was of jax, with nan for it."""
     what, low, high = ARGUMENTS[name]
     if isinstance(value, jax.Array):
         _require_double(name, value)
         return jnp.where((value >= low) & (value <= high), value, jnp.nan)
-    try:
-        numbers = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be {what}, got {value!r}") from None
+    numbers = checked_numbers(name, value, what)
     outside = ~((numbers >= low) & (numbers <= high))
     if np.any(outside):
         raise InputError(f"{name} must be {what}, got {float(numbers[outside].flat[0])}")

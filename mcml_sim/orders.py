@@ -10,7 +10,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import order_bins, single, tally, tracer
-from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers
+from mcml_sim.checks import (
+    MAX_PHOTONS,
+    checked_folder,
+    checked_numbers,
+    checked_whole,
+    checked_workers,
+    require_own_process,
+)
 from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid, require_resolved
 from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, roulette_weight
@@ -218,6 +225,7 @@ def trace_share(
 
 def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
     """How many photons, and the seed."""
+    require_own_process()
     if not isinstance(setting, Setting):
         raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
     require_resolved(grid)
@@ -249,10 +257,7 @@ def _shape(grid: Grid) -> tuple[int, int]:
 
 
 def _checked_alpha(alpha: ArrayLike) -> Floats:
-    try:
-        albedos = np.asarray(alpha, dtype=np.float64)
-    except (TypeError, ValueError):
-        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {alpha!r}") from None
+    albedos = checked_numbers("alpha", alpha, "a single-scattering albedo in [0, 1]")
     outside = ~((albedos >= 0) & (albedos <= 1))
     if np.any(outside):
         raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {albedos[outside].flat[0]:g}")

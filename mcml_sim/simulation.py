@@ -7,7 +7,7 @@ from pathlib import Path
 from types import ModuleType
 
 from mcml_sim import deposits, layered, matched, pool
-from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers
+from mcml_sim.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.deposits import Deposits
 from mcml_sim.errors import InputError
 from mcml_sim.grid import Grid, require_resolved
@@ -51,6 +51,7 @@ def simulate(
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
     require_resolved(grid)
+    require_own_process()
     number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     key = checked_whole("seed", seed, lowest=0)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)

@@ -22,6 +22,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.estimate import Fit, Problem, curvature
 from profilefit.walking import Moves, walk
@@ -91,6 +92,7 @@ def posterior(
     moves  emcee's, with their weights; by default those of `walking.default_moves`
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
+    require_own_process()
     if kind not in ("statistical", "discrepancy"):
         raise InputError(f"kind must be 'statistical' or 'discrepancy', got {kind!r}")
     if not fit.solution.converged:

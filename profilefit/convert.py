@@ -36,6 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
+from mcml_sim.checks import checked_numbers
 from profilefit.errors import InputError
 from profilefit.laws import published
 
@@ -273,10 +274,7 @@ class Optical:
 
 def _checked(name: str, values: ArrayLike, low: float, high: float) -> Floats:
     accepted = f"in [{low:g}, {high:g}]" if high < LARGEST else f">= {low:g} and finite"
-    try:
-        numbers = np.asarray(values, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be numbers {accepted}, got {values!r}") from None
+    numbers = checked_numbers(name, values, f"numbers {accepted}")
     outside = ~((numbers >= low) & (numbers <= high))
     if np.any(outside):
         raise InputError(f"{name} must be {accepted}, got {numbers[outside].flat[0]:g}")

@@ -21,6 +21,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.checks import require_own_process
 from mcml_sim.errors import InputError, SettingError
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.liang import QUANTILES
@@ -110,9 +111,12 @@ def fit(
     used       (m, n) rings that count, counted (m,) albedos that do, as far as they rest on enough photons
     limits     the weights of the energy limit, the source limit and of rising with alpha; xi shares for quantiles
     jackknife  whether to refit for the jackknife, which takes longer than the fit itself
-    A fit that does not converge is returned with the reason in `result`. Raises InputError on an unknown objective or
-    constant, SettingError if the law and the profiles belong to different light or surface.
+    A fit that does not converge is returned with the reason in `result`. Derivatives are by the constants and by the
+    light, never by alpha: that of A is infinite at alpha = 1, which may be among the profiles. A law of one's own whose
+    constant stands with 1 - alpha under a root has no finite derivative there. Raises InputError on an unknown
+    objective or constant, SettingError if the law and the profiles belong to different light or surface.
     """
+    require_own_process()
     target = objective or ("albedo" if isinstance(law, AlbedoLaw) else "energy")
     if target not in OBJECTIVES:
         raise InputError(f"objective must be one of {', '.join(OBJECTIVES)}, got {target!r}")

@@ -1,8 +1,9 @@
 """What a fit makes small: one function an objective, from a law and ring energies to residuals, a row an albedo.
 
 Every objective is a differentiable function of the law **and** of the ring energies, weights included, so that the
-photon noise of the energies propagates to the constants without another formula. The weighting decides the constants
-of a law that is not the truth: it belongs to the objective's name, and each record states it.
+photon noise of the energies propagates to the constants without another formula. The weighting decides the constants of
+a law that is not the truth: it belongs to the objective's name, and each record states it. None is differentiated by
+alpha, whose derivatives are infinite at alpha = 1.
 """
 
 from __future__ import annotations

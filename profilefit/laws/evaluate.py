@@ -11,6 +11,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mcml_sim.checks import checked_numbers, require_own_process
 from mcml_sim.errors import InputError
 
 # What an argument of this name may be, wherever it occurs. A mean free path beyond these, in whatever unit, has no
@@ -44,10 +45,8 @@ def evaluated(method: Callable) -> Callable:
 
 
 def _checked(name: str, value: Any) -> np.ndarray:
-    try:
-        numbers = np.asarray(value, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name} must be a number or an array of numbers, got {value!r}") from None
+    require_own_process()
+    numbers = checked_numbers(name, value, "a number or an array of numbers")
     low, high = span = RANGES.get(name, (-np.inf, np.inf))
     outside = ~((numbers >= low) & (numbers <= high))
     if name in RANGES and np.any(outside):

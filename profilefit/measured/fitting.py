@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from mcml_sim.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import derived, law_error
 from profilefit.measured.data import Measured
@@ -162,6 +163,7 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     source  the record that the law's constants came from, which knows how far it is from the truth
     InputError if there are not more rows than free coordinates, or if the data are beyond `limits`.
     """
+    require_own_process()
     free = len(question.free)
     if data.value.size <= free:
         raise InputError(f"{data.source}: expected more than {free} rows, one more than is free, got {data.value.size}")

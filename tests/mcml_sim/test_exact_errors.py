@@ -1,5 +1,7 @@
 """How wrong the exact half space is, what it says of that, and what it refuses."""
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -109,3 +111,28 @@ def test_other_surfaces_are_refused_by_name(setting):
     ):
         with pytest.raises(SettingError, match=r"n = 1 and g = 0, got .*simulate it instead"):
             call()
+
+
+@pytest.mark.parametrize(
+    "value", [np.ma.masked_less([0.1, 0.5], 0.3), np.array([0.5 + 0j]), "0.5", [None], [[1], [1, 2]]]
+)
+def test_what_is_no_real_number_is_named(value):
+    """Masked, complex, text, other objects, ragged: numpy would make numbers of the first three."""
+    for ask in (exact.reflectance, exact.decay_rate, lambda alpha: exact.profile(1.0, alpha)):
+        with pytest.raises(InputError, match=r"alpha must be a single-scattering albedo in \[0, 1\], got \S"):
+            ask(value)
+    with pytest.raises(InputError, match=r"r must be a radius >= 0, got \S"):
+        exact.profile(value, 0.5)
+    with pytest.raises(InputError, match=r"xi must be a share of the energy in \[0, 1\], got \S"):
+        exact.quantile(value, 0.5)
+
+
+def test_shapes_that_do_not_broadcast_are_named():
+    two, three = np.array([0.1, 0.2]), np.array([0.1, 0.2, 0.3])
+    for ask in (exact.profile, exact.cdf, exact.error_estimate):
+        with pytest.raises(InputError, match=r"broadcast to one, got r \(2,\), alpha \(3,\), mfp \(\)"):
+            ask(two, three)
+    with pytest.raises(InputError, match=r"broadcast to one, got xi \(2,\), alpha \(\), mfp \(3,\)"):
+        exact.quantile(two, 0.5, three)
+    with jax.enable_x64(True), pytest.raises(InputError, match=r"got r \(2,\), alpha \(3,\), mfp \(\)"):
+        exact.profile(jnp.asarray(two), jnp.asarray(three))

@@ -71,6 +71,15 @@ def test_a_method_keeps_its_name_and_words():
         ({"r": [0.5, -1.0], "alpha": 0.5}, "r must be >= 0, got -1"),
         ({"r": 0.5, "alpha": 0.5, "mfp": 0.0}, r"mfp must be > 0, from 1e-100 to 1e\+100, got 0"),
         ({"r": "far", "alpha": 0.5}, "r must be a number or an array of numbers, got 'far'"),
+        ({"r": "0.5", "alpha": 0.5}, "r must be a number or an array of numbers, got '0.5'"),
+        ({"r": np.array([1j]), "alpha": 0.5}, r"r must be a number or an array of numbers, got array\(\[0.\+1.j\]\)"),
+        ({"r": 10**400, "alpha": 0.5}, r"r must be a number or an array of numbers, got 1000000"),
+        ({"r": [[1.0], [1.0, 2.0]], "alpha": 0.5}, r"r must be a number or an array of numbers, got \[\[1.0\], "),
+        (
+            {"r": np.array([0.5, None]), "alpha": 0.5},
+            r"r must be a number .*, got array\(.* dtype=object\)",
+        ),
+        ({"r": np.ma.masked_greater([0.5, 9.0], 1.0), "alpha": 0.5}, "r must be .*, got an array with masked values"),
     ],
 )
 def test_numbers_out_of_range_are_named(burley, words, said):
@@ -80,9 +89,18 @@ def test_numbers_out_of_range_are_named(burley, words, said):
         burley.profile(*words.values())
 
 
+def test_what_is_not_masked_is_an_array_like_any_other(burley):
+    whole = np.ma.masked_greater([0.5, 0.7], 1.0)
+    np.testing.assert_array_equal(burley.profile(whole, 0.5), burley.profile([0.5, 0.7], 0.5))
+
+
 def test_samplers_and_maps_name_theirs(burley, liang_printed):
     with pytest.raises(InputError, match=r"xi must be in \[0, 1\], got 2"):
         burley.sampler.sample(2.0, 0.5)
+    with pytest.raises(
+        InputError, match=r"xi must be .*, got an array with masked values: fill them or leave them out"
+    ):
+        burley.sampler.sample(np.ma.masked_less([0.1, 0.5], 0.3), 0.5)
     with pytest.raises(InputError, match=r"reflectance must be in \[0, 1\], got 1.2"):
         burley.albedo.alpha(1.2)
     with pytest.raises(InputError, match=r"alpha must be in \[0, 1\], got -0.1"):
