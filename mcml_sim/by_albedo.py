@@ -37,7 +37,7 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, illumination: str, rule: Rule =
         for value in np.unique(alpha):
             here = alpha == value
             transform = _transform(float(value), illumination, rule)
-            started.append((here, [_of_block(kernel, transform, value, block) for block in _blocks(x[here])]))
+            started.append((here, [_of_block(kernel, transform, value, block) for block in blocks(x[here])]))
         for here, parts in started:
             out[here] = np.concatenate(parts)[: np.count_nonzero(here)]
     return out
@@ -48,7 +48,7 @@ def elementwise(function: Callable[[jax.Array], jax.Array], alpha: Any) -> Any:
     if isinstance(alpha, jax.Array):
         return _traced_each(function, alpha)
     with jax.enable_x64(True), jax.core.eval_context():
-        parts = [_each(function, block) for block in _blocks(alpha.ravel())]
+        parts = [_each(function, block) for block in blocks(alpha.ravel())]
         return np.concatenate([np.empty(0), *parts])[: alpha.size].reshape(alpha.shape)
 
 
@@ -75,10 +75,10 @@ def _each(function: Callable[[jax.Array], jax.Array], alpha: jax.Array) -> jax.A
     return jax.vmap(function)(alpha)
 
 
-def _blocks(x: Floats) -> list[Floats]:
-    """Pieces of x of one length, the last one filled up with its last number."""
-    full = np.pad(x, (0, -x.size % BLOCK), mode="edge") if x.size else x
-    return list(full.reshape(-1, BLOCK))
+def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
+    """Pieces of x (n,) of one length, the last one filled up with its last number."""
+    full = np.pad(x, (0, -x.size % size), mode="edge") if x.size else x
+    return list(full.reshape(-1, size))
 
 
 @partial(jax.jit, static_argnums=(0, 3, 4))

@@ -109,14 +109,17 @@ def posterior(
 
 
 class _Density(eqx.Module):
-    """Logarithm of a posterior density at many points at once."""
+    """Logarithm of a posterior density at many points at once.
+
+    Every number is an array: one that is a Python float would be compiled in, and every fit would compile anew.
+    """
 
     law: eqx.Module
     rings: eqx.Module
     centre: jax.Array
     adjust: jax.Array
-    variance: float
-    least: float
+    variance: jax.Array
+    least: jax.Array
     bound: jax.Array
     problem: Problem = eqx.field(static=True)
 
@@ -127,10 +130,11 @@ class _Density(eqx.Module):
         else:
             adjust, variance = np.eye(len(fit.free)), fit.variance
         problem = Problem(fit.objective, fit.free)
+        centre = fit.solution.parameters
+        bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            centre, matrix = jnp.asarray(fit.solution.parameters), jnp.asarray(adjust)
-            bound = PRIOR_WIDTH * jnp.maximum(jnp.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
-        return cls(fit.law, fit.rings, centre, matrix, variance, fit.solution.cost, bound, problem)
+            numbers = (fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound)
+            return cls(*jax.tree.map(jnp.asarray, numbers), problem)
 
     @eqx.filter_jit
     def __call__(self, points):

@@ -297,7 +297,7 @@ def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alp
     """A compiled function of every value, BATCH of them at a time."""
     padded = np.pad(values, (0, -values.size % BATCH), mode="edge").reshape(-1, BATCH)
     with jax.enable_x64(True):
-        at = jnp.asarray(alpha)
+        owner, at = jax.tree.map(jnp.asarray, (owner, alpha))  # traced, so that other constants compile nothing
         parts = [np.asarray(function(owner, jnp.asarray(part), at)) for part in padded]
     return np.concatenate(parts)[: values.size]
 

@@ -3,16 +3,27 @@
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable
-from functools import wraps
+from functools import lru_cache, wraps
+from itertools import repeat
 from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 
-from mcml_sim.checks import checked_numbers, require_own_process
+from mcml_sim.by_albedo import blocks
+from mcml_sim.checks import checked_numbers, require_one_shape, require_own_process
 from mcml_sim.errors import InputError
+
+Floats = NDArray[np.float64]
+# Numbers at a time: a length compiles nothing new, and at most three quarters of a block are filling.
+BLOCKS = (64, 256, 1024, 4096, 16384)
+# Compiled methods that are kept, those of other settings and laws go: a program takes a megabyte and thirty memory maps
+# of the 65 thousand that Linux gives a process.
+PROGRAMS = 256
 
 # What an argument of this name may be, wherever it occurs. A mean free path beyond these, in whatever unit, has no
 # square in float64; jax arrays of single precision want it within 1e-12 and 1e12, and nobody can tell them so.
@@ -25,23 +36,49 @@ def evaluated(method: Callable) -> Callable:
     """Let a method of a law take numbers, lists or numpy arrays and answer in float64: a float for scalars.
 
     Arguments that are jax arrays (concrete or traced) keep their type, so that a law can be jitted, vmapped and
-    differentiated in whatever precision its caller chose. Numbers out of range raise InputError.
+    differentiated in whatever precision its caller chose. Numbers out of range, and shapes that do not broadcast, raise
+    InputError. The method is compiled for blocks of a few sizes, whatever the lengths and the law's constants.
     """
-    names = tuple(inspect.signature(method).parameters)[1:]
+    signature = inspect.signature(method)
 
     @wraps(method)
     def call(law, *arguments, **named):
-        values = (*jax.tree.leaves(law), *arguments, *named.values())
-        if any(isinstance(value, jax.Array) for value in values):
+        leaves, form = jax.tree.flatten(law)
+        if any(isinstance(value, jax.Array) for value in (*leaves, *arguments, *named.values())):
             return method(law, *arguments, **named)
-        plain = [_checked(name, value) for name, value in zip(names, arguments, strict=False)]
-        with jax.enable_x64(True):
-            arrays = [jnp.asarray(value) for value in plain]
-            keywords = {name: jnp.asarray(_checked(name, value)) for name, value in named.items()}
-            out = np.asarray(method(law, *arrays, **keywords))
+        given = list(signature.bind(law, *arguments, **named).arguments.items())[1:]
+        checked = {name: _checked(name, value) for name, value in given}
+        out = _in_blocks(_program(method, form, tuple(checked)), [np.asarray(leaf, float) for leaf in leaves], checked)
         return float(out) if out.ndim == 0 else out
 
     return call
+
+
+@lru_cache(maxsize=PROGRAMS)
+def _program(method: Callable, form: Any, names: tuple[str, ...]) -> Callable:
+    """The method of a law of this class and setting, compiled: its constants are arguments like any other."""
+
+    def run(leaves: list[jax.Array], *values: jax.Array) -> jax.Array:
+        out = method(jax.tree.unflatten(form, leaves), **dict(zip(names, values, strict=True)))
+        return jnp.broadcast_to(out, values[0].shape)
+
+    return jax.jit(run)
+
+
+def _in_blocks(program: Callable, leaves: list[Floats], arguments: dict[str, Floats]) -> Floats:
+    """The program on arguments broadcast to one shape: a block at a time, but single numbers as they are."""
+    arrays = list(arguments.values())
+    require_one_shape(**arguments)
+    shape = np.broadcast_shapes(*(one.shape for one in arrays))
+    count = math.prod(shape)
+    size = next((one for one in BLOCKS if count <= one), BLOCKS[-1])
+    pieces = [
+        repeat(one.reshape(())) if one.size == 1 and at else blocks(np.broadcast_to(one, shape).ravel(), size)
+        for at, one in enumerate(arrays)
+    ]
+    with jax.enable_x64(True):
+        parts = [program(leaves, *piece) for piece in zip(*pieces, strict=False)]  # all, before the first is waited for
+    return np.concatenate([np.empty(0), *parts])[:count].reshape(shape)
 
 
 def _checked(name: str, value: Any) -> np.ndarray:

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
+from mcml_sim.by_albedo import blocks
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.diffusion import DiffusionLaw
 
@@ -83,10 +84,7 @@ def total(law: ProfileLaw, alpha) -> jax.Array:
 
 
 def _blocks(inner: Floats, outer: Floats):
-    """Radii in blocks of one size, the last filled with its last radius."""
-    count = -(-inner.size // BLOCK)
-    fill = (0, count * BLOCK - inner.size)
-    return zip(*(np.split(np.pad(one, fill, mode="edge"), count) for one in (inner, outer)), strict=True)
+    return zip(blocks(inner, BLOCK), blocks(outer, BLOCK), strict=True)
 
 
 def _light(law: ProfileLaw, rings: bool, point, inner, outer):

@@ -31,7 +31,8 @@ SHARE = (0.0, 1e-12, 1e-6, 1e-3, 0.008, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.9
 REFLECTANCE = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99, 1.0 - 2.0**-24, 1.0)
 # Of the argument, or of its distance to 1: four points of a step cancel its error up to the fourth power.
 STEP = 1e-4
-WEIGHTS = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
+Weights = tuple[tuple[float, float], ...]
+WEIGHTS: Weights = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 BOUND = 1e-4  # relative; derivatives that are less than a millionth of value over argument count as that
 LEAST = 1e-6
 # Where differences are asked: elsewhere the step, or what is left of the value, is rounding.
@@ -118,9 +119,7 @@ def _derivatives(
     steps = {symbol: STEP * (u if symbol == "r" else np.minimum(u, 1.0 - u)), "α": STEP * np.minimum(a, 1.0 - a)}
     with jax.enable_x64(True):
         own = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float64), law)
-        made = _computed(
-            function, own, jnp.asarray(u), jnp.asarray(a), jnp.asarray(steps[symbol]), jnp.asarray(steps["α"])
-        )
+        made = _computed(function, WEIGHTS, own, *map(jnp.asarray, (u, a, steps[symbol], steps["α"])))
         value, gradients, differences = jax.tree.map(np.asarray, made)
     with np.errstate(all="ignore"):
         over = {symbol: np.abs(value / u), "α": np.abs(value / np.minimum(a, 1.0 - a)), "l": np.abs(value)}
@@ -132,8 +131,11 @@ def _derivatives(
 
 
 @eqx.filter_jit
-def _computed(function: Function, law: Any, u: Array, a: Array, du: Array, da: Array):
-    """Values, derivatives by u, alpha, l and along the constants themselves, and the same by differences."""
+def _computed(function: Function, weights: Weights, law: Any, u: Array, a: Array, du: Array, da: Array):
+    """Values, derivatives by u, alpha, l and along the constants themselves, and the same by differences.
+
+    `weights` are given and not the module's own: a program that is kept must not outlive them.
+    """
     leaves, form = jax.tree.flatten(law)
     one = jnp.ones_like(u)
 
@@ -146,10 +148,10 @@ def _computed(function: Function, law: Any, u: Array, a: Array, du: Array, da: A
     widths = [du, da, STEP * one, STEP * one]
     points = []
     for place, width in enumerate(widths):
-        for k, _ in WEIGHTS:
+        for k, _ in weights:
             points.append([each + (k * width if i == place else nothing) for i, each in enumerate(usual)])
     stacked = [jnp.concatenate(column) for column in zip(usual, *points, strict=True)]  # at once: compiled once
     made = whole(*stacked).reshape(1 + len(points), u.size)
-    values = made[1:].reshape(len(widths), len(WEIGHTS), u.size)
-    sums = jnp.einsum("skn,k->sn", values, jnp.array([weight for _, weight in WEIGHTS]))
+    values = made[1:].reshape(len(widths), len(weights), u.size)
+    sums = jnp.einsum("skn,k->sn", values, jnp.array([weight for _, weight in weights]))
     return made[0], gradients, sums / jnp.where(jnp.stack(widths) > 0, jnp.stack(widths), 1.0)

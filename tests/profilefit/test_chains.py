@@ -1,12 +1,16 @@
 """Chains on a problem whose posterior is known in closed form."""
 
+import mmap
+import sys
 from dataclasses import replace
+from pathlib import Path
 
 import equinox as eqx
 import numpy as np
 import pytest
 
 from mcml_sim import Setting
+from mcml_sim.compiling import Compiling
 from profilefit.chains import _curvature_adjustment, posterior
 from profilefit.errors import InputError
 from profilefit.estimate import Problem, curvature, fit
@@ -31,10 +35,9 @@ class Line(AlbedoLaw):
         return self.u + self.v * alpha
 
 
-@pytest.fixture(scope="module")
-def line_fit():
-    """Twelve noisy points whose photon noise is correlated, and nothing like their misfit."""
-    rng = np.random.default_rng(8)
+def fitted_line(seed, law):
+    """A fit to twelve noisy points whose photon noise is correlated, and nothing like their misfit."""
+    rng = np.random.default_rng(seed)
     alpha = np.linspace(0.1, 0.9, 12)
     energy = (0.2 + 0.6 * alpha + 0.02 * rng.standard_normal(12))[:, None]
     factor = 0.01 * rng.standard_normal((1, 12, 12)) * np.linspace(0.2, 2.0, 12)[:, None]
@@ -51,7 +54,12 @@ def line_fit():
         1000,
         Covariance(factor, energy, 1000, 0.0),
     )
-    return fit(profiles, Line(Setting()), "reflectance")
+    return fit(profiles, law, "reflectance")
+
+
+@pytest.fixture(scope="module")
+def line_fit():
+    return fitted_line(8, Line(Setting()))
 
 
 def whitened(samples, covariance):
@@ -109,6 +117,33 @@ def test_same_seed_same_samples_other_seed_others(line_fit):
     first, again, other = (posterior(line_fit, "statistical", seed, max_steps=1000) for seed in (3, 3, 4))
     np.testing.assert_array_equal(first.samples, again.samples)
     assert np.any(first.samples != other.samples)
+
+
+def test_other_fits_of_a_law_compile_nothing(line_fit):
+    """Other data, constants and covariances of one shape: a program for each fit would fill the memory."""
+    for kind in ("statistical", "discrepancy"):
+        posterior(line_fit, kind, max_steps=100)
+    with Compiling() as again:
+        other = fitted_line(9, Line(Setting(), 0.25, 0.55))
+        for kind in ("statistical", "discrepancy"):
+            posterior(other, kind, seed=5, max_steps=100)
+    assert again.seconds == 0.0
+    assert other.constants != line_fit.constants
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
+    """Each took 5 MB and 156 memory maps, of which Linux gives a process 65530: Python aborted after some hundreds."""
+    used = []
+    for seed, counts in enumerate(tallies.draw(24, 500)):
+        posterior(fit(tallies.profiles(counts), toy, "energy", jackknife=False), seed=seed, max_steps=100)
+        pages = int(Path("/proc/self/statm").read_text().split()[1])
+        used.append((pages * mmap.PAGESIZE, len(Path("/proc/self/maps").read_text().splitlines())))
+    memory, maps = np.subtract(used[-1], used[0])
+    assert memory < 500e6
+    assert maps < 1000
 
 
 def test_a_chain_that_is_too_short_says_so(line_fit):

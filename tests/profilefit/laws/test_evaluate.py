@@ -1,15 +1,21 @@
 """Numbers in, float64 numpy out; jax in, jax out."""
 
+import subprocess
+import sys
+from dataclasses import replace
+
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 import pytest
 
 from mcml_sim import InputError
-from profilefit.laws.evaluate import evaluated
+from mcml_sim.compiling import Compiling
+from profilefit.laws.evaluate import BLOCKS, evaluated
 
 
-class Doubler:
+class Doubler(eqx.Module):
     @evaluated
     def twice(self, x, y=0.0):
         """Twice x, and y."""
@@ -17,13 +23,9 @@ class Doubler:
 
 
 class Halver(Doubler):
-    """A law whose own constant is a jax array: something is being traced or fitted."""
+    """A law with a constant of its own; a jax array where it is being traced or fitted."""
 
-    def __init__(self, constant):
-        self.constant = constant
-
-
-jax.tree_util.register_pytree_node(Halver, lambda h: ((h.constant,), None), lambda _, leaves: Halver(*leaves))
+    constant: float
 
 
 @pytest.mark.parametrize("x", [3, 3.0, np.float32(3.0), np.array(3)])
@@ -56,6 +58,74 @@ def test_jax_anywhere_stays_jax(where):
     }[where]()
     assert isinstance(out, jax.Array)
     assert out.dtype == jnp.float32
+
+
+def jitted(method, *arguments):
+    """The method of a law compiled for its arguments as they are: the twin of what goes by blocks."""
+    with jax.enable_x64(True):
+        return np.asarray(jax.jit(method)(*map(jnp.asarray, arguments)))
+
+
+@pytest.mark.parametrize("size", [0, 1, 63, 64, 65, 1024, 1025, 2 * BLOCKS[-1] + 1])
+def test_every_length_is_that_of_one_call(burley, size):
+    """To rounding: a vector's last numbers may be worked out by other instructions."""
+    r, alpha = np.geomspace(1e-3, 30.0, size), np.linspace(0.1, 1.0, size)
+    for albedos in (alpha, 0.9):
+        found = burley.profile(r, albedos)
+        assert found.shape == (size,)
+        np.testing.assert_allclose(found, jitted(burley.profile, r, albedos), rtol=1e-14)
+
+
+def test_a_grid_keeps_its_shape(burley):
+    r, alpha, mfp = np.geomspace(1e-3, 30.0, 40), np.linspace(0.1, 1.0, 9)[:, None], np.full((2, 1, 1), 1.5)
+    found = burley.profile(r, alpha, mfp)
+    assert found.shape == (2, 9, 40)
+    np.testing.assert_array_equal(found[0], found[1])
+    for row, a in zip(found[0], alpha[:, 0], strict=True):
+        np.testing.assert_allclose(row, burley.profile(r, a, 1.5), rtol=1e-14)
+    assert burley.profile(1.0, [0.5]).shape == (1,)
+
+
+def test_no_length_and_no_constant_compiles_anew(burley):
+    """Once for each size of block; jax's own listener counts."""
+    for size in BLOCKS:
+        burley.profile(np.ones(size), 0.9)
+        burley.sampler.sample(np.full(size, 0.5), 0.9)
+    with Compiling() as again:
+        for size in range(1, 2000, 7):
+            law = replace(burley, s0=1.0 + size)
+            law.profile(np.ones(size), 0.5)
+            law.sampler.sample(np.full(size, 0.5), 1.0 / size)
+    assert again.seconds == 0.0
+
+
+GROWTH = """
+import mmap
+import numpy as np, profilefit
+from pathlib import Path
+
+law = profilefit.load("hazard")
+pages = lambda: int(Path("/proc/self/statm").read_text().split()[1])
+law.profile(1.0, 0.9), law.sampler.sample(0.5, 0.9)
+before = pages()
+for size in range(1, 1001):
+    law.profile(np.full(size, 1.0), 0.9), law.sampler.sample(np.full(size, 0.5), 0.9)
+print((pages() - before) * mmap.PAGESIZE)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
+def test_a_thousand_lengths_take_no_memory():
+    """They took 35 MB each."""
+    done = subprocess.run([sys.executable, "-c", GROWTH], capture_output=True, text=True, check=True)
+    assert int(done.stdout) < 200e6
+
+
+def test_shapes_that_do_not_fit_are_named(burley):
+    said = r"the shapes of the arguments must broadcast to one, got r \(3,\), alpha \(2,\)"
+    with pytest.raises(InputError, match=said):
+        burley.profile([1.0, 2.0, 3.0], [0.5, 0.6])
 
 
 def test_a_method_keeps_its_name_and_words():

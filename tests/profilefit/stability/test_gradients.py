@@ -29,9 +29,14 @@ def test_the_printed_map_has_no_slope_above_its_fold():
     assert any(one.verdict == Verdict.NOT_FINITE and one.cause.key == "no A above the fold" for one in regions)
 
 
-def test_a_wrong_derivative_is_found(monkeypatch):
-    """Negative control: differences of half the step are half as large. A map that nothing has compiled yet."""
-    monkeypatch.setattr(gradients, "WEIGHTS", tuple((0.5 * k, weight) for k, weight in gradients.WEIGHTS))
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "van_de_hulst, published")
-    cells = list(gradients.of_map(one, validity.of_map(one, FITS)))
-    assert any(Verdict.INACCURATE in each.verdicts for each in cells)
+def test_a_wrong_derivative_is_found_and_leaves_nothing_behind(monkeypatch):
+    """Negative control: differences of half the step are half as large. What was compiled with them is not used again:
+    the atlas, looked at later in the same process, had four regions that nothing explained."""
+
+    def found():
+        return {one.quantity for one in of_map("van_de_hulst, published") if Verdict.INACCURATE in one.verdicts}
+
+    with monkeypatch.context() as wrong:
+        wrong.setattr(gradients, "WEIGHTS", tuple((0.5 * k, weight) for k, weight in gradients.WEIGHTS))
+        assert found() == {"∂α(A)/∂A", "∂α(A)/∂constants", "∂A(α)/∂α", "∂A(α)/∂constants"}
+    assert found() == set()
