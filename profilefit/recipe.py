@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
@@ -11,6 +10,7 @@ from typing import Any
 
 from mcml_sim.setting import Setting
 from profilefit.errors import InputError, RecipeError
+from profilefit.schema import LONGEST_TEXT, is_line, is_number
 
 # Each pipeline and the objectives it can make small.
 PIPELINES = {
@@ -262,24 +262,21 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
         if not isinstance(value, dict):
             raise RecipeError(f"{where}: [{key}] must be a table, got {_shown(value)}")
         return _build(tables[annotation], value, f"{where}: [{key}]")
-    if annotation == "float" and _is_number(value):
+    if annotation == "float" and is_number(value):
         return float(value)
-    if annotation == "int" and _is_number(value) and isinstance(value, int):
+    if annotation == "int" and is_number(value) and isinstance(value, int):
         return value
-    if annotation == "str" and isinstance(value, str):
+    if annotation == "str" and is_line(value):
         return value
-    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(map(_is_number, value)):
+    if annotation == "tuple[float, ...]" and isinstance(value, list) and all(map(is_number, value)):
         return tuple(float(v) for v in value)
-    if annotation == "tuple[str, ...]" and isinstance(value, list) and all(isinstance(v, str) for v in value):
+    if annotation == "tuple[str, ...]" and isinstance(value, list) and all(map(is_line, value)):
         return tuple(value)
-    raise RecipeError(f"{where}: {key} must be a {_spoken(annotation)}, got {_shown(value)}")
-
-
-def _is_number(value: Any) -> bool:
-    """Whether it is a number that float64 can hold."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
+    words = _spoken(annotation)
+    texts = [value] if annotation == "str" else value
+    if "str" in annotation and isinstance(texts, list) and all(isinstance(text, str) for text in texts):
+        words += f" of one printable line and {LONGEST_TEXT} characters at most"  # it becomes comments in code
+    raise RecipeError(f"{where}: {key} must be a {words}, got {_shown(value)}")
 
 
 def _shown(value: Any) -> str:

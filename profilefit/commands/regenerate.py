@@ -10,9 +10,9 @@ from mcml_sim.progress import is_watched
 from mcml_sim.screen import notes, print_json
 from profilefit import calibrate, catalogue, recipe, record
 from profilefit.errors import InputError, RecipeError
-from profilefit.record import ERRORS
 from profilefit.report.quality_tables import worst_measures
 from profilefit.run import Run
+from profilefit.schema import ERRORS
 
 PHOTON_STORE = ".photons"
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits

@@ -6,12 +6,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from profilefit.record import ERRORS
+from profilefit.schema import ERRORS, SETS
 
 Content = Mapping[str, Any]
 ADDED = ("statistical", "discretisation", "model", "jackknife")  # errors, of which the larger of the last two counts
 TOTAL = "photons, rings, and the larger of model and jackknife"
-SETS = ("published", "corrected", "regenerated")
 
 
 def converged(content: Content) -> bool:

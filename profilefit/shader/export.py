@@ -15,7 +15,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.inventory import PRINTED_MAP, Named
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
-from profilefit.record import ERRORS
+from profilefit.schema import ERRORS
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")

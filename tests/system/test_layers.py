@@ -88,6 +88,7 @@ ORDER = {
         "coverage",
         "derived",
         "staged",
+        "schema",
         "recipe",
         "targets",
         "record",

@@ -1,0 +1,327 @@
+"""What a record must hold, and of which kinds: everything that laws, exported texts, tables and pages take from it.
+
+A record may come from anywhere. Its texts are shown on terminals and become comments in code, its numbers become
+constants: what passes here is safe for both.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+LONGEST_TEXT = 1000  # characters; ours have 256
+DEEPEST = 12  # tables and lists within one another; ours have 6
+LONGEST_SHOWN = 60  # characters of a value in a message
+
+
+def is_line(value: Any) -> bool:
+    """Whether it is one line of printable text: no line break of any kind, no control character, no hidden one."""
+    return isinstance(value, str) and len(value) <= LONGEST_TEXT and value.isprintable()
+
+
+def is_number(value: Any) -> bool:
+    """Whether it is a number that float64 can hold; true and false are none."""
+    if not isinstance(value, int | float) or isinstance(value, bool):
+        return False
+    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
+
+
+@dataclass(frozen=True)
+class Kind:
+    """What a value may be: `accepts` decides, `words` say it."""
+
+    words: str
+    accepts: Callable[[Any], bool]
+
+
+def _every(accepts: Callable[[Any], bool], least: int = 0) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, list) and len(value) >= least and all(map(accepts, value))
+
+
+def _is_measure(value: Any) -> bool:
+    return value is None or is_number(value)
+
+
+def _is_matrix(value: Any) -> bool:
+    return value is None or _every(lambda row: _every(_is_measure)(row) and len(row) == len(value))(value)
+
+
+TEXT = Kind(f"one line of printable text, of {LONGEST_TEXT} characters at most", is_line)
+TEXTS = Kind("a list of texts", _every(is_line))
+DIGEST = Kind(
+    "64 hexadecimal digits", lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{64}", value))
+)
+NUMBER = Kind("a number", is_number)
+MEASURE = Kind("a number or null", _is_measure)  # null where it is not finite
+COUNT = Kind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool) and 0 <= v < 2**63)
+FLAG = Kind("true or false", lambda value: isinstance(value, bool))
+TABLE = Kind("a table", lambda value: isinstance(value, dict))
+LIST = Kind("a list", lambda value: isinstance(value, list))
+NUMBERS = Kind("a list of numbers", _every(is_number, 1))
+MEASURES = Kind("a list of numbers or nulls", _every(_is_measure))
+PAIR = Kind("a list of two numbers or nulls", lambda value: _every(_is_measure)(value) and len(value) == 2)
+HALVES = Kind("a list of pairs of numbers", _every(lambda row: _every(is_number)(row) and len(row) == 2))
+MATRIX = Kind("a square matrix of numbers, or null", _is_matrix)
+
+# By dotted key, * for each one inside, ? behind what may be absent; a table stands before what is in it.
+Kinds = Mapping[str, Kind]
+# A constant's errors in a record, and what tables and texts call them; older records have no second and third.
+ERRORS = {
+    "statistical_error": "photons",
+    "discretisation_error": "dr",
+    "model_error": "model",
+    "discrepancy_error": "misfit",
+    "jackknife_error": "jackknife",
+}
+# What a law is made of.
+NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "data_digest?": DIGEST}
+CONSTANTS: Kinds = {
+    "constants": TABLE,
+    "constants.*": TABLE,
+    "constants.*.regenerated": NUMBER,
+    **{f"constants.*.{name}?": MEASURE for name in ("published", *ERRORS)},
+}
+# What is shown besides, of whatever pipeline.
+TOLD: Kinds = {
+    "name": TEXT,
+    "title": TEXT,
+    "equations": TEXT,
+    "note?": TEXT,
+    "preset": TEXT,
+    "seed": COUNT,
+    "setting.illumination": TEXT,
+    "setting.n": NUMBER,
+    "setting.g": NUMBER,
+    "truth": TABLE,
+    "truth.kind?": TEXT,
+    "truth.photons?": COUNT,
+    "truth.grid_digest?": DIGEST,
+    "versions?": TABLE,
+    "versions?.*": TEXT,
+}
+# A measure of laws by albedo, and one of maps as a whole.
+BY_ALBEDO = ("rel", "ks", "l1", "mse", "r2", "inversion_error", "rel_noise", "ks_noise")
+OF_MAP = {
+    "delta_A": NUMBER,
+    "delta_alpha": NUMBER,
+    "largest_s": NUMBER,
+    "monotone": FLAG,
+    "at_one": NUMBER,
+    "fold": NUMBER,
+}
+SETS = ("published", "corrected", "regenerated")
+PARTS: Kinds = {
+    "covariance?": TABLE,
+    "covariance?.names": TEXTS,
+    **{f"covariance?.{name}?": MATRIX for name in ("statistical", "discrepancy", "model")},
+    "left_out?": TABLE,
+    "left_out?.rings": COUNT,
+    "left_out?.albedos": COUNT,
+    "derived?": TABLE,
+    "derived?.quantity": Kind("radius or reflectance", lambda value: value in ("radius", "reflectance")),
+    "derived?.alpha": NUMBERS,
+    **{f"derived?.{name}": MEASURES for name in ("value", "statistical", "model")},
+    "discrepancy?": TABLE,
+    **{f"discrepancy?.{name}": MEASURE for name in ("amplitude", "amplitude_error", "length_r", "length_s", "rms")},
+    "discrepancy?.result": TEXT,
+    "crosscheck?": TABLE,
+    "crosscheck?.constants": TABLE,
+    "crosscheck?.constants.*": TABLE,
+    **{f"crosscheck?.constants.*.{name}": MEASURE for name in ("exact", "photons", "statistical_error", "z")},
+    "crosscheck?.chi2": MEASURE,
+    "crosscheck?.rank": COUNT,
+    "crosscheck?.chance": MEASURE,
+    "crosscheck?.photons": COUNT,
+    "crosscheck?.result": TEXT,
+    "starts?": TABLE,
+    "starts?.count": COUNT,
+    "starts?.share_best": NUMBER,
+    "starts?.result": TEXT,
+    "starts?.rule": TEXT,
+    "starts?.others": COUNT,
+    "starts?.outcomes": LIST,
+    "starts?.outcomes.*": TABLE,
+    "starts?.outcomes.*.count": COUNT,
+    "starts?.outcomes.*.cost_ratio": MEASURE,
+    "starts?.outcomes.*.result": TEXT,
+    "starts?.outcomes.*.constants": TABLE,
+}
+FIT: Kinds = {
+    **CONSTANTS,
+    "constants.*.free?": FLAG,
+    "constants.*.intervals?": TABLE,
+    "constants.*.intervals?.*": TABLE,
+    "constants.*.intervals?.*.*": PAIR,
+    "protocol": TABLE,
+    "protocol.albedos": TABLE,
+    "protocol.albedos.low": NUMBER,
+    "protocol.albedos.high": NUMBER,
+    "protocol.albedos.count": COUNT,
+    "protocol.albedos.spacing": TEXT,
+    "protocol.rings?": Kind("a table or null", lambda value: value is None or isinstance(value, dict)),
+    **{f"protocol.rings?.{name}": NUMBER for name in ("dr", "first", "last", "epsilon")},
+    "protocol.rings?.count": COUNT,
+    "protocol.rings?.trim": TEXT,
+    "protocol.held?": TEXTS,
+    "protocol.weighting": TABLE,
+    "protocol.weighting.objective": TEXT,
+    **{f"protocol.weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
+    "fit": TABLE,
+    "fit.result": TEXT,
+    "fit.steps": COUNT,
+    "fit.condition_number": MEASURE,
+    "fit.residuals": TABLE,
+    "fit.residuals.rms": MEASURE,
+    "fit.residuals.largest": MEASURE,
+    "fit.residuals.along_r": NUMBER,
+    "fit.residuals.along_alpha": NUMBER,
+    "fit.residuals.half_waves": NUMBER,
+    "posterior": TABLE,
+    "posterior.*": TABLE,
+    "posterior.*.result": TEXT,
+    "posterior.*.steps": COUNT,
+    "posterior.*.walkers": COUNT,
+    "posterior.*.tau": MEASURE,
+    "posterior.*.acceptance": NUMBER,
+    "quality": TABLE,
+    "quality.regenerated": TABLE,
+    "quality.alpha?": NUMBERS,
+    **{f"quality.{one}?": TABLE for one in SETS},
+    **{f"quality.{one}?.{name}?": NUMBERS for one in SETS for name in BY_ALBEDO},
+    **{f"quality.{one}?.{name}_halves?": HALVES for one in SETS for name in ("mse", "r2")},
+    **{f"quality.{one}?.{name}?": kind for one in SETS for name, kind in OF_MAP.items()},
+    **PARTS,
+}
+PROFILE: Kinds = {**FIT, "quality.alpha": NUMBERS}
+STAGED: Kinds = {
+    **PROFILE,
+    "stages": TABLE,
+    "stages.coefficient_laws": TABLE,
+    "stages.coefficient_laws.*": TABLE,
+    "stages.coefficient_laws.*.constants": TABLE,
+    "stages.coefficient_laws.*.constants.*": NUMBER,
+    "stages.coefficient_laws.*.standard_error?": TABLE,
+    "stages.coefficient_laws.*.standard_error?.*": MEASURE,
+    "stages.coefficient_laws.*.result": TEXT,
+    "stages.coefficient_laws.*.condition_number": MEASURE,
+    "stages.per_albedo_failures?": TABLE,
+    "stages.per_albedo_failures?.*": COUNT,
+    "stages.length_exponents?": TABLE,
+    "stages.length_exponents?.*": NUMBER,
+}
+EVIDENCE: Kinds = {
+    "readings": LIST,
+    "readings.*": TABLE,
+    **{f"readings.*.{name}?": TEXT for name in ("equation", "verdict", "choices", "evidence")},
+    **{f"readings.*.{name}?": MEASURE for name in ("curve_distance", "constant_distance", "curve_maximum")},
+    **{
+        f"readings.*.{name}?{part}": k
+        for name in ("constants", "published")
+        for part, k in (("", TABLE), (".*", NUMBER))
+    },
+    "table1": LIST,
+    "table1.*": TABLE,
+    **{f"table1.*.{name}?": TEXT for name in ("material", "model", "channel", "range_choice")},
+    "table1.*.range_mm?": NUMBER,
+    "table1.*.mse_over_printed?": MEASURES,
+    "halves?": LIST,
+    "halves?.*": TABLE,
+    "halves?.*.material?": TEXT,
+    "halves?.*.model?": TEXT,
+    "halves?.*.off?": MEASURE,
+}
+PIPELINES = {"albedo": FIT, "profile": PROFILE, "inverse": PROFILE, "as-published": STAGED, "evidence": EVIDENCE}
+ABSENT = object()
+
+
+def problem(content: dict[str, Any], whole: bool) -> str | None:
+    """What is wrong with a record, in one line, or None; of a `whole` one with anything that a report shows."""
+    pipeline = content.get("pipeline")
+    kinds = [NAMED if pipeline == "evidence" else {**NAMED, **CONSTANTS}]
+    if whole and pipeline not in PIPELINES and is_line(pipeline):
+        return f"pipeline must be one of {', '.join(PIPELINES)}, got {pipeline!r}"
+    if whole and is_line(pipeline):
+        kinds += [TOLD, PIPELINES[str(pipeline)]]
+    found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
+    return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
+
+
+def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
+    """What no record holds, at whatever key: text of several lines or unprintable, no numbers, nests without end."""
+    if isinstance(value, str):
+        return None if is_line(value) else f"{place or 'it'} must be {TEXT.words}, got {shown(value)}"
+    if isinstance(value, int | float):
+        return None if isinstance(value, bool) or is_number(value) else f"{place} must be {NUMBER.words} of float64"
+    if value is None:
+        return None
+    if depth == DEEPEST:
+        return f"{place} must not nest deeper than {DEEPEST} tables and lists"
+    items = value.items() if isinstance(value, dict) else enumerate(value)
+    for name, item in items:
+        if isinstance(name, str) and not is_line(name):
+            return f"keys in {place or 'it'} must be {TEXT.words}, got {shown(name)}"
+        if text := _unfit(item, f"{place}.{name}".removeprefix("."), depth + 1):
+            return text
+    return None
+
+
+def _mistyped(content: dict[str, Any], kinds: Kinds) -> str | None:
+    """The first key that is absent or of another kind."""
+    for key, kind in kinds.items():
+        for place, value in _each(content, key.split(".")):
+            if not kind.accepts(value):
+                return f"{place} must be {kind.words}, got {'nothing' if value is ABSENT else shown(value)}"
+    return None
+
+
+def _each(value: Any, key: list[str], place: str = "") -> Iterator[tuple[str, Any]]:
+    """Every value that stands at a key, ABSENT where it must and does not; what is above it has been checked."""
+    if not key:
+        yield place[1:], value
+    elif value is None:  # a table that may be null
+        return
+    elif key[0] == "*":
+        for name, item in value.items() if isinstance(value, dict) else enumerate(value):
+            yield from _each(item, key[1:], f"{place}.{name}")
+    elif (name := key[0].rstrip("?")) in value or not key[0].endswith("?"):
+        yield from _each(value.get(name, ABSENT), key[1:], f"{place}.{name}")
+
+
+def _mismatched(content: dict[str, Any]) -> str | None:
+    """Lists that must be as long as others, names that must be of the constants, measures that come together."""
+    names = content.get("covariance", {}).get("names", [])
+    if strange := [name for name in names if name not in content["constants"]]:
+        return f"covariance.names must be of its constants, got {strange[0]!r}"
+    for kind, matrix in content.get("covariance", {}).items():
+        if kind != "names" and matrix is not None and len(matrix) != len(names):
+            return f"covariance.{kind} must have a row for each of {len(names)} names, got {len(matrix)}"
+    derived = content.get("derived", {})
+    for key in ("value", "statistical", "model") if derived else ():
+        if len(derived[key]) != len(derived["alpha"]):
+            return f"derived.{key} must be as long as derived.alpha, {len(derived['alpha'])}, got {len(derived[key])}"
+    quality = content["quality"]
+    found = [one for one in SETS if one in quality]
+    for one in found:
+        for key in (*BY_ALBEDO, "mse_halves", "r2_halves"):
+            length = len(quality.get("alpha", ()))
+            if key in quality[one] and len(quality[one][key]) != length:
+                return f"quality.{one}.{key} must be as long as quality.alpha, {length}, got {len(quality[one][key])}"
+        # What is measured of the regenerated law is measured of the printed ones beside it.
+        kept = [key for key in ("rel", "ks", "inversion_error") if key in quality["regenerated"]]
+        kept += OF_MAP if "delta_A" in quality["regenerated"] else ()
+        if missing := [key for key in kept if key not in quality[one]]:
+            return f"quality.{one}.{missing[0]} must be there, as others of its kind are, got nothing"
+    return None
+
+
+def shown(value: Any) -> str:
+    """A value for a message: printable, and shortened."""
+    try:
+        text = json.dumps(value)
+    except (ValueError, RecursionError, TypeError):  # Python spells no whole number beyond 4300 digits
+        return f"a {type(value).__name__}"
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
