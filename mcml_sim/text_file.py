@@ -21,7 +21,7 @@ from mcml_sim.whole_file import read_whole
 MOST_JSON = 2**21  # bytes; the largest file that ships, where arithmetic fails, has two fifths of it
 MOST_TOML = 2**18  # a thousand layers are a third of it
 MOST_LEVELS = 32  # records nest seven deep
-MOST_DIGITS = 100  # of a whole number in JSON; 19 are what other programs hold
+MOST_DIGITS = 300  # of a whole number in JSON, which floating point can hold
 # The time of tomllib goes with the square of the names in a key: a.a.a.a = 1.
 LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MOST_LEVELS  # noqa: UP031
