@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import operator
 import os
+import sys
 from pathlib import Path
 from typing import TypeGuard
 
@@ -14,12 +15,26 @@ from mcml_sim.errors import InputError
 
 MAX_PHOTONS = 10**13  # weeks on the largest machines; more is a slip of the pen
 MAX_WORKERS = 4096
+LONGEST_SHOWN = 60  # characters of a value in a message
+
+
+def shown(value: object) -> str:
+    """A value for a message: one line, shortened. A whole number can have as many digits as a file."""
+    try:
+        text = repr(value)
+    except ValueError:  # Python spells no whole number beyond 4300 digits
+        return "one of more than 4300 digits"
+    if isinstance(value, int) and len(text) > LONGEST_SHOWN:
+        return f"one of {len(text)} digits"
+    text = " ".join(text.split())  # an array's has lines
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """True of a real number, infinite ones included; neither of nan nor of True."""
-    kinds = (int, float, np.integer, np.floating)
-    return isinstance(value, kinds) and not isinstance(value, bool) and not math.isnan(value)
+    """True of a real number, infinite ones included; neither of nan, nor of True, nor beyond floating point."""
+    if isinstance(value, int):
+        return not isinstance(value, bool) and abs(value) <= sys.float_info.max
+    return isinstance(value, (float, np.integer, np.floating)) and not math.isnan(value)
 
 
 def checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:
@@ -28,21 +43,21 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
     try:
         whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
     except TypeError:
-        raise InputError(f"{name} must be {accepted}, got {number!r}") from None
+        raise InputError(f"{name} must be {accepted}, got {shown(number)}") from None
     if isinstance(number, bool) or whole < lowest or (highest is not None and whole > highest):
-        raise InputError(f"{name} must be {accepted}, got {number!r}")
+        raise InputError(f"{name} must be {accepted}, got {shown(number)}")
     return whole
 
 
 def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
     """A number of threads, or None for one a core; a scheduler has workers of its own."""
     if workers is not None and scheduler is not None:
-        raise InputError(f"workers must be None where a scheduler is given, whose workers they are, got {workers!r}")
+        raise InputError(f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}")
     return None if workers is None else checked_whole("workers", workers, lowest=1, highest=MAX_WORKERS)
 
 
 def checked_folder(store: str | os.PathLike[str] | None) -> Path | None:
     """The folder of a store, or None."""
     if store is not None and not isinstance(store, (str, os.PathLike)):
-        raise InputError(f"store must be the path of a folder, got {store!r}")
+        raise InputError(f"store must be the path of a folder, got {shown(store)}")
     return None if store is None else Path(store)

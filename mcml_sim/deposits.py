@@ -58,12 +58,14 @@ class Deposits:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray], shapes: Mapping[str, tuple[int, ...]]) -> Deposits:
-        """What `arrays` gave; ValueError if something is missing or has another shape than `shapes` (see there)."""
+        """What `arrays` gave; ValueError if something is missing, not finite, or has another shape than `shapes`."""
         for name, shape in shapes.items():
             if name not in arrays:
                 raise ValueError(f"{name} is missing")
             if arrays[name].shape != shape:
                 raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
+            if not np.all(np.isfinite(arrays[name])):
+                raise ValueError(f"{name} is not finite")
         values = {name: np.asarray(arrays[name], np.float64) for name in shapes if name != "started"}
         return cls(started=int(arrays["started"]), **values)
 

@@ -20,6 +20,7 @@ from mcml_sim.terminal import INTERRUPTED, mend_streams
 
 BAD_INPUT = 2
 AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
+LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
 NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
 
 
@@ -31,6 +32,17 @@ def accepted() -> str:
 def unchanged(text: str) -> str:
     """What a library error says, as it says it."""
     return text
+
+
+def one_line(text: str) -> str:
+    """A text as one line that a terminal only prints.
+
+    Names of files and words in them may hold line breaks, escape sequences or marks that turn the direction of
+    writing: everything that is not to be seen is spelled as Python spells it. Of a long text the middle is left out.
+    """
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST - KEPT_END]} ... {text[-KEPT_END:]}"
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
 
 
 @dataclass(frozen=True)
@@ -61,8 +73,8 @@ class Program:
         sys.exit(status)
 
     def say(self, text: object) -> None:
-        """A line on stderr."""
-        Console(stderr=True, highlight=False, soft_wrap=True).print(f"{self.name}: {text}", markup=False)
+        """A line on stderr: one, whatever the text holds."""
+        Console(stderr=True, highlight=False, soft_wrap=True).print(f"{self.name}: {one_line(str(text))}", markup=False)
 
     def _status(self) -> int:
         """Do the subcommand, and say what went wrong."""

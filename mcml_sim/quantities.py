@@ -40,6 +40,14 @@ def quantities(grid: Grid) -> tuple[str, ...]:
     return (*SCALARS, *BY_LAYER, *BY_RADIUS, *z, *a)
 
 
+def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
+    """Shape of every estimate that a grid resolves, in a medium of so many layers."""
+    bins = {"r": grid.rings, "z": grid.depths, "a": grid.angles}
+    found = {name: name.rpartition("_")[2] for name in quantities(grid)}
+    axes = {name: tuple(bins[axis] for axis in end) for name, end in found.items() if set(end) <= set(bins)}
+    return {name: axes.get(name, (layers,) if name in BY_LAYER else ()) for name in found}
+
+
 @dataclass(frozen=True)
 class Precision:
     """When to stop: as soon as a quantity's standard error, in every bin, is this share of its value.

@@ -8,30 +8,38 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import reprlib
-import zipfile
-import zlib
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.checks import MAX_PHOTONS, checked_whole, is_number, shown
 from mcml_sim.errors import InputError
-from mcml_sim.grid import Grid
-from mcml_sim.medium import Layer, Medium
-from mcml_sim.quantities import Tally, quantities
+from mcml_sim.grid import Grid, require_resolved
+from mcml_sim.medium import MAX_LAYERS, Layer, Medium
+from mcml_sim.npz import read_npz
+from mcml_sim.quantities import Tally, shapes
 from mcml_sim.tally import Estimate
+from mcml_sim.text_file import parse_json
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import checked_path, write_whole
 
 FORMAT = 1
 ENDS = ("", "_standard_error", "_effective_samples")  # the fields of an Estimate
-# What numpy and zip raise at a file that is not what was written.
-DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, zipfile.BadZipFile, zlib.error)
+EDGES = ("r_edges", "z_edges", "a_edges")
+HEADER = frozenset({"format", "mcml_sim", "photons", "seed", "cut", "medium"})
+MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) for kind in (Medium, Layer))
+MAX_BYTES = 2**28  # of a file; the finest tables have 2^27.2 unpacked
+MOST_FIRST = 2**22  # bytes of edges and header: 65537 numbers an axis, and a thousand layers
+MOST_BEFORE = 512  # bytes of an array's own header
+WORD = 8  # bytes of a number
+LONGEST_VERSION = 60  # characters
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,36 +89,91 @@ def read_results(path: str | os.PathLike[str]) -> Results:
     """What `write_results` wrote. InputError names the file and says what is wrong with it."""
     try:
         with Path(path).open("rb") as file:
-            if not zipfile.is_zipfile(file):  # numpy would take it for a pickle
-                raise ValueError("not a whole .npz file")
-            with np.load(file, allow_pickle=False) as fields:
-                return _results(dict(fields))
-    except DAMAGED as error:
-        reason = getattr(error, "strerror", None) or str(error) or type(error).__name__
-        raise InputError(f"{path}: expected results of mcml_sim, got: {reason.splitlines()[0]}") from None
+            content = file.read(MAX_BYTES + 1)
+    except (OSError, ValueError, TypeError) as error:
+        reason = getattr(error, "strerror", None) or error
+        raise InputError(f"{path}: expected results of mcml_sim, got: {reason}") from None
+    return parse_results(content, str(path))
 
 
-def _results(fields: Mapping[str, NDArray]) -> Results:
-    header: dict[str, Any] = json.loads(str(fields["header"]))
-    if header["format"] != FORMAT:
-        raise ValueError(f"format {header['format']!r}, not {FORMAT}")
-    layers = tuple(Layer(**layer) for layer in header["medium"].pop("layers"))
-    a_edges = fields.get("a_edges")
-    grid = Grid.from_edges(
-        r=fields["r_edges"], z=fields.get("z_edges"), na=None if a_edges is None else len(a_edges) - 1
-    )
-    estimates = {name: _estimate(fields, name) for name in quantities(grid)}
+def parse_results(content: bytes, name: str) -> Results:
+    """What `read_results` gives for a file of this name and content."""
+    try:
+        if len(content) > MAX_BYTES:
+            raise ValueError(f"more than {MAX_BYTES} bytes")
+        return _results(content)
+    except ValueError as error:
+        raise InputError(f"{name}: expected results of mcml_sim, got: {error}") from None
+
+
+def _results(content: bytes) -> Results:
+    """What was run comes first: it says how large everything else is. ValueError in one line."""
+    first = read_npz(content, MOST_FIRST, {"header": (), **dict.fromkeys(EDGES)}, text=["header"])
+    header = _table("header", parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True), HEADER)
+    if type(header["format"]) is not int or header["format"] != FORMAT:
+        raise ValueError(f"format {shown(header['format'])}, not {FORMAT}")
+    medium, grid = _medium(header["medium"]), _grid(first)
+    photons = checked_whole("photons", header["photons"], lowest=1, highest=MAX_PHOTONS)
+    version, cut = header["mcml_sim"], header["cut"]
+    if not (isinstance(version, str) and version.isprintable() and len(version) <= LONGEST_VERSION):
+        raise ValueError(f"mcml_sim must be a version, got {shown(version)}")
+    if not (is_number(cut) and 0 <= cut <= 1):
+        raise ValueError(f"cut must be a share of the light, got {shown(cut)}")
+    sizes = shapes(grid, len(medium.layers))
+    wanted = {name + end: size for name, size in sizes.items() for end in ENDS}
+    arrays = read_npz(content, sum(MOST_BEFORE + WORD * math.prod(size) for size in wanted.values()), wanted)
     return Results(
-        medium=Medium(layers, **header["medium"]),
+        medium=medium,
         grid=grid,
-        photons=header["photons"],
-        seed=header["seed"],
-        version=header["mcml_sim"],
-        cut=header["cut"],
-        estimates=estimates,
+        photons=photons,
+        seed=checked_whole("seed", header["seed"], lowest=0),
+        version=version,
+        cut=cut,
+        estimates={name: _estimate(arrays, name, photons) for name in sizes},
     )
 
 
-def _estimate(fields: Mapping[str, NDArray], name: str) -> Estimate:
-    parts = [fields[name + end] for end in ENDS]
-    return Estimate(*(part if part.ndim else float(part) for part in parts))
+def _medium(told: object) -> Medium:
+    table = _table("medium", told, MEDIUM)
+    layers = table.pop("layers")
+    if not isinstance(layers, list) or len(layers) > MAX_LAYERS:
+        raise ValueError(f"layers must be a list of at most {MAX_LAYERS}, got {shown(layers)}")
+    each = [_table(f"layer {at}", layer, LAYER) for at, layer in enumerate(layers, start=1)]
+    return Medium(tuple(Layer(**layer) for layer in each), **table)
+
+
+def _grid(arrays: Mapping[str, NDArray]) -> Grid:
+    angles = arrays.get("a_edges")
+    grid = Grid.from_edges(
+        r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=None if angles is None else angles.size - 1
+    )
+    require_resolved(grid)
+    if angles is not None and not (angles.ndim == 1 and np.allclose(angles, grid.a_edges, rtol=1e-12)):
+        raise ValueError("a_edges must be even from 0 to pi/2")
+    return grid
+
+
+def _table(name: str, told: object, keys: frozenset[str]) -> dict[str, Any]:
+    """An object of just these keys."""
+    if not isinstance(told, dict):
+        raise ValueError(f"{name} must be an object, got {shown(told)}")
+    for key in sorted(keys ^ told.keys()):
+        raise ValueError(f"{name} has no key {key!r}" if key in keys else f"{name} has the unknown key {shown(key)}")
+    return dict(told)
+
+
+def _estimate(arrays: Mapping[str, NDArray], name: str, photons: int) -> Estimate:
+    value, error, samples = parts = [_needed(arrays, name + end) for end in ENDS]
+    if not np.all(np.isfinite(value)):
+        raise ValueError(f"{name} must be finite")
+    if not np.all(error >= 0) or (photons > 1 and not np.all(np.isfinite(error))):  # one photon says nothing of it
+        raise ValueError(f"{name}{ENDS[1]} must be finite and >= 0")
+    if not np.all(samples >= 0):
+        raise ValueError(f"{name}{ENDS[2]} must be >= 0")
+    return Estimate(*(np.asarray(part, float) if part.ndim else float(part) for part in parts))
+
+
+def _needed(arrays: Mapping[str, NDArray], name: str) -> NDArray:
+    if name not in arrays:
+        raise ValueError(f"no {name}")
+    return arrays[name]

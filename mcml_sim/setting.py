@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from mcml_sim.checks import is_number
+from mcml_sim.checks import is_number, shown
 from mcml_sim.errors import InputError
 
 ILLUMINATIONS = ("searchlight", "diffuse")
@@ -28,11 +28,11 @@ class Setting:
 
     def __post_init__(self) -> None:
         if self.illumination not in ILLUMINATIONS:
-            raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {self.illumination!r}")
+            raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(self.illumination)}")
         if not (is_number(self.n) and math.isfinite(self.n) and self.n > 0):
-            raise InputError(f"n must be a refractive index > 0, got {self.n!r}")
+            raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
         if not (is_number(self.g) and -1 < self.g < 1):
-            raise InputError(f"g must be a mean cosine in (-1, 1), got {self.g!r}")
+            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
 
     @property
     def is_matched_isotropic(self) -> bool:

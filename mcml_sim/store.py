@@ -25,12 +25,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.errors import ELSEWHERE, RESUMES, StoreError
+from mcml_sim.npz import read_npz
+from mcml_sim.text_file import parse_json
 from mcml_sim.version import __version__
 from mcml_sim.whole_file import replace_whole
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
 STALE_AFTER = 600.0
+# A seal is no secret, so batches are held against bounds as any file is [bytes, packed or not].
+MAX_BATCH = 2**28  # the finest grid's are half of it
+MAX_MANIFEST = 2**23  # 65537 edges an axis are 3 MB
 SEAL_BYTES = 64  # SHA-256 in hexadecimal
 LONGEST_SHOWN = 60  # characters of a value in a message
 SHARED_SHOWN = 12  # of them, those before the first that differs
@@ -77,8 +82,8 @@ class Store(Generic[R]):
         """The batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
         path = self._path(batch)
         try:
-            fields = _unsealed(path.read_bytes())
-            if str(fields.pop("made_by")) != self._digest:
+            fields = _unsealed(_read(path, MAX_BATCH))
+            if str(fields.pop("made_by", "")) != self._digest:
                 raise StoreError(f"{path} was made by another run; delete it to redo just that batch")
             return self._read(fields)
         except FileNotFoundError:
@@ -145,10 +150,19 @@ def batches(folder: Path) -> list[int]:
     return sorted(int(number) for number in numbers if number.isdecimal())
 
 
+def _read(path: Path, most: int) -> bytes:
+    """The bytes of a file; ValueError if they are more than so many."""
+    with path.open("rb") as file:
+        content = file.read(most + 1)
+    if len(content) > most:
+        raise ValueError(f"more than {most} bytes")
+    return content
+
+
 def _holds(path: Path, contents: bytes) -> bool:
     try:
-        return path.read_bytes() == contents
-    except OSError:
+        return _read(path, MAX_MANIFEST) == contents
+    except (OSError, ValueError):
         return False
 
 
@@ -164,8 +178,7 @@ def _unsealed(data: bytes) -> dict[str, NDArray]:
     """The arrays of a sealed file; ValueError if a bit of it has changed."""
     if data[-SEAL_BYTES:] != _seal(data[:-SEAL_BYTES]):
         raise ValueError("its bytes are not those that were written")
-    with np.load(io.BytesIO(data), allow_pickle=False) as fields:
-        return dict(fields)
+    return read_npz(data, MAX_BATCH, text=["made_by"])
 
 
 def _seal(body: bytes) -> bytes:
@@ -174,7 +187,7 @@ def _seal(body: bytes) -> bytes:
 
 def _read_manifest(path: Path) -> dict[str, object] | None:
     try:
-        found = json.loads(path.read_text(encoding="utf-8"))
+        found = parse_json(_read(path, MAX_MANIFEST), MAX_MANIFEST, infinite=True)
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:

@@ -85,6 +85,8 @@ class Counts:
     def from_arrays(cls, arrays: Mapping[str, NDArray], shape: tuple[int, int]) -> Counts:
         """What `arrays` gave, `shape` being that of `exits`; ValueError if it is not that."""
         try:
+            if any(arrays[name].dtype.kind != "i" or np.any(arrays[name] < 0) for name in ("cells", "exits", "rest")):
+                raise TypeError("numbers of cells and photons are whole and >= 0")
             exits = np.zeros(shape, np.int64)
             exits.ravel()[arrays["cells"]] = arrays["exits"]
             rouletted, cut, started = map(int, arrays["rest"])

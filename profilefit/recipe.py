@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
+from mcml_sim.checks import shown
 from mcml_sim.setting import Setting
+from mcml_sim.text_file import read_toml
 from profilefit.errors import InputError, RecipeError
 from profilefit.schema import LONGEST_TEXT, is_line, is_number
 
@@ -33,7 +34,6 @@ TRIMMED = ("r R_d", "R_d", "none")
 MFP = (1e-3, 1e3)  # beyond three decades a length is a slip of the pen
 FINEST = 0.0025  # the first edge of the run that rings are merged from [mfp]
 FEWEST_RINGS, MOST_RINGS = 3, 4000  # the run has 4000 even rings
-LONGEST_SHOWN = 60  # characters of a value in a message
 MAX_LIMIT = 1e6  # a weight beyond this makes the rings round off beside it
 
 
@@ -203,14 +203,12 @@ class Recipe:
 
 def read(path: Path) -> Recipe:
     """Read one recipe; RecipeError says the file, what was wrong, what was got and what is accepted."""
+    if not path.exists():
+        raise RecipeError(f"{path}: there is no such recipe")
     try:
-        table = tomllib.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise RecipeError(f"{path}: there is no such recipe") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise RecipeError(f"{path}: cannot be read ({error})") from None
-    except (ValueError, RecursionError) as error:  # besides bad syntax: whole numbers and nests too long for Python
-        raise RecipeError(f"{path}: is not TOML: {error}") from None
+        table = read_toml(path)
+    except InputError as error:
+        raise RecipeError(str(error)) from None
     for key in ("name", "path"):
         if key in table:
             raise RecipeError(f"{path}: unknown key {key!r}: a recipe is named by its file")
@@ -260,7 +258,7 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
     tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting, "Setting": Setting}
     if annotation in tables:
         if not isinstance(value, dict):
-            raise RecipeError(f"{where}: [{key}] must be a table, got {_shown(value)}")
+            raise RecipeError(f"{where}: [{key}] must be a table, got {shown(value)}")
         return _build(tables[annotation], value, f"{where}: [{key}]")
     if annotation == "float" and is_number(value):
         return float(value)
@@ -276,18 +274,7 @@ def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
     texts = [value] if annotation == "str" else value
     if "str" in annotation and isinstance(texts, list) and all(isinstance(text, str) for text in texts):
         words += f" of one printable line and {LONGEST_TEXT} characters at most"  # it becomes comments in code
-    raise RecipeError(f"{where}: {key} must be a {words}, got {_shown(value)}")
-
-
-def _shown(value: Any) -> str:
-    """A value for a message, shortened: a whole number can have as many digits as a file."""
-    try:
-        text = repr(value)
-    except ValueError:  # Python spells no whole number beyond 4300 digits
-        return "one of more than 4300 digits"
-    if isinstance(value, int) and len(text) > LONGEST_SHOWN:
-        return f"one of {len(text)} digits"
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
+    raise RecipeError(f"{where}: {key} must be a {words}, got {shown(value)}")
 
 
 def _spoken(annotation: str) -> str:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 from mcml_sim import Layer, Medium, Setting
+from mcml_sim.checks import is_number, shown
 from mcml_sim.errors import InputError as MediumError
 from mcml_sim.setting import ILLUMINATIONS
+from mcml_sim.text_file import read_toml
 from profilefit.choose.case import Within
 from profilefit.choose.cost import TFLOPS, YARDSTICK
 from profilefit.choose.truth import truth
@@ -69,16 +70,7 @@ class Scene:
 
 def read(path: Path) -> Scene:
     """A scene from its file; InputError that names file, table and key, what was got and what is accepted."""
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise InputError(f"{path}: scene must be a TOML file, got: {reason.splitlines()[0]}") from None
-    return _Reader(str(path)).scene(content)
-
-
-def _is_number(value: Any) -> TypeGuard[float]:
-    return isinstance(value, int | float) and not isinstance(value, bool)
+    return _Reader(str(path)).scene(read_toml(path))
 
 
 def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
@@ -159,7 +151,7 @@ class _Reader:
         if stack is None:
             return None
         if not isinstance(stack, list) or not all(isinstance(layer, dict) for layer in stack):
-            raise InputError(f"{self.file}: layers must be tables [[layers]], got {stack!r}")
+            raise InputError(f"{self.file}: layers must be tables [[layers]], got {shown(stack)}")
         made = []
         for number, layer in enumerate(stack, start=1):
             self.known(f"layers {number}", layer, TABLES["layers"])
@@ -175,7 +167,7 @@ class _Reader:
         if value is None:
             raise InputError(f"{self.file}: table [{where}] is missing")
         if not isinstance(value, dict):
-            raise InputError(f"{self.file}: {where} must be a table [{where}], got {value!r}")
+            raise InputError(f"{self.file}: {where} must be a table [{where}], got {shown(value)}")
         if name in TABLES:
             self.known(where, value)
         return value
@@ -185,11 +177,11 @@ class _Reader:
         for key in table:
             if key not in keys:
                 place = f"[{where}] " if where else ""
-                raise InputError(f"{self.file}: {place}keys must be of {', '.join(keys)}, got {key!r}")
+                raise InputError(f"{self.file}: {place}keys must be of {', '.join(keys)}, got {shown(key)}")
 
     def number(self, where: str, key: str, table: Table, default: float | None = None, most: float = math.inf) -> float:
         value = table.get(key, default)
-        if not _is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
+        if not is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
             raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
         return float(value)
 
@@ -197,7 +189,7 @@ class _Reader:
         """A number, or the least and the most."""
         value = table.get(key)
         ends: list[Any] = value if isinstance(value, list) else [value, value]
-        numbers = len(ends) == 2 and all(_is_number(end) for end in ends)
+        numbers = len(ends) == 2 and all(is_number(end) for end in ends)
         if not (numbers and 0 < ends[0] <= ends[1] <= most and ends[1] < MOST_ASIDE * ends[0]):
             accepted = "a number > 0 or two of them, the smaller first" + (f", <= {most:g}" if most < math.inf else "")
             raise self.bad(where, key, accepted, value)
@@ -219,6 +211,6 @@ class _Reader:
             raise InputError(f"{self.file}: [{where}] {error}") from None
 
     def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:
-        got = "nothing" if value is None else repr(value)
+        got = "nothing" if value is None else shown(value)
         place = f"[{where}] " if where else ""
         return InputError(f"{self.file}: {place}{key} must be {accepted}, got {got}")

@@ -17,6 +17,8 @@ ORDER = {
         "lazy",
         "plain",
         "whole_file",
+        "text_file",
+        "npz",
         "checks",
         "medium",
         "setting",

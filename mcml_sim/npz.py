@@ -1,0 +1,128 @@
+"""Arrays out of .npz files that others made: what a file claims is checked before any of it is unpacked.
+
+An .npz file is a zip file of .npy files, which pack well: 13 MB can hold 3 GB of zeros. So the zip file's directory and
+the header of each array are held against bounds first, and only arrays that are wanted are unpacked, no further than
+they said. Nothing is unpickled.
+"""
+
+from __future__ import annotations
+
+import io
+import math
+import re
+import struct
+import zipfile
+import zlib
+from collections.abc import Collection, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+Shapes = Mapping[str, tuple[int, ...] | None]
+MOST_MEMBERS = 1000  # of a zip file; a run's results have some fifty
+MOST_AXES = 8
+ENTRY = b"PK\x01\x02"  # begins each line of a zip file's directory
+METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # numpy's; others unpack without a bound
+ENCRYPTED = 1  # a zip file's flag
+SUFFIX = ".npy"
+# What numpy.lib.format writes before the numbers: numpy's own parser would evaluate any other text.
+HEADER = re.compile(
+    rb"\x93NUMPY\x01\x00(?P<length>..)(?P<text>\{'descr': '(?P<dtype>[<>|][fiuU]\d{1,9})', "
+    rb"'fortran_order': (?:True|False), 'shape': \((?P<shape>[\d, ]*)\), \} *\n)",
+    re.DOTALL,
+)
+LONGEST_HEADER = 512  # bytes
+LONGEST_NUMBER = 15  # digits of a shape
+LONGEST_NAME = 60  # characters of one in a message
+LAST_LETTER = 0x10FFFF
+WIDEST = 8  # bytes of a number
+# What numpy and zip raise at a file that is not what was written.
+DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, OverflowError, struct.error,
+           zipfile.BadZipFile, zlib.error)  # fmt: skip
+
+
+def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Collection[str] = ()) -> dict[str, NDArray]:
+    """The arrays of an .npz file by name, in this machine's byte order; those that it lacks are left out.
+
+    content  of the file
+    most     bytes that all of them may fill; more is an error before any is unpacked
+    wanted   shapes by name, None for any; other arrays are not looked at. None: all that the file has
+    text     names of those that are one text each, in place of real numbers
+
+    ValueError says in one line what is wrong with the file.
+    """
+    try:
+        with zipfile.ZipFile(io.BytesIO(_zip_file(content))) as archive:
+            members = _members(archive, wanted)
+            sizes = [
+                _checked_size(archive, name, member, (wanted or {}).get(name), name in text)
+                for name, member in members.items()
+            ]
+            if sum(sizes) > most:
+                raise ValueError(f"its arrays claim {sum(sizes)} bytes, more than the {most} that are read")
+            return {name: _array(archive, member) for name, member in members.items()}
+    except DAMAGED as error:
+        reason = (str(error) or type(error).__name__).splitlines()[0]
+        raise ValueError(reason) from None
+
+
+def _zip_file(content: bytes) -> bytes:
+    if not zipfile.is_zipfile(io.BytesIO(content)):
+        raise ValueError("not a whole .npz file")
+    if content.count(ENTRY) > MOST_MEMBERS:
+        raise ValueError(f"more than {MOST_MEMBERS} arrays")
+    return content
+
+
+def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfile.ZipInfo]:
+    """The wanted members by the name of their array."""
+    found: dict[str, zipfile.ZipInfo] = {}
+    for member in archive.infolist():
+        name = member.filename.removesuffix(SUFFIX)
+        if name == member.filename or (wanted is not None and name not in wanted):
+            continue
+        if name in found:
+            raise ValueError(f"two arrays are named {_shown(name)}")
+        if member.flag_bits & ENCRYPTED:
+            raise ValueError(f"{_shown(name)} is encrypted")
+        if member.compress_type not in METHODS:
+            raise ValueError(f"{_shown(name)} is packed in a way that numpy does not use")
+        found[name] = member
+    return found
+
+
+def _checked_size(
+    archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo, shape: tuple[int, ...] | None, is_text: bool
+) -> int:
+    """Bytes of a member; ValueError unless its header says what is wanted, and as much as the directory says."""
+    with archive.open(member) as file:
+        head = HEADER.match(file.read(LONGEST_HEADER))
+    if head is None or int.from_bytes(head["length"], "little") != len(head["text"]):
+        raise ValueError(f"{_shown(name)} is no array of numbers or text as numpy writes it")
+    lengths = [part.strip() for part in head["shape"].decode().rstrip(" ,").split(",")] if head["shape"] else []
+    if len(lengths) > MOST_AXES or not all(re.fullmatch(rf"\d{{1,{LONGEST_NUMBER}}}", one) for one in lengths):
+        raise ValueError(f"{_shown(name)} has a shape that no array has")
+    found, dtype = tuple(map(int, lengths)), np.dtype(head["dtype"].decode())
+    if is_text and (dtype.kind != "U" or found != ()):
+        raise ValueError(f"{_shown(name)} must be one text, got {dtype} of shape {found}")
+    if not is_text and (dtype.kind == "U" or dtype.itemsize > WIDEST):
+        raise ValueError(f"{_shown(name)} must be real numbers, got {dtype}")
+    if shape is not None and found != shape:
+        raise ValueError(f"{_shown(name)} must have the shape {shape}, got {found}")
+    claimed = math.prod(found) * dtype.itemsize
+    if member.file_size != head.end() + claimed:
+        raise ValueError(f"{_shown(name)} claims {claimed} bytes, and has {member.file_size - head.end()}")
+    return member.file_size
+
+
+def _array(archive: zipfile.ZipFile, member: zipfile.ZipInfo) -> NDArray:
+    with archive.open(member) as file:
+        array: NDArray = np.lib.format.read_array(file, allow_pickle=False)
+    array = array.astype(array.dtype.newbyteorder("="), copy=False)
+    if array.dtype.kind == "U" and np.any(array.reshape(1).view(np.uint32) > LAST_LETTER):  # Python would stop there
+        raise ValueError(f"{_shown(member.filename)} is no text")
+    return array
+
+
+def _shown(name: str) -> str:
+    return repr(name if len(name) <= LONGEST_NAME else f"{name[:LONGEST_NAME]}...")

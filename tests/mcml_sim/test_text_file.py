@@ -1,0 +1,107 @@
+"""JSON and TOML that others wrote: one line for everything that is not to be trusted, and no time lost over it."""
+
+import time
+
+import pytest
+
+from mcml_sim.errors import InputError
+from mcml_sim.text_file import MOST_JSON, MOST_LEVELS, MOST_TOML, parse_json, parse_toml, read_json, read_toml
+
+
+def test_json_comes_back(tmp_path):
+    path = tmp_path / "file.json"
+    path.write_text('\ufeff{"a": [1, -2.5e3, null, true, "ü"], "b": {}}', encoding="utf-8")
+    assert read_json(path) == {"a": [1, -2500.0, None, True, "ü"], "b": {}}
+    assert parse_json(b"[" * MOST_LEVELS + b"1" + b"]" * MOST_LEVELS)
+    assert parse_json(b"Infinity", infinite=True) == float("inf")
+
+
+def test_toml_comes_back(tmp_path):
+    path = tmp_path / "file.toml"
+    path.write_text('\ufeffa = [1, -2.5e3, inf]\r\n"b".c = "ü"\n', encoding="utf-8")
+    assert read_toml(path) == {"a": [1, -2500.0, float("inf")], "b": {"c": "ü"}}
+
+
+DEEP = f"tables or lists nested more than {MOST_LEVELS} deep"
+NO_JSON = {
+    b"": "Expecting value",
+    b"{": "Expecting property name",
+    b"\xff": "'utf-8' codec can't decode byte 0xff",
+    b"[" * 100_000: DEEP,
+    b'{"a":' * 100_000: DEEP,
+    b"[" * 33 + b"]" * 33 + b" ": None,
+    b"[" * 34 + b"]" * 34: DEEP,
+    b"9" * 5000: "a whole number of 5000 digits",
+    b"[1e400]": "the number 1e400, beyond floating point",
+    b'{"a": -Infinity}': "-Infinity, which is no number",
+    b'{"a": Infinity}': "Infinity, which is no number",
+    b"NaN": "NaN, which is no number",
+    b'{"a": 1, "b": {"a": 2, "a": 3}}': "the key 'a' twice in one object",
+    b'["\\ud800"]': "'utf-8' codec can't encode character",
+    b'{"\\ud800": 1}': "'utf-8' codec can't encode character",
+    b" " * (MOST_JSON + 1): f"more than {MOST_JSON} bytes",
+}
+NO_TOML = {
+    b"a = ": "Invalid value",
+    b"a = \xff": "'utf-8' codec can't decode byte 0xff",
+    b"a = 1\na = 2": "Cannot overwrite a value",
+    b"a = " + b"9" * 5000: "Exceeds the limit",
+    b"a = 1e400": "the number 1e400, beyond floating point",
+    b"a = " + b"[" * 100_000: DEEP,
+    b"a = " + b"{a = " * 50_000: DEEP,
+    b"a." * 100_000 + b"a = 1": DEEP,
+    b"[" + b"'a' . " * 40_000 + b"a]": DEEP,
+    b"a = [" + b"[" * 32 + b"]" * 33: DEEP,
+    b"#" * (MOST_TOML + 1): f"more than {MOST_TOML} bytes",
+}
+
+
+@pytest.mark.parametrize(
+    ("parse", "text", "reason"),
+    [(parse, *case) for parse, cases in ((parse_json, NO_JSON), (parse_toml, NO_TOML)) for case in cases.items()],
+    ids=lambda value: repr(value[:12]) if isinstance(value, bytes) else "",
+)
+def test_what_is_not_to_be_trusted_is_one_line(parse, text, reason):
+    started = time.perf_counter()
+    if reason is None:
+        parse(text)
+        return
+    with pytest.raises(ValueError, match=f"^{reason}") as error:
+        parse(text)
+    assert "\n" not in str(error.value)
+    assert len(str(error.value)) < 200
+    assert time.perf_counter() - started < 1
+
+
+@pytest.mark.parametrize(
+    ("parse", "text"),
+    [
+        (parse_json, b"[" + b"[]," * (MOST_TOML // 3) + b"[]]"),
+        (parse_json, b"{" + b",".join(b'"%d":0' % i for i in range(MOST_TOML // 11)) + b"}"),
+        (parse_toml, b"".join(b"a%d=1\n" % i for i in range(MOST_TOML // 9))),
+        (parse_toml, b"a = '''" + b"x." * (MOST_TOML // 2 - 9) + b"x'''"),
+        (parse_toml, b"a = '''" + b'" ' * (MOST_TOML // 2 - 9) + b"x'''"),
+        (parse_toml, b"a = [" + b"0.5," * (MOST_TOML // 4 - 9) + b"]"),
+        (parse_toml, b"[[layers]]\nn = 1\n" * (MOST_TOML // 17)),
+    ],
+    ids=["lists", "keys", "lines", "chain", "quotes", "numbers", "tables"],
+)
+def test_large_files_take_less_than_two_seconds(parse, text):
+    """Nothing grows faster than the file: the slowest takes half a second of a core."""
+    started = time.process_time()
+    try:
+        parse(text)
+    except ValueError as error:
+        assert str(error) == DEEP  # noqa: PT017 - a text of names between dots might be a key
+    assert time.process_time() - started < 2
+
+
+def test_files_are_named(tmp_path):
+    for read, kind in ((read_json, "JSON"), (read_toml, "TOML")):
+        with pytest.raises(InputError, match=r"file: expected a file that can be read, got: No such file"):
+            read(tmp_path / "file")
+        (tmp_path / "file").write_bytes(b"\0")
+        with pytest.raises(InputError, match=rf"file: expected {kind}, got: ") as error:
+            read(tmp_path / "file")
+        assert "\n" not in str(error.value)
+        (tmp_path / "file").unlink()
