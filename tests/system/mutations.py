@@ -48,7 +48,18 @@ TEXTS = (
     *("1.0; evil", "1.0\nevil", "nan", "inf", "1e400", "0x10", "1_0", "LAW_", "@i", "//% for 9\n@i\n//% end", "PF_SELECT"),
     *("x" * 10_000, "x " * 10_000, "0" * 64, "F" * 64, "0" * 63),
 )  # fmt: skip
-WORDS = ("converged", "failed", "profile", "albedo", "evidence", "as-published", "inverse", "hazard", "liang", "diffuse")
+WORDS = (
+    "converged",
+    "failed",
+    "profile",
+    "albedo",
+    "evidence",
+    "as-published",
+    "inverse",
+    "hazard",
+    "liang",
+    "diffuse",
+)
 # As they stand in a file: numbers that are large, tiny or none, and nests that are deep.
 NUMBERS = (
     *("0", "-0.0", "1", "-1", "2", "3.5", "1e-300", "5e-324", "1e16", "1e22", "1e300", "1e308", "1e400", "-1e400"),
@@ -56,18 +67,49 @@ NUMBERS = (
 )
 DEEP = 100_000
 NESTS = ("[" * DEEP + "]" * DEEP, '{"a":' * DEEP + "1" + "}" * DEEP, "[" * DEEP, "[[]," * 2000 + "1" + "]" * 2000)
-FILE_NAMES = ("a\nimport os", "a\x1b[31mred", "<img src=x onerror=alert(1)>", "a\\", "[bold]a", "-a", "a*", "\u202ea", "a.b")
+FILE_NAMES = (
+    "a\nimport os",
+    "a\x1b[31mred",
+    "<img src=x onerror=alert(1)>",
+    "a\\",
+    "[bold]a",
+    "-a",
+    "a*",
+    "\u202ea",
+    "a.b",
+)
 TOML_WORDS = (
     *NUMBERS, *("nan", "inf", "-inf", "true", "1_000", "0x10", "1979-05-27T07:32:00Z", "[]", "{}", "{a = 1}", "[[1]]"),
     *("[1, 2]", "[2, 1]", "[1, 2, 3]", "[0.1, true]", '["a"]', "'''a", '"', "=", "[" * DEEP, "{a=" * DEEP, "[" * 500),
 )  # fmt: skip
 TOML_LINES = (
     *("[view]", "[[layers]]", "[layers]", "layers = 3", "view = 3", "unknown = 1", "[", "]", "=", "a = ", '"" = 1'),
-    *(f"{'a.' * DEEP}b = 1", f"[{'a.' * 3000}b]", f"{'k' * DEEP} = 1", f"x = {'9' * 5000}", "x = 1\nx = 2", "\x1b[31m = 1"),
+    *(
+        f"{'a.' * DEEP}b = 1",
+        f"[{'a.' * 3000}b]",
+        f"{'k' * DEEP} = 1",
+        f"x = {'9' * 5000}",
+        "x = 1\nx = 2",
+        "\x1b[31m = 1",
+    ),
 )
 CELLS = (
     *("0", "-1", "1e400", "-1e308", "5e-324", "nan", "inf", "1_000", "", '"', '"a', '"1"', "1,5", "1.5.5", "٣", "0x10"),
-    *("\x1b[31m", "a\u2028b", "\0", "=cmd|' /C calc'!A0", "x" * DEEP, "9" * 5000, ",", ";", "\t", "#", '"\n"', "[", "[a.u.]"),
+    *(
+        "\x1b[31m",
+        "a\u2028b",
+        "\0",
+        "=cmd|' /C calc'!A0",
+        "x" * DEEP,
+        "9" * 5000,
+        ",",
+        ";",
+        "\t",
+        "#",
+        '"\n"',
+        "[",
+        "[a.u.]",
+    ),
     *("r", "value", "sigma", "value1", "value_2", "r_in", "r_out", "r [mm]", "r [furlong]", "r (mm)", "value [1/cm^2]"),
 )
 CELL_LINES = (
@@ -161,7 +203,9 @@ class Tree:
             return self._literal(rng.choice(NUMBERS))
         if way < 0.6:
             return any_text(rng, value if isinstance(value, str) else "")
-        return copy.deepcopy(rng.choice((None, True, False, [], {}, [1, 2], {"a": 1}, [[]], [None], "", value, self.content)))
+        return copy.deepcopy(
+            rng.choice((None, True, False, [], {}, [1, 2], {"a": 1}, [[]], [None], "", value, self.content))
+        )
 
     def _literal(self, text: str) -> str:
         mark = f"@literal {len(self.literal)}@"
@@ -248,7 +292,9 @@ def npz_mutant(rng: random.Random, arrays: Mapping[str, np.ndarray]) -> bytes:
         elif way == 4:
             del members[at]
         elif way == 5:
-            odd = rng.choice(("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999))
+            odd = rng.choice(
+                ("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999)
+            )
             members[at] = (odd, data)
         elif way == 6:
             members.insert(at, rng.choice(((name, data), (name, _npy(_odd_array(rng, array))), ("more.npy", data))))
@@ -300,10 +346,24 @@ def _odd_header(rng: random.Random, text: str) -> np.ndarray:
 
 def _lying(rng: random.Random, data: bytes) -> bytes:
     """A member whose header says what its bytes are not."""
-    shapes = ("(100000000000000,)", "(10000000, 10000000)", "(-1,)", "(1e9,)", "(True,)", "()", "(3", "(2**40,)", "None", "3")
+    shapes = (
+        "(100000000000000,)",
+        "(10000000, 10000000)",
+        "(-1,)",
+        "(1e9,)",
+        "(True,)",
+        "()",
+        "(3",
+        "(2**40,)",
+        "None",
+        "3",
+    )
     told = (
         *(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}" for shape in shapes),
-        *(f"{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,), }}" for kind in ("|O", "<U1000000000", "<f99", "")),
+        *(
+            f"{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,), }}"
+            for kind in ("|O", "<U1000000000", "<f99", "")
+        ),
         *(f"__import__('os').system('touch {CANARY}')", "{}", "[" * 1000, "'" * 999, "{'descr': '<f8'}", "1" * 5000),
     )
     body = data[128:] if rng.random() < 0.5 else b"cos\nsystem\n(S'touch CANARY'\ntR."
@@ -436,7 +496,9 @@ def scene(seed: int) -> bytes:
 def recipe(seed: int) -> bytes:
     """A .toml of `profilefit regenerate`."""
     rng = random.Random(seed)
-    return toml_mutant(rng, _text(f"fits/{rng.choice(('burley-whole', 'albedo-rational', 'liang-as-published', 'quantile'))}.toml"))
+    return toml_mutant(
+        rng, _text(f"fits/{rng.choice(('burley-whole', 'albedo-rational', 'liang-as-published', 'quantile'))}.toml")
+    )
 
 
 @cache
