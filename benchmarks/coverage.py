@@ -24,7 +24,8 @@ from rich.progress import Progress
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
-from profilefit import catalogue, inventory, recipe, record
+from mcml_sim.whole_file import write_whole
+from profilefit import catalogue, inventory, recipe
 from profilefit.coverage import LEVELS, Coverage, coverage, refits
 from profilefit.discrepancy import predicted
 from profilefit.estimate import Fit, Problem, fit
@@ -184,7 +185,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             show(title, head, [row.cells() for row in made])  # a law takes minutes, so each as it comes
             found += made
             if given.json is not None:
-                record.write_text(given.json, json.dumps([row.content() for row in found], indent=1) + "\n")
+                write_whole(given.json, json.dumps([row.content() for row in found], indent=1) + "\n")
             progress.advance(task)
 
 

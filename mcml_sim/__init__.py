@@ -1,12 +1,9 @@
 """What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
-from typing import TYPE_CHECKING
-
 from mcml_sim.errors import ClusterError, InputError, OutputError, SettingError, StoreError
 from mcml_sim.lazy import attributes
-from mcml_sim.setting import Setting
-from mcml_sim.version import __version__
 
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest, while Ctrl-C is a traceback
 if TYPE_CHECKING:
     from mcml_sim import exact
     from mcml_sim.grid import Grid
@@ -15,9 +12,11 @@ if TYPE_CHECKING:
     from mcml_sim.orders import Orders, simulate_orders, trace_share
     from mcml_sim.quantities import Precision, Tally
     from mcml_sim.results import read_results, write_results
+    from mcml_sim.setting import Setting
     from mcml_sim.simulation import simulate
     from mcml_sim.store import DamagedBatch
     from mcml_sim.tally import Estimate
+    from mcml_sim.version import __version__
 else:
     __getattr__ = attributes(
         __name__,
@@ -29,9 +28,11 @@ else:
             **dict.fromkeys(("Orders", "simulate_orders", "trace_share"), "orders"),
             **dict.fromkeys(("Precision", "Tally"), "quantities"),
             **dict.fromkeys(("read_results", "write_results"), "results"),
+            "Setting": "setting",
             "simulate": "simulation",
             "DamagedBatch": "store",
             "Estimate": "tally",
+            "__version__": "version",
         },
     )
 

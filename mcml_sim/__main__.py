@@ -1,5 +1,12 @@
-"""`python -m mcml_sim` is the mcml-sim command."""
+"""`python -m mcml_sim` is the mcml-sim command, and so is the script of that name."""
 
-from mcml_sim.cli import main
+from mcml_sim.lazy import command
 
-main()
+
+def main() -> None:
+    """Run the command."""
+    command("mcml_sim.cli")
+
+
+if __name__ == "__main__":
+    main()

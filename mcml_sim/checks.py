@@ -52,7 +52,9 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
 def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
     """A number of threads, or None for one a core; a scheduler has workers of its own."""
     if workers is not None and scheduler is not None:
-        raise InputError(f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}")
+        raise InputError(
+            f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}"
+        )
     return None if workers is None else checked_whole("workers", workers, lowest=1, highest=MAX_WORKERS)
 
 

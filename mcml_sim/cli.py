@@ -20,8 +20,8 @@ __all__ = ["app", "main", "run"]
 
 # What the library tells to do about an error, as the command line says it.
 REMEDIES = {
-    ELSEWHERE: "delete that folder, or use --out elsewhere",
-    RESUMES: "the same command with --resume goes on",
+    ELSEWHERE: "use --out elsewhere",
+    RESUMES: "the same command resumes",
 }
 # Numbers and names of what takes a second to import; a test holds them against it.
 FIRST_LOOKS = ("2.1 million", "8.4 million")
@@ -57,9 +57,9 @@ Trace light through layered media as MCML does, with error bars.
 
   mcml-sim run FILE.mci --out runs        every run of an MCML input file
   mcml-sim run FILE.mci --precision 1e-3  until reflectance is known to 0.1 %
-  mcml-sim run FILE.mci --resume          go on after Ctrl-C
 
-Writes NAME.mco, as MCML does, and NAME.npz with the standard error of each bin."""
+Writes NAME.mco, as MCML does, and NAME.npz with the standard error of each bin.
+After Ctrl-C the same command resumes."""
 
 app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_exceptions_enable=False)
 
@@ -97,7 +97,7 @@ def run(
             autocompletion=_quantities,
         ),
     ] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Go on where the same command was interrupted.")] = False,
+    resume: Annotated[bool, typer.Option("--resume", help="Changes nothing: a command resumes without.")] = False,
     workers: Annotated[int | None, typer.Option(help="Threads.", show_default="one a core")] = None,
     scheduler: Annotated[
         str | None, typer.Option(help="Address of a Dask scheduler whose workers trace, like tcp://host:8786.")
@@ -115,8 +115,10 @@ def run(
 ) -> None:
     """Do every run of an MCML input file.
 
-    Each writes NAME.mco, as MCML does, and NAME.npz, with the standard error of every bin; what had these names is
-    replaced. While it runs, NAME.photons keeps the finished batches.
+    Each writes NAME.mco, as MCML does, and NAME.npz, with the standard error of every bin. While it runs, NAME.photons
+    keeps the finished batches: the same command goes on where it was interrupted, and leaves a run that is finished as
+    it is. Results of another run are replaced, other files are not. An absolute NAME, or one with .., needs --out, and
+    its last part is written there.
 
     \b
     Examples, from a clone:
@@ -129,7 +131,7 @@ add(app, run)
 
 
 def _stopped() -> str:
-    return "stopped; the finished batches are kept, the same command with --resume goes on"
+    return "stopped; the finished batches are kept, the same command resumes"
 
 
 def _remedied(text: str) -> str:

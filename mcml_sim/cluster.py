@@ -10,7 +10,7 @@ from concurrent.futures import CancelledError, ThreadPoolExecutor
 from types import ModuleType, TracebackType
 from typing import Generic
 
-from mcml_sim.errors import ClusterError, InputError
+from mcml_sim.errors import ClusterError, InputError, Notice
 from mcml_sim.store import RESUMES, R, cpu_class, maker
 
 # Twice as many batches as there are threads: the next one is there when one is done.
@@ -21,7 +21,7 @@ PATIENCE = 5.0  # for a scheduler to answer [s]
 REMEDY = "install the same profilefit there as here"
 
 
-class Deserted(UserWarning):
+class Deserted(Notice):
     """A Dask cluster has no workers; the run waits for one."""
 
 

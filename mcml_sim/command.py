@@ -14,16 +14,19 @@ from rich.console import Console
 from mcml_sim import printed
 from mcml_sim.checks import MAX_PHOTONS, checked_whole, checked_workers
 from mcml_sim.compiling import Compiling
-from mcml_sim.errors import InputError
-from mcml_sim.mcml_files import Run, read_mci, write_mco
+from mcml_sim.errors import InputError, StoreError
+from mcml_sim.mcml_files import Run, read_mci
+from mcml_sim.mco import made_by, mco_text
+from mcml_sim.mco_reader import HEAD_BYTES, begins_mco
+from mcml_sim.medium import Medium
 from mcml_sim.quantities import Precision, Tally, quantities
-from mcml_sim.results import Results, read_results, write_results
+from mcml_sim.results import Results, read_results, results_bytes
 from mcml_sim.screen import print_json
-from mcml_sim.simulation import batch_photons, require_store, simulate
-from mcml_sim.store import MANIFEST, batches
+from mcml_sim.simulation import batch_photons, is_store_of, require_store, simulate
+from mcml_sim.store import batches, discard, strange
 from mcml_sim.terminal import without_logs
 from mcml_sim.version import __version__
-from mcml_sim.whole_file import require_writable
+from mcml_sim.whole_file import read_whole, require_target, require_writable, write_together
 
 QUANTITY = "diffuse_reflectance"
 REPEATS = (
@@ -38,7 +41,7 @@ def run(
     seed: str,
     precision: float | None,
     quantity: str | None,
-    resume: bool,
+    resume: bool,  # changes nothing: a command resumes by itself
     workers: int | None,
     scheduler: str | None,
     out: Path | None,
@@ -53,7 +56,6 @@ def run(
     plan = _Plan(
         seed=_whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
-        resume=resume,
         workers=checked_workers(workers, scheduler),
         scheduler=scheduler,
         progress=False if quiet else None,
@@ -91,7 +93,6 @@ class _Plan:
 
     seed: int
     goal: Precision | None
-    resume: bool
     workers: int | None
     scheduler: str | None
     progress: bool | None
@@ -115,57 +116,94 @@ class _Job:
     @property
     def is_part_of_more(self) -> bool:
         """True if the store holds batches beyond this run's photons, which are a longer run's."""
-        return any(batch * batch_photons(self.run.medium) >= self.photons for batch in batches(self.store))
+        return self._holds_more(self.run.medium, self.photons)
 
-    def discard_batches(self) -> None:
-        """Remove what a store keeps, and its folder if nothing else is in it."""
-        with contextlib.suppress(OSError):  # left behind, it is in nobody's way but the next plain run's, which says so
-            for path in (*self.store.glob("batch-*"), *self.store.glob("*.part"), self.store / MANIFEST):
-                path.unlink(missing_ok=True)
-            self.store.rmdir()
+    def is_in_the_way(self, seed: int) -> bool:
+        """True if the store holds what another run left, finished: no more photons than the results to be replaced.
+
+        StoreError if it holds anything else of another run.
+        """
+        try:
+            require_store(self.store, self.run.medium, self.run.grid, seed)
+        except StoreError:
+            done = _results(self.npz) if self.store.is_dir() else None
+            if done is None or self._holds_more(done.medium, done.photons):
+                raise
+            if not is_store_of(self.store, done.medium, done.grid, done.seed):
+                raise
+            return True
+        return False
+
+    def _holds_more(self, medium: Medium, photons: int) -> bool:
+        return any(batch * batch_photons(medium) >= photons for batch in batches(self.store))
 
 
 def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
-    """Paths by the name in the input file, in `folder` or, as MCML does, seen from where we are."""
+    """Paths by the name in the input file, in `folder` or, as MCML does, seen from where we are.
+
+    A name that leads out of there is a stranger's say over our files: it takes a folder, which gets its last part.
+    """
     name = Path(run.output)
-    if folder is not None and (name.is_absolute() or ".." in name.parts):
-        raise InputError(f"output files must stay inside --out {folder}, got {run.output}")
+    if name.is_absolute() or ".." in name.parts:
+        if folder is None or name.name in ("", ".."):
+            raise InputError(
+                f"output files must lie in the current folder, or have a name and --out FOLDER, got {run.output}"
+            )
+        name = Path(name.name)
     mco = (folder or Path()) / name
     bare = mco.with_suffix("") if mco.suffix.lower() == ".mco" else mco
     return mco, Path(f"{bare}.npz"), Path(f"{bare}.photons")
 
 
 def _require_room(file: Path, jobs: list[_Job], plan: _Plan) -> None:
-    """InputError or OutputError where the results of a run could not be written: better now than hours later."""
+    """InputError, OutputError or StoreError where a run could not keep its results: better now than hours later.
+
+    Nothing is written before all of them have passed.
+    """
     taken = {file.resolve(): f"the input file {file}"}
     for job in jobs:
         if plan.goal is not None and plan.goal.quantity not in (names := quantities(job.run.grid)):
             raise InputError(f"quantity must be one of {', '.join(names)}, got {plan.goal.quantity!r}")
         for path in (job.mco, job.npz):
-            require_writable(path)
+            require_target(path)
+        for path in (job.mco, job.npz, job.store):
             place = path.resolve()
             if place in taken:
                 raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
             taken[place] = job.run.output
-        require_store(job.store, job.run.medium, job.run.grid, plan.seed)
-        if job.is_begun and not plan.resume:
-            raise InputError(
-                f"{job.store} holds photons of a run that was not finished: --resume goes on with them, "
-                "or delete that folder"
-            )
+        _require_ours(job)
+        job.is_in_the_way(plan.seed)
+    for job in jobs:
+        for path in (job.mco, job.npz):
+            require_writable(path)
+
+
+def _require_ours(job: _Job) -> None:
+    """InputError where a file or a folder that is to be replaced is no output of a run."""
+    found = None
+    if job.mco.is_file() and job.mco.stat().st_size and not begins_mco(job.mco):
+        found = f"{job.mco} is there already, and no output of MCML"
+    elif job.npz.exists() and not (job.npz.is_file() and (not job.npz.stat().st_size or _results(job.npz))):
+        found = f"{job.npz} is there already, and no results of mcml_sim"
+    elif names := strange(job.store):
+        found = f"{job.store} is there already, and holds {names[0]}, which is no batch of photons"
+    if found is not None:
+        raise InputError(f"{found}: it is not replaced, use --out elsewhere")
 
 
 def _done(job: _Job, plan: _Plan) -> tuple[Results, str]:
-    """The results of the run, which is done unless a resumed command finds it so; and how that went."""
-    kept, how = _finished(job, plan) if plan.resume else None, "finished before"
+    """The results of the run, which is done unless the same command has done it before; and how that went."""
+    kept, how = _finished(job, plan), "finished before"
     if kept is None:
+        if job.is_in_the_way(plan.seed):
+            discard(job.store)
         tally, how = _traced(job, plan)
-        write_mco(tally, job.mco)
-        write_results(tally, job.npz)  # the last, by which the run counts as finished
+        # The .npz is last: by it the run counts as finished.
+        write_together({job.mco: mco_text(tally, job.mco.name), job.npz: results_bytes(tally)})
         kept = read_results(job.npz)
     is_enough = plan.goal is None or plan.goal.is_reached(kept.estimates[plan.goal.quantity])
     if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
-        job.discard_batches()
+        discard(job.store)
     return kept, how
 
 
@@ -176,7 +214,7 @@ def _told(job: _Job, kept: Results, how: str, plan: _Plan) -> Iterator[str]:
     if plan.goal is not None:
         yield printed.answer(kept.estimates[plan.goal.quantity], plan.goal, kept.photons)
     if job.is_part_of_more:
-        yield f"{job.store} is kept, since it holds more photons than these: --resume with more --photons uses them"
+        yield f"{job.store} is kept, since it holds more photons than these: more --photons use them"
 
 
 def _summary(job: _Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
@@ -221,12 +259,19 @@ def _traced(job: _Job, plan: _Plan) -> tuple[Tally, str]:
 
 def _finished(job: _Job, plan: _Plan) -> Results | None:
     """The run's results, if its files are there and of this very run."""
-    try:
-        found = read_results(job.npz)
-    except InputError:
+    found = _results(job.npz)
+    if found is None or not job.mco.is_file() or made_by(plan.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
     if (found.medium, found.grid, found.seed, found.version) != (job.run.medium, job.run.grid, plan.seed, __version__):
         return None
     goal = plan.goal
     is_enough = goal is not None and found.photons < job.photons and goal.is_reached(found.estimates[goal.quantity])
-    return found if (is_enough or found.photons == job.photons) and job.mco.is_file() else None
+    return found if is_enough or found.photons == job.photons else None
+
+
+def _results(path: Path) -> Results | None:
+    """What a run has kept there, if anything."""
+    try:
+        return read_results(path)
+    except InputError:
+        return None

@@ -1,8 +1,12 @@
 """What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
 
 # What errors tell to do about them; a command line has other words for it.
-ELSEWHERE = "delete it, or use another folder"
+ELSEWHERE = "use another folder"
 RESUMES = "the same run with its store resumes"
+
+
+class Notice(UserWarning):
+    """Something to know besides the answer; a command line says it on stderr, beside what it prints."""
 
 
 class InputError(ValueError):

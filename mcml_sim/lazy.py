@@ -1,14 +1,22 @@
-"""What is imported only when it is asked for: names of a package (PEP 562), and what a subcommand does.
+"""What is imported only when it is asked for: names of a package (PEP 562), a command, and what a subcommand does.
 
 JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
 """
 
 from __future__ import annotations
 
+import contextlib
 import functools
-from collections.abc import Callable, Mapping
+import os
+import signal
 from importlib import import_module
-from typing import Any
+
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Mapping
+    from typing import Any
+
+INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 
 
 def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
@@ -30,8 +38,52 @@ def carried_out(module: str) -> Callable[[Callable[..., None]], Callable[..., No
     def of(asked: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(asked)
         def run(**given: Any) -> None:
-            getattr(import_module(module), asked.__name__)(**given)
+            with _nothing_to_finish(module):
+                done = getattr(import_module(module), asked.__name__)
+            done(**given)
 
         return run
 
     return of
+
+
+def command(module: str) -> None:
+    """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last."""
+    with _nothing_to_finish(module):
+        main = import_module(module).main
+    try:
+        main()
+    except KeyboardInterrupt:  # between what `main` guards
+        _quit(module)
+    finally:
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            _on_interrupt(lambda *_: _quit(module))  # for as long as Python takes to end
+
+
+@contextlib.contextmanager
+def _nothing_to_finish(module: str) -> Iterator[None]:
+    """Have Ctrl-C end the process at once: an exception that falls into imports may be dropped, or told as another."""
+    before = signal.getsignal(signal.SIGINT)
+    if before in (signal.SIG_IGN, None) or not _on_interrupt(lambda *_: _quit(module)):
+        yield
+        return
+    try:
+        yield
+    finally:
+        _on_interrupt(before)
+
+
+def _on_interrupt(handler: Any) -> bool:
+    """Set the handler of Ctrl-C, where this thread may."""
+    try:
+        signal.signal(signal.SIGINT, handler)
+    except ValueError:  # only the main thread may
+        return False
+    return True
+
+
+def _quit(module: str) -> None:
+    name = module.partition(".")[0].replace("_", "-")
+    with contextlib.suppress(OSError):  # stderr is closed: nobody is listening
+        os.write(2, f"{name}: stopped\n".encode())
+    os._exit(INTERRUPTED)

@@ -21,6 +21,7 @@ text for B as for A, so B is read and makes no difference. Beyond V1, g may be n
 
 from __future__ import annotations
 
+import io
 import itertools
 import os
 import posixpath
@@ -36,6 +37,7 @@ from mcml_sim.whole_file import read_whole
 # Bounds of a file and of what it asks for: far beyond any use, near enough that a slip of the pen fails at once and
 # not after hours or gigabytes.
 MAX_BYTES = 2**21
+MAX_LINES = 2**20
 MAX_RUNS = 10_000
 MAX_NAME = 255  # characters; what V1 and most file systems hold
 LENGTHS = (1e-12, 1e12)  # [cm]
@@ -89,7 +91,7 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     """What `read_mci` gives for a file of this name and content."""
-    lines = Lines(name, _text(name, content))
+    lines = Lines(name, _checked(name, content))
     (version,) = lines.take(1, "the file version, 1.0")
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
         raise lines.error("the file version, 1.0", _shown(version))
@@ -101,19 +103,21 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
 class Lines:
     """The data lines of a file, one after the other, and where they stand."""
 
-    def __init__(self, name: str, text: str) -> None:
+    def __init__(self, name: str, content: bytes) -> None:
         self._name = name
-        # Not splitlines(): it breaks lines where no editor does, and their numbers would be off.
-        self._lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        # Not splitlines(): it breaks lines where no editor does, and their numbers would be off. One after the other,
+        # since a list of empty lines takes eight times their bytes. A mark that some editors put first is no text.
+        self._lines = io.TextIOWrapper(io.BytesIO(content + b"\n"), "utf-8-sig", errors="surrogateescape")
         self._number = 0
 
     def take(self, count: int, expected: str, optional: int = 0) -> list[str]:
         """The first `count` words of the next line that has any, and up to `optional` more; no number may follow."""
-        while self._number < len(self._lines):
-            line = self._lines[self._number]
+        for line in self._lines:
             self._number += 1
+            if self._number > MAX_LINES:
+                raise self.error(expected, f"more than {MAX_LINES} lines before it")
             wanted = count + optional
-            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=wanted + 1) if line else []
+            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=wanted + 1)
             if len(words) > wanted and _is_number(words[wanted]):
                 raise self.error(f"{expected} alone", f"{wanted + _numbers(words[wanted:])} values")
             if len(words) >= count:
@@ -211,15 +215,14 @@ def _layer(lines: Lines, at: int, number: int) -> Layer:
     return Layer(**values, thickness=lines.decimal(f"thickness {of} in cm", thickness, LENGTHS))
 
 
-def _text(name: str, content: bytes) -> str:
+def _checked(name: str, content: bytes) -> bytes:
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
     before, null, _ = content.partition(b"\x00")
     if null:
         line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
         raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
-    # A mark that some editors put first is no part of the text.
-    return content.decode("utf-8", errors="surrogateescape").removeprefix("\ufeff")
+    return content
 
 
 def _is_number(word: str) -> bool:

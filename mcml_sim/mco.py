@@ -57,7 +57,17 @@ def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
     if not isinstance(found, Tally):
         raise InputError(f"tally must be what simulate gave, got {reprlib.repr(found)}")
     file = checked_path(name)
-    write_whole(file, "".join(_sections(found, file.name)).encode())
+    write_whole(file, mco_text(found, file.name))
+
+
+def mco_text(tally: Tally, name: str) -> str:
+    """What `write_mco` writes into a file of that name."""
+    return "".join(_sections(tally, name))
+
+
+def made_by(seed: int) -> str:
+    """The line of an .mco that stands where V1 reports its time, which would make equal runs differ."""
+    return f"# Made by mcml-sim {__version__}, seed {seed}.\n"
 
 
 @dataclass(frozen=True)
@@ -107,8 +117,7 @@ def _sections(tally: Tally, name: str) -> Iterator[str]:
     absorbed = share * _folded(_folded(tally.deposits.absorbed_rz, 0), 1)
     layers = share * tally.deposits.absorbed
     yield HEAD
-    # One line, as V1's report of its time: equal runs give equal files.
-    yield f"# Made by mcml-sim {__version__}, seed {tally.seed}.\n\n"
+    yield f"{made_by(tally.seed)}\n"
     yield _parameters(tally, bins, name)
     yield _totals(specular, reflected.sum(), layers[-1], transmitted.sum())
     yield _column("A_l #Absorption as a function of layer. [-]", layers[:-1], "%12.4G\n")

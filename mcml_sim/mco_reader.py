@@ -16,7 +16,8 @@ from mcml_sim.mci import DECIMAL, Lines, Run, read_run
 from mcml_sim.whole_file import read_whole
 
 Floats = NDArray[np.float64]
-MAX_BYTES = 2**28  # tables of 2^21 cells take 30 MB each
+MAX_BYTES = 2**27  # tables of 2^21 cells take 30 MB each
+HEAD_BYTES = 2**16  # hold what comes before the parameters
 LARGEST = 1e30  # of a printed number
 
 
@@ -45,11 +46,8 @@ def parse_mco(content: bytes, name: str) -> Output:
     """What `read_mco` gives for a file of this name and content."""
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
-    lines = Lines(name, content.replace(b"\x00", b"\xff").decode("utf-8", errors="surrogateescape"))
-    (version,) = lines.take(1, "the file version, A1")
-    if version != "A1":
-        raise lines.error("the file version, A1", repr(version[:8]))
-    _keyword(lines, "InParm")
+    lines = Lines(name, content.replace(b"\x00", b"\xff"))
+    _beginning(lines)
     run = read_run(lines, set())
     _keyword(lines, "RAT")
     specular, diffuse, _, _ = _column(lines, "RAT", 4)
@@ -58,6 +56,22 @@ def parse_mco(content: bytes, name: str) -> Output:
         _column(lines, key, size)
     _keyword(lines, "Rd_r")
     return Output(run, specular, diffuse, np.array(_column(lines, "Rd_r", run.nr)))
+
+
+def begins_mco(path: str | os.PathLike[str]) -> bool:
+    """Whether a file begins as an .mco does, down to its parameters."""
+    try:
+        _beginning(Lines(str(path), read_whole(path, HEAD_BYTES)))
+    except InputError:
+        return False
+    return True
+
+
+def _beginning(lines: Lines) -> None:
+    (version,) = lines.take(1, "the file version, A1")
+    if version != "A1":
+        raise lines.error("the file version, A1", repr(version[:8]))
+    _keyword(lines, "InParm")
 
 
 def _keyword(lines: Lines, key: str) -> None:

@@ -82,5 +82,5 @@ def answer(estimate: Estimate, goal: Precision, photons: int) -> str:
     needed = photons * (found / goal.relative_error) ** 2
     return (
         f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
-        "photons in all would reach it, and these are kept: ask for more --photons, with --resume"
+        "photons in all would reach it, and these are kept: ask for more --photons"
     )

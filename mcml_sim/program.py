@@ -9,16 +9,22 @@ import signal
 import sys
 import threading
 import time
+import traceback
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from pathlib import Path
 
 import typer
 from rich.console import Console
 
-from mcml_sim.terminal import INTERRUPTED, mend_streams
+from mcml_sim.errors import Notice
+from mcml_sim.lazy import INTERRUPTED
+from mcml_sim.terminal import mend_streams
 
+ANSWERS = (0, 1)
 BAD_INPUT = 2
+FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
 AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
 LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
 NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
@@ -63,11 +69,23 @@ class Program:
     def main(self) -> None:
         """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
         mend_streams()
-        with warnings.catch_warnings():  # of a damaged batch, say: a line, without the place in the code
-            warnings.showwarning = lambda message, *_: self.say(message)
+        notices: dict[str, None] = {}
+
+        def noted(message: Warning | str, *_: object) -> None:  # what a library tells its caller is not shown
+            if isinstance(message, Notice):
+                notices.setdefault(str(message))
+
+        with warnings.catch_warnings():
+            warnings.filterwarnings(
+                "error", category=RuntimeWarning
+            )  # of arithmetic: no answer is made of such numbers
+            warnings.simplefilter("always", Notice)
+            warnings.showwarning = noted
             with _lost_interrupts() as lost:
                 status = self._status()
             status = INTERRUPTED if lost else status
+            for text in notices if status in ANSWERS else ():  # an error is one line
+                self.say(text)
             if status == INTERRUPTED:
                 self.say(self.stopped())
         sys.exit(status)
@@ -88,7 +106,6 @@ class Program:
         except typer.TyperException as error:
             if message := error.format_message():  # without arguments typer has shown the help and says no more
                 self.say(f"{message} ({self.hint()})")
-            return int(error.exit_code)
         except (KeyboardInterrupt, typer.Abort):
             return INTERRUPTED
         except (BrokenPipeError, SystemExit) as end:  # as in `| head`; typer and rich make an exit of it
@@ -99,6 +116,18 @@ class Program:
         except OSError as error:  # what is printed goes to a full disk
             self.say(f"cannot print: {error.strerror or error}")
             _let_go_of_stdout()
+        except RuntimeWarning:
+            self.say("no answer: a number on the way is beyond double precision; check units and sizes")
+        except Exception as error:
+            if sys.flags.dev_mode:
+                raise
+            kind, place = type(error).__name__, traceback.extract_tb(error.__traceback__)[-1]
+            first = next(iter(str(error).splitlines()), "")
+            self.say(
+                f"a fault of this program, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: "
+                f"{first[:KEPT_END]} (PYTHONDEVMODE=1 shows where)"
+            )
+            return FAULT
         return BAD_INPUT
 
 

@@ -65,7 +65,11 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
     """
     if not isinstance(tally, Tally):
         raise InputError(f"tally must be what simulate gave, got {reprlib.repr(tally)}")
-    file = checked_path(path)
+    write_whole(checked_path(path), results_bytes(tally))
+
+
+def results_bytes(tally: Tally) -> bytes:
+    """What `write_results` writes."""
     header = {
         "format": FORMAT,
         "mcml_sim": __version__,
@@ -82,7 +86,7 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
         arrays |= {name + end: np.asarray(part) for end, part in zip(ENDS, parts, strict=True)}
     contents = io.BytesIO()
     np.savez_compressed(contents, allow_pickle=False, header=np.array(json.dumps(header)), **arrays)
-    write_whole(file, contents.getvalue())
+    return contents.getvalue()
 
 
 def read_results(path: str | os.PathLike[str]) -> Results:
@@ -148,7 +152,7 @@ def _grid(arrays: Mapping[str, NDArray]) -> Grid:
         r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=None if angles is None else angles.size - 1
     )
     require_resolved(grid)
-    if angles is not None and not (angles.ndim == 1 and np.allclose(angles, grid.a_edges, rtol=1e-12)):
+    if angles is not None and not (angles.ndim == 1 and np.allclose(angles, np.asarray(grid.a_edges), rtol=1e-12)):
         raise ValueError("a_edges must be even from 0 to pi/2")
     return grid
 
@@ -166,8 +170,8 @@ def _estimate(arrays: Mapping[str, NDArray], name: str, photons: int) -> Estimat
     value, error, samples = parts = [_needed(arrays, name + end) for end in ENDS]
     if not np.all(np.isfinite(value)):
         raise ValueError(f"{name} must be finite")
-    if not np.all(error >= 0) or (photons > 1 and not np.all(np.isfinite(error))):  # one photon says nothing of it
-        raise ValueError(f"{name}{ENDS[1]} must be finite and >= 0")
+    if not np.all(error >= 0):  # infinite where one photon or one batch says nothing of it
+        raise ValueError(f"{name}{ENDS[1]} must be >= 0")
     if not np.all(samples >= 0):
         raise ValueError(f"{name}{ENDS[2]} must be >= 0")
     return Estimate(*(np.asarray(part, float) if part.ndim else float(part) for part in parts))

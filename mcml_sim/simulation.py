@@ -14,7 +14,7 @@ from mcml_sim.grid import Grid, require_resolved
 from mcml_sim.medium import Medium
 from mcml_sim.quantities import Precision, Tally, require_quantity
 from mcml_sim.run import run_batches
-from mcml_sim.store import Store, require_ours
+from mcml_sim.store import Store, manifest, require_ours
 
 BATCH_PHOTONS = {matched: pool.BATCH_PHOTONS, layered: layered.BATCH_PHOTONS}
 
@@ -78,6 +78,11 @@ def batch_photons(medium: Medium) -> int:
 def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
     """StoreError if `simulate` could not keep batches in that folder because of what is there; nothing is written."""
     require_ours(folder, _made_by(medium, grid, seed))
+
+
+def is_store_of(folder: Path, medium: Medium, grid: Grid, seed: int) -> bool:
+    """Whether the batches in that folder are of such a run, by whatever version and on whatever machine."""
+    return _made_by(medium, grid, seed).items() <= (manifest(folder) or {}).items()
 
 
 class _Enough:

@@ -12,7 +12,9 @@ import functools
 import hashlib
 import io
 import json
+import os
 import platform
+import re
 import time
 import warnings
 from collections.abc import Callable, Mapping
@@ -24,11 +26,11 @@ import jaxlib.version
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.errors import ELSEWHERE, RESUMES, StoreError
+from mcml_sim.errors import ELSEWHERE, RESUMES, Notice, OutputError, StoreError
 from mcml_sim.npz import read_npz
 from mcml_sim.text_file import parse_json
 from mcml_sim.version import __version__
-from mcml_sim.whole_file import replace_whole
+from mcml_sim.whole_file import UNFINISHED, write_whole
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
@@ -36,12 +38,15 @@ STALE_AFTER = 600.0
 # A seal is no secret, so batches are held against bounds as any file is [bytes, packed or not].
 MAX_BATCH = 2**28  # the finest grid's are half of it
 MAX_MANIFEST = 2**23  # 65537 edges an axis are 3 MB
+# What a store's files are called, and what is left of them when a run is killed while it writes one.
+KEPT = re.compile(r"run\.json|batch-[0-9]{8,}\.npz")
+HALF_WRITTEN = re.compile(rf"\.?({KEPT.pattern})\..*{re.escape(UNFINISHED)}")
 SEAL_BYTES = 64  # SHA-256 in hexadecimal
 LONGEST_SHOWN = 60  # characters of a value in a message
 SHARED_SHOWN = 12  # of them, those before the first that differs
 
 
-class DamagedBatch(UserWarning):
+class DamagedBatch(Notice):
     """A batch in a store is not what was written there; it is traced again."""
 
 
@@ -84,7 +89,10 @@ class Store(Generic[R]):
         try:
             fields = _unsealed(_read(path, MAX_BATCH))
             if str(fields.pop("made_by", "")) != self._digest:
-                raise StoreError(f"{path} was made by another run; delete it to redo just that batch")
+                raise StoreError(
+                    f"{path} was made by another run; if that is still at work, {ELSEWHERE}; "
+                    "if not, delete that file to redo just that batch"
+                )
             return self._read(fields)
         except FileNotFoundError:
             return None
@@ -113,18 +121,16 @@ class Store(Generic[R]):
             self._write(path, contents)
 
     def _sweep(self) -> None:
-        for leftover in self.folder.glob("*.part"):
+        for name in filter(HALF_WRITTEN.fullmatch, os.listdir(self.folder)):
             with contextlib.suppress(FileNotFoundError):  # another run swept it first
-                if time.time() - leftover.stat().st_mtime > STALE_AFTER:
+                if time.time() - (leftover := self.folder / name).stat().st_mtime > STALE_AFTER:
                     leftover.unlink()
 
     def _write(self, path: Path, data: bytes) -> None:
         try:
-            replace_whole(path, data)
-        except OSError as error:
-            raise StoreError(
-                f"cannot write to store {self.folder}: {_reason(error)}; what it holds is whole, {RESUMES}"
-            ) from error
+            write_whole(path, data)
+        except OutputError as error:
+            raise StoreError(f"{error}; what the store holds is whole, {RESUMES}") from error
 
 
 def require_ours(folder: Path, made_by: dict[str, object]) -> None:
@@ -134,20 +140,42 @@ def require_ours(folder: Path, made_by: dict[str, object]) -> None:
         raise StoreError(f"cannot use {folder} as a store: it is there already, and no folder")
     if not batches(folder):  # it is of a run that ended before its first
         return
-    found = _read_manifest(folder / MANIFEST)
+    found = manifest(folder)
     if found is None:
         return
     # What kind of run it is tells most, and explains other differences.
     for name in sorted(here.keys() | found.keys(), key=lambda name: (name != "kind", name)):
         if found.get(name) != here.get(name):
             one, other = _apart(found.get(name), here.get(name))
-            raise StoreError(f"{folder} was made by another run: {name} is {one} there, {other} here; {ELSEWHERE}")
+            raise StoreError(
+                f"{folder} was made by another run: {name} is {one} there, {other} here; "
+                f"{ELSEWHERE}, or delete it if that run is over"
+            )
 
 
 def batches(folder: Path) -> list[int]:
     """The numbers of the batches in a folder, of whatever run."""
     numbers = (path.stem.removeprefix("batch-") for path in folder.glob("batch-*.npz"))
     return sorted(int(number) for number in numbers if number.isdecimal())
+
+
+def strange(folder: Path) -> list[str]:
+    """The names in a folder of what no store has put there; none if there is no folder."""
+    if not folder.is_dir():
+        return []
+    ours = [name for name in os.listdir(folder) if KEPT.fullmatch(name) or HALF_WRITTEN.fullmatch(name)]
+    if not batches(folder) and "mcml_sim" not in (manifest(folder) or {"mcml_sim": None}):
+        ours.remove(MANIFEST)
+    return sorted(set(os.listdir(folder)) - set(ours))
+
+
+def discard(folder: Path) -> None:
+    """Remove what a store keeps, and its folder if nothing else is in it."""
+    with contextlib.suppress(OSError):  # left behind, it is in nobody's way but another run's, which says so
+        for name in os.listdir(folder):
+            if KEPT.fullmatch(name) or HALF_WRITTEN.fullmatch(name):
+                (folder / name).unlink(missing_ok=True)
+        folder.rmdir()
 
 
 def _read(path: Path, most: int) -> bytes:
@@ -185,7 +213,9 @@ def _seal(body: bytes) -> bytes:
     return hashlib.sha256(body).hexdigest().encode()
 
 
-def _read_manifest(path: Path) -> dict[str, object] | None:
+def manifest(folder: Path) -> dict[str, object] | None:
+    """What made the batches in a folder, None if nothing says; StoreError if that is damaged."""
+    path = folder / MANIFEST
     try:
         found = parse_json(_read(path, MAX_MANIFEST), MAX_MANIFEST, infinite=True)
     except FileNotFoundError:

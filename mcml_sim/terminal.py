@@ -13,8 +13,8 @@ from collections.abc import Iterator
 from types import FrameType
 
 from mcml_sim import letters
+from mcml_sim.lazy import INTERRUPTED
 
-INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 STOPPING = "mcml-sim: stopping after the batches in flight; Ctrl-C again stops at once\n"
 SHOW_CURSOR = "\x1b[?25h"  # which a progress bar hides
 

@@ -30,21 +30,21 @@ LONGEST_SHOWN = 40  # characters of a number or key in a message
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
-    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: expected ..., got ...`."""
+    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: is not JSON: ...`."""
     content = read_whole(path, most)
     try:
         return parse_json(content, most)
     except ValueError as error:
-        raise InputError(f"{path}: expected JSON, got: {error}") from None
+        raise InputError(f"{path}: is not JSON: {error}") from None
 
 
 def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, Any]:
-    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: expected ..., got ...`."""
+    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: is not TOML: ...`."""
     content = read_whole(path, most)
     try:
         return parse_toml(content, most)
     except ValueError as error:
-        raise InputError(f"{path}: expected TOML, got: {error}") from None
+        raise InputError(f"{path}: is not TOML: {error}") from None
 
 
 def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) -> Any:

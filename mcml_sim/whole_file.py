@@ -1,14 +1,33 @@
-"""Files as a whole: read up to a bound, and whole or absent, whatever happens while they are written."""
+"""Files as a whole: read up to a bound, and whole or absent, whatever happens while they are written.
+
+Everything that either package writes goes through here. What had the name before stays until the new file is whole:
+
+link            is followed, and what it leads to is replaced; a dangling one gets its file
+device, pipe    is written into; so is /dev/stdout, whatever that is; a pipe that nobody reads from is refused
+folder, disk    is refused, and so is a socket
+mode            stays that of the file before, and its owner as far as the system allows; of a new file the umask says
+read-only file  is refused where the system would not let this user write into it (root it lets)
+hard link       parts: this name gets the new file, the other names keep the old one
+"""
 
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import reprlib
+import secrets
+import stat
+import sys
 import tempfile
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 from mcml_sim.errors import InputError, OutputError
+
+UNFINISHED = ".part"  # ends the name of a file that is not whole yet, or about to be replaced
+NAME_KEPT = 30  # characters of its name in that name: file systems hold 255 bytes, some of them 143
+LONGEST_CHAIN = 40  # links, as in Linux
 
 
 def checked_path(path: object) -> Path:
@@ -31,49 +50,202 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
         raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
 
 
-def require_writable(path: Path) -> None:
-    """OutputError unless `write_whole(path)` can work: better now than after an hour of photons. Makes its folder."""
-    _target(path)
+def require_folder(folder: Path) -> None:
+    """OutputError unless files can be made in `folder`: better now than after an hour of photons. Makes the folder."""
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=path.parent):
+        folder.mkdir(parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder):
             pass
-    except OSError as error:
-        raise OutputError(f"cannot write into {path.parent}: {error.strerror or error}") from None
-
-
-def write_whole(path: Path, data: bytes) -> None:
-    """Write a file under another name, then rename it: what had the name before stays until the new file is whole.
-
-    OutputError names file and reason.
-    """
-    target = _target(path)
-    try:
-        replace_whole(target, data)
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-def replace_whole(target: Path, data: bytes) -> None:
-    """The same for a file that is known to be one; OSError if it cannot be written."""
-    part = target.with_name(f"{target.name}.{os.getpid()}.part")
-    try:
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(part, target)
-    finally:
-        with contextlib.suppress(OSError):  # renamed, or the folder is gone: then the error on its way up says so
-            part.unlink()
-
-
-def _target(path: Path) -> Path:
-    """The file that a link leads to; never a folder or a device, which a renamed file would replace."""
-    try:
-        target = Path(os.path.realpath(path))
-        if target.exists() and not target.is_file():
-            raise OutputError(f"cannot write {path}: it is there already, and no file")
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot write {path}: {getattr(error, 'strerror', None) or error}") from None
-    return target
+        raise OutputError(f"cannot write into {folder}: {_reason(error)}") from None
+
+
+def require_target(path: Path) -> None:
+    """OutputError if what has that name already cannot be replaced or written into; makes nothing."""
+    with _named(path):
+        _target(path)
+
+
+def require_writable(path: Path) -> None:
+    """OutputError unless `write_whole(path)` can work, as far as one can tell before. Makes its folder."""
+    with _named(path):
+        target = _target(path)
+    if target is not None:
+        require_folder(target.parent if path.is_symlink() else path.parent)
+
+
+def write_whole(path: Path, content: bytes | str) -> None:
+    """Write a file, whole or not at all; text in UTF-8. OutputError names file and reason."""
+    write_together({path: content})
+
+
+def write_together(contents: Mapping[Path, bytes | str]) -> None:
+    """Write files that belong together: all of them, or none. OutputError names the file and the reason.
+
+    All are on the disk under other names before the first gets its own. The last one is what others are read for: if
+    the machine stops while they are renamed, it is missing and never beside files that it does not belong to.
+    """
+    files: dict[Path, tuple[Path, Path]] = {}  # target -> the path as given, and the file that is to replace it
+    streams: dict[Path, bytes] = {}
+    leftovers: list[Path] = []
+    try:
+        for path, content in contents.items():
+            with _named(path):
+                data = content.encode() if isinstance(content, str) else content
+                target = _target(path)
+                if target is None:
+                    streams[path] = data
+                elif target in files:
+                    raise OSError(errno.EEXIST, f"it is the same file as {files[target][0]}")
+                else:
+                    files[target] = path, _beside(target)
+                    leftovers.append(files[target][1])
+                    _fill(files[target][1], data, target)
+        for path, data in streams.items():
+            with _named(path):
+                _pour(path, data)
+        _exchange(files, leftovers)
+    finally:
+        try:
+            _remove(leftovers)
+        finally:  # once more, where Ctrl-C fell into it
+            _remove(leftovers)
+
+
+def _target(path: Path) -> Path | None:
+    """The file to be replaced, where links lead; None for what is written into. OSError if it can be neither."""
+    if _stream(path) is not None:
+        return None
+    target = Path(os.path.realpath(path))
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return target
+    for is_it, refused in (
+        (stat.S_ISDIR, "it is a folder"),
+        (stat.S_ISBLK, "it is a disk, not a file"),
+        (stat.S_ISSOCK, "it is a socket, not a file"),
+    ):
+        if is_it(mode):
+            raise OSError(errno.EEXIST, refused)
+    if not os.access(path, os.W_OK):
+        raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    return target if stat.S_ISREG(mode) else None
+
+
+def _stream(path: Path) -> int | None:
+    """The open file descriptor that a path such as /dev/stdout or /dev/fd/3 stands for.
+
+    What it is open on may be a file. To replace that would part it from whoever writes to the same stream.
+    """
+    own = os.path.realpath("/proc/self/fd")
+    for _ in range(LONGEST_CHAIN):
+        if path.name.isdecimal() and os.path.realpath(path.parent) == own:
+            return int(path.name)
+        if not path.is_symlink():
+            break
+        path = path.parent / os.readlink(path)
+    return None
+
+
+def _pour(path: Path, data: bytes) -> None:
+    """Write into what is no regular file."""
+    if (stream := _stream(path)) is not None:
+        if sys.stdout:
+            sys.stdout.flush()  # what was printed before stands before
+        handle = os.dup(stream)
+    else:
+        handle = _opened(path)
+    with open(handle, "wb") as file:
+        file.write(data)
+
+
+def _opened(path: Path) -> int:
+    """A device, or a pipe that somebody reads from; neither is waited for."""
+    try:
+        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+    except OSError as error:
+        if error.errno == errno.ENXIO:
+            raise OSError(errno.ENXIO, "it is a pipe that nobody reads from") from None
+        raise
+    if stat.S_ISREG(os.fstat(handle).st_mode):
+        os.close(handle)
+        raise OSError(errno.EEXIST, "somebody put a file in its place just now")
+    if sys.platform != "win32":
+        os.set_blocking(handle, True)
+    return handle
+
+
+def _beside(target: Path) -> Path:
+    """A name that no file has, in the same folder."""
+    return target.with_name(f".{target.name[:NAME_KEPT]}.{secrets.token_hex(4)}{UNFINISHED}")
+
+
+def _fill(part: Path, data: bytes, target: Path) -> None:
+    """Make the file that is to replace `target`, with the mode and the owner that it keeps, and see it on the disk."""
+    with part.open("xb") as file:  # x: never through a link that somebody put there
+        with contextlib.suppress(FileNotFoundError):
+            before = target.stat()
+            _own(part, before)
+            part.chmod(stat.S_IMODE(before.st_mode) & 0o777)
+        file.write(data)
+        file.flush()
+        os.fsync(file.fileno())
+
+
+def _own(part: Path, before: os.stat_result) -> None:
+    """Keep owner and group, or at least the group, where the system allows it."""
+    if sys.platform != "win32":
+        for owner in (before.st_uid, -1):
+            with contextlib.suppress(OSError):
+                os.chown(part, owner, before.st_gid)
+                return
+
+
+def _exchange(files: Mapping[Path, tuple[Path, Path]], leftovers: list[Path]) -> None:
+    """Give files the names of their targets: all or none. What had these names before is added to `leftovers`.
+
+    One file is replaced at once. Of several the old ones are first moved aside, the last one before all others.
+    """
+    aside: dict[Path, Path] = {}
+    placed: list[Path] = []
+    try:
+        if len(files) > 1:
+            for target, (path, _) in reversed(list(files.items())):
+                if target.exists():
+                    aside[target] = _beside(target)
+                    with _named(path):
+                        target.rename(aside[target])
+        for target, (path, part) in files.items():
+            placed.append(target)
+            with _named(path):
+                os.replace(part, target)
+        leftovers.extend(aside.values())
+    except BaseException:
+        if len(files) > 1:
+            for target in reversed(placed):
+                with contextlib.suppress(OSError):
+                    target.unlink()
+        for target, before in reversed(list(aside.items())):
+            with contextlib.suppress(OSError):
+                before.replace(target)
+        raise
+
+
+def _remove(leftovers: list[Path]) -> None:
+    for one in leftovers:
+        with contextlib.suppress(OSError):  # renamed, or the folder is gone: then the error on its way up says so
+            one.unlink()
+
+
+@contextlib.contextmanager
+def _named(path: Path) -> Iterator[None]:
+    """What the system says of a file, as an OutputError in one line."""
+    try:
+        yield
+    except (OSError, ValueError) as error:
+        raise OutputError(f"cannot write {path}: {_reason(error)}") from None
+
+
+def _reason(error: Exception) -> str:
+    return (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]

@@ -1,10 +1,9 @@
 """Closed-form laws of subsurface scattering, fitted to simulated or exact light, with error bars."""
 
-from typing import TYPE_CHECKING
-
 from mcml_sim.lazy import attributes
 from profilefit.errors import InputError, OutputError, RecipeError, RecordError, SettingError, StoreError
 
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest, while Ctrl-C is a traceback
 if TYPE_CHECKING:
     from profilefit.catalogue import albedo_law, load, names
     from profilefit.chains import Posterior, posterior

@@ -1,5 +1,12 @@
-"""`python -m profilefit` is the profilefit command."""
+"""`python -m profilefit` is the profilefit command, and so is the script of that name."""
 
-from profilefit.cli import main
+from mcml_sim.lazy import command
 
-main()
+
+def main() -> None:
+    """Run the command."""
+    command("profilefit.cli")
+
+
+if __name__ == "__main__":
+    main()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -9,7 +10,7 @@ import numpy as np
 
 from mcml_sim.setting import Setting
 from profilefit import record
-from profilefit.errors import InputError, RecordError, SettingError
+from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.folder import fits_folder
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
@@ -80,7 +81,9 @@ def load(
     setting    the light and surface the constants must belong to; by default that of the set or record that was named,
                and Setting() of regenerated ones
     folder     where the regenerated records lie, by default those of this installation
-    Raises InputError on an unknown law or set, SettingError where no such constants exist for the setting.
+    Raises InputError on an unknown law or set, RecordError where the folder has no such record, SettingError where no
+    such constants exist for the setting. Where the folder lacks only the map between alpha and A that normalises laws,
+    the shipped one serves, with a ShippedMap warning.
     """
     kind, key = _profile_law(name), SHORT.get(name, name)
     values, where = _constants(kind, key, key, constants, _checked(setting), folder or fits_folder())
@@ -102,8 +105,21 @@ def albedo_law(
 
 def normalisation(setting: Setting, folder: Path | None = None) -> Rational:
     """The map that scales profile laws to their reflectance; SettingError where the setting has none."""
-    name, content = _regenerated(ALBEDO_RECORD, setting, folder or fits_folder())
-    return _made(Rational, _of_record(content, setting, name), name, setting=setting)
+    path = map_file(setting, folder)
+    if folder is not None and path.parent != folder:
+        warnings.warn(
+            f"no record {path.stem!r} in {str(folder)!r}: the shipped map serves",
+            ShippedMap,
+            stacklevel=3,
+        )
+    return _made(Rational, _of_record(record.read(path), setting, path.stem), path.stem, setting=setting)
+
+
+def map_file(setting: Setting, folder: Path | None = None) -> Path:
+    """The record of that map: in the folder, or the one shipped. SettingError where neither has one of the setting."""
+    if folder is not None and (path := folder / f"{record_name(ALBEDO_RECORD, setting)}.json").exists():
+        return path
+    return record_file(ALBEDO_RECORD, setting, fits_folder())
 
 
 def record_name(base: str, setting: Setting) -> str:
@@ -118,13 +134,25 @@ def record_name(base: str, setting: Setting) -> str:
     return "-".join(parts)
 
 
+def record_file(base: str, setting: Setting, folder: Path) -> Path:
+    """The record of a setting in a folder, by its name for Setting().
+
+    SettingError that lists the settings there are; RecordError where there is none at all.
+    """
+    if (path := folder / f"{record_name(base, setting)}.json").exists():
+        return path
+    if known := regenerated_settings(base, folder):
+        there = "; ".join(str(one) for one in known)
+        raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
+    raise RecordError(f"{path}: there is no such record; `profilefit regenerate {base} --out {folder}` makes it")
+
+
 def regenerated_settings(base: str, folder: Path | None = None) -> tuple[Setting, ...]:
     """The settings that a record was regenerated for, by its name for Setting()."""
     found = {}
-    for place in (folder or fits_folder(), fits_folder()):
-        for name, path in record.available(place).items():
-            if name.startswith(base) and record_name(base, setting := record_setting(record.read(path))) == name:
-                found[name] = setting
+    for name, path in record.available(folder or fits_folder()).items():
+        if name.startswith(base) and record_name(base, setting := record_setting(record.read(path))) == name:
+            found[name] = setting
     return tuple(found[name] for name in sorted(found))
 
 
@@ -183,8 +211,8 @@ def _all_regenerated(kind: type[Constants], key: str, law: str, setting: Setting
         )
     values: dict[str, float] = {}
     for base in REGENERATED[key]:
-        name, content = _regenerated(base, setting, folder)
-        values |= _of_record(content, setting, name)
+        path = record_file(base, setting, folder)
+        values |= _of_record(record.read(path), setting, path.stem)
     return values
 
 
@@ -201,19 +229,6 @@ def _printed(law: str, which: str, asked: Setting | None) -> tuple[dict[str, flo
 
 def _accepted(law: str) -> str:
     return ", ".join([*(s.name for s in published.SETS if s.law == law), "the path of a record (.json)"])
-
-
-def _regenerated(base: str, setting: Setting, folder: Path) -> tuple[str, dict[str, Any]]:
-    """The record of a setting: its name and what it says. SettingError that lists the settings there are."""
-    name = record_name(base, setting)
-    for place in (folder, fits_folder()):
-        if (path := place / f"{name}.json").exists():
-            return name, record.read(path)
-    known = regenerated_settings(base, folder)
-    if not known:
-        return name, record.read(folder / f"{name}.json")  # a RecordError that says what to do
-    there = "; ".join(str(one) for one in known)
-    raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
 
 
 def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str, float]:

@@ -1,8 +1,19 @@
 """What can go wrong in fitting, by name. Every message says what was wrong, what was got and what is accepted."""
 
-from mcml_sim.errors import InputError, OutputError, SettingError, StoreError
+from mcml_sim.errors import InputError, Notice, OutputError, SettingError, StoreError
 
-__all__ = ["InputError", "OutputError", "RecipeError", "RecordError", "SettingError", "ShaderError", "StoreError"]
+__all__ = [
+    "InputError",
+    "Notice",
+    "OtherRecords",
+    "OutputError",
+    "RecipeError",
+    "RecordError",
+    "SettingError",
+    "ShaderError",
+    "ShippedMap",
+    "StoreError",
+]
 
 
 class RecipeError(InputError):
@@ -11,6 +22,14 @@ class RecipeError(InputError):
 
 class RecordError(InputError):
     """A record that is missing, malformed or belongs to something else."""
+
+
+class OtherRecords(Notice):
+    """The records in use are not those that came with this installation."""
+
+
+class ShippedMap(Notice):
+    """A folder of records lacks the map between alpha and A of a setting: the shipped one serves."""
 
 
 class ShaderError(Exception):

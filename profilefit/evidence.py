@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from mcml_sim.version import __version__
+from mcml_sim.whole_file import require_folder
 from profilefit import record
 from profilefit.errors import InputError
 from profilefit.folder import LOCAL
@@ -54,7 +55,7 @@ def require_apart(out: Path, records: Path) -> None:
     taken = {records.resolve(), LOCAL.resolve()}
     if out.resolve() in taken:
         raise InputError(f"--out must be another folder than that of the records, got {out}")
-    record.require_writable(out)
+    require_folder(out)
 
 
 def processor() -> str:

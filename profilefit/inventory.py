@@ -24,13 +24,18 @@ class Named:
     """A law with its constants, at home in one setting.
 
     name     of the law in the catalogue; constants the printed set or the records they come from, "" if it has none
-    records  the names of those records
+    files    those records; constants that they do not hold are as printed
     """
 
     name: str
     constants: str
     law: Any
-    records: tuple[str, ...] = ()
+    files: tuple[Path, ...] = ()
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        """The names of those records."""
+        return tuple(path.stem for path in self.files)
 
     @property
     def label(self) -> str:
@@ -67,7 +72,7 @@ def albedo_laws(folder: Path, records: Records = None, matched: bool = True) -> 
         if (name := s.law.removesuffix(PRINTED_MAP)) != s.law
     ]
     keys = [key for key in catalogue.REGENERATED if key.startswith(REGENERATED_MAP)]
-    return _asked([*printed, *_regenerated(folder, keys, matched)], records)
+    return [*(printed if records is None else ()), *_regenerated(folder, keys, records, matched)]
 
 
 def find(name: str, folder: Path, constants: str | None = None) -> Named:
@@ -108,20 +113,28 @@ def _profile_by_name(name: str, constants: str | None, folder: Path) -> Named:
     key = catalogue.SHORT.get(name, name)
     which = constants or _default(key, key, bool(catalogue.PROFILE_LAWS[name].constant_names()))
     law = catalogue.load(name, which, folder=folder)
-    return _named(key, key, which, law)
+    return _named(key, key, which, law, folder)
 
 
 def _map_by_name(name: str, constants: str | None, folder: Path) -> Named:
     key = REGENERATED_MAP + name
     which = constants or _default(key, name + PRINTED_MAP, True)
-    return _named(name, key, which, catalogue.albedo_law(name, which, folder=folder))
+    return _named(name, key, which, catalogue.albedo_law(name, which, folder=folder), folder)
 
 
-def _named(name: str, key: str, which: str, law: Any) -> Named:
+def _named(name: str, key: str, which: str, law: Any, folder: Path) -> Named:
     """Under the key of `catalogue.REGENERATED`."""
-    records = catalogue.REGENERATED.get(key, ()) if which == "regenerated" else ()
-    told = " + ".join(records) or (which.removeprefix("published:") if law.constant_names() else "")
-    return Named(name, told, law, records)
+    if which == "regenerated":
+        files = _files(key, law.setting, folder)
+    else:
+        files = (Path(which),) if which.endswith(".json") else ()
+    told = " + ".join(path.stem for path in files) or which.removeprefix("published:")
+    return Named(name, told if law.constant_names() else "", law, files)
+
+
+def _files(key: str, setting: Setting, folder: Path) -> tuple[Path, ...]:
+    bases = catalogue.REGENERATED.get(key, ())
+    return tuple(folder / f"{catalogue.record_name(base, setting)}.json" for base in bases)
 
 
 def _default(key: str, printed_as: str, has_constants: bool) -> str:
@@ -138,53 +151,52 @@ def _default(key: str, printed_as: str, has_constants: bool) -> str:
 
 def _whole_laws(folder: Path, records: Records, matched: bool) -> list[Named]:
     """Printed sets, laws without constants, and laws made of all their regenerated records."""
+    keys = [key for key in catalogue.REGENERATED if not key.startswith(REGENERATED_MAP)]
+    regenerated = _regenerated(folder, keys, records, matched)
+    if records is not None:  # others are of none
+        return regenerated
     known = catalogue.PROFILE_LAWS
     printed = [
         Named(s.law, s.name, catalogue.load(s.law, s.name, folder=folder)) for s in published.SETS if s.law in known
     ]
     bare = [name for name, kind in known.items() if not kind.constant_names()]
-    physical = [Named(name, "", catalogue.load(name, folder=folder)) for name in bare]
-    keys = [key for key in catalogue.REGENERATED if not key.startswith(REGENERATED_MAP)]
-    return _asked([*printed, *physical, *_regenerated(folder, keys, matched)], records)
+    return [*printed, *(Named(name, "", catalogue.load(name, folder=folder)) for name in bare), *regenerated]
 
 
-def _regenerated(folder: Path, keys: Sequence[str], matched: bool) -> list[Named]:
+def _regenerated(folder: Path, keys: Sequence[str], records: Records, matched: bool) -> list[Named]:
     """The laws under these keys of `catalogue.REGENERATED`, in every setting whose records all are in the folder."""
-    there = _usable(folder, matched)
+    there = _usable(folder, records, matched)
     settings = dict.fromkeys(catalogue.record_setting(content) for content in there.values())
     found = []
     for key in keys:
         name = key.removeprefix(REGENERATED_MAP)
         load = catalogue.load if name == key else catalogue.albedo_law
         for setting in settings:
-            records = tuple(catalogue.record_name(base, setting) for base in catalogue.REGENERATED[key])
-            if all(one in there for one in records):
-                law = load(name, setting=setting, folder=folder)
-                found.append(Named(name, " + ".join(records), law, records))
+            names = [path.stem for path in _files(key, setting, folder)]
+            if set(names) & set(there) and len(_usable(folder, names, matched)) == len(names):
+                found.append(_named(name, key, "regenerated", load(name, setting=setting, folder=folder), folder))
     return found
 
 
 def _single(folder: Path, records: Records, pipelines: tuple[str, ...], matched: bool) -> list[Named]:
     """Records that no law takes by its name alone; constants that they do not hold are as printed."""
-    taken = {name for one in _regenerated(folder, list(catalogue.REGENERATED), matched) for name in one.records}
+    whole = _regenerated(folder, list(catalogue.REGENERATED), records, matched)
+    taken = {name for one in whole for name in one.records}
     found = []
-    for name, content in _usable(folder, matched).items():
+    for name, content in _usable(folder, records, matched).items():
         if name not in taken and content["pipeline"] in pipelines:
-            law = catalogue.load(content["law"], str(folder / f"{name}.json"), folder=folder)
-            found.append(Named(content["law"], name, law, (name,)))
-    return _asked(found, records)
+            path = folder / f"{name}.json"
+            found.append(Named(content["law"], name, catalogue.load(content["law"], str(path), folder=folder), (path,)))
+    return found
 
 
-def _usable(folder: Path, matched: bool) -> dict[str, dict[str, Any]]:
-    """The records of fits that converged."""
-    found = {name: record.read(path, whole=True) for name, path in record.available(folder).items()}
+def _usable(folder: Path, records: Records, matched: bool) -> dict[str, dict[str, Any]]:
+    """The records of a folder, or those named, of fits that converged."""
+    there = {n: path for n, path in record.available(folder).items() if records is None or n in records}
+    found = {name: record.read(path, whole=True) for name, path in there.items()}
     return {name: content for name, content in found.items() if "constants" in content and _is_usable(content, matched)}
 
 
 def _is_usable(content: dict[str, Any], matched: bool) -> bool:
     setting = catalogue.record_setting(content)
     return content["fit"]["result"] == "converged" and (setting.is_matched_isotropic or not matched)
-
-
-def _asked(found: list[Named], records: Records) -> list[Named]:
-    return found if records is None else [one for one in found if set(one.records) & set(records)]

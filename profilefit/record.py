@@ -7,10 +7,9 @@ curves that figures need lie beside it in an .npz of the same name.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-import os
-import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -19,48 +18,31 @@ import numpy as np
 
 from mcml_sim.npz import read_npz
 from mcml_sim.plain import plain as to_plain
-from mcml_sim.whole_file import read_whole
+from mcml_sim.text_file import MOST_JSON, parse_json
+from mcml_sim.whole_file import read_whole, require_folder, write_together
 from profilefit import schema
-from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.errors import InputError, RecordError
 
 FORMAT = 1
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
-LONGEST_FILE = 4 * 2**20  # bytes of a record; ours have 4e4
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 
 
 def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
-    """Write `name`.json and `name`.npz into `folder`, each whole or not at all. OutputError names folder and reason."""
+    """Write `name`.json and `name`.npz into `folder`, both or neither. OutputError names the file and the reason."""
     body = plain({"format": FORMAT, "name": name, **content})
-    text = json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        if arrays:
-            _replace(folder / f"{name}.npz", lambda file: np.savez_compressed(file, allow_pickle=False, **arrays))
-        _replace(folder / f"{name}.json", lambda file: file.write(text.encode()))
-    except OSError as error:
-        raise OutputError(f"cannot write record {name!r} into {folder}: {error.strerror or error}") from None
-    return folder / f"{name}.json"
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, whole or not at all. OutputError names file and reason."""
-    try:
-        _replace(path, lambda file: file.write(text.encode()))
-    except OSError as error:
-        raise OutputError(f"cannot write {path}: {error.strerror or error}") from None
-
-
-def require_writable(folder: Path) -> None:
-    """OutputError unless files can be made in `folder`: better now than after an hour of photons."""
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            pass
-    except OSError as error:
-        raise OutputError(f"cannot write into {folder}: {error.strerror or error}") from None
+    contents: dict[Path, bytes | str] = {}
+    if arrays:
+        file = io.BytesIO()
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+        contents[folder / f"{name}.npz"] = file.getvalue()
+    path = folder / f"{name}.json"
+    contents[path] = json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    require_folder(folder)
+    write_together(contents)
+    return path
 
 
 def read(path: Path, whole: bool = False) -> dict[str, Any]:
@@ -72,13 +54,10 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:
-        data = read_whole(path, LONGEST_FILE)
-        if len(data) > LONGEST_FILE:
-            raise ValueError(f"longer than {LONGEST_FILE} bytes")
-        content = json.loads(data.decode("utf-8"), parse_constant=_refused)
+        content = parse_json(read_whole(path, MOST_JSON))
     except InputError as error:
         raise RecordError(f"{path}: cannot be read ({str(error).rpartition('got: ')[2]})") from None
-    except (ValueError, RecursionError) as error:
+    except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
@@ -86,10 +65,6 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     if text := schema.problem(content, whole):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     return content
-
-
-def _refused(word: str) -> float:
-    raise ValueError(f"{word} is no number in JSON")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -125,18 +100,3 @@ def versions() -> dict[str, str]:
 def plain(value: Any) -> Any:
     """`mcml_sim.plain` with the digits of a record: numbers, text, lists and dicts; None for what is not finite."""
     return to_plain(value, DIGITS)
-
-
-def _replace(target: Path, fill: Callable[[Any], object]) -> None:
-    """Fill a temporary file beside `target`, then rename it: a reader sees the old file or the new one."""
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            fill(file)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        os.unlink(name)
-        raise

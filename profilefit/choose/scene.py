@@ -30,6 +30,8 @@ TABLES = {
     "layers": ("n", "mu_a", "mu_s", "g", "thickness"),
 }
 LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
+LONGEST_TEXT = 60  # characters
+LENGTHS = (1e-9, 1e9)  # in the unit of the mean free paths
 MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
 
 
@@ -94,6 +96,12 @@ class _Reader:
         pixel = self.range("view", "pixel", view)
         radius = world * self.number("view", "radius", view, math.inf)
         longest = max(most for _, most in mfp)
+        pixel = (world * pixel[0], world * pixel[1])
+        curved = math.isfinite(view.get("radius", math.inf))
+        self.lengths("view", "pixel", pixel)
+        self.lengths("view", "radius", (radius,) if curved else ())
+        for channel, ends in zip(CHANNELS, mfp, strict=True):
+            self.lengths(f"material.{channel}", "mfp", ends)
         if radius < LEAST_RADIUS * longest:
             least = f"at least {LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest / world:.3g}"
             raise self.bad("view", "radius", least, view["radius"])
@@ -102,14 +110,21 @@ class _Reader:
             setting=setting,
             reflectance=_three(reflectance),
             mfp=_three(mfp),
-            pixel=(world * pixel[0], world * pixel[1]),
+            pixel=pixel,
             radius=radius,
             tolerance=self.number("tolerance", "error", tolerance, most=1.0),
-            within=self.made("tolerance", lambda: Within(tolerance.get("mfp", 4.0), tolerance.get("pixels", 2))),
+            within=self.within(tolerance),
             budget=self.budget(budget, view),
             resolution=self.resolution(view),
             layers=self.layers(content.get("layers")),
         )
+
+    def within(self, tolerance: Table) -> Within:
+        pixels = tolerance.get("pixels", 2)
+        if type(pixels) is not int:
+            raise self.bad("tolerance", "pixels", "a whole number in 1 ... 100", pixels)
+        mfp = self.number("tolerance", "mfp", tolerance, 4.0)
+        return self.made("tolerance", lambda: Within(mfp, pixels))
 
     def setting(self, material: Table) -> Setting:
         light = self.text("material", "light", material, "diffuse", ILLUMINATIONS)
@@ -195,19 +210,28 @@ class _Reader:
             raise self.bad(where, key, accepted, value)
         return float(ends[0]), float(ends[1])
 
+    def lengths(self, where: str, key: str, found: tuple[float, ...]) -> None:
+        """InputError unless ratios and squares of these lengths can be computed with."""
+        for one in found:
+            if not LENGTHS[0] <= one <= LENGTHS[1]:
+                words = f"between {LENGTHS[0]:g} and {LENGTHS[1]:g} in the unit of the mean free paths"
+                raise self.bad(where, key, words, one)
+
     def text(
         self, where: str, key: str, table: Table, default: str | None = None, accepted: tuple[str, ...] = ()
     ) -> str:
         value = table.get(key, default)
-        if not isinstance(value, str) or (accepted and value not in accepted):
-            raise self.bad(where, key, f"one of {', '.join(accepted)}" if accepted else "a text", value)
+        line = isinstance(value, str) and value.isprintable() and len(value) <= LONGEST_TEXT
+        if not line or (accepted and value not in accepted):
+            words = f"one of {', '.join(accepted)}" if accepted else f"a text of {LONGEST_TEXT} characters at most"
+            raise self.bad(where, key, words, value)
         return value
 
     def made(self, where: str, make: Any) -> Any:
         """What `make` makes; where it refuses, the message says in which file and table."""
         try:
             return make()
-        except (MediumError, TypeError) as error:
+        except MediumError as error:
             raise InputError(f"{self.file}: [{where}] {error}") from None
 
     def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:

@@ -11,7 +11,7 @@ from pathlib import Path
 import typer
 
 from profilefit import record
-from profilefit.folder import fits_folder, records_folder
+from profilefit.folder import fits_folder, known_folder
 from profilefit.laws.published import SETS
 
 LAWS = (
@@ -74,7 +74,7 @@ def constants(incomplete: str) -> Iterator[str]:
 
 def _folder(ctx: typer.Context) -> Path:
     asked = ctx.params.get("fits")
-    return records_folder(Path(asked) if asked else None)
+    return known_folder(Path(asked) if asked else None)
 
 
 def _starting(incomplete: str, known: Iterable[str]) -> Iterator[str]:

@@ -14,7 +14,7 @@ from rich.console import RenderableType
 from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import tracked, working
 from mcml_sim.screen import notes, print_json, screen, show, typed
-from profilefit import record
+from mcml_sim.whole_file import write_whole
 from profilefit.evidence import made, require_apart
 from profilefit.folder import records_folder
 from profilefit.inventory import Named
@@ -58,7 +58,7 @@ def check(
     quiet: bool,
 ) -> None:
     """Measure, print or keep, and exit with status 1 if a bound is broken."""
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     laws, maps = chosen(names or [], constants, folder)
     if out is not None:
         require_apart(out, folder)
@@ -66,7 +66,7 @@ def check(
     if out is not None or as_json:
         told = {"made": made(typed(), folder), "of": asked(names, constants), **_content(found)}
     if out is not None:
-        record.write_text(out / "check.json", json_text(told))
+        write_whole(out / "check.json", json_text(told))
         notes(quiet).print(f"wrote {out / 'check.json'}", markup=False)
     if as_json:
         print_json(told)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from profilefit import record
+from mcml_sim.whole_file import write_whole
 from profilefit.folder import records_folder
 from profilefit.inventory import find
 from profilefit.shader.export import export as exported
@@ -18,4 +18,4 @@ def export(what: str, lang: str, constants: str | None, name: str | None, out: P
     if out is None:
         sys.stdout.write(text)
     else:
-        record.write_text(out, text)
+        write_whole(out, text)

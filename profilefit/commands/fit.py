@@ -14,7 +14,8 @@ from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import working
 from mcml_sim.screen import notes, print_json, screen, show
 from mcml_sim.setting import ILLUMINATIONS, Setting
-from profilefit import catalogue, record
+from mcml_sim.whole_file import require_folder, write_whole
+from profilefit import catalogue
 from profilefit.errors import InputError, SettingError
 from profilefit.folder import records_folder
 from profilefit.laws.base import ProfileLaw
@@ -56,7 +57,7 @@ def fit(
     """Fit, print or keep, and exit with status 1 if the fit does not converge."""
     if seed < 0:
         raise InputError(f"--seed must be a whole number >= 0, got {seed}")
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     measured = read(data, unit, scale == FREE)
     measured = measured.within(_radius("--r-min", r_min, measured), _radius("--r-max", r_max, measured))
     setting = _setting(measured, light, n)
@@ -64,7 +65,7 @@ def fit(
     chosen = _law(law, constants, setting, folder)
     question = _question(chosen, measured, fix or [], scale, total)
     if out is not None:
-        record.require_writable(out)
+        require_folder(out)
     with working("fitting", quiet):
         answer = answered(fitted(measured, question, origin(law, constants, chosen.setting, folder)), seed)
         body = content(answer, law, constants)
@@ -80,7 +81,7 @@ def fit(
 
 
 def _write(answer: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
-    record.write_text(out / "fit.json", json_text(body))
+    write_whole(out / "fit.json", json_text(body))
     figures = [*residual_figure(answer, out), *posterior_figure(answer, out)]
     notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from mcml_sim.progress import is_watched
 from mcml_sim.screen import notes, print_json
+from mcml_sim.whole_file import require_folder
 from profilefit import calibrate, catalogue, recipe, record
 from profilefit.errors import InputError, RecipeError
 from profilefit.report.quality_tables import worst_measures
@@ -30,7 +31,7 @@ def regenerate(
     names = recipes or list(recipe.available(catalogue.fits_folder()))
     chosen = tuple(recipe.find(name, catalogue.fits_folder()) for name in names)
     _require_one_record_each(chosen)
-    record.require_writable(out)
+    require_folder(out)
     begin = time.perf_counter()
     run = Run(
         preset=str(preset),

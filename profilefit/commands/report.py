@@ -9,6 +9,7 @@ from typing import Any
 
 from mcml_sim.progress import tracked, working
 from mcml_sim.screen import notes, print_json, put, screen, show
+from mcml_sim.whole_file import require_folder, write_whole
 from profilefit import record
 from profilefit.errors import InputError, RecordError, ShaderError
 from profilefit.folder import evidence_folder, records_folder
@@ -33,7 +34,7 @@ def report(
 ) -> None:
     """Print what is asked for, or write it."""
     _require_one({"--markdown": markdown, "--html": html, "--json": as_json, "--quality": quality and not as_json})
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     contents = _contents(folder, names)
     if markdown is not None:
         _fill(markdown, contents, folder, quiet)
@@ -76,7 +77,7 @@ def _measured(folder: Path, names: list[str] | None, quiet: bool) -> law_tables.
 
 
 def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
-    record.require_writable(out)
+    require_folder(out)
 
     def track(plans: list[figures.Plan]) -> Iterable[figures.Plan]:
         return tracked(plans, "drawing", "figures", quiet=quiet)
@@ -97,6 +98,8 @@ def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, qui
 
 
 def _fill(path: Path, contents: Contents, folder: Path, quiet: bool) -> None:
+    if path.exists() and not path.is_file():  # to read a pipe would wait for ever
+        raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
     try:
         text = path.read_text(encoding="utf-8")
     except (OSError, UnicodeDecodeError) as error:
@@ -109,7 +112,7 @@ def _fill(path: Path, contents: Contents, folder: Path, quiet: bool) -> None:
                     measured[name] = make()
             except ShaderError as error:
                 notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
-    record.write_text(path, fill(text, sections(contents) | measured))
+    write_whole(path, fill(text, sections(contents) | measured))
 
 
 def _contents(folder: Path, names: list[str] | None) -> Contents:

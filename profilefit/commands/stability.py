@@ -11,7 +11,7 @@ from rich.console import RenderableType
 from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import tracked
 from mcml_sim.screen import notes, print_json, screen, show, typed
-from profilefit import record
+from mcml_sim.whole_file import write_whole
 from profilefit.evidence import made, require_apart
 from profilefit.folder import records_folder
 from profilefit.report.stability_figure import stability_figures
@@ -34,7 +34,7 @@ def stability(
     names: list[str] | None, out: Path | None, quick: bool, fits: Path | None, as_json: bool, quiet: bool
 ) -> None:
     """Look, print or keep, and exit with status 1 if something of this project broke its word."""
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     todo = jobs(names or [], folder, quick)
     if out is not None:
         require_apart(out, folder)
@@ -43,7 +43,7 @@ def stability(
         told = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}
     if out is not None:
         _write(parts, out)
-        record.write_text(out / "stability.json", json_text(told))
+        write_whole(out / "stability.json", json_text(told))
         notes(quiet).print(f"{out}: stability*.png, .svg; stability.csv, .json", markup=False)
     if as_json:
         print_json(told)
@@ -68,6 +68,6 @@ def _show(parts: Sequence[Part], named: bool) -> None:
 
 def _write(parts: Sequence[Part], out: Path) -> None:
     stability_figures([one for part in parts for one in part.cells], out)
-    record.write_text(out / "stability.csv", regions_csv(parts))
+    write_whole(out / "stability.csv", regions_csv(parts))
     if found := [one for part in parts for one in part.fits]:
-        record.write_text(out / "stability-fits.csv", fits_csv(found))
+        write_whole(out / "stability-fits.csv", fits_csv(found))

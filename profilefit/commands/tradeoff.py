@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
@@ -10,7 +9,9 @@ from typing import Any
 from mcml_sim.plain import as_json as json_text
 from mcml_sim.progress import tracked
 from mcml_sim.screen import notes, print_json, screen, show, typed
-from profilefit import record
+from mcml_sim.text_file import read_json
+from mcml_sim.whole_file import write_whole
+from profilefit.errors import InputError
 from profilefit.evidence import made, require_apart
 from profilefit.folder import records_folder
 from profilefit.report.tradeoff_figure import tradeoff_figure
@@ -29,7 +30,7 @@ SAME = ("version", "sha256", "machine")  # of `made`: what parts beside each oth
 def tradeoff(parts: list[str] | None, out: Path, quick: bool, fits: Path | None, as_json: bool, quiet: bool) -> None:
     """Measure each part, write it at once, and print it."""
     names = chosen(parts or [])
-    folder = records_folder(fits)
+    folder = records_folder(fits, quiet)
     require_apart(out, folder)
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": made(typed(), folder)}
@@ -65,14 +66,14 @@ def keep(file: Path, told: Mapping[str, Any]) -> None:
         kept = {name: {**own, **before[name]} for name in PARTS if isinstance(before.get(name), dict)}
     parts = {**kept, **told}
     heads = {name: value for name, value in told.items() if name not in PARTS}
-    record.write_text(file, json_text({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
+    write_whole(file, json_text({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
 
 
 def read(file: Path) -> Told:
     """What a tradeoff.json says, which is nothing if it is damaged or not there: it is only added to, or replaced."""
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
-    except (OSError, ValueError, RecursionError):
+        content = read_json(file)
+    except InputError:
         return {}
     return content if isinstance(content, dict) and isinstance(content.get("made"), dict) else {}
 
@@ -84,5 +85,5 @@ def is_alike(before: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
 
 def _written(found: Part, known: dict[str, str], out: Path) -> list[Path]:
     data = out / f"tradeoff-{found.name}.csv"
-    record.write_text(data, as_csv(found, known))
+    write_whole(data, as_csv(found, known))
     return [*tradeoff_figure(found, machine.caption(known), out), data]

@@ -20,12 +20,22 @@ from profilefit.measured.telling import Telling, told
 from profilefit.walking import Walk
 
 Floats = NDArray[np.float64]
+Ends = tuple[float | None, float | None]
 GREY = 0.9  # albedo that advice is given for where the data leave it open altogether
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A fit judged. telling, advice and walk are None where the fit failed, walk also where an interval is open."""
+    """A fit judged. telling, advice and walk are None where the fit failed, walk also where the chain had no bounds.
+
+    Where the data do not exclude the end of what a coordinate may be (alpha = 1, say: chi-square there is within the
+    square of the 95 % quantile, 3.84 of known errors, of the least), the optimum is no estimate and the derivatives
+    there are no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
+    no value; the others keep their interval, and a value if it lies inside. No value lies outside its own interval.
+    The limit is a quantile of the posterior, whose prior is flat in sqrt(1 - alpha) >= 0: it covers at 95 % or more.
+    Without a chain it is the end of the two-sided interval of the profile likelihood: 97.5 %. At an end no interval
+    knows of the law's own error.
+    """
 
     found: Found
     telling: Telling | None
@@ -41,9 +51,12 @@ class Answer:
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """The same, each moved by an error of the law and, where one is seen, of the misfit; empty if none is known."""
+        """The same, each moved by an error of the law and, where one is seen, of the misfit.
+
+        Empty if none is known, or where derivatives, which carry them over, are no errors: at an end.
+        """
         found = self.found
-        if self.walk is None or not found.minimum.converged or not (found.misfit.detected or found.rel is not None):
+        if self.walk is None or not self.told or not (found.misfit.detected or found.rel is not None):
             return {}
         free = list(found.question.free)
         others = found.of_law + (found.of_misfit if found.misfit.detected else 0.0)
@@ -65,27 +78,57 @@ class Answer:
 
     @property
     def told(self) -> tuple[str, ...]:
-        """Those whose errors mean something: at an edge of alpha, what hangs on it has none."""
-        if self.found.minimum.converged:
-            return self.moving
-        hanging = ("A", "alpha", "mu_a")
-        return tuple(name for name in self.moving if name not in hanging) if self.found.minimum.at_edge else ()
+        """Those with symmetric errors: none where an end is not excluded, or where the fit failed."""
+        opened = self.telling is None or any(one.is_open for one in self.telling.intervals)
+        return () if opened or not self.found.minimum.converged else self.moving
 
-    def interval(self, name: str) -> tuple[float, float] | None:
-        """95 % by the data's errors alone: of the posterior draws; without a chain, of the profile likelihood."""
-        if name not in self.draws or name not in self.moving:
-            found = [one for one in (self.telling.intervals if self.telling else ()) if one.name == name]
-            return (found[0].low, found[0].high) if found and name in self.moving else None
-        return _middle(self.draws[name])
+    def ends(self, name: str) -> tuple[bool, bool]:
+        """Whether the data exclude neither how little nor how much a quantity may be: (low, high)."""
+        of = {one.name: (one.open_low, one.open_high) for one in (self.telling.intervals if self.telling else ())}
+        (dark, white), (short, long) = of.get("alpha", (False, False)), of.get("l", (False, False))
+        return {
+            "A": (dark, white),
+            "alpha": (dark, white),
+            "mu_s'": (dark or long, short),
+            "mu_a": (white or long, short),
+        }.get(name, of.get(name, (False, False)))
 
-    def whole_interval(self, name: str) -> tuple[float, float] | None:
+    def value(self, name: str) -> float | None:
+        """The best value: of what was held, or has an error or an interval, and lies inside; else None."""
+        value = self.found.values[name]
+        if name not in self.moving:
+            return value
+        intervals = [one for one in (self.interval(name), self.whole_interval(name)) if one is not None]
+        if any(self.ends(name)) or not (intervals or name in self.told):
+            return None
+        inside = all(low is not None and high is not None and low <= value <= high for low, high in intervals)
+        return value if inside else None
+
+    def interval(self, name: str) -> Ends | None:
+        """95 % by the data's errors alone: of the posterior draws; without a chain, of the profile likelihood.
+
+        Both ends, or one and None: a one-sided limit.
+        """
+        if name in self.draws and name in self.moving:
+            return self._middle(name, self.draws[name])
+        found = [one for one in (self.telling.intervals if self.telling else ()) if one.name == name]
+        return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
+
+    def whole_interval(self, name: str) -> Ends | None:
         """95 % by all errors together: data, law, and misfit where one is seen; None where these are not known."""
-        return _middle(self.whole_draws[name]) if name in self.whole_draws and name in self.moving else None
+        held = name not in self.whole_draws or name not in self.moving
+        return None if held else self._middle(name, self.whole_draws[name])
+
+    def _middle(self, name: str, draws: Floats) -> Ends | None:
+        ends = self.ends(name)
+        outside = 1.0 - LEVEL if any(ends) else 0.5 * (1.0 - LEVEL)
+        low, high = np.quantile(draws, [outside, 1.0 - outside])
+        return _closed(float(low), float(high), ends)
 
 
-def _middle(draws: Floats) -> tuple[float, float]:
-    low, high = np.quantile(draws, [0.5 - LEVEL / 2, 0.5 + LEVEL / 2])
-    return float(low), float(high)
+def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
+    """The ends of an interval that are not open; None if both are."""
+    return None if all(opened) else (None if opened[0] else low, None if opened[1] else high)
 
 
 def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
@@ -121,7 +164,10 @@ def known_medium(data: Measured) -> dict[str, float]:
 
 
 def content(answer: Answer, law: str, constants: str) -> dict[str, Any]:
-    """Everything, as JSON takes it; errors of the law are null where they are not known."""
+    """Everything, as JSON takes it; errors of the law are null where they are not known.
+
+    Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
+    """
     found = answer.found
     data, question = found.data, found.question
     body = {
@@ -190,14 +236,15 @@ def _quantities(answer: Answer) -> dict[str, Any]:
     truth = known_medium(found.data)
     return {
         name: {
-            "value": value,
+            "value": answer.value(name),
+            "at_edge": any(answer.ends(name)),
             "unit": derived.unit_of(name, found.data.unit),
             **{f"{kind}_error": one.get(name) if name in answer.told else None for kind, one in errors.items()},
             "interval_95_data": answer.interval(name),
             "interval_95_total": answer.whole_interval(name),
             "of_file": truth.get(name),
         }
-        for name, value in found.values.items()
+        for name in found.values
     }
 
 

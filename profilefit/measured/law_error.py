@@ -47,9 +47,7 @@ def origin(name: str, constants: str, setting: Setting, folder: Path) -> Origin 
     if constants.endswith(".json"):
         path = Path(constants)
     elif constants == "regenerated" and (key := catalogue.SHORT.get(name, name)) in catalogue.REGENERATED:
-        record_name = catalogue.record_name(catalogue.REGENERATED[key][0], setting)
-        places = [place / f"{record_name}.json" for place in (folder, catalogue.fits_folder())]
-        path = next((place for place in places if place.exists()), places[0])
+        path = catalogue.record_file(catalogue.REGENERATED[key][0], setting, folder)
     else:
         return None
     quality = record.read(path).get("quality") or {}

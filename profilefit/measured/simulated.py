@@ -20,12 +20,11 @@ from pathlib import Path
 
 import numpy as np
 
-from mcml_sim.mco_reader import parse_mco
+from mcml_sim import mco_reader, results
 from mcml_sim.medium import Medium
-from mcml_sim.results import read_results
+from mcml_sim.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
-from profilefit.measured.table_file import read_bytes
 
 UNIT = "cm"
 # At a hundred photons the standard error of a ring is known to 10 %, and near enough to a normal one.
@@ -38,10 +37,12 @@ ALL_LIGHT = 1.0 + 1e-3  # files are rounded
 
 def read_mco_profile(path: Path) -> Measured:
     """Rd_r of an .mco file, lengths in cm."""
-    content = read_bytes(path)
-    found = parse_mco(content, str(path))
+    content = read_whole(path, mco_reader.MAX_BYTES)
+    found = mco_reader.parse_mco(content, str(path))
     grid, photons = found.run.grid, found.run.photons
     entered = 1.0 - found.specular_reflectance
+    if not entered > 0:
+        raise InputError(f"{path}: expected a specular reflectance below 1, got {found.specular_reflectance:g}")
     energy = (found.reflectance_r * grid.r_areas)[:-1]
     each = entered / photons
     notes = (f"the last of {grid.rings} rings, which holds the light beyond, is left out",)
@@ -53,11 +54,17 @@ def read_mco_profile(path: Path) -> Measured:
 
 def read_npz_profile(path: Path) -> Measured:
     """reflectance_r of the results of `mcml-sim run`, with its own errors, lengths in cm."""
-    content = read_bytes(path)
-    found = read_results(path)
+    content = read_whole(path, results.MAX_BYTES)
+    found = results.parse_results(content, str(path))
+    if found.photons < 2:
+        raise InputError(f"{path}: expected two photons or more, since one says nothing of its error, got 1")
     estimate = found.estimates["reflectance_r"]
     areas = found.grid.r_areas
-    energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
+    with np.errstate(over="ignore"):  # what no light can be is refused below
+        energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
+    if not np.all(error <= ALL_LIGHT):
+        raise InputError(f"{path}: expected standard errors of no more than all of the light")
+    _require_light(path, energy)
     squares = error**2 + energy**2 / (found.photons - 1.0)
     return _counted(
         path, content, found.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
@@ -84,8 +91,7 @@ def _counted(
                 variance of E; seen the photons that it rests on
     photons     N, of the whole run
     """
-    if not (np.all(energy >= 0) and energy.sum() <= ALL_LIGHT):
-        raise InputError(f"{path}: expected rings of no less than 0 and, in all, no more than 1 of the light")
+    _require_light(path, energy)
     starts = merged(edges, seen)
     if starts.size < FEWEST_RINGS:
         raise InputError(
@@ -95,13 +101,22 @@ def _counted(
     inner, outer = edges[starts], np.append(edges[starts[1:]], edges[-1])
     areas = np.pi * (outer - inner) * (outer + inner)
     whole = np.add.reduceat(energy, starts)
-    spread = np.sqrt(np.add.reduceat(squares, starts) - whole**2 / (photons - 1.0))
+    variance = np.add.reduceat(squares, starts) - whole**2 / (photons - 1.0)
+    if not np.all(variance > 0):
+        at = int(np.argmin(variance > 0))
+        raise InputError(f"{path}: expected a standard error > 0 of the light from r = {inner[at]:g} to {outer[at]:g}")
+    spread = np.sqrt(variance)
     if starts.size < energy.size:
         notes = (*notes, f"{energy.size} rings merged into {starts.size}, of {FEWEST_PHOTONS:.0f} photons or more each")
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), inner, outer, whole / areas, spread / areas,
         np.full(whole.size, np.inf), errors, UNIT, True, bounded, photons=photons, medium=medium, notes=notes,
     )  # fmt: skip
+
+
+def _require_light(path: Path, energy: Floats) -> None:
+    if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
+        raise InputError(f"{path}: expected rings of no less than 0 and, in all, no more than 1 of the light")
 
 
 def merged(edges: Floats, photons: Floats) -> np.ndarray:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from profilefit.measured.derived import STRENGTHS
 from profilefit.measured.fitting import Found
 from profilefit.measured.model import NAMES, U, alpha_of
-from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, descended
+from profilefit.measured.solving import BLACK, FARTHEST_LN, FARTHEST_U, WHITE, descended
 
 Floats = NDArray[np.float64]
 # A quantity is not told if its standard error is more than half of itself: it may as well be twice as much.
@@ -99,7 +99,10 @@ def _interval(found: Found, at: int) -> Interval:
 
 
 def _end(found: Found, at: int, side: float) -> tuple[float, bool]:
-    """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does."""
+    """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does.
+
+    Nor does it where alpha is 0 or 1 for all that data can say.
+    """
     best, others = found.minimum, tuple(one for one in found.question.free if one != at)
     limit = side * FARTHEST_U if at == U else best.point[at] + side * FARTHEST_LN
     last = [best.point]
@@ -119,7 +122,8 @@ def _end(found: Found, at: int, side: float) -> tuple[float, bool]:
             for _ in range(HALVINGS):  # by sign alone: each value is a fit, and known to its tolerance only
                 middle = 0.5 * (inside + outside)
                 inside, outside = (inside, middle) if rise(middle) > 0 else (middle, outside)
-            return float(0.5 * (inside + outside)), False
+            end = float(0.5 * (inside + outside))
+            return end, at == U and not WHITE <= end <= BLACK
         if outside == limit:
             break
         inside, step = outside, 2.0 * step

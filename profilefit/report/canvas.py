@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
+import io
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import partial, wraps
+from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,7 +19,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from profilefit.errors import OutputError
+from mcml_sim.whole_file import require_folder, write_together
 
 DPI = 150
 WIDTH = 8.0  # [inch]: 1200 pixels at DPI
@@ -132,27 +131,16 @@ def only(*formats: str) -> Iterator[None]:
 
 
 def save(figure: Figure, out: Path, name: str) -> list[Path]:
-    """Write `name`.png and `name`.svg into folder `out`, each whole or not at all; the SVG carries no date."""
+    """Write `name`.png and `name`.svg into folder `out`, both or neither; the SVG carries no date."""
     given: dict[str, Any] = {"png": {"dpi": DPI}, "svg": {"metadata": {"Date": None}}}
     files = {kind: out / f"{name}.{kind}" for kind in FORMATS.get()}
     figure.draw_without_rendering()
     figure.set_layout_engine("none")  # it is laid out now: no need to do so again for each format
-    try:
-        out.mkdir(parents=True, exist_ok=True)
-        for kind, path in files.items():
-            _replace(path, partial(figure.savefig, format=kind, **given[kind]))
-    except OSError as error:
-        raise OutputError(f"cannot write figure {name!r} into {out}: {error.strerror or error}") from None
+    contents: dict[Path, bytes | str] = {}
+    for kind, path in files.items():
+        drawn = io.BytesIO()
+        figure.savefig(drawn, format=kind, **given[kind])
+        contents[path] = drawn.getvalue()
+    require_folder(out)
+    write_together(contents)
     return list(files.values())
-
-
-def _replace(target: Path, fill: Callable[[Any], object]) -> None:
-    handle, name = tempfile.mkstemp(dir=target.parent, prefix=f".{target.name}.")
-    try:
-        with os.fdopen(handle, "wb") as file:
-            fill(file)
-        os.chmod(name, 0o644)
-        os.replace(name, target)
-    except BaseException:
-        os.unlink(name)
-        raise

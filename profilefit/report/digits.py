@@ -34,12 +34,19 @@ def significant(value: float | None, digits: int = 2) -> str:
     return f"{value:.{max(digits - 1 - _exponent(value), 0)}f}"
 
 
-def interval(ends: Sequence[float] | None) -> str:
-    """Both ends, to two digits of half their distance."""
+def interval(ends: Sequence[float | None] | None, most: float | None = None) -> str:
+    """Both ends, to two digits of half their distance; one that is None leaves a limit.
+
+    That has three digits, or two of its half distance from `most`, the end of what such a number can be.
+    """
     if ends is None:
         return ABSENT
     low, high = ends
-    return f"{to_error(low, (high - low) / 2)} … {to_error(high, (high - low) / 2)}"
+    if low is not None and high is not None:
+        return f"{to_error(low, (high - low) / 2)} … {to_error(high, (high - low) / 2)}"
+    limit = high if low is None else low
+    room = None if limit is None or most is None else (most - limit) / 2
+    return f"{'<' if low is None else '>'} {to_error(limit, room)}"
 
 
 def on_the_point(texts: Sequence[str]) -> list[str]:

@@ -72,7 +72,7 @@ def posterior_figure(answer: Answer, out: Path, name: str = "fit-corner") -> lis
     for row in range(size):
         for column in range(row + 1):
             _dressed(grid[row, column], row, column)
-            _marked(grid[row, column], [answer.found.values[names[at]] for at in (column, row)], row != column)
+            _marked(grid[row, column], [answer.value(names[at]) for at in (column, row)], row != column)
     for at, one in enumerate(names):
         unit = unit_of(one, answer.found.data.unit)
         label = f"{_symbol(one)} [{unit or '-'}]"
@@ -96,10 +96,11 @@ def shown(answer: Answer) -> tuple[str, ...]:
     return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in answer.moving)
 
 
-def _marked(ax: Axes, best: list[float], is_pair: bool) -> None:
-    """Thin lines at the best fit."""
-    ax.axvline(best[0], color=BLACK, linewidth=0.8)
-    if is_pair:
+def _marked(ax: Axes, best: list[float | None], is_pair: bool) -> None:
+    """Thin lines at the best fit, where it is a value."""
+    if best[0] is not None:
+        ax.axvline(best[0], color=BLACK, linewidth=0.8)
+    if is_pair and best[1] is not None:
         ax.axhline(best[1], color=BLACK, linewidth=0.8)
 
 

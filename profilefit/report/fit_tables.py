@@ -15,7 +15,8 @@ from profilefit.measured.misfit import DETECTED
 from profilefit.report.columns import column_table
 from profilefit.report.digits import ABSENT, interval, on_the_point, significant, to_error
 
-HELD = "held"
+HELD, EDGE = "held", "edge"
+SHARES = ("A", "alpha")  # which end at 1
 # tests/profilefit/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
 HELD_IN = "tried on made-up replicates, such intervals hold in 93 to 98 %"
 TINIEST = 1e-16  # chance that is worth printing
@@ -45,10 +46,8 @@ def _quantity_table(answer: Answer, title: str) -> RenderableType:
     truth = known_medium(found.data)
     columns = {
         "": list(names),
-        "value": on_the_point([to_error(found.values[name], data[name] if name in moving else None) for name in names]),
-        "± data": [
-            significant(data[name]) if name in moving else ABSENT if name in answer.moving else HELD for name in names
-        ],
+        "value": on_the_point([to_error(answer.value(name), data[name] if name in moving else None) for name in names]),
+        "± data": [significant(data[name]) if name in moving else _mark(answer, name) for name in names],
         "± law": [significant(law[name]) if name in law and name in moving else ABSENT for name in names],
     }
     caption = CAPTION
@@ -57,13 +56,25 @@ def _quantity_table(answer: Answer, title: str) -> RenderableType:
         columns["± misfit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± misfit: what is left unexplained, taken likewise"
     whole = bool(answer.whole_draws)
-    columns["95 %"] = [interval(answer.whole_interval(name) if whole else answer.interval(name)) for name in names]
+    columns["95 %"] = [
+        interval(answer.whole_interval(name) if whole else answer.interval(name), 1.0 if name in SHARES else None)
+        for name in names
+    ]
     caption += "; 95 %: " + ("all of these errors together" if whole else "the data's errors alone")
+    if any(any(answer.ends(name)) for name in answer.moving):
+        caption += f"; {EDGE}: the data do not exclude that it ends there, so a limit at 95 % and no value"
     columns["unit"] = [unit_of(name, found.data.unit) for name in names]
     if truth:
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
         caption += "; of file: its first layer, scattering reduced by 1 - g"
     return column_table(title, columns, caption, left=("", "unit"))
+
+
+def _mark(answer: Answer, name: str) -> str:
+    """What stands where a quantity has no symmetric error."""
+    if name not in answer.moving:
+        return HELD
+    return EDGE if any(answer.ends(name)) else ABSENT
 
 
 def _correlation_table(answer: Answer) -> RenderableType:

@@ -62,6 +62,7 @@ class Form:
     file    in `glsl/`; name its prefix, of the instance
     parts   files that it rests on, before it in order; ends files that rest on it
     extra   constants that are not the law's own; count of its `//% for` blocks
+    clamps  what the text takes for another number than was given, in words
     """
 
     file: str
@@ -69,6 +70,7 @@ class Form:
     ends: tuple[str, ...] = ("wrappers",)
     extra: Callable[[Any], Numbers] = lambda law: {}
     count: Callable[[Any], int] = lambda law: 0
+    clamps: str = "none"
 
 
 def _source(law: Any) -> Numbers:
@@ -98,23 +100,28 @@ def _better_dipole(law: Any) -> Numbers:
     return {"entered": law.entered, "c_phi": c_phi, "c_e": c_e, "lift": 4.0 * mismatch}
 
 
+NEAR = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; xi to 1 - 2^-24"
+FAR = f"{NEAR}; r to 1e8 mfp"
+TO_R_MAX = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; alpha to at least 1e-6; radii to r_max"
 NORMALIZED = ("normalized_diffusion", "wrappers")
 NUMERIC = ("numeric_inverse", "wrappers")
 FORMS: dict[type[Any], Form] = {
-    Hazard: Form("hazard", ("rational", "decay"), extra=_source),
-    Quantile: Form("quantile", ("rational", "decay"), extra=_source),
-    Liang: Form("liang", ("rational", "near_zero"), extra=_liang),
-    Burley: Form("burley", ends=NORMALIZED, extra=lambda law: {"power": law.power}),
-    BurleyDiffuseMfp: Form("burley_diffuse_mfp", ends=NORMALIZED),
-    Gaussians: Form("gaussians", extra=_gaussians, count=lambda law: law.count()),
-    Dipole: Form("dipole", ("near_zero", "diffusion"), NUMERIC, _dipole),
-    BetterDipole: Form("better_dipole", ("near_zero", "diffusion"), NUMERIC, _better_dipole),
+    Hazard: Form("hazard", ("rational", "decay"), extra=_source, clamps=FAR),
+    Quantile: Form("quantile", ("rational", "decay"), extra=_source, clamps=FAR),
+    Liang: Form("liang", ("rational", "near_zero"), extra=_liang, clamps=TO_R_MAX),
+    Burley: Form("burley", ends=NORMALIZED, extra=lambda law: {"power": law.power}, clamps=NEAR),
+    BurleyDiffuseMfp: Form("burley_diffuse_mfp", ends=NORMALIZED, clamps=f"{NEAR}; falloff rate to 1e-7 / mfp"),
+    Gaussians: Form("gaussians", extra=_gaussians, count=lambda law: law.count(), clamps=FAR),
+    Dipole: Form("dipole", ("near_zero", "diffusion"), NUMERIC, _dipole, clamps=FAR),
+    BetterDipole: Form("better_dipole", ("near_zero", "diffusion"), NUMERIC, _better_dipole, clamps=FAR),
 }
 MAPS: dict[type[Any], Form] = {
-    Rational: Form("rational", (), extra=lambda law: {"entered": law.entered}),
-    LiangAlbedo: Form("liang_albedo", (), extra=lambda law: {"fold": law.fold}),
-    VanDeHulst: Form("van_de_hulst", ()),
-    Chiang: Form("chiang", ("near_zero",)),
+    Rational: Form("rational", (), extra=lambda law: {"entered": law.entered}, clamps="A to the light that enters"),
+    LiangAlbedo: Form(
+        "liang_albedo", (), extra=lambda law: {"fold": law.fold}, clamps="A to where it turns; alpha to 1"
+    ),
+    VanDeHulst: Form("van_de_hulst", (), clamps="both results to [0, 1]"),
+    Chiang: Form("chiang", ("near_zero",), clamps="alpha to that of A = 1"),
 }
 
 
@@ -123,6 +130,11 @@ def prefix(law: Constants) -> str:
     form = _form(law, {**FORMS, **MAPS})
     count = form.count(law)
     return f"{form.file}{count}" if count else form.file
+
+
+def clamps(law: Constants) -> str:
+    """What a law's text takes for another number than was given, in words."""
+    return _form(law, {**FORMS, **MAPS}).clamps
 
 
 def law_text(

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Mapping
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from mcml_sim import __version__
 from mcml_sim.setting import Setting
 from profilefit import catalogue, record
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError
 from profilefit.inventory import PRINTED_MAP, Named
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
@@ -21,6 +23,7 @@ from profilefit.shader import emit
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 ENDINGS = {"glsl": "glsl", "hlsl": "hlsl", "glsl-es": "glsl", "python": "py", "json": "json"}
 MARKS = {"python": "#"}
+JOINING = re.compile(r"(?:\\|\?\?/|\s)+$")
 TARGETS = {
     "glsl": "GLSL, for after #version 330 or later",
     "glsl-es": "GLSL ES, for after #version 300 es or later",
@@ -47,61 +50,89 @@ MAP_NAMES = (
     ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
     ("map_reflectance(alpha)", "and back"),
 )
+DOMAIN = "domain, which nothing checks: alpha and A in [0, 1]"
 CONVENTIONS = """\
 alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
 
 
 def export(named: Named, folder: Path, lang: str = "glsl", name: str | None = None) -> str:
-    """The whole file of a law or map in one of `LANGUAGES`; `folder` holds its records.
+    """The whole file of a law or map in one of `LANGUAGES`; `folder` holds the record of the map that normalises it.
 
     name  what the names in it begin with, by default `emit.prefix`: two media in one shader need two
-    InputError for another language, for a name that is none, or for a law that has no shader text.
+    InputError for another language, for a name that is none, or for a law that has no shader text; RecordError where a
+    record behind it is missing or damaged.
     """
     if lang not in LANGUAGES:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
-    contents = _records(named, folder)
+    sources = _sources(named, folder)
     if lang == "json":
         if name is not None:
             raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
-        return json.dumps(_plain(named, contents, folder), indent=1, sort_keys=True, allow_nan=False) + "\n"
-    make, start = (emit.map_text, "") if isinstance(named.law, AlbedoLaw) else (emit.law_text, "map_")
-    body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(contents, start))
-    mark = MARKS.get(lang, "//")
-    head = "".join(f"{mark} {line}".rstrip() + "\n" for line in _head(named, contents, folder, lang, name))
+        return json.dumps(_plain(named, sources), indent=1, sort_keys=True, allow_nan=False) + "\n"
+    make = emit.map_text if isinstance(named.law, AlbedoLaw) else emit.law_text
+    body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(named, sources))
+    head = commented(_head(named, sources, lang, name), MARKS.get(lang, "//"))
     return head + "\n" + (ES_HEAD if lang == "glsl-es" else "") + body
 
 
-def _records(named: Named, folder: Path) -> dict[str, dict[str, Any]]:
-    """The records behind a law, by name: its own, and that of the map which normalises it."""
-    names = list(named.records)
+def commented(lines: Iterable[str], mark: str) -> str:
+    """Lines as comments and nothing else, whatever they hold.
+
+    Split at every kind of line break; what is not printable ASCII becomes its escape, as in a Python string, and a line
+    ends in no backslash (nor its trigraph), with which a preprocessor would join the next one to it.
+    """
+    parts = (part for line in lines for part in (line.splitlines() or [""]))
+    texts = (part.encode("unicode_escape").decode("ascii").replace("\\\\", "\\") for part in parts)
+    return "".join(f"{mark} {JOINING.sub('', text)}".rstrip() + "\n" for text in texts)
+
+
+@dataclass(frozen=True)
+class _Source:
+    """A record behind a text.
+
+    of     "law" or "map", whose constants it holds
+    spare  whether it is the shipped record of a map that the folder lacks
+    """
+
+    of: str
+    path: Path
+    content: dict[str, Any]
+    digest: str
+    spare: bool = False
+
+
+def _sources(named: Named, folder: Path) -> list[_Source]:
+    """The records behind a law: its own, and that of the map which normalises it."""
+    own = "map" if isinstance(named.law, AlbedoLaw) else "law"
+    found = [_source(own, path) for path in named.files]
     if getattr(named.law, "albedo", None) is not None:
-        names.append(catalogue.record_name(catalogue.ALBEDO_RECORD, named.setting))
-    return {name: record.read(_place(folder, name)) for name in names}
+        path = catalogue.map_file(named.setting, folder)
+        found.append(_source("map", path, spare=path.parent != folder))
+    return found
 
 
-def _place(folder: Path, name: str) -> Path:
-    for place in (folder, catalogue.fits_folder()):
-        if (path := place / f"{name}.json").exists():
-            return path
-    raise RecordError(f"{folder}: there is no record {name!r}; `profilefit regenerate` makes them")
+def _source(of: str, path: Path, spare: bool = False) -> _Source:
+    content = record.read(path, whole=True)
+    return _Source(of, path, content, hashlib.sha256(path.read_bytes()).hexdigest(), spare)
 
 
-def _head(named: Named, contents: Mapping[str, dict[str, Any]], folder: Path, lang: str, name: str | None) -> list[str]:
-    """What a reader of the file must know, a line each."""
+def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None) -> list[str]:
+    """What a reader of the file must know, a line each. The first two hold nothing from outside: there, a word of a
+    comment can change how Python reads the file (PEP 263)."""
     is_map = isinstance(named.law, AlbedoLaw)
     kind = "map between alpha and A" if is_map else "reflectance profile of a half space"
-    what = f"{named.name}, {named.constants or 'no constants'}: {kind}"
-    lines = [what, TARGETS[lang], f"by profilefit {__version__}; generated, do not edit", ""]
+    lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], ""]
+    lines += [f"{named.name}, {named.constants or 'no constants'}: {kind}"]
     start = name or emit.prefix(named.law)
     lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
     lines += ["", *_setting_lines(named.setting), ""]
-    for of, content in contents.items():
-        lines += [f"record {of}: {content['title']}", f"  {content['equations']}", *_told_of(content)]
-        lines += [f"  sha256 of the data {content['data_digest']}"] if content.get("data_digest") else []
-        lines += [f"  sha256 of the record {_digest(_place(folder, of))}"]
-    printed = _printed(named)
-    return [*lines, f"constants as printed: {printed.source}"] if printed else lines
+    lines += [DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"), f"clamps: {emit.clamps(named.law)}", ""]
+    if printed := _printed(named):
+        lines.append(f"constants as printed: {printed.source}")
+    for source in sources:
+        lines += _told_of(source, f"{source.of}: ")
+    return lines
 
 
 def _setting_lines(setting: Setting) -> list[str]:
@@ -110,39 +141,46 @@ def _setting_lines(setting: Setting) -> list[str]:
     return [light, surface, *CONVENTIONS.splitlines()]
 
 
-def _told_of(content: dict[str, Any]) -> list[str]:
-    """Range and error of a fit."""
+def _told_of(source: _Source, before: str) -> list[str]:
+    """A record: its title, equations, range, error and digests, each line after whose it is."""
+    content = source.content
+    lines = [f"record {source.path.stem}: {content['title']}", content["equations"]]
+    if source.spare:
+        lines.append("this record came with profilefit: the folder of the law's has none of this light and surface")
     fitted = content["protocol"]["albedos"]
-    lines = [f"  fitted for alpha from {fitted['low']:g} to {fitted['high']:g}"]
+    lines.append(f"fitted for alpha from {fitted['low']:g} to {fitted['high']:g}")
     measured = content["quality"]["regenerated"]
     worst = [f"{text} at most {max(measured[key]):.2g}" for key, text in MEASURES.items() if key in measured]
     if "delta_A" in measured:
         worst.append(f"error of A at most {measured['delta_A']:.2g}")
-    return [*lines, f"  {', '.join(worst)} (albedos that were not fitted)"]
+    if worst:
+        lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
+    if content.get("data_digest"):
+        lines.append(f"sha256 of the data {content['data_digest']}")
+    return [before + line for line in [*lines, f"sha256 of the record {source.digest}"]]
 
 
-def _remarks(contents: Mapping[str, dict[str, Any]], start: str) -> dict[str, str]:
-    """The errors of each constant, in words; `start` begins the names of the map's."""
+def _remarks(named: Named, sources: Sequence[_Source]) -> dict[str, str]:
+    """The errors of each constant, in words; of a profile law's map, the names begin with map_."""
     remarks = {}
-    for content in contents.values():
-        before = start if content["pipeline"] == "albedo" else ""
-        for name, constant in content["constants"].items():
+    start = "" if isinstance(named.law, AlbedoLaw) else "map_"
+    for source in sources:
+        before = start if source.of == "map" else ""
+        for name, constant in source.content["constants"].items():
             found = [f"{constant[key]:.2g} ({word})" for key, word in ERRORS.items() if constant.get(key) is not None]
             remarks[before + name] = "+- " + ", +- ".join(found) if found else "held"
+    if named.files:  # a record may hold a part of a law's constants
+        remarks = {**dict.fromkeys(named.law.constant_names(), "as printed"), **remarks}
     return remarks
 
 
 def _printed(named: Named) -> Any:
     """The printed set that a law's constants are, or None."""
     law = named.name + (PRINTED_MAP if isinstance(named.law, AlbedoLaw) else "")
-    return next((s for s in published.SETS if not named.records and (s.law, s.name) == (law, named.constants)), None)
+    return next((s for s in published.SETS if not named.files and (s.law, s.name) == (law, named.constants)), None)
 
 
-def _digest(path: Path) -> str:
-    return hashlib.sha256(path.read_bytes()).hexdigest()
-
-
-def _plain(named: Named, contents: Mapping[str, dict[str, Any]], folder: Path) -> dict[str, Any]:
+def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
     """The same as data: every constant with its errors, null where a kind of error does not apply."""
     printed = _printed(named)
     law = named.law
@@ -154,15 +192,17 @@ def _plain(named: Named, contents: Mapping[str, dict[str, Any]], folder: Path) -
         "units": "lengths in mean free paths 1 / (mu_s' + mu_a)",
         "constants": law.constants(),
         "printed_in": printed.source if printed else None,
-        "records": {name: _record_data(content, _place(folder, name)) for name, content in contents.items()},
+        "records": {source.path.stem: _record_data(source) for source in sources},
     }
     if getattr(law, "albedo", None) is not None:
         made["map"] = {"entered": law.albedo.entered, **law.albedo.constants()}
     return made
 
 
-def _record_data(content: dict[str, Any], path: Path) -> dict[str, Any]:
+def _record_data(source: _Source) -> dict[str, Any]:
+    content = source.content
     errors = {name: {key: one.get(key) for key in ERRORS} for name, one in content["constants"].items()}
     kept = {key: content.get(key) for key in ("title", "equations", "data_digest", "truth")}
     fitted = {key: content["protocol"]["albedos"][key] for key in ("low", "high")}
-    return {**kept, "sha256": _digest(path), "errors": errors, "fitted_alpha": fitted}
+    own = {"of": source.of, "sha256": source.digest, "came_with_profilefit": source.spare}
+    return {**kept, **own, "errors": errors, "fitted_alpha": fitted}

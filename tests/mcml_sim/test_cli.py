@@ -34,7 +34,8 @@ RUN = """{name} A
 """
 
 
-REMEDY = "delete that folder, or use --out elsewhere\n"
+REMEDY = "use --out elsewhere, or delete it if that run is over\n"
+KEPT = "stopped; the finished batches are kept, the same command resumes\n"
 
 
 def runs(*rows: tuple[str, int, float]) -> str:
@@ -113,15 +114,77 @@ def test_photons_seed_and_folder_are_the_users(command, mci):
     assert read_results("a/first.npz").photons == 1000
 
 
-def test_what_was_there_is_replaced(command, mci):
-    Path("first.mco").write_text("old")
-    Path("first.npz").write_text("old")
+def test_results_of_another_run_are_replaced(command, mci):
+    assert command("run", mci, "--seed", 3)[0] == 0
+    before = Path("first.mco").read_bytes()
     assert command("run", mci)[0] == 0
+    assert Path("first.mco").read_bytes() != before
+    assert read_results("first.npz").seed == 0
+    Path("first.mco").write_text("A1\nInParm\n")  # as V1 leaves it, not of this run
+    Path("second.npz").write_bytes(b"")
+    assert "finished before" not in command("run", mci)[1]
     assert totals(Path("first.mco"))[0] == pytest.approx(0.0277778)
-    assert read_results("first.npz").photons == 2000
+    assert read_results("second.npz").photons == 3000
 
 
-def test_an_interrupted_command_resumes(command, mci, monkeypatch):
+@pytest.mark.parametrize(
+    ("name", "kept", "said"),
+    [
+        ("thesis.tex", "thesis.tex", "thesis.tex is there already, and no output of MCML"),
+        ("a.mco", "a.mco", "a.mco is there already, and no output of MCML"),
+        ("a.mco", "link:a.mco", "a.mco is there already, and no output of MCML"),
+        ("a.mco", "a.npz", "a.npz is there already, and no results of mcml_sim"),
+        ("a.mco", "pipe:a.npz", "a.npz is there already, and no results of mcml_sim"),
+        ("a.mco", "a.photons/thesis.tex", "a.photons is there already, and holds thesis.tex, which is no batch of .*"),
+        ("a.mco", "a.photons/run.json", "a.photons is there already, and holds run.json, which is no batch of .*"),
+        ("a.mco", "a.photons/movie.mkv.part", "a.photons is there already, and holds movie.mkv.part, .*"),
+    ],
+)
+def test_what_no_run_wrote_is_not_replaced(command, mci, name, kept, said):
+    """The first run could be done; it is not begun before the second one has passed."""
+    mci.write_text(runs(("first.mco", 2000, 10), (name, 2000, 10)))
+    how, _, place = kept.rpartition(":")
+    path = Path(place)
+    path.parent.mkdir(exist_ok=True)
+    if how == "pipe":
+        os.mkfifo(path)
+    else:
+        Path("old").write_text('{"old": 1}')
+        (path.symlink_to if how else path.hardlink_to)("old")
+
+    def there() -> dict[Path, tuple[int, ...]]:
+        found = {one: one.lstat() for one in Path().rglob("*")}
+        return {one: (each.st_ino, each.st_mode, each.st_size, each.st_mtime_ns) for one, each in found.items()}
+
+    before = there()
+    status, out, err = command("run", mci, "--photons", 1000)
+    assert (status, out) == (2, "")
+    assert re.fullmatch(f"mcml-sim: {said}: it is not replaced, use --out elsewhere\n", err), err
+    assert there() == before
+
+
+def test_a_name_that_leads_elsewhere_takes_a_folder(command, mci, tmp_path):
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    mci.write_text(runs((f"{elsewhere}/one.mco", 2000, 10), ("../two.mco", 2000, 10), ("sub/three.mco", 2000, 10)))
+    assert command("run", mci, "--out", "o")[0] == 0
+    ends = ("mco", "npz")
+    assert names(Path("o")) == {f"{name}.{end}" for name in ("one", "two", "sub/three") for end in ends}
+    assert not list(elsewhere.iterdir())
+
+
+def test_a_link_named_as_output_is_followed(command, mci):
+    mci.write_text(runs(("first.mco", 2000, 10)))
+    Path("sub").mkdir()
+    Path("first.mco").symlink_to("sub/real.mco")
+    assert command("run", mci)[0] == 0
+    assert Path("first.mco").is_symlink()
+    assert totals(Path("sub/real.mco"))[0] == pytest.approx(0.0277778)
+    assert "finished before" in command("run", mci)[1]
+
+
+@pytest.mark.parametrize("more", [(), ("--resume",)])
+def test_the_same_command_resumes(command, mci, monkeypatch, more):
     """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
     photons = 2 * layered.BATCH_PHOTONS + 77
     words = ("run", mci, "--photons", photons)
@@ -138,19 +201,12 @@ def test_an_interrupted_command_resumes(command, mci, monkeypatch):
     monkeypatch.setattr(layered, "trace_batch", interrupted)
     status, _, err = command(*words, "--workers", 1)
     assert status == 130
-    assert err == "mcml-sim: stopped; the finished batches are kept, the same command with --resume goes on\n"
+    assert err == f"mcml-sim: {KEPT}"
     kept = {"first.mco", "first.npz", "second.photons/run.json", "second.photons/batch-00000000.npz"}
     assert {name for name in names() if not name.startswith("at-once")} == kept | {"two.mci"}
 
-    status, _, err = command(*words)
-    assert status == 2
-    assert err == (
-        "mcml-sim: second.photons holds photons of a run that was not finished: --resume goes on with them, "
-        "or delete that folder\n"
-    )
-
     monkeypatch.setattr(layered, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
-    status, out, err = command(*words, "--resume")
+    status, out, err = command(*words, *more)
     assert (status, err) == (0, "")
     assert sorted(traced) == [0, 0, 1, 1, 2, 2]
     assert re.search(rf"run 1 of 2: first.mco\n  {photons} photons, seed 0, finished before\n  specular", out)
@@ -163,16 +219,52 @@ def test_an_interrupted_command_resumes(command, mci, monkeypatch):
 @pytest.mark.parametrize("words", [("--seed", 1), ("--photons", 2001)])
 def test_another_run_is_not_taken_for_finished(command, mci, words):
     assert command("run", mci)[0] == 0
-    assert "finished before" not in command("run", mci, "--resume", *words)[1]
-    assert "finished before" in command("run", mci, "--resume", *words)[1]
+    assert "finished before" not in command("run", mci, *words)[1]
+    assert "finished before" in command("run", mci, *words)[1]
 
 
 def test_batches_of_another_run_are_not_mixed_in(command, mci):
-    words = ("run", mci, "--precision", 1e-4, "--resume")
+    words = ("run", mci, "--precision", 1e-4)
     assert command(*words)[0] == 0
+    Path("first.npz").unlink()  # else they are but what a finished run left
     status, _, err = command(*words, "--seed", 5)
     assert status == 2
     assert err == "mcml-sim: first.photons was made by another run: seed is 0 there, 5 here; " + REMEDY
+
+
+@pytest.mark.parametrize("words", [("--seed", 5), ("--photons", 2500), ("--precision", 1e-4), ()])
+def test_a_precision_that_was_not_reached_blocks_no_run(command, mci, words):
+    """Its photons wait for a run with more of them, until another one replaces its results."""
+    mci.write_text(runs(("one.mco", 2000, 10)))
+    assert command("run", mci, "--precision", 1e-4)[0] == 0
+    assert Path("one.photons").is_dir()
+    status, _, err = command("run", mci, *words)
+    assert (status, err) == (0, "")
+    status, _, err = command("run", mci, "--precision", 1e-4, "--seed", 7)
+    assert (status, err) == (0, "")
+    mci.write_text(runs(("one.mco", 2000, 20)))
+    status, out, err = command("run", mci, "--precision", 1e-4)
+    assert (status, err) == (0, "")
+    assert "finished before" not in out
+
+
+def test_two_at_once_with_other_seeds_are_told_to_part(command, mci, monkeypatch):
+    """Both begin before the other has a batch: nothing is mixed, and nobody is told to delete what is in use."""
+    mci.write_text(runs(("one.mco", 2000, 10)))
+
+    def second(medium, grid, photons, **options):
+        simulate(medium, grid, 10, seed=5, store="one.photons")  # the other's first batch
+        Path("one.photons/run.json").unlink()  # as if it had not been there when this one looked
+        return simulate(medium, grid, photons, **options)
+
+    monkeypatch.setattr(doing, "simulate", second)
+    status, _, err = command("run", mci)
+    assert status == 2
+    assert err == (
+        "mcml-sim: one.photons/batch-00000000.npz was made by another run; if that is still at work, "
+        "use --out elsewhere; if not, delete that file to redo just that batch\n"
+    )
+    assert not Path("one.mco").exists()
 
 
 def test_another_runs_store_is_found_before_any_photon(command, mci):
@@ -182,10 +274,9 @@ def test_another_runs_store_is_found_before_any_photon(command, mci):
     told = (
         "mcml-sim: b/second.photons was made by another run: medium is .*mu_a=10.* there, .*mu_a=20.* here; " + REMEDY
     )
-    for words in ((), ("--resume",)):
-        status, out, err = command("run", mci, "--out", "b", *words)
-        assert (status, out) == (2, "")
-        assert re.fullmatch(told, err), err
+    status, out, err = command("run", mci, "--out", "b")
+    assert (status, out) == (2, "")
+    assert re.fullmatch(told, err), err
     assert "b/first.mco" not in names()
     Path("c").mkdir()
     Path("c/second.photons").write_text("")
@@ -214,11 +305,14 @@ def test_fewer_photons_do_not_cost_the_others(command, mci):
     kept = {path.name: path.read_bytes() for path in Path("one.photons").iterdir()}
     assert len(kept) == 3
     for _ in range(2):  # the second time it is done already
-        status, out, _ = command("run", mci, "--photons", 1000, "--resume")
+        status, out, _ = command("run", mci, "--photons", 1000)
         assert status == 0
-        assert "  one.photons is kept, since it holds more photons than these: --resume with more --photons" in out
+        assert "  one.photons is kept, since it holds more photons than these: more --photons use them" in out
         assert {path.name: path.read_bytes() for path in Path("one.photons").iterdir()} == kept
-    status, out, _ = command("run", mci, "--resume")
+    status, _, err = command("run", mci, "--seed", 5)  # the results of 1000 photons are finished, these are not
+    assert status == 2
+    assert err == "mcml-sim: one.photons was made by another run: seed is 0 there, 5 here; " + REMEDY
+    status, out, _ = command("run", mci)
     assert (status, Path("one.photons").exists()) == (0, False)
     assert f"\n  {photons} photons, " in out
 
@@ -243,7 +337,7 @@ def test_more_photons_or_more_repeats(command, mci):
     assert float(found[2]) == pytest.approx(20_000 * (kept.standard_error / kept.value / 2e-3) ** 2, rel=0.05)
     assert "k runs of N photons with k seeds are worth one run of k N" in out
     assert Path("one.photons").is_dir()
-    words = ("--precision", 2e-3, "--quantity", "absorbed", "--resume")
+    words = ("--precision", 2e-3, "--quantity", "absorbed")
     status, out, _ = command("run", mci, "--photons", int(1.1 * float(found[2])), *words)
     assert status == 0
     assert "absorbed: relative standard error 0.002 reached" in out
@@ -274,7 +368,7 @@ def test_a_damaged_batch_is_named_and_done_again(command, mci):
     batch = Path("first.photons/batch-00000000.npz")
     batch.write_bytes(batch.read_bytes()[:-1])
     Path("first.npz").unlink()
-    status, _, err = command(*words, "--resume")
+    status, _, err = command(*words)
     assert status == 0
     assert re.fullmatch(
         r"mcml-sim: first.photons/batch-00000000.npz is damaged .*; just that batch is traced again\n", err
@@ -289,8 +383,8 @@ def test_a_damaged_batch_is_named_and_done_again(command, mci):
         ("npz", "cannot write first.npz: No space left on device"),
         (
             "photons",
-            "cannot write to store first.photons: No space left on device; what it holds is whole, "
-            "the same command with --resume goes on",
+            "cannot write first.photons/run.json: No space left on device; what the store holds is whole, "
+            "the same command resumes",
         ),
     ],
 )
@@ -310,7 +404,7 @@ def test_a_full_disk_is_one_line_and_nothing_half_written(command, mci, monkeypa
     assert not [name for name in names() if name.endswith(".part")]
     assert f"first.{end}" not in names()
     monkeypatch.undo()
-    assert command("run", mci.resolve(), "--out", mci.parent, "--resume")[0] == 0
+    assert command("run", mci.resolve(), "--out", mci.parent)[0] == 0
     assert read_results(mci.parent / "first.npz").photons == 2000
 
 
@@ -357,7 +451,7 @@ def lines_of(run: str) -> str:
         (
             None,
             ("run", "two.mci", "--out", "a/folder"),
-            "cannot write a/folder/first.mco: it is there already, and no file",
+            "cannot write a/folder/first.mco: it is a folder",
         ),
         (lines_of("x.mco A\nten\n"), ("run", "two.mci"), "two.mci:4: expected the number of photons, .*, got 'ten'"),
         (
@@ -370,12 +464,32 @@ def lines_of(run: str) -> str:
             ("run", "two.mci"),
             "cannot write x.npz for x: it belongs to x.mco",
         ),
-        (
-            runs(("../x.mco", 9, 1)),
-            ("run", "two.mci", "--out", "o"),
-            "output files must stay inside --out o, got ../x.mco",
+        *(
+            (
+                runs(("x.mco", 9, 1), (name, 9, 1)),
+                ("run", "two.mci", *words),
+                "output files must lie in the current folder, or have a name and --out FOLDER, got " + re.escape(name),
+            )
+            for name, words in (
+                ("../y.mco", ()),
+                ("/dev/null", ()),
+                ("a/../../y.mco", ()),
+                ("a/../y.mco", ()),
+                ("..", ("--out", "o")),
+                ("a/..", ("--out", "o")),
+                ("/", ("--out", "o")),
+            )
         ),
-        (runs(("/dev/null", 9, 1)), ("run", "two.mci"), "cannot write /dev/null: it is there already, and no file"),
+        (
+            runs(("/x/y.mco", 9, 1), ("../y.mco", 9, 1)),
+            ("run", "two.mci", "--out", "o"),
+            "cannot write o/y.mco for ../y.mco: it belongs to /x/y.mco",
+        ),
+        (
+            runs(("x.mco", 9, 1), ("x.photons", 9, 1)),
+            ("run", "two.mci"),
+            "cannot write x.photons for x.photons: it belongs to x.mco",
+        ),
     ],
 )
 def test_what_a_user_can_mend_is_one_line(command, mci, content, words, said):
@@ -407,7 +521,7 @@ def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, m
 
     monkeypatch.setattr(doing, "simulate", gone)
     status, _, err = command("run", mci)
-    assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command with --resume goes on\n")
+    assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command resumes\n")
 
 
 def test_json_is_the_totals_with_their_errors_and_nothing_else(command, mci):

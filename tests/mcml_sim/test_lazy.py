@@ -2,6 +2,8 @@
 
 import ast
 import importlib
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -39,3 +41,38 @@ def test_a_subcommand_is_done_by_the_function_of_its_name():
     assert (done.__name__, done.__doc__) == ("sqrt", "Of x.")
     with pytest.raises(TypeError, match="keyword"):
         done(x=4.0)  # math.sqrt itself is asked, which takes no keywords
+
+
+INTERRUPTED = """
+import runpy, signal, sys
+
+_, imported, package, *words = sys.argv
+
+class Interrupting:
+    def find_spec(self, name, path=None, target=None):
+        if name == imported:
+            sys.meta_path.remove(self)
+            signal.raise_signal(signal.SIGINT)
+
+signal.signal(signal.SIGINT, signal.default_int_handler)
+sys.meta_path.insert(0, Interrupting())
+sys.argv[1:] = words
+runpy.run_module(package, run_name="__main__")
+"""
+
+
+@pytest.mark.parametrize(
+    ("imported", "package", "words"),
+    [
+        ("typer", "profilefit", ("--help",)),
+        ("typer", "mcml_sim", ("--help",)),
+        ("profilefit.convert", "profilefit", ("convert", "--alpha", ".5", "--mfp", "1")),
+    ],
+)
+def test_ctrl_c_among_the_imports_of_a_command_is_one_line(imported, package, words, tmp_path):
+    """The first of a command's imports, and one of what a subcommand does."""
+    run = subprocess.run(
+        [sys.executable, "-c", INTERRUPTED, imported, package, *words],
+        cwd=tmp_path, capture_output=True, text=True, check=False, timeout=60,
+    )  # fmt: skip
+    assert (run.returncode, run.stdout, run.stderr) == (130, "", f"{package.replace('_', '-')}: stopped\n")

@@ -5,15 +5,18 @@ import sys
 
 import pytest
 
-SMALL = """
+SMALL = r"""
 import gc
 import signal
 import sys
 import time
+import warnings
+import numpy
 import typer
 from rich.console import Console
 from mcml_sim.errors import InputError
 from mcml_sim.program import Program
+from mcml_sim.store import DamagedBatch
 
 app = typer.Typer()
 
@@ -37,6 +40,10 @@ def wrong():
     raise InputError("x must be 1, got 2")
 
 @app.command()
+def hostile():
+    raise InputError("\x1b[2Jone\r\ntwo\u202e\x9b\u2028" + "x" * 10**6 + ", got 2")
+
+@app.command()
 def stopped():
     raise KeyboardInterrupt
 
@@ -56,6 +63,19 @@ def unraisable():
         def __del__(self):
             raise ValueError("dying")
     Dying()
+
+@app.command()
+def fault():
+    raise KeyError("first line\\nsecond line")
+
+@app.command()
+def overflow():
+    print(numpy.float64(1e300) * numpy.float64(1e300))
+
+@app.command()
+def library():
+    warnings.warn("jax has something to say", UserWarning)
+    warnings.warn("a batch is damaged", DamagedBatch)
 
 Program("small", app, (InputError,), lambda: "stopped; begin again", remedied=lambda text: text.upper()).main()
 """
@@ -85,6 +105,14 @@ def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
     [
         ("wrong", 2, "small: X MUST BE 1, GOT 2\n"),
         ("stopped", 130, "small: stopped; begin again\n"),
+        (
+            "fault",
+            70,
+            "small: a fault of this program, please report it: KeyError in <string>:58: 'first line\\nsecond line' "
+            "(PYTHONDEVMODE=1 shows where)\n",
+        ),
+        ("overflow", 2, "small: no answer: a number on the way is beyond double precision; check units and sizes\n"),
+        ("library", 0, "small: a batch is damaged\n"),
         ("wrnog", 2, "small: No such command 'wrnog'. Did you mean 'wrong'? (--help shows what is accepted)\n"),
     ],
 )
@@ -93,6 +121,17 @@ def test_what_a_user_can_mend_is_one_line(small, words, status, said):
         out, err = run.communicate(timeout=60)
     assert (run.returncode, err.decode()) == (status, said)
     assert out == b""
+
+
+def test_whatever_a_message_holds_it_is_one_line_that_is_only_printed(small):
+    with small("hostile") as run:
+        _, err = run.communicate(timeout=60)
+    said = err.decode()
+    assert run.returncode == 2
+    assert said.startswith(r"small: \X1B[2JONE\r\nTWO\u202e\x9b\u2028XXX".replace(r"\X1B", r"\x1b"))
+    assert said.endswith("XXX, GOT 2\n")
+    assert said[:-1].isprintable()
+    assert len(said) < 2100
 
 
 @pytest.mark.parametrize(("seconds", "printed"), [("50", (b"",)), ("0", (b"", b"slept\n"))])

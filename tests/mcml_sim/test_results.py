@@ -105,6 +105,84 @@ def test_a_damaged_file_is_named(tmp_path, how, reason):
         read_results(path)
 
 
+def layer(**changes):
+    return {"n": 1.3, "mu_a": 1, "mu_s": 9, "g": 0.7, "thickness": 0.1} | changes
+
+
+HEADERS = {
+    "photons 0": ({"photons": 0}, "photons must be a whole number >= 1 and <= 1e\\+13, got 0"),
+    "photons true": ({"photons": True}, "photons must be a whole number .*, got True"),
+    "photons text": ({"photons": "9"}, "photons must be a whole number .*, got '9'"),
+    "photons list": ({"photons": [1] * 1000}, r"photons must be a whole number .*, got \[1, 1.*\.\.\.$"),
+    "photons long": ({"photons": 10**400}, "a whole number of 401 digits"),
+    "seed": ({"seed": 1.5}, "seed must be a whole number >= 0, got 1.5"),
+    "cut": ({"cut": "0"}, "cut must be a share of the light, got '0'"),
+    "cut nan": ({"cut": float("nan")}, "NaN, which is no number"),
+    "version": ({"mcml_sim": "1\x1b[2J"}, r"mcml_sim must be a version, got '1\\x1b\[2J'"),
+    "format true": ({"format": True}, "format True, not 1"),
+    "unknown": ({"colour": 1}, "header has the unknown key 'colour'"),
+    "medium": ({"medium": [1]}, r"medium must be an object, got \[1\]"),
+    "n_above": ({"medium": {"layers": [layer()], "n_above": "1", "n_below": 1}}, "n_above must be .*, got '1'"),
+    "n_below": ({"medium": {"layers": [layer()], "n_above": 1}}, "medium has no key 'n_below'"),
+    "layers": ({"medium": {"layers": {}, "n_above": 1, "n_below": 1}}, "layers must be a list of at most 1000, got {}"),
+    "layer": ({"medium": {"layers": [3], "n_above": 1, "n_below": 1}}, "layer 1 must be an object, got 3"),
+    "no layer": ({"medium": {"layers": [], "n_above": 1, "n_below": 1}}, "a medium must have 1 to 1000 layers, got 0"),
+    "depth": (
+        {"medium": {"layers": [layer(depth=1)], "n_above": 1, "n_below": 1}},
+        "layer 1 has the unknown key 'depth'",
+    ),
+    "mu_a": (
+        {"medium": {"layers": [layer(mu_a=True)], "n_above": 1, "n_below": 1}},
+        "mu_a must be a coefficient >= 0, got True",
+    ),
+    "other layers": (
+        {"medium": {"layers": [layer()], "n_above": 1, "n_below": 1}},
+        r"'absorbed_per_layer' must have the shape \(1,\), got \(2,\)",
+    ),
+}
+FIELDS = {
+    "deep header": ({"header": np.array("[" * 100_000)}, "tables or lists nested more than 32 deep"),
+    "twice": ({"header": np.array('{"format": 1, "format": 1}')}, "the key 'format' twice in one object"),
+    "header": ({"header": np.array(3)}, "'header' must be one text"),
+    "rings": ({"r_edges": np.arange(6.0)}, r"'reflectance_r' must have the shape \(5,\), got \(4,\)"),
+    "edges": ({"r_edges": np.array([0, 2, 1, 3.0])}, "r must rise, got 1 after 2"),
+    "edges inf": ({"r_edges": np.array([0, 2, np.inf])}, "r must be finite edges"),
+    "edges text": ({"r_edges": np.array(["0", "1"])}, "'r_edges' must be real numbers"),
+    "cells": ({"r_edges": np.arange(65537.0), "z_edges": np.arange(65537.0)}, "grid must have at most 2097152 bins"),
+    "angles": ({"a_edges": np.array([0, 0.1, 1, 1.5])}, "a_edges must be even from 0 to pi/2"),
+    "angles 2": ({"a_edges": np.zeros((2, 2))}, "a_edges must be even from 0 to pi/2"),
+    "value": ({"reflectance_r": np.array([1, np.nan, 1, 1])}, "reflectance_r must be finite"),
+    "truth": ({"reflectance_r": np.ones(4, bool)}, "'reflectance_r' is no array of numbers or text"),
+    "objects": ({"reflectance_r": np.array([None] * 4)}, "'reflectance_r' is no array of numbers or text"),
+    "error": ({"absorbed_standard_error": np.array(-1.0)}, "absorbed_standard_error must be >= 0"),
+    "error nan": ({"absorbed_standard_error": np.array(np.nan)}, "absorbed_standard_error must be >= 0"),
+    "samples": ({"energy_effective_samples": np.array(np.nan)}, "energy_effective_samples must be >= 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("changes", "reason"), [*HEADERS.values(), *FIELDS.values()], ids=[*HEADERS, *FIELDS])
+def test_what_no_run_wrote_is_one_line(tmp_path, changes, reason):
+    path = tmp_path / "out.npz"
+    write_results(made_up(LAYERS, Grid(0.1, 4, 0.2, 5, na=3)), path)
+    with np.load(path) as whole:
+        arrays = dict(whole)
+    if not set(changes) <= set(arrays):
+        changes = {"header": np.array(json.dumps(json.loads(str(arrays["header"])) | changes))}
+    np.savez(path, **{**arrays, **changes})
+    with pytest.raises(InputError, match=rf"^\S*out.npz: expected results of mcml_sim, got: {reason}") as error:
+        read_results(path)
+    assert "\n" not in str(error.value)
+
+
+def test_one_photon_comes_back_without_an_error_of_its_own(tmp_path):
+    grid = Grid(0.1, 4)
+    sums = {name: np.ones(shape) for name, shape in shapes(grid, 2).items()}
+    write_results(Tally(LAYERS, grid, 1, 3, Deposits(**{**sums, "started": 1})), tmp_path / "out.npz")
+    found = read_results(tmp_path / "out.npz")
+    assert found.photons == 1
+    assert np.all(np.isinf(found.estimates["reflectance_r"].standard_error))
+
+
 def test_misuse_is_named(tmp_path):
     tally = made_up(LAYERS, Grid(0.1, 4))
     orders = simulate_orders(Grid(1, 2), 10, progress=False)

@@ -170,7 +170,9 @@ def test_a_full_disk_is_named_and_the_run_goes_on_when_there_is_room(tmp_path, h
     )
     assert child.returncode == 0, child.stderr
     error, before, after = child.stdout.splitlines()
-    assert re.fullmatch(rf"cannot write to store {tmp_path}: {reason}; what it holds is whole, .*", error)
+    assert re.fullmatch(
+        rf"cannot write {tmp_path}/batch-0+[0-9]+.npz: {reason}; what the store holds is whole, .*", error
+    )
     failed = int(before.split("]")[0].split(",")[-1])
     assert 3 < failed < 19
     assert before == f"{list(range(failed + 1))} {failed + 1}", "the manifest and the batches before, nothing half-done"

@@ -1,5 +1,7 @@
 """The folder of batches: what it keeps, refuses and finds damaged."""
 
+import hashlib
+import io
 import json
 import os
 import time
@@ -74,7 +76,7 @@ def test_manifest_says_what_decides_the_bits(tmp_path):
 
 def test_another_runs_store_is_refused_with_both_values(tmp_path):
     simulate_orders(GRID, 100, seed=4, store=tmp_path)
-    remedy = "delete it, or use another folder"
+    remedy = "use another folder, or delete it if that run is over"
     with pytest.raises(StoreError, match=rf"made by another run: seed is 4 there, 5 here; {remedy}$"):
         simulate_orders(GRID, 100, seed=5, store=tmp_path)
     with pytest.raises(StoreError, match=r'made by another run: grid is "'):
@@ -133,7 +135,9 @@ def test_a_batch_from_another_store_is_refused(store, tmp_path):
     other.save(0, COUNTS)
     (tmp_path / "other" / "batch-00000000.npz").rename(tmp_path / "batch-00000000.npz")
     with pytest.raises(
-        StoreError, match=r"batch-00000000.npz was made by another run; delete it to redo just that batch"
+        StoreError,
+        match=r"batch-00000000.npz was made by another run; if that is still at work, use another folder; "
+        "if not, delete that file to redo just that batch",
     ):
         store.load(0)
 
@@ -193,7 +197,17 @@ def test_a_batch_whose_photons_do_not_add_up_is_damaged(store):
 
 
 @pytest.mark.parametrize(
-    "wrong", [{"cells": np.array([6, 1])}, {"rest": np.array([1, 2])}, {"exits": np.array([1, 2])}]
+    "wrong",
+    [
+        {"cells": np.array([6, 1])},
+        {"cells": np.array([0, 2, -1])},
+        {"cells": np.array([0.0, 2.0, 5.0])},
+        {"rest": np.array([1, 2])},
+        {"rest": np.array([4, 5, np.inf])},
+        {"rest": np.array([-1, 10, 15])},
+        {"exits": np.array([1, 2])},
+        {"exits": np.array([1, np.nan, 2])},
+    ],
 )
 def test_arrays_that_are_no_counts_are_refused(wrong):
     with pytest.raises(ValueError, match=r"."):
@@ -203,13 +217,35 @@ def test_arrays_that_are_no_counts_are_refused(wrong):
     assert READ(COUNTS.arrays()).ledger == COUNTS.ledger
 
 
+@pytest.mark.parametrize(
+    ("arrays", "reason"),
+    [
+        ({"exits": np.zeros(2**26, np.int8)}, r"its arrays claim 6710\d+ bytes, more than the 1048576 that are read"),
+        ({"made_by": np.array(3)}, "'made_by' must be one text, got int64"),
+        ({"exits": np.array([None])}, "'exits' is no array of numbers or text"),
+    ],
+)
+def test_a_seal_is_no_proof(store, tmp_path, monkeypatch, arrays, reason):
+    """Anybody can seal a batch: what it claims is checked, and one that claims too much is not unpacked."""
+    monkeypatch.setattr("mcml_sim.store.MAX_BATCH", 2**20)
+    store.save(0, COUNTS)
+    with np.load(tmp_path / "batch-00000000.npz") as whole:
+        fields = {**whole, **arrays}
+    file = io.BytesIO()
+    np.savez_compressed(file, **fields)
+    body = file.getvalue()[:-2] + (64).to_bytes(2, "little")
+    (tmp_path / "batch-00000000.npz").write_bytes(body + hashlib.sha256(body).hexdigest().encode())
+    with pytest.warns(DamagedBatch, match=rf"is damaged \({reason}"):
+        assert store.load(0) is None
+
+
 def test_a_batch_that_cannot_be_read_is_damaged(store, tmp_path):
     (tmp_path / "batch-00000000.npz").mkdir()
     with pytest.warns(DamagedBatch, match=r"batch-00000000.npz is damaged \(Is a directory\)"):
         assert store.load(0) is None
 
 
-@pytest.mark.parametrize("text", ["", "{", "[1]", "\x00"])
+@pytest.mark.parametrize("text", ["", "{", "[1]", "\x00", "[" * 10**5, '{"seed": 1, "seed": 2}'])
 def test_a_damaged_manifest_is_named_and_rewritten_once_deleted(store, tmp_path, text):
     store.save(0, COUNTS)
     (tmp_path / "run.json").write_text(text)
@@ -224,7 +260,10 @@ def test_a_full_disk_is_named_and_leaves_nothing_half_written(store, tmp_path, m
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(StoreError, match=r"cannot write to store .*: No space left on device; .* resumes"):
+    with pytest.raises(
+        StoreError,
+        match=r"cannot write .*batch-0+.npz: No space left on device; what the store holds is whole, .* resumes",
+    ):
         store.save(0, COUNTS)
     assert [path.name for path in tmp_path.iterdir()] == ["run.json"]
 

@@ -101,7 +101,7 @@ def test_files_are_named(tmp_path):
         with pytest.raises(InputError, match=r"file: expected a file that can be read, got: No such file"):
             read(tmp_path / "file")
         (tmp_path / "file").write_bytes(b"\0")
-        with pytest.raises(InputError, match=rf"file: expected {kind}, got: ") as error:
+        with pytest.raises(InputError, match=rf"file: is not {kind}: ") as error:
             read(tmp_path / "file")
         assert "\n" not in str(error.value)
         (tmp_path / "file").unlink()

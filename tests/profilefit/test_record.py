@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mcml_sim.text_file import MOST_JSON
 from profilefit import record, schema
 from profilefit.catalogue import fits_folder
 from profilefit.errors import InputError, OutputError, RecordError
@@ -81,7 +82,7 @@ def test_a_failure_leaves_the_old_record_and_nothing_else(tmp_path, monkeypatch)
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(os, "fsync", full_disk)
-    with pytest.raises(OutputError, match=r"cannot write record 'mine' into .*: No space left on device"):
+    with pytest.raises(OutputError, match=r"cannot write .*mine.json: No space left on device"):
         record.write(tmp_path, "mine", {"law": "other"}, {})
     assert {name: (tmp_path / name).read_bytes() for name in os.listdir(tmp_path)} == before
     assert record.read(path)["law"] == "liang"
@@ -99,7 +100,7 @@ def test_an_interruption_leaves_nothing_behind(tmp_path, monkeypatch):
 
 def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    with pytest.raises(OutputError, match=r"cannot write record 'mine' into .*file"):
+    with pytest.raises(OutputError, match=r"cannot write into .*file: "):
         record.write(tmp_path / "file", "mine", CONTENT, ARRAYS)
 
 
@@ -198,6 +199,79 @@ def test_what_a_recipe_may_ask_for_is_whole_if_it_is_there(tmp_path, part, key, 
     del content[part]
     path.write_text(json.dumps(content))
     assert record.read(path, whole=True)["law"] == "rational"
+
+
+STRANGE = ["\x1b[31m", "\x00", "\x9b", "\u202e", "\u2066", "\ud800", "x" * 1001]
+BREAKS = ["\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029"]
+
+
+@pytest.mark.parametrize("place", ["title", "equations", "law", "a key"])
+@pytest.mark.parametrize(
+    "strange", [*BREAKS, "\x1b[31m", "\x00", "\x9b", "\u202e", "\u2066", "\ud800", "x" * 1001], ids=ascii
+)
+def test_text_that_is_no_printable_line_is_refused(tmp_path, place, strange):
+    """It would become a comment in code, and would be shown on a terminal."""
+    content = json.loads((fits_folder() / "hazard.json").read_text())
+    if place == "a key":
+        content["constants"][f"a{strange}"] = {"regenerated": 1.0}
+    else:
+        content[place] += f"{strange}import os"
+    path = tmp_path / "mine.json"
+    path.write_text(json.dumps(content))
+    with pytest.raises(
+        RecordError, match=r"mine\.json: is (damaged: .*one line of printable text|not a record: .*surrogates)"
+    ) as caught:
+        record.read(path)
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        ('"data_digest": "0"', r"data_digest must be 64 hexadecimal digits, got \"0\""),
+        (
+            '"constants": {"s0": {"regenerated": "1; evil()"}}',
+            r'constants\.s0\.regenerated must be a number, got "1; ev',
+        ),
+        ('"constants": {"s0": {"regenerated": 1e400}}', r"is not a record: the number 1e400, beyond floating point"),
+        (
+            '"constants": {"s0": {"regenerated": 1, "model_error": "x"}}',
+            r'model_error must be a number or null, got "x"',
+        ),
+        ('"constants": {"s0": {"regenerated": NaN}}', r"is not a record: NaN, which is no number"),
+        ('"constants": {"s0": {"regenerated": ' + "9" * 5000 + "}}", r"is not a record: a whole number of 5000 digits"),
+        ('"note": ' + "[" * 20 + "]" * 20, r"note.* must not nest deeper than 12 tables and lists"),
+        ('"note": ' + "[" * 100_000 + "]" * 100_000, r"is not a record: "),
+        ('"note": "' + "x" * MOST_JSON + '"', r"is not a record: more than 2097152 bytes"),
+    ],
+    ids=range(9),
+)
+def test_what_no_law_can_be_made_of_is_named(tmp_path, change, words):
+    rest = json.dumps({"format": record.FORMAT, **NAMED, **({} if "constants" in change else {"constants": {}})})[1:]
+    path = tmp_path / "mine.json"
+    path.write_text("{" + rest[:-1] + ", " + change + "}")
+    with pytest.raises(RecordError, match=rf"mine\.json: .*{words}") as caught:
+        record.read(path)
+    assert len(str(caught.value)) < 300 + len(str(tmp_path))
+
+
+def test_lists_that_belong_together_are_of_one_length(tmp_path):
+    for change, words in (
+        (
+            lambda c: c["quality"]["regenerated"]["rel"].pop(),
+            "quality.regenerated.rel must be as long as quality.alpha",
+        ),
+        (lambda c: c["covariance"]["model"].pop(), "covariance.model must be a square matrix of numbers, or null"),
+        (lambda c: c["covariance"]["names"].append("zz"), "covariance.names must be of its constants, got 'zz'"),
+        (lambda c: c["derived"]["value"].pop(), "derived.value must be as long as derived.alpha"),
+        (lambda c: c["quality"]["published"].pop("ks"), "quality.published.ks must be there"),
+    ):
+        content = json.loads((fits_folder() / "burley-whole.json").read_text())
+        change(content)
+        path = tmp_path / "mine.json"
+        path.write_text(json.dumps(content))
+        with pytest.raises(RecordError, match=words):
+            record.read(path, whole=True)
 
 
 def test_records_that_cannot_be_read_are_named(tmp_path):

@@ -65,7 +65,7 @@ def _data(folder: Path) -> str:
         "start": first(laws),
         "shaders": _shaders(),
     }
-    return json.dumps(told, ensure_ascii=False, allow_nan=False).replace("</", "<\\/")
+    return json.dumps(told, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
 def _shaders() -> dict[str, str]:

@@ -10,6 +10,7 @@ from pathlib import Path
 from string import Template
 
 from mcml_sim.version import __version__
+from mcml_sim.whole_file import require_writable, write_whole
 from profilefit import record
 from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
@@ -91,7 +92,7 @@ def write_page(
     RecordError, InputError on files that are damaged; OutputError where `path` cannot be written.
     Thirty records take two minutes.
     """
-    record.require_writable(path.parent)
+    require_writable(path)
     source = Source(folder, tuple(names) if names else None)
     found = Measured(evidence, folder)
     for file in source.paths.values():  # what is damaged is better said now than after a minute
@@ -99,7 +100,7 @@ def write_page(
     measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
     makers = _makers(source, path.name) | {key: partial(str, text) for key, text in measured.items()}
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
-    record.write_text(path, _document(made, len(source.paths)))
+    write_whole(path, _document(made, len(source.paths)))
 
 
 def _makers(source: Source, page: str) -> dict[str, Callable[[], str]]:

@@ -2,19 +2,21 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mcml_sim.text_file import read_json
+from mcml_sim.whole_file import read_whole
 from profilefit import evidence
 from profilefit.errors import InputError
 from profilefit.report.page.markup import command, paragraph
-from profilefit.report.page.vector import inline
+from profilefit.report.page.vector import checked, inline
 
 Told = dict[str, Any]
 ALL = "all"
+MOST_DRAWING = 2**24  # bytes; the largest of ours has a fourteenth of it
 
 
 @dataclass(frozen=True)
@@ -42,11 +44,11 @@ class Measured:
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
         try:
-            content = json.loads(path.read_text(encoding="utf-8"))
-        except FileNotFoundError:
+            content = read_json(path) if path.exists() else None
+        except InputError as error:
+            raise InputError(f"{expected}, got: {str(error).removeprefix(f'{path}: ')}") from None
+        if content is None:
             return None
-        except (OSError, ValueError, RecursionError) as error:
-            raise InputError(f"{expected}, got: {error}") from None
         if not isinstance(content, dict) or not isinstance(content.get("made"), dict):
             raise InputError(f"{expected}, got no key 'made'")
         return content
@@ -54,7 +56,12 @@ class Measured:
     def drawing(self, name: str, title: str, on_paper: bool = False) -> str:
         """The figure `name`.svg beside it, or nothing."""
         path = self.folder / f"{name}.svg"
-        return inline(path.read_text(encoding="utf-8"), name, title, on_paper) if path.exists() else ""
+        if not path.exists():
+            return ""
+        content = read_whole(path, MOST_DRAWING)
+        if len(content) > MOST_DRAWING:
+            raise ValueError(f"a drawing of more than {MOST_DRAWING} bytes, {path.name}")
+        return inline(checked(content.decode("utf-8")), name, title, on_paper)
 
     def origin(self, told: Told) -> str:
         """When, where and by which command; and whether the records have changed since."""

@@ -6,6 +6,7 @@ import re
 from html import escape
 from itertools import groupby
 from types import MappingProxyType
+from xml.etree import ElementTree
 
 from profilefit.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
 from profilefit.report.page.markup import element
@@ -25,7 +26,44 @@ CURVED = re.compile("[CQScqsAaHhVv]")
 INVISIBLE = re.compile(r'<path [^>]*style="fill: none"[^>]*/>')  # as under the contours of a corner plot
 LETTER = re.compile(r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan>')
 ROW = re.compile(rf"{LETTER.pattern}(?:\s*{LETTER.pattern})+")
+SVG, HREF = "{http://www.w3.org/2000/svg}", "{http://www.w3.org/1999/xlink}href"
+ElementTree.register_namespace("", SVG.strip("{}"))
+ElementTree.register_namespace("xlink", HREF[1:].removesuffix("}href"))
+ELEMENTS = ("svg", "defs", "style", "g", "path", "image", "use", "text", "tspan", "clipPath", "rect")
+ATTRIBUTES = (
+    "height", "viewBox", "width", "version", "type", "id", "clip-path", "transform", "d", "style", "x", "y", HREF
+)  # fmt: skip
+RULE = "*{stroke-linejoin: round; stroke-linecap: butt}"
+REACHING = re.compile(r"url\s*\(|[\\@<>&]|expression|script", re.IGNORECASE)
 ALONE = 560  # [px] below which a figure is scrolled, not shrunk
+
+
+def checked(svg: str) -> str:
+    """The same drawing, if it holds what matplotlib's do and nothing else; ValueError where it does not.
+
+    A page runs what it holds: a figure that lies in some folder may bring scripts, or load what it likes.
+    """
+    try:
+        root = ElementTree.fromstring(svg)
+    except ElementTree.ParseError as error:
+        raise ValueError(f"a drawing that is not SVG: {error}") from None
+    for part in list(root):
+        if part.tag == f"{SVG}metadata":
+            root.remove(part)
+    for part in root.iter():
+        tag = str(part.tag).removeprefix(SVG)
+        strange = [key for key, value in part.attrib.items() if key not in ATTRIBUTES or not _is_inside(key, value)]
+        if tag not in ELEMENTS or strange or (tag == "style" and part.text != RULE):
+            what = f"<{tag}>" + (f" with {strange[0]}" if strange else "")
+            raise ValueError(f"a drawing with what matplotlib does not write: {what}")
+    return ElementTree.tostring(root, encoding="unicode")
+
+
+def _is_inside(key: str, value: str) -> bool:
+    """Whether a value points nowhere but into the drawing."""
+    if key == HREF:
+        return value.startswith(("#", "data:image/png;base64,"))
+    return not REACHING.search(value.replace("url(#", ""))
 
 
 def inline(svg: str, prefix: str, title: str, on_paper: bool = False) -> str:

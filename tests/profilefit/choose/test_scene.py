@@ -89,18 +89,43 @@ WRONG = [
     ("[material]", "[material]\nindex = 1.7", r"\[material\] index must be one of 1, 1.3, 1.4, 1.5 .* got 1.7"),
     ("[material]", "[material]\nname = 'skin1'", r"\[material\] name must be left out where red, green, blue are"),
     ("[tolerance]\nerror = 0.01", "", r"table \[tolerance\] is missing"),
-    ("error = 0.01", "error = 0.01\nmfp = -1", r"\[tolerance\] within.mfp must be .* got -1"),
+    ("error = 0.01", "error = 0.01\nmfp = -1", r"\[tolerance\] mfp must be a number > 0, got -1"),
     ("", "[budget]\ngpu = 'voodoo'", r"\[budget\] gpu must be one of switch, .* got 'voodoo'"),
     ("", "[extra]", "keys must be of unit, view, .* got 'extra'"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a number, got nothing"),
     ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0, got -1"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
-    ("[view]", "[view", "scene must be a TOML file, got:"),
+    ("[view]", "[view", "is not TOML: "),
+    ("pixel = 0.5", f"pixel = {10**400}", r"\[view\] pixel must be a number > 0 .*, got one of 401 digits"),
+    ("pixel = 0.5", f"pixel = 0x1{'0' * 5000}", r"\[view\] pixel must be .*, got one of more than 4300 digits"),
+    ("pixel = 0.5", f"pixel = {'9' * 5000}", "is not TOML: Exceeds the limit"),
+    ("pixel = 0.5", "pixel = 1e400", "is not TOML: the number 1e400, beyond floating point"),
+    ("pixel = 0.5", "pixel = 1e300", r"\[view\] pixel must be between 1e-09 and 1e\+09 in the unit .*, got 1e\+300"),
+    ("pixel = 0.5", "pixel = 1e300\nworld = 1e300", r"\[view\] pixel must be between .*, got inf"),
+    ("pixel = 0.5", "pixel = 1\nradius = 1e300\nworld = 1e5", r"\[view\] radius must be between .*, got 1.*e\+305"),
+    ("pixel = 0.5", "pixel = 1\nradius = nan", r"\[view\] radius must be a number > 0, got nan"),
+    ("pixel = 0.5", f"pixel = 1\n{'a.' * 100_000}b = 1", "is not TOML: tables or lists nested more than 32 deep"),
+    ("pixel = 0.5", f"pixel = {'[' * 100_000}", "is not TOML: tables or lists nested more than 32 deep"),
+    ("pixel = 0.5", f"pixel = {[1] * 1000}", r"\[view\] pixel must be .*, got \[1, 1.*\.\.\.$"),
+    ("pixel = 0.5", f'pixel = "{"x" * 1000}"', r"\[view\] pixel must be .*, got 'x+\.\.\.$"),
+    ("mfp = 0.5", "mfp = 1e-300", r"\[material.blue\] mfp must be between"),
+    ("error = 0.01", 'error = 0.01\nmfp = "4"', r"\[tolerance\] mfp must be a number > 0, got '4'"),
+    ("error = 0.01", "error = 0.01\nmfp = true", r"\[tolerance\] mfp must be a number > 0, got True"),
+    ("error = 0.01", "error = 0.01\nmfp = 101", r"\[tolerance\] within.mfp must be .* \(0, 100\], got 101"),
+    (
+        "error = 0.01",
+        "error = 0.01\npixels = 1.5",
+        r"\[tolerance\] pixels must be a whole number in 1 ... 100, got 1.5",
+    ),
+    ("", "[budget]\ngpu = ['voodoo']", r"\[budget\] gpu must be one of switch, .* got \['voodoo'\]"),
+    ("", f"[[layers]]\nn = {10**400}\nmu_a = 1\nmu_s = 1\ng = 0", r"\[layers 1\] n must be .*, got one of 401 digits"),
+    ("", "[[layers]]\nn = 1\nmu_a = '1'\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .*, got '1'"),
+    ("[view]", 'unit = "\\u001b[31m"\n[view]', r"unit must be a text of 60 characters at most, got '\\x1b\[31m'"),
 ]
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "message"), WRONG, ids=[new.splitlines()[-1] if new else old for old, new, _ in WRONG]
+    ("old", "new", "message"), WRONG, ids=[(new.splitlines()[-1] if new else old)[:30] for old, new, _ in WRONG]
 )
 def test_mistakes_are_one_line(written, old, new, message):
     path = written(old, new)
@@ -111,5 +136,5 @@ def test_mistakes_are_one_line(written, old, new, message):
 
 
 def test_missing_file(tmp_path):
-    with pytest.raises(InputError, match=r"absent.toml: scene must be a TOML file, got: No such file"):
+    with pytest.raises(InputError, match=r"absent.toml: expected a file that can be read, got: No such file"):
         read(tmp_path / "absent.toml")

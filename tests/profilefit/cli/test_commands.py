@@ -191,7 +191,7 @@ def test_a_bad_recipe_is_one_line_and_writes_nothing(command, recipe, change, sa
         (("regenerate", "albedo-rational", "--seed", "-1"), "seed must be a whole number in [0, 4294967295], got -1"),
         (("regenerate", "missing.toml", "--seed", str(2**32)), "seed must be a whole number in [0, 4294967295], got"),
         (("report", "no-such-record"), "there is no record 'no-such-record' in "),
-        (("report", "--fits", "empty"), "empty has no records"),
+        (("report", "--fits", "empty"), "must be a folder of records, got 'empty', which is none"),
     ],
 )
 def test_bad_words_are_one_line(command, words, said):

@@ -1,5 +1,6 @@
 """`profilefit export` as a user meets it: what it writes, what it refuses, and in how many lines."""
 
+import shutil
 from pathlib import Path
 
 from profilefit import catalogue
@@ -35,7 +36,39 @@ def test_what_was_only_printed_needs_no_word_for_it(command):
     for name in ("burley_diffuse_mfp", "van_de_hulst", "chiang"):
         status, text, _ = command("export", name)
         assert status == 0
-        assert text.startswith(f"// {name}, published: ")
+        assert f"\n// {name}, published: " in text
+
+
+def test_records_that_are_not_the_shipped_ones_are_named(command):
+    """A cloned folder may bring records of its own."""
+    _, shipped, err = command("export", "hazard")
+    assert err == ""
+    Path("fits").mkdir()
+    for name in ("hazard", "albedo-rational"):
+        shutil.copy(FITS / f"{name}.json", "fits")
+    said = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
+    assert command("export", "hazard") == (0, shipped, said)
+    assert command("export", "hazard", "--fits", "fits") == (0, shipped, "profilefit: records of 'fits'\n")
+    assert command("export", "hazard", "--fits", str(FITS)) == (0, shipped, "")
+    (Path("fits") / "albedo-rational.json").unlink()
+    status, out, err = command("export", "hazard")
+    assert (status, "// map: this record came with profilefit" in out) == (0, True)
+    assert err.splitlines()[1:] == ["profilefit: no record 'albedo-rational' in 'fits': the shipped map serves"]
+
+
+def test_a_folder_that_lacks_the_record_gives_no_other(command):
+    """As after a `regenerate --out mine` that failed."""
+    Path("mine").mkdir()
+    for name in ("hazard", "gaussians", "albedo liang"):
+        for words in ("export", name), ("export", name, "--constants", "regenerated"):
+            status, out, err = command(*words, "--fits", "mine")
+            assert (status, out, err.count("\n")) == (2, "", 1), err
+            assert "mine/" in err
+            assert "there is no such record; `profilefit regenerate" in err
+    Path("mine/burley.csv").write_text("r, value, sigma\n1,1,1\n2,.5,.1\n3,.1,.1\n")
+    status, out, err = command("fit", "mine/burley.csv", "--unit", "mm", "--fits", "mine")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "mine/hazard.json: there is no such record" in err
 
 
 def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path):
@@ -47,7 +80,11 @@ def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path):
         (("hazard", "--lang", "wgsl"), "profilefit: lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
         (("hazard", "--constants", "old"), "profilefit: constants must be one of regenerated, "),
         (("hazard", "--out", "no/such/folder.glsl"), "profilefit: cannot write no/such/folder.glsl: No such file"),
-        (("hazard", "--fits", "nowhere", "--constants", "x.json"), "profilefit: x.json: there is no such record"),
+        (("hazard", "--constants", "x.json"), "profilefit: x.json: there is no such record"),
+        (
+            ("hazard", "--fits", "nowhere"),
+            "profilefit: --fits must be a folder of records, got 'nowhere', which is none",
+        ),
     ):
         status, out, err = command("export", *words)
         assert (status, out) == (2, "")

@@ -96,6 +96,31 @@ def test_two_layers_are_a_misfit(command):
     assert found["quantities"]["mu_a"]["misfit_error"] > 20 * found["quantities"]["mu_a"]["statistical_error"]
 
 
+def test_three_rows_have_limits_where_alpha_may_be_one(command, tmp_path):
+    """One-sided, without a value, marked in the row; the same in JSON."""
+    rows = Path(PHANTOM).read_text().splitlines()[1:5]
+    (tmp_path / "three.csv").write_text("\n".join(rows) + "\n")
+    status, out, err = command("fit", str(tmp_path / "three.csv"), "--out", str(tmp_path / "out"))
+    assert (status, err) == (0, f"wrote fit.json and 4 figures into {tmp_path / 'out'}\n")
+    rows = [line.split() for line in out.splitlines()[:8]]
+    table = {row[0]: row[1:] for row in rows if len(row) > 4}
+    assert [table[name][:5] for name in ("A", "alpha", "mu_a")] == [
+        ["–", "edge", "–", sign, table[name][4]] for name, sign in (("A", ">"), ("alpha", ">"), ("mu_a", "<"))
+    ]
+    quantities = json.loads((tmp_path / "out" / "fit.json").read_text())["quantities"]
+    for name, (low, high) in {"A": (0.4, 1.0), "alpha": (0.9, 1.0), "mu_a": (0.0, 0.09)}.items():
+        one = quantities[name]
+        assert (one["value"], one["at_edge"], one["statistical_error"]) == (None, True, None)
+        limits = one["interval_95_data"]
+        assert limits.count(None) == 1
+        assert limits[0 if name != "mu_a" else 1] == pytest.approx(float(table[name][4]), rel=0.01)
+        assert low < float(table[name][4]) < high
+    length = quantities["l"]
+    assert length["at_edge"] is False
+    assert length["interval_95_data"][0] < length["value"] < length["interval_95_data"][1]
+    assert length["statistical_error"] is None, "derivatives at the edge are no errors"
+
+
 def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
     """Five times as much as is there."""
     status, out, err = command("fit", PHANTOM, "--scale", "0.2")

@@ -11,7 +11,9 @@ import pytest
 from mcml_sim import Setting
 from profilefit import catalogue
 from profilefit.errors import InputError
+from profilefit.measured.answer import Answer
 from profilefit.measured.candidates import advised
+from profilefit.measured.chain import posterior
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import Found, fitted
 from profilefit.measured.law_error import origin, relative_error
@@ -173,6 +175,42 @@ def test_intervals_are_where_chi_square_rises(plain):
         half = 1.96 * plain.errors(plain.statistical)[one.name]
         assert (one.high - one.low) / 2 == pytest.approx(half, rel=0.05)
         assert one.low < plain.values[one.name] < one.high
+
+
+def small(generator) -> Found:
+    """A fit to a few radii of some medium, often too near, too few or too noisy to tell white from grey."""
+    first, noise = generator.choice([0.05, 0.2, 1.0]), generator.choice([0.01, 0.1, 0.3])
+    r = np.geomspace(first, first * generator.choice([1.5, 4.0, 20.0]), int(generator.integers(4, 8)))
+    value = np.asarray(LAW.profile(r, 1.0 - generator.choice([0.0, 1e-3, 0.05, 0.3]), MFP))
+    drawn = value * (1.0 + noise * generator.standard_normal(r.size))
+    data = Measured("made up", "", r, r, drawn, noise * value, np.full(r.size, np.inf), "as given", "mm")
+    return fit(data, **({} if generator.random() < 0.2 else {"scale": 1.0}))
+
+
+def test_no_value_lies_outside_its_own_interval():
+    """Nor is there one, or a symmetric error, where alpha = 1 fits as well: but a limit."""
+    at_edge = given = 0
+    for seed in range(5):
+        found = small(np.random.default_rng(seed))
+        if not (found.minimum.converged or found.minimum.at_edge):
+            continue
+        told_of = told(found)
+        endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in told_of.intervals)
+        answer = Answer(found, told_of, None, None if endless else posterior(found, max_steps=100))
+        for name in answer.moving:
+            value, shown = answer.value(name), [answer.interval(name), answer.whole_interval(name)]
+            if any(answer.ends(name)):
+                at_edge += 1
+                assert value is None
+                assert name not in answer.told
+                assert all(one is None or None in one for one in shown)
+            elif value is not None:
+                given += 1
+                assert all(low <= value <= high for low, high in filter(None, shown))
+        outside = found.values["alpha"] > 0.9999
+        assert not outside or answer.value("alpha") is None, "nothing here tells alpha from 1 so well"
+    assert at_edge >= 3
+    assert given >= 3
 
 
 def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled):

@@ -2,18 +2,21 @@
 
 import hashlib
 import json
+import shutil
 import subprocess
 import sys
+from dataclasses import replace
 
 import moderngl
 import numpy as np
 import pytest
 
 from profilefit import catalogue
-from profilefit.errors import InputError
+from profilefit.errors import InputError, ShippedMap
 from profilefit.inventory import find
+from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
-from profilefit.shader.export import LANGUAGES, TARGETS, export
+from profilefit.shader.export import LANGUAGES, TARGETS, commented, export
 
 FITS = catalogue.fits_folder()
 MAIN = """
@@ -118,6 +121,83 @@ def test_two_media_share_a_shader_and_each_may_be_included_twice(context):
     calls = "skin_profile(0.5, 0.9, 2.0), wax_profile(0.5, 0.9, 2.0)"
     made = drawn(context, head + f"out vec4 made;\nvoid main() {{ made = vec4({calls}, 0.0, 0.0); }}")
     np.testing.assert_allclose(made[:2], [one.law.profile(0.5, 0.9, 2.0) for one in (skin, wax)], rtol=1e-5)
+
+
+def test_comments_are_comments_whatever_they_hold():
+    lines = ["a\nb\rc\u2028d\x85e", "\x1b[31m é", "ends in \\", "ends in ??/ ", "\\", "", "coding: utf-7"]
+    for mark in ("#", "//"):
+        text = commented(lines, mark)
+        told = text.splitlines()
+        assert text.count("\n") == len(told) == 11
+        assert all(line.startswith(mark) for line in told)
+        assert text.replace("\n", "").isprintable()
+        assert text.isascii()
+        assert not any(line.endswith(("\\", "??/")) for line in told), "a preprocessor would join the next line to it"
+    assert told[5:8] == ["// \\x1b[31m \\xe9", "// ends in", "// ends in"]
+
+
+def test_the_first_two_lines_hold_nothing_from_outside():
+    """There, a word of a comment changes the encoding in which Python reads a file (PEP 263)."""
+    named = replace(find("hazard", FITS), constants="coding: utf-7")
+    first = export(named, FITS, "python").splitlines()[:4]
+    assert not any("coding" in line for line in first[:2])
+    assert "coding: utf-7" in first[3]
+
+
+def test_constants_by_the_path_of_their_record_are_those_by_its_name():
+    for name in ("hazard-diffuse", "burley-whole", "gaussians-6", "albedo-rational-n1.4"):
+        law = find(name, FITS).name
+        by_name, by_path = (
+            export(found, FITS)
+            for found in (
+                find(name, FITS),
+                find("rational" if name.startswith("albedo") else law, FITS, str(FITS / f"{name}.json")),
+            )
+        )
+        assert by_path == by_name
+    text = export(find("liang", FITS, str(FITS / "liang-whole.json")), FITS)
+    assert "const float liang_g1 = 1.504; // as printed" in text
+    assert "(jackknife)" in next(line for line in text.splitlines() if "liang_a1 =" in line)
+
+
+def test_the_lines_of_the_map_are_marked():
+    head = [line for line in export(find("hazard", FITS), FITS).splitlines() if line.startswith("//")]
+    law, of_map = ([line for line in head if line.startswith(f"// {word}: ")] for word in ("law", "map"))
+    for lines, name in ((law, "hazard"), (of_map, "albedo-rational")):
+        digest = hashlib.sha256((FITS / f"{name}.json").read_bytes()).hexdigest()
+        assert lines[0].startswith(f"// {lines[0][3:6]}: record {name}: ")
+        assert lines[-1].endswith(digest)
+    assert not [line for line in head if "sha256" in line and line not in law + of_map]
+
+
+def test_a_map_that_the_folder_lacks_is_said_to_have_come_with_the_installation(tmp_path):
+    shutil.copy(FITS / "hazard.json", tmp_path)
+    with pytest.warns(ShippedMap):
+        named = find("hazard", tmp_path)
+    assert "// map: this record came with profilefit: the folder of the law's has none" in export(named, tmp_path)
+    told = json.loads(export(named, tmp_path, "json"))["records"]
+    assert (told["hazard"]["of"], told["hazard"]["came_with_profilefit"]) == ("law", False)
+    assert (told["albedo-rational"]["of"], told["albedo-rational"]["came_with_profilefit"]) == ("map", True)
+    assert "came with profilefit" not in export(find("hazard", FITS), FITS)
+
+
+@pytest.mark.parametrize("name", ["hazard", "quantile", "burley", "gaussians", "liang", "dipole", "better_dipole"])
+def test_the_clamps_are_those_that_it_states(name):
+    text = export(find(name, FITS), FITS, "python")
+    stated = next(line for line in text.splitlines() if line.startswith("# clamps: "))
+    names: dict = {}
+    exec(text, names)
+    start = emit.prefix(find(name, FITS).law)
+    profile, sample, cdf = (names[f"{start}_{word}"] for word in ("profile", "sample", "cdf"))
+    assert "R_d within 1e-6 mfp of the source to that at 1e-6 mfp" in stated
+    assert profile(0.0, 0.9, 2.0) == profile(1e-7, 0.9, 2.0) == profile(2e-6, 0.9, 2.0) != profile(4e-6, 0.9, 2.0)
+    if "xi to 1 - 2^-24" in stated:
+        assert np.isfinite(sample(1.0, 0.9, 1.0))
+        np.testing.assert_allclose(sample(1.0, 0.9, 1.0), sample(1 - 2.0**-24, 0.9, 1.0), rtol=1e-8)
+    if "r to 1e8 mfp" in stated:
+        assert cdf(1e30, 0.9, 1.0) == cdf(1e8, 0.9, 1.0)
+    if "alpha to at least 1e-6" in stated:
+        assert cdf(0.5, 0.0, 1.0) == cdf(0.5, 1e-6, 1.0) != cdf(0.5, 1e-3, 1.0)
 
 
 def test_what_cannot_be_exported_is_named():

@@ -9,7 +9,7 @@ import pytest
 
 from profilefit.report.canvas import BLUE, GREY, canvas, styled
 from profilefit.report.page.lettering import font_face
-from profilefit.report.page.vector import VARIABLES, inline
+from profilefit.report.page.vector import VARIABLES, checked, inline
 
 NOBODY_SEES = r'<path [^>]*style="fill: none"[^>]*>'
 
@@ -102,3 +102,33 @@ def test_the_font_has_the_letters_that_are_used_and_no_others(page):
     rule = font_face([page])
     assert rule.startswith("@font-face{font-family:'DejaVu Sans';src:url(data:font/woff;base64,")
     assert len(rule) < len(font_face([page, "<text>ABCDEFGHIJKLMNOPQRSTUVWXYZ</text>"])) < 40_000
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("</svg>", "<script>evil()</script></svg>"),
+        ("</svg>", "<foreignObject/></svg>"),
+        ("<svg ", '<svg onload="evil()" '),
+        ("<path ", '<path onclick="evil()" '),
+        ('xlink:href="#', 'xlink:href="javascript:evil()#'),
+        ('xlink:href="#', 'xlink:href="https://example.org/#'),
+        ("fill: ", "background: url(https://example.org/x); fill: "),
+        ("*{stroke-linejoin: round", "@import 'https://example.org/x'; *{stroke-linejoin: round"),
+        ("</svg>", ""),
+    ],
+    ids=range(9),
+)
+def test_a_drawing_holds_what_matplotlib_draws_and_nothing_else(original, old, new):
+    assert inline(checked(original), "first", "A").replace(" />", "/>").replace("  ", " ") == inline(
+        original, "first", "A"
+    ).replace("  ", " ")
+    assert old in original
+    with pytest.raises(ValueError, match=r"^a drawing (with what matplotlib does not write: <\w+>|that is not SVG: )"):
+        checked(original.replace(old, new, 1))
+
+
+def test_a_drawing_hides_nothing_in_its_head(original):
+    entity = "<!DOCTYPE svg [<!ENTITY x \"<svg onload='evil()'>\">]>"
+    hidden = original.replace(original[original.index("<!DOCTYPE") : original.index("<svg")], entity)
+    assert "evil" not in inline(checked(hidden), "first", "A")
