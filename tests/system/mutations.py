@@ -45,8 +45,8 @@ TEXTS = (
     *("<!-- quality -->", "<!-- /quality -->", "<img src=x onerror=alert(1)>", '" onmouseover="alert(1)', "</td><td>"),
     *("[bold]one[/bold]", "[link=file:///etc/passwd]one[/link]", "[/]", "[", "a|b", "\\|", "| --- |", "# one", "> one"),
     *("../../one", "/etc/passwd", "..", "~/one", f"$(touch {CANARY})", f"; touch {CANARY}", "-o", "--out=/dev/null"),
-    *("1.0; evil", "1.0\nevil", "nan", "inf", "1e400", "0x10", "1_0", "LAW_", "@i", "//% for 9\n@i\n//% end", "PF_SELECT"),
-    *("x" * 10_000, "x " * 10_000, "0" * 64, "F" * 64, "0" * 63),
+    *("1.0; evil", "1.0\nevil", "nan", "inf", "1e400", "0x10", "1_0", "LAW_", "@i", "//% for 9\n@i\n//% end", "x|"),
+    *("PF_SELECT", "x" * 10_000, "x " * 10_000, "0" * 64, "F" * 64, "0" * 63),
 )  # fmt: skip
 WORDS = (
     "converged",
@@ -68,15 +68,16 @@ NUMBERS = (
 DEEP = 100_000
 NESTS = ("[" * DEEP + "]" * DEEP, '{"a":' * DEEP + "1" + "}" * DEEP, "[" * DEEP, "[[]," * 2000 + "1" + "]" * 2000)
 FILE_NAMES = (
-    "a\nimport os",
-    "a\x1b[31mred",
+    "\nimport os",
+    "\x1b[31mred",
     "<img src=x onerror=alert(1)>",
-    "a\\",
+    "\\",
     "[bold]a",
-    "-a",
-    "a*",
+    "*",
     "\u202ea",
-    "a.b",
+    ".b",
+    "|",
+    "`",
 )
 TOML_WORDS = (
     *NUMBERS, *("nan", "inf", "-inf", "true", "1_000", "0x10", "1979-05-27T07:32:00Z", "[]", "{}", "{a = 1}", "[[1]]"),
@@ -134,7 +135,8 @@ def damaged(rng: random.Random, data: bytes) -> bytes:
     ways: tuple[bytes, ...] = (
         *(data[:at], data[at:], data[:at] + some + data[at:], data[:at] + data[at + len(some) :], bytes(flipped)),
         *(data + data, data + some, some + data, b"\xef\xbb\xbf" + data, data[:at] + b"\0" + data[at:], b"", some),
-        *(b"\xff\xfe" + data, data.replace(b"\n", b"\r"), data.replace(b"\n", b"\r\n"), data[:at] + b"\xed\xa0\x80" + data[at:]),
+        *(b"\xff\xfe" + data, data.replace(b"\n", b"\r"), data.replace(b"\n", b"\r\n")),
+        data[:at] + b"\xed\xa0\x80" + data[at:],
     )  # fmt: skip
     return rng.choice(ways)
 
@@ -246,7 +248,8 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
             places = [place for line, one in enumerate(found) for place in _words(line, one)]
             if places:
                 line, begin, end = rng.choice(places)
-                found[line] = found[line][:begin] + rng.choice(words) + found[line][end:]
+                word = rng.choice((rng.choice(words), rng.choice(words), _scaled(rng, found[line][begin:end])))
+                found[line] = found[line][:begin] + word + found[line][end:]
         elif way < 0.65 and len(found) > 1:
             del found[at]
         elif way < 0.75:
@@ -261,6 +264,14 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
 
 def _words(line: int, text: str) -> Iterator[tuple[int, int, int]]:
     return ((line, *found.span()) for found in TOKEN.finditer(text.partition("#")[0]))
+
+
+def _scaled(rng: random.Random, word: str) -> str:
+    """Another number where there is one."""
+    try:
+        return f"{float(word) * rng.choice((0.5, 2, 10, -1, 0, 1e-9, 1e9)):.6g}"
+    except ValueError:
+        return word
 
 
 def toml_mutant(rng: random.Random, text: str) -> bytes:

@@ -1,7 +1,7 @@
 """Commands as processes of their own, a thousand of them in minutes: one process imports what they need, and forks.
 
-Run as a program, it reads requests from stdin, a JSON list [module, arguments, folder, seconds] a line, and answers each
-with a line [status, stdout, stderr] when the process has ended; a status below 0 is the signal that ended it.
+Run as a program, it reads requests from stdin, a JSON list [module, arguments, folder, seconds] a line, and answers
+each with a line [status, stdout, stderr] when the process has ended; a status below 0 is the signal that ended it.
 """
 
 from __future__ import annotations

@@ -23,8 +23,6 @@ from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
-import mutations
-import processes
 import pytest
 
 from mcml_sim.errors import InputError, OutputError, StoreError
@@ -39,6 +37,7 @@ from profilefit.measured import reading
 from profilefit.report.page.document import write_page
 from profilefit.shader import emit
 from profilefit.shader.export import LANGUAGES, export
+from tests.system import mutations, processes
 
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
 QUICK, ALL = 200, 10_000
@@ -143,7 +142,7 @@ LITERAL = re.compile(r"\.?\d.*")
 
 
 def tokens(text: str, joined: bool) -> list[list[str]]:
-    """The tokens of each line that has any, numbers as 0 without their sign; `joined` as a C preprocessor joins lines."""
+    """The tokens of each line that has any, numbers as 0 without sign; `joined` as a C preprocessor joins lines."""
     if joined:
         text = re.sub(r"(?:\\|\?\?/)[ \t]*(?:\r\n|\r|\n)", "", text)
     text = re.sub(r"//[^\r\n]*|/\*.*?\*/", " ", text, flags=re.DOTALL)
@@ -341,7 +340,7 @@ ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning
 def process_faults(kind: str, count: int, folder: Path) -> list[str]:
     """Run a command on so many mutated files, each in a folder of its own."""
     module, arguments, answered = AS_PROCESSES[kind]
-    ending, mutant, readers = KINDS["record" if kind in ("export", "report") else kind]
+    ending, mutant, _ = KINDS["record" if kind in ("export", "report") else kind]
     faults: list[str] = []
     with processes.commands(folder) as program:
         for seed in _seeds(kind, count, answered, folder):
