@@ -133,8 +133,9 @@ class _Density(eqx.Module):
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            numbers = (fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound)
-            return cls(*jax.tree.map(jnp.asarray, numbers), problem)
+            made = [fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound]
+            law, rings, *numbers = jax.tree.map(jnp.asarray, made)
+            return cls(law, rings, *numbers, problem=problem)
 
     @eqx.filter_jit
     def __call__(self, points):
