@@ -133,9 +133,16 @@ class _Density(eqx.Module):
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            made = [fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound]
-            law, rings, *numbers = jax.tree.map(jnp.asarray, made)
-            return cls(law, rings, *numbers, problem=problem)
+            made = {
+                "law": fit.law,
+                "rings": fit.rings,
+                "centre": centre,
+                "adjust": adjust,
+                "variance": variance,
+                "least": fit.solution.cost,
+                "bound": bound,
+            }
+            return cls(problem=problem, **jax.tree.map(jnp.asarray, made))
 
     @eqx.filter_jit
     def __call__(self, points):
