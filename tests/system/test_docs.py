@@ -171,6 +171,23 @@ def test_the_python_that_is_printed_runs(page):
     exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
 
 
+# The commands
+
+
+def test_make_ends_when_a_worker_dies(tmp_path):
+    """As the Makefile runs the tests: the run fails at once and names the test, where it waited for ever."""
+    words = re.search(
+        r"^PYTEST := \$\(PY\) (-m pytest .*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    (tmp_path / "test_dead.py").write_text("import os\ndef test_lives(): pass\ndef test_dies(): os._exit(9)\n")
+    for name in "abc":
+        (tmp_path / f"test_{name}.py").write_text("def test_one(): pass\ndef test_two(): pass\n")
+    command = [sys.executable, *words[1].replace("auto", "1").split(), "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "crashed while running 'test_dead.py::test_dies'" in done.stdout
+
+
 # The site
 
 
