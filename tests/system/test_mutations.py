@@ -39,6 +39,7 @@ from profilefit.shader import emit
 from profilefit.shader.export import LANGUAGES, export
 from tests.system import mutations, processes
 
+pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")  # folders of one record
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
 QUICK, ALL = 200, 10_000
 LONGEST = 1.0  # [s] of this process
