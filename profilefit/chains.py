@@ -74,7 +74,7 @@ class Posterior:
         try:
             from arviz_base import from_dict
         except ImportError:
-            raise InputError("to_arviz needs the package arviz-base: pip install 'profilefit[arviz]'") from None
+            raise InputError("to_arviz needs the package arviz-base: pip install arviz-base") from None
         shape = (-1, self.walkers)
         draws = {name: column.reshape(shape).T for name, column in zip(self.names, self.samples.T, strict=True)}
         groups = {"posterior": draws, "sample_stats": {"lp": self.log_density.reshape(shape).T}}

@@ -70,6 +70,18 @@ def commands_of(page):
     return [re.sub(r"[\[\]]|\.\.\.", "", one).split() for one in typed]
 
 
+def test_no_text_installs_a_package_of_this_name_from_the_index():
+    """There it is somebody else's, or will be: a clone is installed as '.[extra]', and messages name the packages."""
+    places = ("docs", "notebooks", "benchmarks", "profilefit", "mcml_sim", "tests")
+    texts = [*ROOT.glob("*.*"), ROOT / "Makefile", *(path for one in places for path in (ROOT / one).rglob("*.*"))]
+    read = [path for path in texts if path.suffix in (".md", ".py", ".ipynb", ".sh", ".toml", "") and path.is_file()]
+    named = re.compile("profilefit" r"\[|pip3? install (-\S+ )*[\"']?(profilefit|mcml)")
+    assert len(read) > 400
+    assert [path for path in read if "_build" not in path.parts and named.search(path.read_text("utf-8"))] == []
+    for bad in ("pip install -U '{}[cluster]'", "the extra {}[cluster]", "pip install --upgrade {}"):
+        assert named.search(bad.format("profilefit"))
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_and_options_exist(page):
     for program, command, *words in commands_of(page):
