@@ -114,11 +114,11 @@ class _Density(eqx.Module):
 
     law: eqx.Module
     rings: eqx.Module
-    centre: jax.Array
-    adjust: jax.Array
-    variance: jax.Array
-    least: jax.Array
-    bound: jax.Array
+    centre: Floats | jax.Array
+    adjust: Floats | jax.Array
+    variance: float | jax.Array
+    least: float | jax.Array
+    bound: Floats | jax.Array
     problem: Problem = eqx.field(static=True)
 
     @classmethod
@@ -131,8 +131,8 @@ class _Density(eqx.Module):
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            numbers = (fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound)
-            return cls(*jax.tree.map(jnp.asarray, numbers), problem)
+            density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
+            return jax.tree.map(jnp.asarray, density)
 
     @eqx.filter_jit
     def __call__(self, points):
