@@ -116,11 +116,11 @@ class _Density(eqx.Module):
 
     law: eqx.Module
     rings: eqx.Module
-    centre: jax.Array
-    adjust: jax.Array
-    variance: jax.Array
-    least: jax.Array
-    bound: jax.Array
+    centre: Floats | jax.Array
+    adjust: Floats | jax.Array
+    variance: float | jax.Array
+    least: float | jax.Array
+    bound: Floats | jax.Array
     problem: Problem = eqx.field(static=True)
 
     @classmethod
@@ -133,16 +133,8 @@ class _Density(eqx.Module):
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            made = {
-                "law": fit.law,
-                "rings": fit.rings,
-                "centre": centre,
-                "adjust": adjust,
-                "variance": variance,
-                "least": fit.solution.cost,
-                "bound": bound,
-            }
-            return cls(problem=problem, **jax.tree.map(jnp.asarray, made))
+            density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
+            return jax.tree.map(jnp.asarray, density)
 
     @eqx.filter_jit
     def __call__(self, points):

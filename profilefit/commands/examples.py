@@ -6,7 +6,7 @@ import os
 from pathlib import Path
 
 from mcml_sim.screen import screen
-from mcml_sim.whole_file import require_writable, write_whole
+from mcml_sim.whole_file import require_writable, write_together
 from profilefit.errors import OutputError
 from profilefit.folder import shipped
 
@@ -20,7 +20,7 @@ def examples(out: Path) -> None:
         )
     for path in files:
         require_writable(out / path.name)
+    write_together({out / path.name: path.read_bytes() for path in files})
     console = screen()
     for path in files:
-        write_whole(out / path.name, path.read_bytes())
         console.print(str(out / path.name), markup=False)
