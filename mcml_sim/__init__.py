@@ -1,6 +1,6 @@
 """What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
-from mcml_sim.errors import ClusterError, InputError, OutputError, SettingError, StoreError
+from mcml_sim.errors import ClusterError, ForkError, InputError, OutputError, SettingError, StoreError
 from mcml_sim.lazy import attributes
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest, while Ctrl-C is a traceback
@@ -40,6 +40,7 @@ __all__ = [
     "ClusterError",
     "DamagedBatch",
     "Estimate",
+    "ForkError",
     "Grid",
     "InputError",
     "Layer",

@@ -121,7 +121,7 @@ def run(
     its last part is written there.
 
     \b
-    Examples, from a clone:
+    Examples, on a file of profilefit examples:
       mcml-sim run examples/slab.mci --photons 1e5 --out runs
       mcml-sim run examples/slab.mci --photons 1e8 --precision 1e-3 --out runs
     """

@@ -100,7 +100,7 @@ def _dask() -> ModuleType:
         import distributed
     except ModuleNotFoundError:
         raise InputError(
-            "scheduler must be None where the package distributed is missing; pip install 'profilefit[cluster]'"
+            "scheduler must be None where the package distributed is missing; pip install distributed"
         ) from None
     return distributed
 

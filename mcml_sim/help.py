@@ -32,7 +32,7 @@ class FirstScreen(TyperGroup):
                 console.print(Text.assemble((f"{shown:{titles}}", "dim"), (f"{name:{names}}", "bold cyan"), told))
         options = [one.opts[0] for one in self.get_params(ctx) if one.opts[0] not in NOT_SHOWN]
         console.print(Text.assemble((f"{'Options':{titles}}", "dim"), ", ".join(options)))
-        console.print(Text(f"\nMore, with examples: {ctx.command_path} COMMAND --help", style="dim"))
+        console.print(Text(f"More, with examples: {ctx.command_path} COMMAND --help", style="dim"))
 
     def _commands(self, ctx: typer.Context) -> list[tuple[str, str, str]]:
         """Group, name, what it does."""

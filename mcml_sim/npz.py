@@ -35,6 +35,7 @@ LONGEST_HEADER = 512  # bytes
 LONGEST_NUMBER = 15  # digits of a shape
 LONGEST_NAME = 60  # characters of one in a message
 LAST_LETTER = 0x10FFFF
+LONGEST_REASON = 200  # characters; zipfile quotes names of 65535
 WIDEST = 8  # bytes of a number
 # What numpy and zip raise at a file that is not what was written.
 DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, OverflowError, struct.error,
@@ -62,8 +63,7 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
                 raise ValueError(f"its arrays claim {sum(sizes)} bytes, more than the {most} that are read")
             return {name: _array(archive, member) for name, member in members.items()}
     except DAMAGED as error:
-        reason = (str(error) or type(error).__name__).splitlines()[0]
-        raise ValueError(reason) from None
+        raise ValueError((str(error) or type(error).__name__).splitlines()[0][:LONGEST_REASON]) from None
 
 
 def _zip_file(content: bytes) -> bytes:

@@ -5,12 +5,18 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import jax
+
 from mcml_sim import Orders
 from mcml_sim.progress import tracked
 from profilefit import record, starts
 from profilefit.pipelines import PIPELINES, needs_photons
 from profilefit.recipe import Recipe
 from profilefit.run import Run
+
+# Every law compiles a fit of its own for each setting: one to three thousand memory maps, of which Linux gives a
+# process 65 thousand, and a hundred megabytes. No later recipe needs them.
+CLEARED = 8  # recipes after which compiled programs go
 
 
 def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
@@ -21,11 +27,13 @@ def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
     settings = dict.fromkeys(recipe.setting for recipe in ordered if needs_photons(recipe))
     lights = {setting: run.light(setting) for setting in settings}
     written = []
-    for recipe in tracked(ordered, "fitting", "recipes", quiet=run.progress is False):
+    for number, recipe in enumerate(tracked(ordered, "fitting", "recipes", quiet=run.progress is False), start=1):
         run.say(f"{recipe.name}: {recipe.title}")
         light = lights[recipe.setting] if needs_photons(recipe) else None
         content, arrays = PIPELINES[recipe.pipeline](recipe, run, light)
         written.append(record.write(run.out, recipe.name, {**_header(recipe, run, light), **content}, arrays))
+        if number % CLEARED == 0:
+            jax.clear_caches()
     return written
 
 

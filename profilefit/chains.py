@@ -74,7 +74,7 @@ class Posterior:
         try:
             from arviz_base import from_dict
         except ImportError:
-            raise InputError("to_arviz needs the package arviz-base: pip install 'profilefit[arviz]'") from None
+            raise InputError("to_arviz needs the package arviz-base: pip install arviz-base") from None
         shape = (-1, self.walkers)
         draws = {name: column.reshape(shape).T for name, column in zip(self.names, self.samples.T, strict=True)}
         groups = {"posterior": draws, "sample_stats": {"lp": self.log_density.reshape(shape).T}}
@@ -116,11 +116,11 @@ class _Density(eqx.Module):
 
     law: eqx.Module
     rings: eqx.Module
-    centre: jax.Array
-    adjust: jax.Array
-    variance: jax.Array
-    least: jax.Array
-    bound: jax.Array
+    centre: Floats | jax.Array
+    adjust: Floats | jax.Array
+    variance: float | jax.Array
+    least: float | jax.Array
+    bound: Floats | jax.Array
     problem: Problem = eqx.field(static=True)
 
     @classmethod
@@ -133,9 +133,8 @@ class _Density(eqx.Module):
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
         with jax.enable_x64(True):
-            made = [fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound]
-            law, rings, *numbers = jax.tree.map(jnp.asarray, made)
-            return cls(law, rings, *numbers, problem=problem)
+            density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
+            return jax.tree.map(jnp.asarray, density)
 
     @eqx.filter_jit
     def __call__(self, points):

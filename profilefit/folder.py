@@ -13,10 +13,15 @@ EVIDENCE = Path("evidence")  # what was measured with records: shader check, fai
 
 
 def fits_folder() -> Path:
-    """The recipes and records that came with this installation: in the wheel, or beside the package in a checkout."""
+    """The recipes and records that came with this installation."""
+    return shipped("fits")
+
+
+def shipped(name: str) -> Path:
+    """A folder that came with this installation: in the wheel, or beside the package in a checkout."""
     package = Path(__file__).resolve().parent
-    shipped = package / "fits"
-    return shipped if shipped.is_dir() else package.parent / "fits"
+    inside = package / name
+    return inside if inside.is_dir() else package.parent / name
 
 
 def records_folder(asked: Path | None = None, quiet: bool = False) -> Path:

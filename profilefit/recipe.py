@@ -211,7 +211,7 @@ def read(path: Path) -> Recipe:
         raise RecipeError(str(error)) from None
     for key in ("name", "path"):
         if key in table:
-            raise RecipeError(f"{path}: unknown key {key!r}: a recipe is named by its file")
+            raise RecipeError(f"{path}: unknown key {shown(key)}: a recipe is named by its file")
     needed = () if table.get("pipeline") == "evidence" else ("albedos", "weighting")
     if missing := [f"[{name}]" for name in needed if name not in table]:
         raise RecipeError(f"{path}: missing {', '.join(missing)}")
@@ -242,7 +242,7 @@ def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[st
     for key in table:
         if key not in known:
             accepted = ", ".join(name for name in known if name not in given)
-            raise RecipeError(f"{where}: unknown key {key!r}, accepted: {accepted}")
+            raise RecipeError(f"{where}: unknown key {shown(key)}, accepted: {accepted}")
     missing = [n for n, f in known.items() if n not in table and f.default is MISSING and f.default_factory is MISSING]
     if missing:
         raise RecipeError(f"{where}: missing {', '.join(missing)}")

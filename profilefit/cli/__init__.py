@@ -12,6 +12,7 @@ from mcml_sim.version import __version__
 from profilefit.cli.check import check
 from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert
+from profilefit.cli.examples import examples
 from profilefit.cli.export import export
 from profilefit.cli.fit import fit
 from profilefit.cli.regenerate import regenerate
@@ -33,7 +34,7 @@ light: constants with error bars, all of them made again by one command.
 PANELS = {
     "Make laws": (regenerate, report),
     "Use laws": (export, choose, convert),
-    "Your own data": (fit,),
+    "Your own data": (fit, examples),
     "What to trust": (check, stability, tradeoff),
 }
 

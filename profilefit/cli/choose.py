@@ -15,7 +15,9 @@ from profilefit.cli.options import AsJson, Quiet
 def choose(
     scene: Annotated[
         Path,
-        typer.Argument(metavar="SCENE.toml", help="What is drawn, and how well: see a clone's examples/."),
+        typer.Argument(
+            metavar="SCENE.toml", help="What is drawn, and how well: skin.toml of `profilefit examples` is one."
+        ),
     ],
     measure: Annotated[
         bool, typer.Option("--measure", help="Measure cost ratios on this machine's OpenGL, not those shipped.")
@@ -30,6 +32,6 @@ def choose(
     every option and its constants. Exit status 1 if nothing serves.
 
     \b
-    Example, from a clone:
+    Example, on a file of profilefit examples:
       profilefit choose examples/skin.toml
     """

@@ -52,10 +52,10 @@ def fit(
 
     That is mu_s' and mu_a, from a measured or simulated profile; and what it cannot tell. A table has columns r, value,
     sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over rings. Values
-    are light per area and per incident light, unless the scale is free. Exit status 1 if the fit does not converge.
+    are light per area and per incident light, unless the scale is free. Exit status 1 if they give no medium.
 
     \b
-    Examples, from a clone:
+    Examples, on the files of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
     """

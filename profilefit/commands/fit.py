@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from mcml_sim.plain import as_json as json_text
+from mcml_sim.program import one_line
 from mcml_sim.progress import working
 from mcml_sim.screen import notes, print_json, screen, show
 from mcml_sim.setting import ILLUMINATIONS, Setting
@@ -75,7 +76,7 @@ def fit(
         print_json(body)
     else:
         points = f"{measured.value.size} {'rings' if measured.rings else 'points'}"
-        _show(answer, f"{data.name}: {points}, law {law}, {chosen.setting}")
+        _show(answer, f"{one_line(data.name)}: {points}, law {law}, {chosen.setting}")
     if answer.telling is None:
         raise typer.Exit(FAILED)
 

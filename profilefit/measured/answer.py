@@ -21,6 +21,7 @@ from profilefit.walking import Walk
 
 Floats = NDArray[np.float64]
 Ends = tuple[float | None, float | None]
+BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
 GREY = 0.9  # albedo that advice is given for where the data leave it open altogether
 
 
@@ -132,9 +133,20 @@ def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
 
 
 def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
-    """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate."""
+    """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate.
+
+    Where numbers on the way are none, that is the fit's result, and nothing is told of it.
+    """
     if not (found.minimum.converged or found.minimum.at_edge):
         return Answer(found, None, None, None)
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return _judged(found, seed, walk)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return Answer(replace(found, minimum=replace(found.minimum, result=BEYOND)), None, None, None)
+
+
+def _judged(found: Found, seed: int, walk: bool) -> Answer:
     telling = told(found)
     # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in telling.intervals)
@@ -227,11 +239,11 @@ def content(answer: Answer, law: str, constants: str) -> dict[str, Any]:
 def _quantities(answer: Answer) -> dict[str, Any]:
     found = answer.found
     kinds: dict[str, Floats | None] = {
-        "statistical": found.statistical,
-        "law": found.of_law if found.rel is not None else None,
+        "statistical": found.statistical if answer.told else None,
+        "law": found.of_law if answer.told and found.rel is not None else None,
     }
     if answer.telling is not None:
-        kinds["misfit"] = found.of_misfit
+        kinds["misfit"] = found.of_misfit if answer.told else None
     errors = {kind: found.errors(one) if one is not None else {} for kind, one in kinds.items()}
     truth = known_medium(found.data)
     return {

@@ -40,7 +40,7 @@ def fit_lines(answer: Answer) -> list[Text]:
 
 def _quantity_table(answer: Answer, title: str) -> RenderableType:
     found, names = answer.found, QUANTITIES
-    data = found.errors(found.statistical)
+    data = found.errors(found.statistical) if answer.told else {}
     law = found.errors(found.of_law) if found.rel is not None and answer.told else {}
     moving = answer.told
     truth = known_medium(found.data)
@@ -52,7 +52,7 @@ def _quantity_table(answer: Answer, title: str) -> RenderableType:
     }
     caption = CAPTION
     if answer.telling is not None and found.misfit.detected:
-        misfit = found.errors(found.of_misfit)
+        misfit = found.errors(found.of_misfit) if moving else {}
         columns["± misfit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± misfit: what is left unexplained, taken likewise"
     whole = bool(answer.whole_draws)

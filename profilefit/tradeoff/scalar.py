@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 WEIGHT_THRESHOLD, ROULETTE_CHANCE = 1e-4, 0.1  # MCML's
-ABSENT = 'needs numba, of the extra: pip install "profilefit[benchmark]"'
+ABSENT = "needs numba: pip install numba"
 
 Floats = NDArray[np.float64]
 

@@ -191,7 +191,7 @@ def test_no_address_is_refused(address):
 
 def test_the_optional_package_is_named(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
-    with pytest.raises(InputError, match=r"pip install 'profilefit\[cluster\]'"):
+    with pytest.raises(InputError, match=r"the package distributed is missing; pip install distributed$"):
         run_batches(TRACE, BATCH, BATCH, scheduler="tcp://127.0.0.1:8786")
 
 

@@ -70,6 +70,18 @@ def commands_of(page):
     return [re.sub(r"[\[\]]|\.\.\.", "", one).split() for one in typed]
 
 
+def test_no_text_installs_a_package_of_this_name_from_the_index():
+    """There it is somebody else's, or will be: a clone is installed as '.[extra]', and messages name the packages."""
+    places = ("docs", "notebooks", "benchmarks", "profilefit", "mcml_sim", "tests")
+    texts = [*ROOT.glob("*.*"), ROOT / "Makefile", *(path for one in places for path in (ROOT / one).rglob("*.*"))]
+    read = [path for path in texts if path.suffix in (".md", ".py", ".ipynb", ".sh", ".toml", "") and path.is_file()]
+    named = re.compile("profilefit" r"\[|pip3? install (-\S+ )*[\"']?(profilefit|mcml)")
+    assert len(read) > 400
+    assert [path for path in read if "_build" not in path.parts and named.search(path.read_text("utf-8"))] == []
+    for bad in ("pip install -U '{}[cluster]'", "the extra {}[cluster]", "pip install --upgrade {}"):
+        assert named.search(bad.format("profilefit"))
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_commands_and_options_exist(page):
     for program, command, *words in commands_of(page):
@@ -169,6 +181,23 @@ def test_the_python_that_is_printed_runs(page):
     """With a hundredth of the photons."""
     blocks = re.findall(r"```python\n(.+?)```", (ROOT / page).read_text(encoding="utf-8"), re.DOTALL)
     exec("\n".join(blocks).replace("1_000_000", "10_000"), {})
+
+
+# The commands
+
+
+def test_make_ends_when_a_worker_dies(tmp_path):
+    """As the Makefile runs the tests: the run fails at once and names the test, where it waited for ever."""
+    words = re.search(
+        r"^PYTEST := \$\(PY\) (-m pytest .*)$", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    (tmp_path / "test_dead.py").write_text("import os\ndef test_lives(): pass\ndef test_dies(): os._exit(9)\n")
+    for name in "abc":
+        (tmp_path / f"test_{name}.py").write_text("def test_one(): pass\ndef test_two(): pass\n")
+    command = [sys.executable, *words[1].replace("auto", "1").split(), "-p", "no:cacheprovider"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "crashed while running 'test_dead.py::test_dies'" in done.stdout
 
 
 # The site

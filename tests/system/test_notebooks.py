@@ -202,7 +202,7 @@ def test_without_ipywidgets_one_line_stands_in_for_the_sliders(tmp_path, monkeyp
     (tmp_path / "ipywidgets.py").write_text("raise ImportError('not installed')\n")
     monkeypatch.setenv("PYTHONPATH", str(tmp_path))
     notebook = run(EXPLORE)
-    assert "no sliders without ipywidgets: pip install 'profilefit[notebooks]'" in outputs(notebook, "stream")[0].text
+    assert "no sliders without ipywidgets: pip install ipywidgets" in outputs(notebook, "stream")[0].text
     assert len(pictures(notebook)) == len(pictures(executed(EXPLORE)))
 
 

@@ -49,6 +49,7 @@ def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
     fits = {path.name for pattern in ("*.toml", "*.json") for path in (ROOT / "fits").glob(pattern)}
     assert any(name.endswith(".json") for name in fits)
     assert {f"profilefit/fits/{name}" for name in fits} <= names
+    assert {f"profilefit/examples/{path.name}" for path in (ROOT / "examples").iterdir()} <= names
 
 
 def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
@@ -62,6 +63,9 @@ def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
     assert Path(place).resolve().is_relative_to((tmp_path / "site").resolve())
     assert 0 < float(value) < math.inf
     assert "hazard_profile" in text
+    copied = run(sys.executable, "-I", "-c", code, "examples", cwd=tmp_path).splitlines()[1:]
+    assert {Path(line) for line in copied} == {Path("examples", path.name) for path in (ROOT / "examples").iterdir()}
+    assert all((tmp_path / line).read_bytes() == (ROOT / line).read_bytes() for line in copied)
 
 
 @pytest.mark.slow

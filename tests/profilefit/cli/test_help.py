@@ -18,6 +18,7 @@ PROGRAMS = {"profilefit": profilefit.cli.app, "mcml-sim": mcml_sim.cli.app}
 LINES, COLUMNS = 24, 80
 # What takes more than a few seconds is only held against the options that there are.
 CHEAP = (
+    "profilefit examples --out trial",
     "profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm",
     "profilefit convert --alpha 0.95 --dmfp 3mm --json",
     "profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl",
@@ -80,10 +81,10 @@ def test_options_and_files_of_every_example_are_there(line):
     assert len(files) == line.count("examples/")
 
 
-def test_what_only_a_clone_has_is_said_to_be_of_one():
-    """An installed wheel has no examples/."""
+def test_files_of_examples_are_said_to_be_of_the_command_that_copies_them():
+    """An installed wheel has no examples/ in the folder that one works in."""
     for one in SUBCOMMANDS.values():
-        assert ("examples/" in one.epilog) == ("from a clone:" in one.epilog)
+        assert ("examples/" in one.epilog) == ("of profilefit examples:" in one.epilog)
     assert not any("examples/" in text for text in (profilefit.cli.HELP, mcml_sim.cli.HELP))
 
 

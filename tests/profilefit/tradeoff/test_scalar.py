@@ -43,4 +43,4 @@ def test_without_numba_the_row_is_left_out_and_the_extra_named(monkeypatch):
     finally:
         scalar.compiled.cache_clear()
     assert not [one for one in found if one.method == truth.SCALAR]
-    assert notes == ['left out: the scalar tracer needs numba, of the extra: pip install "profilefit[benchmark]"']
+    assert notes == ["left out: the scalar tracer needs numba: pip install numba"]
