@@ -48,6 +48,9 @@ def evaluated(method: Callable) -> Callable:
             return method(law, *arguments, **named)
         given = list(signature.bind(law, *arguments, **named).arguments.items())[1:]
         checked = {name: _checked(name, value) for name, value in given}
+        if any(np.ndim(leaf) for leaf in leaves):  # many laws in one, draws of a posterior: their shape joins in
+            with jax.enable_x64(True):
+                return np.asarray(method(law, **{name: jnp.asarray(value) for name, value in checked.items()}))
         out = _in_blocks(_program(method, form, tuple(checked)), [np.asarray(leaf, float) for leaf in leaves], checked)
         return float(out) if out.ndim == 0 else out
 
