@@ -197,7 +197,7 @@ def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
 
 
 def _regenerated_laws(run: Run) -> dict[str, ProfileLaw]:
-    """The laws that a table of published ones is compared with: of the records at hand, else as shipped, which is said."""
+    """The laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
     laws = {}
     for label, law, name in (
         ("normalized diffusion, regenerated", "burley", "burley-whole"),
