@@ -148,7 +148,8 @@ def _grid(arrays: Mapping[str, NDArray]) -> Grid:
         r=_needed(arrays, "r_edges"), z=arrays.get("z_edges"), na=None if angles is None else angles.size - 1
     )
     require_resolved(grid)
-    if angles is not None and not (angles.ndim == 1 and np.allclose(angles, grid.a_edges, rtol=1e-12)):
+    even = grid.a_edges
+    if angles is not None and even is not None and not (angles.ndim == 1 and np.allclose(angles, even, rtol=1e-12)):
         raise ValueError("a_edges must be even from 0 to pi/2")
     return grid
 

@@ -221,11 +221,11 @@ class _Reader:
         self, where: str, key: str, table: Table, default: str | None = None, accepted: tuple[str, ...] = ()
     ) -> str:
         value = table.get(key, default)
-        line = isinstance(value, str) and value.isprintable() and len(value) <= LONGEST_TEXT
-        if not line or (accepted and value not in accepted):
-            words = f"one of {', '.join(accepted)}" if accepted else f"a text of {LONGEST_TEXT} characters at most"
-            raise self.bad(where, key, words, value)
-        return value
+        short = isinstance(value, str) and value.isprintable() and len(value) <= LONGEST_TEXT
+        if isinstance(value, str) and short and (not accepted or value in accepted):
+            return value
+        words = f"one of {', '.join(accepted)}" if accepted else f"a text of {LONGEST_TEXT} characters at most"
+        raise self.bad(where, key, words, value)
 
     def made(self, where: str, make: Any) -> Any:
         """What `make` makes; where it refuses, the message says in which file and table."""
