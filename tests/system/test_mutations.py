@@ -17,7 +17,8 @@ import tempfile
 import time
 import traceback
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from html.parser import HTMLParser
 from pathlib import Path
@@ -39,7 +40,8 @@ from profilefit.shader import emit
 from profilefit.shader.export import LANGUAGES, export
 from tests.system import mutations, processes
 
-pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")  # folders of one record
+# A record alone in its folder is normalised with the shipped map, and the command says so.
+pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
 QUICK, ALL = 200, 10_000
 LONGEST = 1.0  # [s] of this process
@@ -335,30 +337,40 @@ AS_PROCESSES: dict[str, tuple[str, tuple[str, ...], int]] = {
     "mci": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 5),
 }
 PROCESSES = 200
+BESIDE = 4  # at a time
 ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning", "site-packages")
 
 
 def process_faults(kind: str, count: int, folder: Path) -> list[str]:
-    """Run a command on so many mutated files, each in a folder of its own."""
-    module, arguments, answered = AS_PROCESSES[kind]
+    """Run a command on so many mutated files, each in a folder of its own, a few side by side."""
+    seeds = list(_seeds(kind, count, folder))
+    shares = [seeds[part::BESIDE] for part in range(BESIDE)]
+    with ThreadPoolExecutor(BESIDE) as pool:
+        found = pool.map(lambda part: _faults_of(kind, shares[part], folder / f"part{part}"), range(BESIDE))
+        return [fault for faults in found for fault in faults]
+
+
+def _faults_of(kind: str, seeds: Sequence[int], folder: Path) -> list[str]:
+    module, arguments, _ = AS_PROCESSES[kind]
     ending, mutant, _ = KINDS["record" if kind in ("export", "report") else kind]
     faults: list[str] = []
+    folder.mkdir()
     with processes.commands(folder) as program:
-        for seed in _seeds(kind, count, answered, folder):
+        for seed in seeds:
             here = folder / str(seed)
             here.mkdir()
             name = mutations.record(seed)[0] if ending == ".json" else "one"
             (here / f"{name}{ending}").write_bytes(mutant(seed))
             told = [{"NAME": name, "FILE": f"{name}{ending}"}.get(word, word) for word in arguments]
-            told = told[:1] + told[2:] + ["--", told[1]]  # a name may begin with a hyphen
             ended = program.run(module, told, here)
             faults += [f"{kind} {seed}: {text}" for text in _ended_wrong(ended, here, f"{name}{ending}")]
             shutil.rmtree(here)
     return faults
 
 
-def _seeds(kind: str, count: int, answered: int, folder: Path) -> Iterator[int]:
-    """Seeds of `count` files, of which at most `answered` are accepted when they are read."""
+def _seeds(kind: str, count: int, folder: Path) -> Iterator[int]:
+    """Seeds of `count` files, of which only so many are accepted when they are read."""
+    answered = AS_PROCESSES[kind][2]
     ending, mutant, readers = KINDS["record" if kind in ("export", "report") else kind]
     path, given = folder / f"one{ending}", 0
     for seed in itertools.count(ALL):
