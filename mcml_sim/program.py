@@ -87,7 +87,9 @@ class Program:
 
     def say(self, text: object) -> None:
         """A line on stderr: one, whatever the text holds."""
-        Console(stderr=True, highlight=False, soft_wrap=True).print(f"{self.name}: {one_line(str(text))}", markup=False)
+        Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(
+            f"{self.name}: {one_line(str(text))}", markup=False
+        )
 
     def _status(self) -> int:
         """Do the subcommand, and say what went wrong."""

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -111,7 +110,7 @@ def _evidence(recipe: Recipe, run: Run, light: Orders | None) -> Made:
         truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
     else:
         truth = ExactTruth()
-    laws = _regenerated_laws(run.out)
+    laws = _regenerated_laws(run)
     found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
     return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
@@ -197,15 +196,17 @@ def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
     return quality_tally.albedo_quality(law, light)
 
 
-def _regenerated_laws(folder: Path) -> dict[str, ProfileLaw]:
-    """The laws that a table of published ones is compared with, as far as their records are there."""
+def _regenerated_laws(run: Run) -> dict[str, ProfileLaw]:
+    """The laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
     laws = {}
     for label, law, name in (
         ("normalized diffusion, regenerated", "burley", "burley-whole"),
         ("paper, regenerated as published", "liang", "liang-as-published"),
         ("paper, regenerated whole", "liang", "liang-whole"),
     ):
-        places = (folder / f"{name}.json", catalogue.fits_folder() / f"{name}.json")
-        if path := next((place for place in places if place.exists()), None):
-            laws[label] = catalogue.load(law, str(path), folder=folder)
+        path = run.out / f"{name}.json"
+        if not path.exists():
+            path = catalogue.fits_folder() / path.name
+            run.say(f"compared with the shipped record {name}: {run.out} has none")
+        laws[label] = catalogue.load(law, str(path), folder=run.out)
     return laws

@@ -41,7 +41,7 @@ def wrong():
 
 @app.command()
 def hostile():
-    raise InputError("\x1b[2Jone\r\ntwo\u202e\x9b\u2028" + "x" * 10**6 + ", got 2")
+    raise InputError("\x1b[2Jone\r\ntwo\u202e\x9b\u2028:bomb:" + "x" * 10**6 + ", got 2")
 
 @app.command()
 def stopped():
@@ -128,7 +128,7 @@ def test_whatever_a_message_holds_it_is_one_line_that_is_only_printed(small):
         _, err = run.communicate(timeout=60)
     said = err.decode()
     assert run.returncode == 2
-    assert said.startswith(r"small: \X1B[2JONE\r\nTWO\u202e\x9b\u2028XXX".replace(r"\X1B", r"\x1b"))
+    assert said.startswith(r"small: \X1B[2JONE\r\nTWO\u202e\x9b\u2028:BOMB:XXX".replace(r"\X1B", r"\x1b"))
     assert said.endswith("XXX, GOT 2\n")
     assert said[:-1].isprintable()
     assert len(said) < 2100
