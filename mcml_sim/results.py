@@ -129,7 +129,7 @@ def _results(content: bytes) -> Results:
         seed=checked_whole("seed", header["seed"], lowest=0),
         version=version,
         cut=cut,
-        estimates={name: _estimate(arrays, name, photons) for name in sizes},
+        estimates={name: _estimate(arrays, name) for name in sizes},
     )
 
 
@@ -163,12 +163,12 @@ def _table(name: str, told: object, keys: frozenset[str]) -> dict[str, Any]:
     return dict(told)
 
 
-def _estimate(arrays: Mapping[str, NDArray], name: str, photons: int) -> Estimate:
+def _estimate(arrays: Mapping[str, NDArray], name: str) -> Estimate:
     value, error, samples = parts = [_needed(arrays, name + end) for end in ENDS]
     if not np.all(np.isfinite(value)):
         raise ValueError(f"{name} must be finite")
-    if not np.all(error >= 0) or (photons > 1 and not np.all(np.isfinite(error))):  # one photon says nothing of it
-        raise ValueError(f"{name}{ENDS[1]} must be finite and >= 0")
+    if not np.all(error >= 0):  # infinite where too few photons say nothing of it
+        raise ValueError(f"{name}{ENDS[1]} must be >= 0")
     if not np.all(samples >= 0):
         raise ValueError(f"{name}{ENDS[2]} must be >= 0")
     return Estimate(*(np.asarray(part, float) if part.ndim else float(part) for part in parts))
