@@ -7,7 +7,7 @@ import operator
 import os
 import reprlib
 from pathlib import Path
-from typing import TypeGuard
+from typing import Any, TypeGuard
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,12 +40,12 @@ def checked_numbers(name: str, value: object, accepted: str) -> NDArray[np.float
     raise InputError(f"{name} must be {accepted}, got {' '.join(reprlib.repr(value).split())}")
 
 
-def require_one_shape(**arrays: object) -> None:
+def require_one_shape(**arrays: Any) -> None:
     """InputError unless the arguments broadcast to one shape."""
     try:
-        np.broadcast_shapes(*(np.shape(one) for one in arrays.values()))  # type: ignore[arg-type]
+        np.broadcast_shapes(*(np.shape(one) for one in arrays.values()))
     except ValueError:
-        got = ", ".join(f"{name} {np.shape(one)}" for name, one in arrays.items())  # type: ignore[arg-type]
+        got = ", ".join(f"{name} {np.shape(one)}" for name, one in arrays.items())
         raise InputError(f"the shapes of the arguments must broadcast to one, got {got}") from None
 
 

@@ -61,7 +61,7 @@ class Program:
             warnings.filterwarnings(
                 "error", category=RuntimeWarning
             )  # of arithmetic: no answer is made of such numbers
-            warnings.showwarning = self._warn
+            warnings.showwarning = lambda message, category, *_: self._warn(message, category)
             with _lost_interrupts() as lost:
                 status = self._status()
             status = INTERRUPTED if lost else status
@@ -73,7 +73,7 @@ class Program:
         """A line on stderr."""
         Console(stderr=True, highlight=False, soft_wrap=True).print(f"{self.name}: {text}", markup=False)
 
-    def _warn(self, message: Warning | str, category: type[Warning], *_: object) -> None:
+    def _warn(self, message: Warning | str, category: type[Warning]) -> None:
         """A line for what this project warns of, a damaged batch, say; what a library tells its caller is not shown."""
         if category.__module__.partition(".")[0] in (LIBRARY, self.name):
             self.say(message)
