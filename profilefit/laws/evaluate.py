@@ -37,8 +37,8 @@ def evaluated(method: Callable) -> Callable:
 
     Arguments that are jax arrays (concrete or traced) keep their type, so that a law can be jitted, vmapped and
     differentiated in whatever precision its caller chose. Numbers out of range, and shapes that do not broadcast, raise
-    InputError. The method is compiled for blocks of a few sizes, whatever the lengths and the law's constants; constants
-    may be arrays, too, which broadcast with the arguments.
+    InputError. The method is compiled for blocks of a few sizes, whatever the lengths and the law's constants.
+    Constants may be arrays, too, which broadcast with the arguments.
     """
     signature = inspect.signature(method)
 
