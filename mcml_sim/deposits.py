@@ -58,14 +58,15 @@ class Deposits:
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray], shapes: Mapping[str, tuple[int, ...]]) -> Deposits:
-        """What `arrays` gave; ValueError if something is missing, not finite, or has another shape than `shapes`."""
+        """What `arrays` gave; ValueError if something is missing, no sum, or has another shape than `shapes`."""
         for name, shape in shapes.items():
             if name not in arrays:
                 raise ValueError(f"{name} is missing")
             if arrays[name].shape != shape:
                 raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
-            if not np.all(np.isfinite(arrays[name])):
-                raise ValueError(f"{name} is not finite")
+            # A variance is infinite where one group of photons is all there is.
+            if not np.all(np.isfinite(arrays[name]) | (name.endswith("_variance") & (arrays[name] == np.inf))):
+                raise ValueError(f"{name} is no sum over photons")
         values = {name: np.asarray(arrays[name], np.float64) for name in shapes if name != "started"}
         return cls(started=int(arrays["started"]), **values)
 

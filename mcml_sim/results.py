@@ -133,7 +133,7 @@ def _results(content: bytes) -> Results:
         seed=checked_whole("seed", header["seed"], lowest=0),
         version=version,
         cut=cut,
-        estimates={name: _estimate(arrays, name, photons) for name in sizes},
+        estimates={name: _estimate(arrays, name) for name in sizes},
     )
 
 
@@ -166,11 +166,11 @@ def _table(name: str, told: object, keys: frozenset[str]) -> dict[str, Any]:
     return dict(told)
 
 
-def _estimate(arrays: Mapping[str, NDArray], name: str, photons: int) -> Estimate:
+def _estimate(arrays: Mapping[str, NDArray], name: str) -> Estimate:
     value, error, samples = parts = [_needed(arrays, name + end) for end in ENDS]
     if not np.all(np.isfinite(value)):
         raise ValueError(f"{name} must be finite")
-    if not np.all(error >= 0):  # infinite where one photon or one batch says nothing of it
+    if not np.all(error >= 0):  # infinite where too few photons say nothing of it
         raise ValueError(f"{name}{ENDS[1]} must be >= 0")
     if not np.all(samples >= 0):
         raise ValueError(f"{name}{ENDS[2]} must be >= 0")

@@ -38,6 +38,7 @@ def evaluated(method: Callable) -> Callable:
     Arguments that are jax arrays (concrete or traced) keep their type, so that a law can be jitted, vmapped and
     differentiated in whatever precision its caller chose. Numbers out of range, and shapes that do not broadcast, raise
     InputError. The method is compiled for blocks of a few sizes, whatever the lengths and the law's constants.
+    Constants may be arrays, too, which broadcast with the arguments.
     """
     signature = inspect.signature(method)
 
@@ -48,7 +49,7 @@ def evaluated(method: Callable) -> Callable:
             return method(law, *arguments, **named)
         given = list(signature.bind(law, *arguments, **named).arguments.items())[1:]
         checked = {name: _checked(name, value) for name, value in given}
-        if any(np.ndim(leaf) for leaf in leaves):  # many laws in one, draws of a posterior: their shape joins in
+        if any(np.ndim(leaf) for leaf in leaves):  # many laws at once, as a posterior's draws
             with jax.enable_x64(True):
                 return np.asarray(method(law, **{name: jnp.asarray(value) for name, value in checked.items()}))
         out = _in_blocks(_program(method, form, tuple(checked)), [np.asarray(leaf, float) for leaf in leaves], checked)

@@ -151,7 +151,9 @@ def _judged(found: Found, seed: int, walk: bool) -> Answer:
     # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in telling.intervals)
     walked = chain.posterior(found, seed) if walk and found.question.free and not endless else None
-    return Answer(found, telling, advised(_inside(found, telling)), walked)
+    answer = Answer(found, telling, advised(_inside(found, telling)), walked)
+    _ = found.misfit, answer.draws, answer.whole_draws  # worked out when first asked for: they fail here or never
+    return answer
 
 
 def _inside(found: Found, telling: Telling) -> Found:

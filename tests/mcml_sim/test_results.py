@@ -174,13 +174,16 @@ def test_what_no_run_wrote_is_one_line(tmp_path, changes, reason):
     assert "\n" not in str(error.value)
 
 
-def test_one_photon_comes_back_without_an_error_of_its_own(tmp_path):
-    grid = Grid(0.1, 4)
-    sums = {name: np.ones(shape) for name, shape in shapes(grid, 2).items()}
-    write_results(Tally(LAYERS, grid, 1, 3, Deposits(**{**sums, "started": 1})), tmp_path / "out.npz")
+@pytest.mark.parametrize("photons", [1, 77])
+def test_few_photons_come_back_with_an_infinite_error(tmp_path, photons):
+    """Of what is absorbed, errors come from the spread between groups of photons: of one group there is none."""
+    tally = simulate(LAYERS, Grid(0.1, 4, 0.2, 5), photons, store=tmp_path / "store", progress=False)
+    write_results(tally, tmp_path / "out.npz")
     found = read_results(tmp_path / "out.npz")
-    assert found.photons == 1
-    assert np.all(np.isinf(found.estimates["reflectance_r"].standard_error))
+    assert found.photons == photons
+    assert np.all(np.isinf(found.estimates["absorbed_rz"].standard_error))
+    again = simulate(LAYERS, Grid(0.1, 4, 0.2, 5), photons, store=tmp_path / "store", progress=False)
+    assert np.all(np.isinf(again.absorbed_rz.standard_error)), "the batch in the store is whole"
 
 
 def test_misuse_is_named(tmp_path):

@@ -44,6 +44,13 @@ def test_lists_and_arrays_give_float64(x):
     assert out.shape == (2, 2)
 
 
+def test_constants_may_be_many(burley):
+    """As the draws of a posterior are: a row a draw."""
+    draws = replace(burley, s0=np.array([[1.8], [1.9]]))
+    expected = [replace(burley, s0=s0).profile([0.1, 1.0, 3.0], 0.9) for s0 in (1.8, 1.9)]
+    np.testing.assert_allclose(draws.profile([0.1, 1.0, 3.0], 0.9), expected, rtol=1e-12)
+
+
 def test_double_precision_survives():
     assert Doubler().twice(0.1) == 0.2
     assert not jax.config.jax_enable_x64

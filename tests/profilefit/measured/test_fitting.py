@@ -11,7 +11,7 @@ import pytest
 from mcml_sim import Setting
 from profilefit import catalogue
 from profilefit.errors import InputError
-from profilefit.measured.answer import Answer
+from profilefit.measured.answer import Answer, answered
 from profilefit.measured.candidates import advised
 from profilefit.measured.chain import posterior
 from profilefit.measured.data import Measured
@@ -246,3 +246,15 @@ def test_what_is_known_of_a_law():
     dipole = catalogue.load("better_dipole", setting=Setting(n=1.4))
     assert origin("better_dipole", "regenerated", dipole.setting, catalogue.fits_folder()) is None
     assert relative_error(dipole, 0.9, None) is None
+
+
+def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
+    """Values of thirty decades and both signs, with a free scale: numpy warned, and the answer had numbers."""
+    r = np.array([0.002, 0.05, 0.2, 0.28, 1.2, 70.0, 990.0])
+    value = np.array([-2.4e-11, -2.5e-3, 9.3e18, -8.1e15, 5e-5, 1.2e7, 2.7e-18])
+    sigma = np.array([1.6e-15, 1.6e-7, 6.1e14, 5.3e11, 3.3e-9, 770.0, 1.8e-22])
+    data = Measured("made up", "", r, r, value, sigma, np.full(r.size, np.inf), "as given", "mm")
+    answer = answered(fit(data))
+    assert answer.found.minimum.result != "converged"
+    assert (answer.telling, answer.told, answer.draws) == (None, (), {})
+    assert {answer.value(name) for name in answer.moving} == {None}
