@@ -12,7 +12,6 @@ import pytest
 
 from mcml_sim import InputError
 from mcml_sim.compiling import Compiling
-from profilefit import catalogue
 from profilefit.laws.evaluate import BLOCKS, evaluated
 
 
@@ -183,13 +182,3 @@ def test_samplers_and_maps_name_theirs(burley, liang_printed):
         burley.albedo.alpha(1.2)
     with pytest.raises(InputError, match=r"alpha must be in \[0, 1\], got -0.1"):
         liang_printed.largest_radius(-0.1)
-
-
-def test_many_laws_in_one_broadcast():
-    """Draws of a posterior are a law whose constants are (draws, 1): it answers (draws, n), each row a law's own."""
-    law = catalogue.albedo_law("liang")
-    names = law.constant_names()
-    draws = np.asarray(law.vector(names)) * np.array([[1.0], [0.99], [1.01]])
-    albedos = law.with_vector(names, draws.T[:, :, None]).alpha(np.array([0.1, 0.5]))
-    rows = [law.with_vector(names, draw).alpha(np.array([0.1, 0.5])) for draw in draws.tolist()]
-    assert albedos == pytest.approx(np.array(rows), rel=1e-12)
