@@ -91,7 +91,7 @@ TOLD: Kinds = {
     "title": TEXT,
     "equations": TEXT,
     "note?": TEXT,
-    "preset": TEXT,
+    "preset": Kind("quick or full", lambda value: value in ("quick", "full")),
     "seed": COUNT,
     "setting.illumination": TEXT,
     "setting.n": NUMBER,

@@ -170,6 +170,7 @@ def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
         ("liang-whole", {"pipeline": ["x"]}, r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
         ("liang-whole", {"constants": {"a1": 3.0}}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
         ("liang-as-published", {"stages": []}, r"stages must be a table, got \[\]"),
+        ("hazard", {"preset": "; rm x"}, r'preset must be quick or full, got "; rm x"'),
         ("reproduction", {"readings": {}}, r"readings must be a list, got {}"),
         ("reproduction", {"table1": ["skin"]}, r'table1\.0 must be a table, got "skin"'),
     ],

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import shlex
 from collections.abc import Iterator, Mapping
 
 from profilefit import catalogue
@@ -35,8 +36,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
         yield paragraph("Made with " + ", ".join(f"{name} {number}" for name, number in known) + ".", "dim")
     yield paragraph(f"SHA-256 over all records of the folder: {digest(source.folder)}", "dim")
     yield paragraph("All of it again; what was measured with the records has its own command where it stands:")
-    named = " ".join(source.names or ())
-    shown = f"profilefit report {named} --fits fits --html {page}".replace("  ", " ")
+    shown = shlex.join(["profilefit", "report", *(source.names or ()), "--fits", "fits", "--html", page])
     yield command("\n".join([*again(contents, bool(source.names)), shown]))
 
 
@@ -47,7 +47,7 @@ def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
         groups.setdefault(_options(one), []).append(name)
     alone = len(groups) == 1 and not named
     return [
-        " ".join(["profilefit regenerate", *([] if alone else names), options, "--out fits"])
+        " ".join(["profilefit regenerate", *([] if alone else map(shlex.quote, names)), options, "--out fits"])
         for options, names in groups.items()
     ]
 
