@@ -164,7 +164,9 @@ def _split(path: Path, at: int, line: str, delimiter: str) -> tuple[str, ...]:
 def _header(path: Path, at: int, cells: tuple[str, ...], delimiter: str) -> _Header:
     if len(cells) > MOST_COLUMNS:
         raise InputError(f"{path}:{at}: expected at most {MOST_COLUMNS} columns, got {len(cells)}")
-    matches = [HEADING.fullmatch(cell) if len(cell) <= LONGEST_HEADING else None for cell in cells]
+    cells = tuple(" ".join(cell.split()) for cell in cells)
+    are_told = [len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells]  # as they are, in messages
+    matches = [HEADING.fullmatch(cell) if told else None for cell, told in zip(cells, are_told, strict=True)]
     words = [match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True)]
     names = tuple(NAMES.get(word, word) for word in words)
     units = tuple(_unit(match) for match in matches)

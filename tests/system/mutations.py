@@ -130,7 +130,7 @@ def damaged(rng: random.Random, data: bytes) -> bytes:
     at = rng.randrange(len(data)) if data else 0
     some = bytes(rng.randrange(256) for _ in range(rng.randint(1, 8)))
     flipped = bytearray(data)
-    for _ in range(rng.randint(1, 4)):
+    for _ in range(rng.randint(1, 4) if data else 0):
         flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
     ways: tuple[bytes, ...] = (
         *(data[:at], data[at:], data[:at] + some + data[at:], data[:at] + data[at + len(some) :], bytes(flipped)),

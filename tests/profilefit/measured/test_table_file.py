@@ -188,6 +188,7 @@ BAD = {
     "r,sigma\n1,2\n": r":1: .*, got no column value$",
     "r_in,value,sigma\n1,2,3\n": r":1: .*, got one of r_in and r_out without the other",
     "r,r_in,r_out,value,sigma\n": r":1: .*, got both r and r_in",
+    "r,value [a\x1b],sigma\n": r":1: .*, got the column 'value \[a\\x1b\]'",
     "r,value,sigma,colour\n": r":1: .*, got the column 'colour'",
     "r,value,value,sigma\n": r":1: expected each column once, got 'value' 2 times",
     "r,value1,value2\n": r":1: .*, got 2 replicates",
