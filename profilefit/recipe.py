@@ -215,6 +215,8 @@ def read(path: Path) -> Recipe:
     needed = () if table.get("pipeline") == "evidence" else ("albedos", "weighting")
     if missing := [f"[{name}]" for name in needed if name not in table]:
         raise RecipeError(f"{path}: missing {', '.join(missing)}")
+    if not is_line(path.stem):  # it names the record
+        raise RecipeError(f"{str(path)!r}: the name of a recipe must be one printable line")
     recipe = _build(Recipe, {**table, "name": path.stem, "path": path}, str(path), frozenset({"path", "name"}))
     if problem := recipe.problems():
         raise RecipeError(f"{path}: {problem}")

@@ -9,7 +9,7 @@ from typing import Any
 
 from mcml_sim.progress import tracked, working
 from mcml_sim.screen import notes, print_json, put, screen, show
-from mcml_sim.whole_file import require_folder, write_whole
+from mcml_sim.whole_file import read_whole, require_folder, write_whole
 from profilefit import record
 from profilefit.errors import InputError, RecordError, ShaderError
 from profilefit.folder import evidence_folder, records_folder
@@ -18,6 +18,7 @@ from profilefit.report.page.document import write_page
 
 Contents = dict[str, dict[str, Any]]
 MEGABYTE = 1e6
+MOST_MARKDOWN = 2**24  # bytes of a page whose tables are filled in
 NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
 
 
@@ -100,9 +101,12 @@ def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, qui
 def _fill(path: Path, contents: Contents, folder: Path, quiet: bool) -> None:
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
+    content = read_whole(path, MOST_MARKDOWN)
     try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
+        if len(content) > MOST_MARKDOWN:
+            raise ValueError(f"more than {MOST_MARKDOWN} bytes")
+        text = content.decode("utf-8")
+    except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     measured = {}
     for name, make in markdown_sections(folder).items():

@@ -8,6 +8,7 @@ from mcml_sim import InputError
 from profilefit.chains import posterior
 from profilefit.coverage import LEVELS, binomial_band, counted, coverage, refits
 from profilefit.estimate import fit
+from profilefit.profiles import FEWEST_EFFECTIVE_SAMPLES
 
 REPLICATES = 2000
 
@@ -94,10 +95,15 @@ def test_a_law_that_is_not_the_truth_covers_its_pseudo_true_constants(tallies, b
 @pytest.mark.slow
 @pytest.mark.timeout(1200)
 def test_posteriors_cover_too(tallies, toy):
-    """200 runs of photons, each with a fit and a chain of its own; not if intervals are a third too narrow."""
+    """200 runs of photons, each with a fit and a chain of its own; not if intervals are a third too narrow.
+
+    Of rings that hold enough photons, in expectation: Toy trusts one of a single photon, and to drop it only where it
+    happens to be empty picks runs by their noise (intervals of 95 % then held in 78 %).
+    """
     truth, within, narrow = np.array([1.0, 0.5, 0.5]), [], []
+    used = tallies.photons * expected_energy(tallies)[:, :-1] >= FEWEST_EFFECTIVE_SAMPLES
     for seed, counts in enumerate(tallies.draw(23, 200)):
-        one = fit(tallies.profiles(counts), toy, "energy", jackknife=False)
+        one = fit(tallies.profiles(counts), toy, "energy", used=used, jackknife=False)
         chain = posterior(one, "statistical", seed)
         assert chain.result == "converged"
         ends = np.stack([chain.interval(level) for level in LEVELS])

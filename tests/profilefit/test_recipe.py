@@ -370,3 +370,12 @@ def test_find_by_name_or_path(write, tmp_path):
 
 def test_a_recipe_error_is_an_input_error():
     assert issubclass(RecipeError, InputError)
+
+
+def test_a_name_that_is_no_printable_line_is_refused(tmp_path):
+    """It would name the record, which nothing could read."""
+    path = tmp_path / "a\nb.toml"
+    path.write_text(GOOD)
+    with pytest.raises(RecipeError, match=r"the name of a recipe must be one printable line") as caught:
+        read(path)
+    assert str(caught.value).isprintable()
