@@ -63,6 +63,7 @@ TABLE = Kind("a table", lambda value: isinstance(value, dict))
 LIST = Kind("a list", lambda value: isinstance(value, list))
 NUMBERS = Kind("a list of numbers", _every(is_number, 1))
 MEASURES = Kind("a list of numbers or nulls", _every(_is_measure))
+RATIOS = Kind("a list of numbers > 0", _every(lambda value: is_number(value) and value > 0, 1))
 PAIR = Kind("a list of two numbers or nulls", lambda value: _every(_is_measure)(value) and len(value) == 2)
 HALVES = Kind("a list of pairs of numbers", _every(lambda row: _every(is_number)(row) and len(row) == 2))
 MATRIX = Kind("a square matrix of numbers, or null", _is_matrix)
@@ -152,26 +153,30 @@ PARTS: Kinds = {
     "starts?.outcomes.*.result": TEXT,
     "starts?.outcomes.*.constants": TABLE,
 }
+PROTOCOL: Kinds = {
+    "albedos": TABLE,
+    "albedos.low": NUMBER,
+    "albedos.high": NUMBER,
+    "albedos.count": COUNT,
+    "albedos.spacing": TEXT,
+    "rings?": Kind("a table or null", lambda value: value is None or isinstance(value, dict)),
+    **{f"rings?.{name}": NUMBER for name in ("dr", "first", "last", "epsilon")},
+    "rings?.count": COUNT,
+    "rings?.trim": TEXT,
+    "held?": TEXTS,
+    "weighting": TABLE,
+    "weighting.objective": TEXT,
+    **{f"weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
+}
 FIT: Kinds = {
     **CONSTANTS,
+    "constants.*.published": MEASURE,
     "constants.*.free?": FLAG,
     "constants.*.intervals?": TABLE,
     "constants.*.intervals?.*": TABLE,
     "constants.*.intervals?.*.*": PAIR,
     "protocol": TABLE,
-    "protocol.albedos": TABLE,
-    "protocol.albedos.low": NUMBER,
-    "protocol.albedos.high": NUMBER,
-    "protocol.albedos.count": COUNT,
-    "protocol.albedos.spacing": TEXT,
-    "protocol.rings?": Kind("a table or null", lambda value: value is None or isinstance(value, dict)),
-    **{f"protocol.rings?.{name}": NUMBER for name in ("dr", "first", "last", "epsilon")},
-    "protocol.rings?.count": COUNT,
-    "protocol.rings?.trim": TEXT,
-    "protocol.held?": TEXTS,
-    "protocol.weighting": TABLE,
-    "protocol.weighting.objective": TEXT,
-    **{f"protocol.weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
+    **{f"protocol.{key}": kind for key, kind in PROTOCOL.items()},
     "fit": TABLE,
     "fit.result": TEXT,
     "fit.steps": COUNT,
@@ -198,7 +203,13 @@ FIT: Kinds = {
     **{f"quality.{one}?.{name}?": kind for one in SETS for name, kind in OF_MAP.items()},
     **PARTS,
 }
-PROFILE: Kinds = {**FIT, "quality.alpha": NUMBERS}
+ALBEDO: Kinds = {**FIT, **{f"quality.regenerated.{name}": kind for name, kind in OF_MAP.items()}}
+INVERSE: Kinds = {**FIT, "quality.alpha": NUMBERS, "quality.regenerated.inversion_error": NUMBERS}
+PROFILE: Kinds = {
+    **FIT,
+    "quality.alpha": NUMBERS,
+    **{f"quality.regenerated.{name}": NUMBERS for name in ("rel", "ks", "l1")},
+}
 STAGED: Kinds = {
     **PROFILE,
     "stages": TABLE,
@@ -216,27 +227,27 @@ STAGED: Kinds = {
     "stages.length_exponents?.*": NUMBER,
 }
 EVIDENCE: Kinds = {
+    "protocol?": TABLE,
+    **{f"protocol?.{key}": kind for key, kind in PROTOCOL.items()},
     "readings": LIST,
     "readings.*": TABLE,
-    **{f"readings.*.{name}?": TEXT for name in ("equation", "verdict", "choices", "evidence")},
-    **{f"readings.*.{name}?": MEASURE for name in ("curve_distance", "constant_distance", "curve_maximum")},
-    **{
-        f"readings.*.{name}?{part}": k
-        for name in ("constants", "published")
-        for part, k in (("", TABLE), (".*", NUMBER))
-    },
+    **{f"readings.*.{name}": TEXT for name in ("equation", "verdict", "choices")},
+    "readings.*.evidence?": TEXT,
+    **{f"readings.*.{name}": MEASURE for name in ("curve_distance", "constant_distance")},
+    **{f"readings.*.{name}": TABLE for name in ("constants", "published")},
+    **{f"readings.*.{name}.*": NUMBER for name in ("constants", "published")},
     "table1": LIST,
     "table1.*": TABLE,
     **{f"table1.*.{name}?": TEXT for name in ("material", "model", "channel", "range_choice")},
     "table1.*.range_mm?": NUMBER,
-    "table1.*.mse_over_printed?": MEASURES,
+    "table1.*.mse_over_printed?": RATIOS,
     "halves?": LIST,
     "halves?.*": TABLE,
     "halves?.*.material?": TEXT,
     "halves?.*.model?": TEXT,
     "halves?.*.off?": MEASURE,
 }
-PIPELINES = {"albedo": FIT, "profile": PROFILE, "inverse": PROFILE, "as-published": STAGED, "evidence": EVIDENCE}
+PIPELINES = {"albedo": ALBEDO, "profile": PROFILE, "inverse": INVERSE, "as-published": STAGED, "evidence": EVIDENCE}
 ABSENT = object()
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from math import inf
 from typing import Any
 
 import numpy as np
@@ -34,7 +35,7 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
     failures = []
     for name, content in _fits(records).items():
         if not converged(content):
-            failures.append(f"`{name}` has no constants to show: {content['fit']['result']}.")
+            failures.append(f"{_text(name)} has no constants to show: {_text(content['fit']['result'])}.")
             continue
         for constant, values in content["constants"].items():
             errors = [significant(values.get(key)) for key in known]
@@ -63,6 +64,7 @@ def markdown_hazard(records: Mapping[str, Content]) -> str:
     if not fitted:
         return ""
     names = next(iter(fitted.values()))["constants"]
+    fitted = {name: c for name, c in fitted.items() if c["constants"].keys() == names.keys()}
     rows = [
         (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
         for columns in [list(fitted.values())]
@@ -89,7 +91,7 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
     header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
     readings = [r for content in records.values() for r in content.get("readings") or ()]
     best: dict[str, Content] = {}
-    for reading in sorted(readings, key=lambda r: (r["curve_distance"] is None, r["curve_distance"])):
+    for reading in sorted(readings, key=lambda r: inf if r["curve_distance"] is None else r["curve_distance"]):
         best.setdefault(reading["equation"], reading)
     rows = [
         (
@@ -97,8 +99,8 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
             best[equation]["choices"],
             ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
             ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
-            f"{best[equation]['constant_distance']:.1%}",
-            f"{best[equation]['curve_distance']:.1%}",
+            _percent(best[equation]["constant_distance"]),
+            _percent(best[equation]["curve_distance"]),
             best[equation]["verdict"],
         )
         for equation in dict.fromkeys(reading["equation"] for reading in readings)
@@ -208,12 +210,21 @@ def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
     return {name: content for name, content in records.items() if "constants" in content}
 
 
+def _percent(share: float | None) -> str:
+    return ABSENT if share is None else f"{share:.1%}"
+
+
+def _text(cell: str) -> str:
+    """What Markdown shows as these letters and takes for nothing else."""
+    return MARKUP.sub(r"\\\g<0>", cell)
+
+
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A GitHub table, names to the left and numbers to the right, every line filled to the same width.
 
     What is in its cells is text: no element, no link and no further column.
     """
-    rows = [[MARKUP.sub(r"\\\g<0>", cell) for cell in row] for row in rows]
+    header, rows = [_text(cell) for cell in header], [[_text(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
     rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
     lines = [header, rule, *rows]
