@@ -395,6 +395,8 @@ def test_a_pair_that_is_one_file_is_refused(tmp_path):
 
 
 WRITES_FOR_EVER = """
+import signal
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what is in its background without
 at = 0
 while True:
     at += 1
