@@ -74,7 +74,8 @@ def _drawn(source: Source, names: Iterable[str], out: Path, name: str) -> list[P
         for ax, key in zip(row, MEASURES, strict=True):
             _panel(ax, key, lines)
         row[0].set_ylabel(KINDS[kind])
-        row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
+        if lines:  # none where every fit failed
+            row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
     for ax, title in zip(grid[0], MEASURES.values(), strict=True):
         ax.set_title(title)
     for ax in grid[:-1].flat:
