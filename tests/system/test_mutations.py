@@ -224,7 +224,7 @@ def table_faults(name: str, folder: Path, faults: list[str], told: str) -> None:
         text = page.read_text(encoding="utf-8")
         if CONTROL.search(text):
             faults.append(f"{told}, markdown: control characters {CONTROL.findall(text)[:5]}")
-        if found := set(re.findall(r"<[A-Za-z!/][^>]*", text)) - set(re.findall("<[^>]*", empty)):
+        if found := set(re.findall(r"(?<!\\)<[A-Za-z!/][^>]*", text)) - set(re.findall("<[^>]*", empty)):
             faults.append(f"{told}, markdown: markup {found}")
         if any(len({row.count("|") for row in rows}) > 1 for rows in _markdown_tables(text)):
             faults.append(f"{told}, markdown: rows of other lengths")
