@@ -60,7 +60,8 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
 
 def markdown_hazard(records: Mapping[str, Content]) -> str:
     """The constants of the hazard law in every setting, a record a column, and its worst errors there."""
-    fitted = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and converged(c)}
+    fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
+    fitted = {name: c for name, c in fits.items() if converged(c)}
     if not fitted:
         return ""
     names = next(iter(fitted.values()))["constants"]
