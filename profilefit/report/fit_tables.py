@@ -198,6 +198,6 @@ def _telling(answer: Answer) -> Iterator[str]:
         low = "anything less" if one.open_low else f"{one.low:.3g}"
         high = "anything more" if one.open_high else f"{one.high:.3g}"
         yield f"  {one.name} from {low} to {high} {unit_of(one.name, unit)}".rstrip() + " fits as well, at 95 %"
-    for name, error in telling.loose.items():
+    for name, error in (telling.loose if answer.told else {}).items():  # at an edge, derivatives are no errors
         yield f"  {name} is known to {100 * min(error, 99.0):.0f} %" + (" or worse" if error > 99 else "")
     yield f"  what would tell: {described(advice.candidates[0], unit or 'units of r')}"
