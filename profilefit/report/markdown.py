@@ -21,7 +21,7 @@ EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equatio
 # Headers of columns that stand to the left.
 NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
 NAMES |= {"verdict", "law", "light", "sampler", "measure"}
-MARKUP = re.compile(r"(?<!\\)[<|\[`]")  # begins an element, a column, a link or code
+MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
 SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
 
@@ -216,14 +216,14 @@ def _percent(share: float | None) -> str:
 
 
 def _text(cell: str) -> str:
-    """What Markdown shows as these letters and takes for nothing else."""
+    """Text for Markdown: no element, and no column of a table."""
     return MARKUP.sub(r"\\\g<0>", cell)
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
     """A GitHub table, names to the left and numbers to the right, every line filled to the same width.
 
-    What is in its cells is text: no element, no link and no further column.
+    What is in its cells begins no element and no further column.
     """
     header, rows = [_text(cell) for cell in header], [[_text(cell) for cell in row] for row in rows]
     widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]

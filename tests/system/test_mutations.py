@@ -41,7 +41,6 @@ from profilefit.shader.export import LANGUAGES, export
 from tests.system import mutations, processes
 
 # A record alone in its folder is normalised with the shipped map, and the command says so.
-pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
 QUICK, ALL = 200, 10_000
 LONGEST = 1.0  # [s] of this process

@@ -17,7 +17,6 @@ from profilefit.report.figures import PAPER, plans
 from profilefit.report.residual_figure import energy_within
 from profilefit.report.source import DRAWS, Source, coefficients
 
-pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")  # folders of one record
 SHIPPED = catalogue.fits_folder()
 SMALL_CORNER = "corner-albedo-liang"
 # Every kind of figure once: corner plots differ in nothing but their record, nor does (15) from (11) but in its letter.

@@ -18,7 +18,6 @@ from profilefit.report.page.shader import shader
 from profilefit.report.page.speed import speed
 from profilefit.report.source import Source
 
-pytestmark = pytest.mark.filterwarnings("ignore::profilefit.errors.ShippedMap")  # of the few records here
 SHIPPED = catalogue.fits_folder()
 DATA = Path(__file__).parent / "data"
 GOLDEN = DATA / "tables.html"
