@@ -64,7 +64,7 @@ def test_standard_output_by_name_is_standard_output(tmp_path):
     log.write_text("first\n")
     with log.open("a") as file:
         subprocess.run([sys.executable, "-m", "profilefit", *EXPORT, "/dev/stdout"], stdout=file, check=True)
-    assert log.read_text().startswith("first\n// burley")
+    assert log.read_text().startswith("first\n// by profilefit")
 
 
 def test_folders_links_and_modes(command, tmp_path):
