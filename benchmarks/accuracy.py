@@ -21,8 +21,10 @@ import scalar_half_space
 from numpy.typing import NDArray
 from scalar_half_space import ROULETTE_CHANCE, WEIGHT_THRESHOLD
 
-from mcml_sim import Orders, exact, order_bins, single
-from profilefit.tradeoff.stopwatch import take_turns
+from mcml_sim import Orders, exact
+from mcml_sim.exact import single_scattering
+from mcml_sim.tracing import order_bins
+from profilefit.studies.tradeoff.stopwatch import take_turns
 
 Floats = NDArray[np.float64]
 
@@ -59,7 +61,7 @@ def ring_energy(alphas: Floats) -> Floats:
 def exit_probabilities(run: Orders) -> Floats:
     """P_n of a white photon by ring and bin of order, (rings, bins)."""
     probabilities = run.ring_order_counts * run.weights(1.0) / run.photons
-    probabilities[:, 0] = single.ring_shares(run.grid.r_edges)[:-1]
+    probabilities[:, 0] = single_scattering.ring_shares(run.grid.r_edges)[:-1]
     return probabilities
 
 

@@ -28,14 +28,14 @@ import numpy as np
 from benchmarks.choose_render import Measured, fits, size
 from benchmarks.table import show
 from mcml_sim import Setting
-from profilefit.choose import cost
-from profilefit.choose.case import Within
-from profilefit.choose.choice import Choice, Predicted, cases, choose, laws
-from profilefit.choose.scene import Budget, Scene
 from profilefit.errors import ShaderError
 from profilefit.materials import MATERIALS
+from profilefit.scenes.skin.material import translucent
 from profilefit.shader.context import opened, renderer
-from profilefit.shader.stage.material import translucent
+from profilefit.studies.choose import cost
+from profilefit.studies.choose.case import Within
+from profilefit.studies.choose.choice import Choice, Predicted, cases, choose, laws
+from profilefit.studies.choose.scene import Budget, Scene
 
 SETTING = Setting("diffuse")
 SCENES, QUICK, SEED = 30, 3, 1

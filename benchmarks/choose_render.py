@@ -15,16 +15,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
-from profilefit.choose.case import Case, Within
-from profilefit.choose.filtered import passes
-from profilefit.choose.options import Option, is_filter
-from profilefit.choose.truth import truth
-from profilefit.shader.stage.buffers import Buffers, step_edge
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.separable_kernel import albedo_of
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth.reference import gathered
-from profilefit.shader.truth.surface import seen
+from profilefit.scenes.skin.separable_kernel import albedo_of
+from profilefit.scenes.skin.truth import gathered
+from profilefit.scenes.stage.buffers import Buffers, step_edge
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface import seen
+from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.filtered import passes
+from profilefit.studies.choose.options import Option, is_filter
+from profilefit.studies.choose.truth import truth
 
 Floats = NDArray[np.float64]
 # How far the picture goes beyond the places that count, and above and below them [longest mean free path]: the first

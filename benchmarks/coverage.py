@@ -21,18 +21,18 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.progress import Progress
 
+from benchmarks.refits import LEVELS, Coverage, coverage, refits
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
-from mcml_sim.whole_file import write_whole
-from profilefit import catalogue, inventory, recipe
-from profilefit.coverage import LEVELS, Coverage, coverage, refits
-from profilefit.discrepancy import predicted
-from profilefit.estimate import Fit, Problem, fit
-from profilefit.objectives import EVERYWHERE, Rings
-from profilefit.profiles import Profiles
-from profilefit.recipe import Recipe
-from profilefit.targets import albedo_values, ring_edges
+from mcml_sim.files.whole_file import write_whole
+from profilefit.fitting.discrepancy import predicted
+from profilefit.fitting.estimate import Fit, Problem, fit
+from profilefit.fitting.objectives import EVERYWHERE, Rings
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes.recipe import Recipe
+from profilefit.recipes.targets import albedo_values, ring_edges
 
 Floats = NDArray[np.float64]
 LAWS = ("albedo-rational", "burley-whole", "liang-whole", "hazard", "quantile")

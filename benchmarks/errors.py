@@ -18,14 +18,14 @@ import numpy as np
 from rich.progress import Progress
 
 from benchmarks.coverage import fitted
+from benchmarks.refits import bootstrap
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
-from profilefit import catalogue, inventory, recipe
-from profilefit.bootstrap import bootstrap
-from profilefit.chains import posterior
-from profilefit.discrepancy import discrepancy
-from profilefit.profiles import Profiles
-from profilefit.targets import albedo_values, ring_edges
+from profilefit.fitting.chains import posterior
+from profilefit.fitting.discrepancy import discrepancy
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("burley-whole", "liang-whole", "hazard")
 SEED, BATCHES, BATCH_PHOTONS = 100, 64, 2**18

@@ -21,9 +21,9 @@ from matplotlib import pyplot
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, exact, simulate_orders
-from mcml_sim.by_albedo import by_alpha, forget
-from mcml_sim.half_space_transform import STANDARD, Rule
-from mcml_sim.hankel import profile
+from mcml_sim.exact.by_albedo import by_alpha, forget
+from mcml_sim.exact.hankel import profile
+from mcml_sim.exact.transform import STANDARD, Rule
 
 Floats = NDArray[np.float64]
 

@@ -27,7 +27,7 @@ from scipy.optimize import least_squares
 from benchmarks.survival import FORMS, HAZARD, Form
 from benchmarks.table import show
 from mcml_sim import exact
-from profilefit.tradeoff.counting import count, described
+from profilefit.studies.tradeoff.counting import count, described
 
 Floats = NDArray[np.float64]
 # Weights of the relative error, of that in the tail, and what more than thrice as bright counts for.

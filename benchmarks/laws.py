@@ -2,7 +2,7 @@
 
     python -m benchmarks.laws [--quick] [--json FILE] [--fits FOLDER]
 
-The tables behind the charts of `profilefit tradeoff laws`, measured by the same code (`profilefit.tradeoff.laws`), with
+The tables behind the charts of `profilefit tradeoff laws`, measured by the same code, `studies/tradeoff/laws.py`, with
 what it leaves out: the functions by name, the sampler alone, ks. Ratios of times are medians over the turns, with
 (least ... most). README.md beside this file says what the columns mean.
 """
@@ -18,10 +18,10 @@ from pathlib import Path
 os.environ.setdefault("JAX_PLATFORMS", "cpu")
 
 from benchmarks.table import show
-from profilefit.tradeoff import stopwatch
-from profilefit.tradeoff.contenders import YARDSTICK, contenders
-from profilefit.tradeoff.counting import Counts, described
-from profilefit.tradeoff.laws import FULL, MANY, PARTS, QUICK, Row, measured
+from profilefit.studies.tradeoff import stopwatch
+from profilefit.studies.tradeoff.contenders import YARDSTICK, contenders
+from profilefit.studies.tradeoff.counting import Counts, described
+from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, Row, measured
 
 
 def as_cells(row: Row) -> tuple[str, ...]:

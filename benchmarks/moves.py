@@ -17,12 +17,11 @@ from rich.progress import Progress
 from benchmarks.coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, simulate_orders
-from profilefit import catalogue, inventory, recipe
-from profilefit.chains import posterior
-from profilefit.estimate import Fit
-from profilefit.profiles import Profiles
-from profilefit.targets import albedo_values, ring_edges
-from profilefit.walking import Moves, default_moves
+from profilefit.fitting.chains import Moves, default_moves, posterior
+from profilefit.fitting.estimate import Fit
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("burley-whole", "liang-whole", "albedo-rational")
 SEED, PHOTONS, LONGEST = 43, 4 * 2**20, 40_000

@@ -9,9 +9,10 @@ import numpy as np
 import scalar_half_space
 import scalar_layered
 
-from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, matched, rng, simulate, simulate_orders, tracer
-from mcml_sim.order_bins import LAST_ORDERS
-from profilefit.tradeoff.stopwatch import Work
+from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, simulate, simulate_orders
+from mcml_sim.tracing import matched_batch, orders_batch, rng
+from mcml_sim.tracing.order_bins import LAST_ORDERS
+from profilefit.studies.tradeoff.stopwatch import Work
 
 ALPHA = 0.9
 # Rings and depths of the half space, in mean free paths: the last bins of the yardstick hold what is beyond.
@@ -79,8 +80,8 @@ def half_space_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) 
 
 def half_space_events(photons: int = 2**18) -> float:
     """Events a photon of `half_space_tally`: its scatterings, and its last flight as the yardstick counts it."""
-    stops = jnp.asarray(matched.weights(ALPHA).stops)
-    ends = tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), stops)
+    stops = jnp.asarray(matched_batch.weights(ALPHA).stops)
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), stops)
     return float(np.abs(np.asarray(ends.order)).sum() / photons) + 1
 
 

@@ -16,10 +16,10 @@ from rich.progress import track
 from benchmarks.coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
-from profilefit import catalogue, inventory, recipe
-from profilefit.estimate import Problem, sensitivity
-from profilefit.profiles import COVARIANCE_RANK, Covariance, Profiles
-from profilefit.targets import albedo_values, ring_edges
+from profilefit.fitting.estimate import Problem, sensitivity
+from profilefit.fitting.profiles import COVARIANCE_RANK, Covariance, Profiles
+from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("albedo-rational", "burley-whole", "quantile")
 SEED, PHOTONS, RANKS = 41, 4 * 2**20, (2, 4, 6, 8, 10, 12)

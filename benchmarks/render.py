@@ -22,8 +22,8 @@ from benchmarks import render_errors, render_pictures, render_table2, render_var
 from benchmarks.render_laws import contenders, variants
 from benchmarks.render_view import judged
 from profilefit.errors import ShaderError
+from profilefit.scenes.skin.scene import head_scene
 from profilefit.shader.context import open_context, renderer
-from profilefit.shader.stage.scene import head_scene
 
 SAMPLES, QUICK_SAMPLES = (1, 4, 16, 64, 256), (1, 4, 16)
 SEEDS, QUICK_SEEDS = 4, 2

@@ -14,7 +14,7 @@ from benchmarks.render_figure import save
 from benchmarks.render_laws import Contender
 from benchmarks.render_view import Judged
 from benchmarks.table import show
-from profilefit.report.canvas import canvas, legend_below, plain_log, styled
+from profilefit.report.figures.canvas import canvas, legend_below, plain_log, styled
 
 Floats = NDArray[np.float64]
 COLOURS = 64  # of the chart

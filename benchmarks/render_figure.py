@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 from PIL import Image
 from scipy.spatial import cKDTree
 
-from profilefit.report.canvas import DPI
+from profilefit.report.figures.canvas import DPI
 
 
 def save(figure: Figure, path: Path, colours: int, kept: Sequence[Sequence[int]] = ()) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 import profilefit
 from mcml_sim import Setting
 from profilefit.laws.base import ProfileLaw
-from profilefit.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
-from profilefit.shader.stage.sampling import Sampling
+from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
+from profilefit.scenes.stage.sampling import Sampling
 
 Law = ProfileLaw | str
 OPEN = "s"

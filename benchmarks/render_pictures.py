@@ -15,8 +15,8 @@ from benchmarks.render_figure import save
 from benchmarks.render_laws import Contender
 from benchmarks.render_view import Judged, shown
 from benchmarks.table import show
-from profilefit.report.canvas import canvas, styled
-from profilefit.shader.stage.sampling import MOST_SAMPLES, Sampling
+from profilefit.report.figures.canvas import canvas, styled
+from profilefit.scenes.stage.sampling import MOST_SAMPLES, Sampling
 
 Floats = NDArray[np.float64]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, ITU-R BT.709

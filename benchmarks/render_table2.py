@@ -11,10 +11,9 @@ from numpy.typing import NDArray
 
 from benchmarks.render_laws import Contender
 from benchmarks.table import show
-from profilefit.shader.stage.coverage import covered, covering
-from profilefit.shader.stage.scene import Scene
-from profilefit.shader.stage.stage import PASSES, Stage
-from profilefit.tradeoff.stopwatch import Ratio
+from profilefit.scenes.skin.scene import Scene
+from profilefit.scenes.stage.stage import PASSES, Stage, covered, covering
+from profilefit.studies.tradeoff.stopwatch import Ratio
 
 Floats = NDArray[np.float64]
 COVERED = (0.25, 0.50, 0.75)

@@ -17,15 +17,14 @@ from numpy.typing import NDArray
 import profilefit
 from benchmarks.table import show
 from mcml_sim import exact
+from profilefit.fitting.sampling import LawTarget
 from profilefit.laws.base import ProfileLaw
-from profilefit.sampling import LawTarget
-from profilefit.shader.stage.buffers import step_edge
-from profilefit.shader.stage.exact_law import ExactLaw
-from profilefit.shader.stage.material import DIFFUSE, translucent
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth.edge_estimate import LAST_XI, shifted_points
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.scenes.skin.material import DIFFUSE, translucent
+from profilefit.scenes.stage.buffers import step_edge
+from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_response
 
 Floats = NDArray[np.float64]
 SIZE = (256, 128)  # [pixels]: 19 mfp of red beside the places, 8 above and below the rows

@@ -13,13 +13,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.shader.stage.buffers import Buffers
-from profilefit.shader.stage.material import Rgb
-from profilefit.shader.stage.scene import FACE, Scene, head_scene
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth import reference as integral
-from profilefit.shader.truth.reference import gathered, refined
-from profilefit.shader.truth.surface import seen
+from profilefit.scenes.skin import truth as integral
+from profilefit.scenes.skin.material import Rgb
+from profilefit.scenes.skin.scene import FACE, Scene, head_scene
+from profilefit.scenes.skin.truth import gathered, refined
+from profilefit.scenes.stage.buffers import Buffers
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface import seen
 
 Floats = NDArray[np.float64]
 OwnError = tuple[float, float, float]

@@ -1,4 +1,4 @@
-"""The scalar yardstick (`profilefit.tradeoff.scalar`), compiled by numba, and a twin of it that keeps squares too."""
+"""The scalar yardstick (`profilefit.studies.tradeoff.scalar`), compiled by numba, and a twin with squares."""
 
 # ruff: noqa: NPY002 - numba compiles numpy's old generator (Mersenne Twister) into the loop; it would call the new one
 
@@ -10,8 +10,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.tradeoff import scalar
-from profilefit.tradeoff.scalar import ROULETTE_CHANCE, WEIGHT_THRESHOLD
+from profilefit.studies.tradeoff import scalar
+from profilefit.studies.tradeoff.scalar import ROULETTE_CHANCE, WEIGHT_THRESHOLD
 
 Floats = NDArray[np.float64]
 

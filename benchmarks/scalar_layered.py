@@ -17,8 +17,8 @@ import numba as nb
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.grid import Grid
-from mcml_sim.medium import Medium
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.medium import Medium
 
 WEIGHT_THRESHOLD, ROULETTE_CHANCE = 1e-4, 0.1  # MCML's
 STRAIGHT = 1 - 1e-12  # MCML's COSZERO: light this close to the normal does not bend at an interface

@@ -25,7 +25,7 @@ from benchmarks.table import show
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.base import ProfileLaw
-from profilefit.shader.truth.edge_estimate import (
+from profilefit.scenes.stage.step_edge import (
     Gather,
     by_law,
     by_quantile,
@@ -33,8 +33,8 @@ from profilefit.shader.truth.edge_estimate import (
     edge_estimate,
     random_points,
     shifted_points,
+    step_response,
 )
-from profilefit.shader.truth.step_edge import step_response
 
 Floats = NDArray[np.float64]
 

@@ -27,8 +27,8 @@ from rich.table import Table
 from worker import ITEMS, Worker, peak_memory
 
 from mcml_sim import Estimate
-from profilefit.tradeoff import stopwatch
-from profilefit.tradeoff.stopwatch import Rates, Ratio
+from profilefit.studies.tradeoff import stopwatch
+from profilefit.studies.tradeoff.stopwatch import Rates, Ratio
 
 ALL_CORES = stopwatch.cores()
 # Before the first array: jax counts then how many cores it may use. The last core has the fewest interrupts.

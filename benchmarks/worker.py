@@ -12,7 +12,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 
-from profilefit.tradeoff.stopwatch import pin
+from profilefit.studies.tradeoff.stopwatch import pin
 
 ITEMS = ("orders", "half space", "half space, r-z", "three layers", "three layers, r-z", "yardstick")
 

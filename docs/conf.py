@@ -46,5 +46,9 @@ nitpick_ignore_regex = [("py:.*", r"(?!(mcml_sim|profilefit)\.).*")]
 # Sums and targets inside a run and a fit, which no page explains.
 nitpick_ignore = [
     ("py:class", name)
-    for name in ("mcml_sim.deposits.Deposits", "mcml_sim.tally.Counts", "profilefit.objectives.Rings")
+    for name in (
+        "mcml_sim.tracing.deposits.Deposits",
+        "mcml_sim.tracing.counts.Counts",
+        "profilefit.fitting.objectives.Rings",
+    )
 ]

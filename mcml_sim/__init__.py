@@ -1,38 +1,42 @@
 """What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
+from mcml_sim.cli.lazy import attributes
 from mcml_sim.errors import ClusterError, ForkError, InputError, OutputError, SettingError, StoreError
-from mcml_sim.lazy import attributes
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest, while Ctrl-C is a traceback
 if TYPE_CHECKING:
     from mcml_sim import exact
-    from mcml_sim.grid import Grid
-    from mcml_sim.mcml_files import read_mci, read_mco, write_mco
-    from mcml_sim.medium import Layer, Medium, half_space
-    from mcml_sim.orders import Orders, simulate_orders, trace_share
-    from mcml_sim.quantities import Precision, Tally
-    from mcml_sim.results import read_results, write_results
-    from mcml_sim.setting import Setting
-    from mcml_sim.simulation import simulate
-    from mcml_sim.store import DamagedBatch
-    from mcml_sim.tally import Estimate
-    from mcml_sim.version import __version__
+    from mcml_sim.files.version import __version__
+    from mcml_sim.media.grid import Grid
+    from mcml_sim.media.medium import Layer, Medium, half_space
+    from mcml_sim.media.setting import Setting
+    from mcml_sim.results.estimate import Estimate
+    from mcml_sim.results.mci import read_mci
+    from mcml_sim.results.mco import read_mco, write_mco
+    from mcml_sim.results.orders import Orders
+    from mcml_sim.results.tally import Precision, Tally
+    from mcml_sim.results.tally_file import read_results, write_results
+    from mcml_sim.runs.order_runs import simulate_orders, trace_share
+    from mcml_sim.runs.simulation import simulate
+    from mcml_sim.runs.store import DamagedBatch
 else:
     __getattr__ = attributes(
         __name__,
         {
             "exact": "",
-            "Grid": "grid",
-            **dict.fromkeys(("read_mci", "read_mco", "write_mco"), "mcml_files"),
-            **dict.fromkeys(("Layer", "Medium", "half_space"), "medium"),
-            **dict.fromkeys(("Orders", "simulate_orders", "trace_share"), "orders"),
-            **dict.fromkeys(("Precision", "Tally"), "quantities"),
-            **dict.fromkeys(("read_results", "write_results"), "results"),
-            "Setting": "setting",
-            "simulate": "simulation",
-            "DamagedBatch": "store",
-            "Estimate": "tally",
-            "__version__": "version",
+            "Grid": "media.grid",
+            "read_mci": "results.mci",
+            **dict.fromkeys(("read_mco", "write_mco"), "results.mco"),
+            **dict.fromkeys(("Layer", "Medium", "half_space"), "media.medium"),
+            "Orders": "results.orders",
+            **dict.fromkeys(("simulate_orders", "trace_share"), "runs.order_runs"),
+            **dict.fromkeys(("Precision", "Tally"), "results.tally"),
+            **dict.fromkeys(("read_results", "write_results"), "results.tally_file"),
+            "Setting": "media.setting",
+            "simulate": "runs.simulation",
+            "DamagedBatch": "runs.store",
+            "Estimate": "results.estimate",
+            "__version__": "files.version",
         },
     )
 

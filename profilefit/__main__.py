@@ -1,6 +1,6 @@
 """`python -m profilefit` is the profilefit command, and so is the script of that name."""
 
-from mcml_sim.lazy import command
+from mcml_sim.cli.lazy import command
 
 
 def main() -> None:

@@ -36,7 +36,7 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
-from mcml_sim.checks import checked_numbers
+from mcml_sim.media.checks import checked_numbers
 from profilefit.errors import InputError
 from profilefit.laws import published
 

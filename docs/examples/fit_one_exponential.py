@@ -5,7 +5,7 @@ from one_exponential import OneExponential
 
 import profilefit
 from mcml_sim import Setting
-from profilefit.catalogue import normalisation
+from profilefit.recipes.catalogue import normalisation
 
 law = OneExponential(Setting(), normalisation(Setting()), q0=0.5, q1=1.0, q2=1.0)
 profiles = profilefit.Profiles.from_exact(np.linspace(0.1, 0.99, 8), np.append(0.0, np.geomspace(0.01, 100.0, 40)))

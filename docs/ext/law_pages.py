@@ -4,11 +4,11 @@ from pathlib import Path
 
 from sphinx.application import Sphinx
 
-from profilefit.folder import fits_folder
-from profilefit.report.canvas import FORMATS
-from profilefit.report.law_page import INDEX, Page, index_text, law_pages, page_text
-from profilefit.report.quality_figure import quality_figure
-from profilefit.report.source import Source
+from profilefit.recipes.folder import fits_folder
+from profilefit.report.figures.canvas import FORMATS
+from profilefit.report.figures.quality_figure import quality_figure
+from profilefit.report.records import Source
+from profilefit.report.tables.law_page import INDEX, Page, index_text, law_pages, page_text
 
 FIGURES = "figures"
 

@@ -6,9 +6,9 @@ import sys
 
 import typer
 
-from mcml_sim.help import FirstScreen, add
-from mcml_sim.program import Program
-from mcml_sim.version import __version__
+from mcml_sim.cli.help import FirstScreen, add
+from mcml_sim.cli.program import Program
+from mcml_sim.files.version import __version__
 from profilefit.cli.check import check
 from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert

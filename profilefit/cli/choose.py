@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.lazy import carried_out
+from mcml_sim.cli.lazy import carried_out
 from profilefit.cli.options import AsJson, Quiet
 
 

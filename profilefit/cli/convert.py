@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.lazy import carried_out
+from mcml_sim.cli.lazy import carried_out
 from profilefit.cli.options import AsJson
 
 LENGTH = "Length"  # the panel of --help

@@ -8,10 +8,10 @@ from typing import Annotated
 
 import typer
 
-from mcml_sim.lazy import carried_out
+from mcml_sim.cli.lazy import carried_out
 from profilefit.cli import words
 from profilefit.cli.options import Quiet
-from profilefit.folder import LOCAL
+from profilefit.recipes.folder import LOCAL
 
 PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
 

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import typer
 
-from profilefit import record
-from profilefit.folder import fits_folder, known_folder
 from profilefit.laws.published import SETS
+from profilefit.recipes import record
+from profilefit.recipes.folder import fits_folder, known_folder
 
 LAWS = (
     "liang",

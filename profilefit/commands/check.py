@@ -11,14 +11,21 @@ import moderngl
 import typer
 from rich.console import RenderableType
 
-from mcml_sim.plain import as_json as json_text
-from mcml_sim.progress import tracked, working
-from mcml_sim.screen import notes, print_json, screen, show, typed
-from mcml_sim.whole_file import write_whole
-from profilefit.evidence import made, require_apart
-from profilefit.folder import records_folder
-from profilefit.inventory import Named
-from profilefit.report.check_tables import check_tables, content, cost_table, half_table, place_tables, verdict_lines
+from mcml_sim.cli.screen import notes, print_json, screen, show, typed
+from mcml_sim.files.plain import as_json as json_text
+from mcml_sim.files.whole_file import write_whole
+from mcml_sim.runs.progress import tracked, working
+from profilefit.recipes.evidence import made, require_apart
+from profilefit.recipes.folder import records_folder
+from profilefit.recipes.inventory import Named
+from profilefit.report.tables.check_tables import (
+    check_tables,
+    content,
+    cost_table,
+    half_table,
+    place_tables,
+    verdict_lines,
+)
 from profilefit.shader.check.chosen import REGENERATED, chosen
 from profilefit.shader.check.cost import Cost, law_costs
 from profilefit.shader.check.evaluate import half_extension, no_half

@@ -7,16 +7,16 @@ from pathlib import Path
 
 import typer
 
-from mcml_sim.progress import tracked, working
-from mcml_sim.screen import print_json, screen
-from profilefit.choose import cost
-from profilefit.choose.choice import choose as chosen
-from profilefit.choose.choice import laws
-from profilefit.choose.layers import one_layer
-from profilefit.choose.options import Option
-from profilefit.choose.scene import Scene, read
-from profilefit.report.choose_table import choose_table, content
+from mcml_sim.cli.screen import print_json, screen
+from mcml_sim.runs.progress import tracked, working
+from profilefit.report.tables.choose_table import choose_table, content
 from profilefit.shader.context import opened
+from profilefit.studies.choose import cost
+from profilefit.studies.choose.choice import choose as chosen
+from profilefit.studies.choose.choice import laws
+from profilefit.studies.choose.layers import one_layer
+from profilefit.studies.choose.options import Option
+from profilefit.studies.choose.scene import Scene, read
 
 UNSERVED = 1
 

@@ -9,13 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.screen import print_json, screen
-from mcml_sim.setting import ILLUMINATIONS
+from mcml_sim.cli.screen import print_json, screen
+from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit import convert as conventions
 from profilefit.convert import LENGTHS, Optical
 from profilefit.errors import InputError
-from profilefit.report.columns import column_table
-from profilefit.report.digits import on_the_point, significant
+from profilefit.report.tables.cells import column_table, on_the_point, significant
 
 Floats = NDArray[np.float64]
 UNITS = ("um", "µm", "μm", "mm", "cm", "m", "in")

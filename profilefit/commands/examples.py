@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from mcml_sim.screen import screen
-from mcml_sim.whole_file import require_writable, write_together
+from mcml_sim.cli.screen import screen
+from mcml_sim.files.whole_file import require_writable, write_together
 from profilefit.errors import OutputError
-from profilefit.folder import shipped
+from profilefit.recipes.folder import shipped
 
 
 def examples(out: Path) -> None:

@@ -5,9 +5,9 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from mcml_sim.whole_file import write_whole
-from profilefit.folder import records_folder
-from profilefit.inventory import find
+from mcml_sim.files.whole_file import write_whole
+from profilefit.recipes.folder import records_folder
+from profilefit.recipes.inventory import find
 from profilefit.shader.export import export as exported
 
 

@@ -10,26 +10,25 @@ from typing import Any
 
 import typer
 
-from mcml_sim.plain import as_json as json_text
-from mcml_sim.program import one_line
-from mcml_sim.progress import working
-from mcml_sim.screen import notes, print_json, screen, show
-from mcml_sim.setting import ILLUMINATIONS, Setting
-from mcml_sim.whole_file import require_folder, write_whole
-from profilefit import catalogue
+from mcml_sim.cli.program import one_line
+from mcml_sim.cli.screen import notes, print_json, screen, show
+from mcml_sim.files.plain import as_json as json_text
+from mcml_sim.files.whole_file import require_folder, write_whole
+from mcml_sim.media.setting import ILLUMINATIONS, Setting
+from mcml_sim.runs.progress import working
 from profilefit.errors import InputError, SettingError
-from profilefit.folder import records_folder
 from profilefit.laws.base import ProfileLaw
-from profilefit.measured.answer import Answer, answered, content
-from profilefit.measured.data import Measured
+from profilefit.measured.data import LARGEST, SMALLEST, Measured
 from profilefit.measured.fitting import fitted
 from profilefit.measured.law_error import origin
 from profilefit.measured.lengths import length
-from profilefit.measured.limits import LARGEST, SMALLEST
-from profilefit.measured.question import Known, Question, held_albedo
+from profilefit.measured.problem import Known, Question, held_albedo
 from profilefit.measured.reading import read
-from profilefit.report.fit_figures import posterior_figure, residual_figure
-from profilefit.report.fit_tables import fit_lines, fit_tables
+from profilefit.measured.result import Answer, answered, content
+from profilefit.recipes import catalogue
+from profilefit.recipes.folder import records_folder
+from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
+from profilefit.report.tables.fit_tables import fit_lines, fit_tables
 
 FAILED = 1
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")

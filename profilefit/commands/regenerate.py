@@ -6,14 +6,15 @@ import time
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.progress import is_watched
-from mcml_sim.screen import notes, print_json
-from mcml_sim.whole_file import require_folder
-from profilefit import calibrate, catalogue, recipe, record
+from mcml_sim.cli.screen import notes, print_json
+from mcml_sim.files.whole_file import require_folder
+from mcml_sim.runs.progress import is_watched
 from profilefit.errors import InputError, RecipeError
-from profilefit.report.quality_tables import worst_measures
-from profilefit.run import Run
-from profilefit.schema import ERRORS
+from profilefit.recipes import catalogue, recipe, record
+from profilefit.recipes.regenerate import regenerate as regenerate_records
+from profilefit.recipes.run import Run
+from profilefit.recipes.schema import ERRORS
+from profilefit.report.tables.quality_tables import worst_measures
 
 PHOTON_STORE = ".photons"
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
@@ -42,7 +43,7 @@ def regenerate(
         say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=is_watched() and not quiet,
     )
-    written = calibrate.regenerate(chosen, run)
+    written = regenerate_records(chosen, run)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
     if as_json:
         print_json({path.stem: _summary(path) for path in written})

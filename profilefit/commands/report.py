@@ -7,14 +7,16 @@ from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.progress import tracked, working
-from mcml_sim.screen import notes, print_json, put, screen, show
-from mcml_sim.whole_file import read_whole, require_folder, write_whole
-from profilefit import record
+from mcml_sim.cli.screen import notes, print_json, put, screen, show
+from mcml_sim.files.whole_file import read_whole, require_folder, write_whole
+from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError, RecordError, ShaderError
-from profilefit.folder import evidence_folder, records_folder
-from profilefit.report import every_law, figures, fill, law_tables, markdown_sections, sections, tables
+from profilefit.recipes import record
+from profilefit.recipes.folder import evidence_folder, records_folder
+from profilefit.report import every_law, fill, markdown_sections, sections
+from profilefit.report.figures import record_figures
 from profilefit.report.page.document import write_page
+from profilefit.report.tables import law_tables, record_tables
 
 Contents = dict[str, dict[str, Any]]
 MEGABYTE = 1e6
@@ -63,10 +65,10 @@ def _require_one(asked: dict[str, object]) -> None:
 def _show(contents: Contents, named: bool) -> None:
     console = screen()
     if not named:
-        put(tables.summary(contents), console)
+        put(record_tables.summary(contents), console)
         return
     for content in contents.values():
-        for part in tables.record_tables(content):
+        for part in record_tables.record_tables(content):
             put(part, console)
 
 
@@ -80,10 +82,10 @@ def _measured(folder: Path, names: list[str] | None, quiet: bool) -> law_tables.
 def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
     require_folder(out)
 
-    def track(plans: list[figures.Plan]) -> Iterable[figures.Plan]:
+    def track(plans: list[record_figures.Plan]) -> Iterable[record_figures.Plan]:
         return tracked(plans, "drawing", "figures", quiet=quiet)
 
-    drawn, skipped = figures.draw_all(folder, out, names, track)
+    drawn, skipped = record_figures.draw_all(folder, out, names, track)
     said = notes(quiet)
     said.print(f"drew {len(drawn)} figures into {out}", markup=False)
     for line in skipped:

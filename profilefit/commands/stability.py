@@ -8,14 +8,14 @@ from pathlib import Path
 import typer
 from rich.console import RenderableType
 
-from mcml_sim.plain import as_json as json_text
-from mcml_sim.progress import tracked
-from mcml_sim.screen import notes, print_json, screen, show, typed
-from mcml_sim.whole_file import write_whole
-from profilefit.evidence import made, require_apart
-from profilefit.folder import records_folder
-from profilefit.report.stability_figure import stability_figures
-from profilefit.report.stability_tables import (
+from mcml_sim.cli.screen import notes, print_json, screen, show, typed
+from mcml_sim.files.plain import as_json as json_text
+from mcml_sim.files.whole_file import write_whole
+from mcml_sim.runs.progress import tracked
+from profilefit.recipes.evidence import made, require_apart
+from profilefit.recipes.folder import records_folder
+from profilefit.report.figures.stability_figure import stability_figures
+from profilefit.report.tables.stability_tables import (
     cause_table,
     content,
     fit_summary,
@@ -25,7 +25,7 @@ from profilefit.report.stability_tables import (
     regions_csv,
     verdict_lines,
 )
-from profilefit.stability.atlas import Part, jobs, run
+from profilefit.studies.stability.atlas import Part, jobs, run
 
 BROKEN = 1
 

@@ -6,21 +6,21 @@ from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.plain import as_json as json_text
-from mcml_sim.progress import tracked
-from mcml_sim.screen import notes, print_json, screen, show, typed
-from mcml_sim.text_file import read_json
-from mcml_sim.whole_file import write_whole
+from mcml_sim.cli.screen import notes, print_json, screen, show, typed
+from mcml_sim.files.plain import as_json as json_text
+from mcml_sim.files.text_file import read_json
+from mcml_sim.files.whole_file import write_whole
+from mcml_sim.runs.progress import tracked
 from profilefit.errors import InputError
-from profilefit.evidence import made, require_apart
-from profilefit.folder import records_folder
-from profilefit.report.tradeoff_figure import tradeoff_figure
-from profilefit.report.tradeoff_tables import tradeoff_tables
-from profilefit.tradeoff import machine
-from profilefit.tradeoff.parts import PARTS, chosen, measured
-from profilefit.tradeoff.points import Part
-from profilefit.tradeoff.stopwatch import on_one_core
-from profilefit.tradeoff.written import as_csv, as_numbers
+from profilefit.recipes.evidence import made, require_apart
+from profilefit.recipes.folder import records_folder
+from profilefit.report.figures.tradeoff_figure import tradeoff_figure
+from profilefit.report.tables.tradeoff_tables import tradeoff_tables
+from profilefit.studies.tradeoff import stopwatch
+from profilefit.studies.tradeoff.parts import PARTS, chosen, measured
+from profilefit.studies.tradeoff.points import Part
+from profilefit.studies.tradeoff.stopwatch import on_one_core
+from profilefit.studies.tradeoff.written import as_csv, as_numbers
 
 Told = dict[str, Any]
 WIDTH = 120  # columns that the tables take
@@ -40,8 +40,8 @@ def tradeoff(parts: list[str] | None, out: Path, quick: bool, fits: Path | None,
     def track(turns: range, title: str) -> Iterable[int]:
         return tracked(turns, title, "turns", quiet=quiet)
 
-    with machine.on_processor(), on_one_core() as pinned:
-        told: Told = {**origin, "machine": (known := machine.facts(pinned))}
+    with stopwatch.on_processor(), on_one_core() as pinned:
+        told: Told = {**origin, "machine": (known := stopwatch.facts(pinned))}
         for name in names:
             found = measured(name, quick, folder, track)
             files = _written(found, known, out)
@@ -86,4 +86,4 @@ def is_alike(before: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
 def _written(found: Part, known: dict[str, str], out: Path) -> list[Path]:
     data = out / f"tradeoff-{found.name}.csv"
     write_whole(data, as_csv(found, known))
-    return [*tradeoff_figure(found, machine.caption(known), out), data]
+    return [*tradeoff_figure(found, stopwatch.caption(known), out), data]

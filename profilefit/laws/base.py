@@ -11,7 +11,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.laws.evaluate import evaluated
 
 

@@ -16,8 +16,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from mcml_sim import optics
-from mcml_sim.setting import Setting
+from mcml_sim.media import fresnel
+from mcml_sim.media.setting import Setting
 from profilefit.laws.diffusion import (
     DiffusionLaw,
     exitance_factors,
@@ -37,7 +37,7 @@ NEAREST = 1e-6
 # What kappa takes away has e^{-2 d} in it: beyond 12 mfp nothing is left. Radii x u^3 resolve the r ln r at 0: to 5e-9.
 RADIUS_NODES = 20
 LAST_TAKEN = 12.0
-# As mcml_sim.single: a trapezoid in ln(k - k_c), whose error is e^{-pi^2 / step}.
+# As mcml_sim.exact.single_scattering: a trapezoid in ln(k - k_c), whose error is e^{-pi^2 / step}.
 K_STEP = 0.35
 CRITICAL_NEAREST, CRITICAL_FARTHEST = -22.0, 30.0
 FINER = 3  # halves of the nodes that `finer` takes: none in common with the law's own
@@ -151,5 +151,5 @@ def _once_scattered_nodes(n: float, halves: int) -> tuple[Floats, Floats]:
     beyond = np.exp(np.arange(CRITICAL_NEAREST, CRITICAL_FARTHEST, step))
     k = critical + beyond
     above = (beyond + (critical - 1.0)) * (k + 1.0)
-    passed = 1.0 - optics.fresnel(n, 1.0, above / (k * k + 1.0))[0]
+    passed = 1.0 - fresnel.fresnel(n, 1.0, above / (k * k + 1.0))[0]
     return k, passed * above / (k * (k * k + 1.0) ** 2) * step * beyond

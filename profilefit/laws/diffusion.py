@@ -15,7 +15,8 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim import optics, single
+from mcml_sim.exact import single_scattering
+from mcml_sim.media import fresnel
 from profilefit.errors import SettingError
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.evaluate import evaluated
@@ -61,7 +62,7 @@ class DiffusionLaw(ProfileLaw):
     @property
     def entered(self) -> float:
         """t, the share of the light that enters the surface [-]."""
-        return single.entered(self.setting)
+        return single_scattering.entered(self.setting)
 
     @eqx.filter_jit  # a sum over nodes is fused, not stored
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
@@ -192,7 +193,7 @@ def fresnel_moments(n: float) -> tuple[float, float]:
     critical = np.sqrt(max(1.0 - 1.0 / n**2, 0.0))  # F = 1 below this cosine, and has the slope of a root above it
     u = 0.5 * (NODES + 1.0)
     mu = critical + (1.0 - critical) * u**2
-    passed = (1.0 - critical) * u * WEIGHTS * (1.0 - optics.fresnel(n, 1.0, mu)[0])
+    passed = (1.0 - critical) * u * WEIGHTS * (1.0 - fresnel.fresnel(n, 1.0, mu)[0])
     return float(1.0 - 2.0 * np.sum(mu * passed)), float(1.0 - 3.0 * np.sum(mu**2 * passed))
 
 

@@ -14,9 +14,9 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.by_albedo import blocks
-from mcml_sim.checks import checked_numbers, require_one_shape, require_own_process
 from mcml_sim.errors import InputError
+from mcml_sim.exact.by_albedo import blocks
+from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
 
 Floats = NDArray[np.float64]
 # Numbers at a time: a length compiles nothing new, and at most three quarters of a block are filling.

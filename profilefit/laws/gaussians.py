@@ -18,7 +18,7 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.rational import Rational

@@ -7,10 +7,9 @@ import jax
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
-from profilefit.laws.decay import decay_rate
-from profilefit.laws.escape import EscapeLaw
+from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard_curve import FARTHEST, Shape, cumulative, density, growth, radius, radius_at
 from profilefit.laws.rational import Rational
 

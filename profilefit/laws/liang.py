@@ -10,7 +10,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Rational

@@ -6,7 +6,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 
 SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")
 MEMO = (

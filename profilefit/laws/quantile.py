@@ -12,10 +12,9 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
-from profilefit.laws.decay import decay_rate
-from profilefit.laws.escape import EscapeLaw
+from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.rational import Rational

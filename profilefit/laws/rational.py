@@ -6,8 +6,8 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim import single
-from mcml_sim.setting import Setting
+from mcml_sim.exact import single_scattering
+from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.evaluate import evaluated
 
@@ -31,7 +31,7 @@ class Rational(AlbedoLaw):
     @property
     def entered(self) -> float:
         """t, the share of the light that enters [-]: by Fresnel at normal incidence, or over cosine-weighted light."""
-        return 1.0 if self.setting.n == 1.0 else single.entered(self.setting)  # 1 to the last bit
+        return 1.0 if self.setting.n == 1.0 else single_scattering.entered(self.setting)  # 1 to the last bit
 
     @evaluated
     def reflectance(self, alpha) -> Array:

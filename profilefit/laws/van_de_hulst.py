@@ -11,7 +11,7 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
-from mcml_sim.setting import Setting
+from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.evaluate import evaluated
 

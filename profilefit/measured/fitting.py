@@ -9,15 +9,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
-from mcml_sim.checks import require_own_process
+from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import derived, law_error
-from profilefit.measured.data import Measured
-from profilefit.measured.limits import require_workable
+from profilefit.measured.data import Measured, require_workable
 from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import noise
-from profilefit.measured.question import Question
+from profilefit.measured.problem import Question
 from profilefit.measured.replicates import widening
 from profilefit.measured.solving import Minimum, Problem, descended, minimised
 

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.setting import Setting
-from profilefit import catalogue, record
+from mcml_sim.media.setting import Setting
+from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.model import u_of
 from profilefit.measured.noise import Noise
-from profilefit.quality import ENERGY_WITHIN, profile_quality
+from profilefit.recipes import catalogue, record
 
 Floats = NDArray[np.float64]
 RMS = 1.5

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit
 
-from mcml_sim.by_albedo import blocks
+from mcml_sim.exact.by_albedo import blocks
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.diffusion import DiffusionLaw
 

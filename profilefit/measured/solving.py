@@ -1,6 +1,6 @@
 """Least squares in the three coordinates, from where the data themselves point.
 
-MINPACK's successor in scipy and not `profilefit.solver`: that one compiles a whole Levenberg-Marquardt around the law,
+MINPACK's successor in scipy and not `fitting.solver`: that one compiles a whole Levenberg-Marquardt around the law,
 which pays for a batch of fits and makes one fit wait nine seconds for a tenth of a millisecond's work.
 
 A failure is a result: `Minimum.result` is "converged" or says what happened and what to try.
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
+from profilefit.fitting.solver import CONVERGED
 from profilefit.measured.data import Measured
 from profilefit.measured.model import LENGTH, NAMES, SCALE, Model, U, u_of
 from profilefit.measured.noise import Noise
-from profilefit.measured.question import Question
-from profilefit.solver import CONVERGED
+from profilefit.measured.problem import Question
 
 Floats = NDArray[np.float64]
 # Far below any error that data leave a coordinate, well above what rounding of the profile does to it.

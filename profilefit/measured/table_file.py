@@ -23,7 +23,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mcml_sim.whole_file import read_whole
+from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor

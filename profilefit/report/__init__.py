@@ -1,9 +1,9 @@
 """Records as tables for a terminal or a README, and as figures."""
 
-from profilefit.report.figures import draw_all
-from profilefit.report.law_tables import every_law, markdown_sections
-from profilefit.report.markdown import fill, markdown_constants, markdown_quality, sections
-from profilefit.report.tables import record_tables, summary
+from profilefit.report.figures.record_figures import draw_all
+from profilefit.report.tables.law_tables import every_law, markdown_sections
+from profilefit.report.tables.markdown import fill, markdown_constants, markdown_quality, sections
+from profilefit.report.tables.record_tables import record_tables, summary
 
 __all__ = [
     "draw_all",

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from mcml_sim import single
+from mcml_sim.exact import single_scattering
 from profilefit.errors import InputError
 from profilefit.laws import diffusion
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
@@ -75,7 +75,7 @@ class Form:
 
 def _source(law: Any) -> Numbers:
     """The strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
-    return {"source": single.source_strength(law.setting)}
+    return {"source": single_scattering.source_strength(law.setting)}
 
 
 def _liang(law: Any) -> Numbers:

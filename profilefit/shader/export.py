@@ -11,13 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from mcml_sim import __version__
-from mcml_sim.setting import Setting
-from profilefit import catalogue, record
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.inventory import PRINTED_MAP, Named
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
-from profilefit.schema import ERRORS
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.inventory import PRINTED_MAP, Named
+from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")

@@ -4,9 +4,9 @@ import numpy as np
 
 import profilefit
 from benchmarks import laws
-from profilefit.tradeoff import contenders
-from profilefit.tradeoff.laws import PARTS, Row, counts
-from profilefit.tradeoff.stopwatch import Ratio
+from profilefit.studies.tradeoff import contenders
+from profilefit.studies.tradeoff.laws import PARTS, Row, counts
+from profilefit.studies.tradeoff.stopwatch import Ratio
 
 
 def test_many_functions_are_summed():

@@ -5,8 +5,8 @@ import json
 import numpy as np
 import pytest
 
-from profilefit.shader.stage.scene import head_scene
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.skin.scene import head_scene
+from profilefit.scenes.stage.stage import Stage
 
 pytest.importorskip("flip_evaluator", reason="FLIP needs the package flip-evaluator")
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from mcml_sim import optics
+from mcml_sim.media import fresnel
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ def solve(medium, angles=18, nodes=4):
     inside = layers[0]
     for below in layers[1:]:
         inside = _add(inside, below)
-    surface = optics.fresnel(relative, 1.0, bundles.mu)[0]
+    surface = fresnel.fresnel(relative, 1.0, bundles.mu)[0]
     return _through_surfaces(inside, surface, bundles)
 
 

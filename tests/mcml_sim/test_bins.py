@@ -4,7 +4,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, bins
+from mcml_sim import Grid
+from mcml_sim.tracing import bins
 
 VALUES = np.random.default_rng(0).exponential(2, 10**5).astype(np.float32)
 

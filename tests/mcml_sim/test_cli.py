@@ -9,18 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim import cli, layered, printed
-from mcml_sim import command as doing
+from mcml_sim.cli import app, printed
+from mcml_sim.cli import run as doing
 from mcml_sim.errors import ClusterError
-from mcml_sim.grid import Grid
-from mcml_sim.mcml_files import read_mci
-from mcml_sim.medium import half_space
-from mcml_sim.quantities import Precision, quantities
-from mcml_sim.results import read_results
-from mcml_sim.run import FIRST_LOOK
-from mcml_sim.simulation import batch_photons, simulate
-from mcml_sim.store import RESUMES
-from mcml_sim.version import __version__
+from mcml_sim.files.version import __version__
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.medium import half_space
+from mcml_sim.results.mci import read_mci
+from mcml_sim.results.tally import Precision, quantities
+from mcml_sim.results.tally_file import read_results
+from mcml_sim.runs.batches import FIRST_LOOK
+from mcml_sim.runs.simulation import batch_photons, simulate
+from mcml_sim.runs.store import RESUMES
+from mcml_sim.tracing import layered_batch
 
 # One layer and one grid for all tests: the tracer is compiled once.
 RUN = """{name} A
@@ -51,7 +52,7 @@ def command(monkeypatch, capsys, tmp_path):
     def run(*words: object) -> tuple[int, str, str]:
         monkeypatch.setattr(sys, "argv", ["mcml-sim", *map(str, words)])
         with pytest.raises(SystemExit) as stop:
-            cli.main()
+            app.main()
         printed = capsys.readouterr()
         return int(stop.value.code or 0), printed.out, printed.err
 
@@ -186,11 +187,11 @@ def test_a_link_named_as_output_is_followed(command, mci):
 @pytest.mark.parametrize("more", [(), ("--resume",)])
 def test_the_same_command_resumes(command, mci, monkeypatch, more):
     """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
-    photons = 2 * layered.BATCH_PHOTONS + 77
+    photons = 2 * layered_batch.BATCH_PHOTONS + 77
     words = ("run", mci, "--photons", photons)
     assert command(*words, "--out", "at-once")[0] == 0
     traced = []
-    trace = layered.trace_batch
+    trace = layered_batch.trace_batch
 
     def interrupted(medium, grid, seed, batch, photons):
         if len(traced) == 4:
@@ -198,14 +199,14 @@ def test_the_same_command_resumes(command, mci, monkeypatch, more):
         traced.append(batch)
         return trace(medium, grid, seed, batch, photons)
 
-    monkeypatch.setattr(layered, "trace_batch", interrupted)
+    monkeypatch.setattr(layered_batch, "trace_batch", interrupted)
     status, _, err = command(*words, "--workers", 1)
     assert status == 130
     assert err == f"mcml-sim: {KEPT}"
     kept = {"first.mco", "first.npz", "second.photons/run.json", "second.photons/batch-00000000.npz"}
     assert {name for name in names() if not name.startswith("at-once")} == kept | {"two.mci"}
 
-    monkeypatch.setattr(layered, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
+    monkeypatch.setattr(layered_batch, "trace_batch", lambda *given: traced.append(given[3]) or trace(*given))
     status, out, err = command(*words, *more)
     assert (status, err) == (0, "")
     assert sorted(traced) == [0, 0, 1, 1, 2, 2]
@@ -290,7 +291,7 @@ def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci,
         raise RuntimeError("before the first batch")
 
     with monkeypatch.context() as change:
-        change.setattr(layered, "trace_batch", dies)
+        change.setattr(layered_batch, "trace_batch", dies)
         status, _, err = command("run", mci)
     assert (status, "before the first batch" in err) == (70, True)
     assert "first.photons/run.json" in names()
@@ -299,7 +300,7 @@ def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci,
 
 
 def test_fewer_photons_do_not_cost_the_others(command, mci):
-    photons = layered.BATCH_PHOTONS + 77
+    photons = layered_batch.BATCH_PHOTONS + 77
     mci.write_text(runs(("one.mco", photons, 10)))
     assert command("run", mci, "--precision", 1e-5)[0] == 0
     kept = {path.name: path.read_bytes() for path in Path("one.photons").iterdir()}
@@ -348,7 +349,7 @@ def test_precision_stops_early_on_the_schedule(command, mci):
     mci.write_text(runs(("one.mco", 10**9, 10)))
     status, out, _ = command("run", mci, "--precision", 0.01)
     assert status == 0
-    assert f"\n  {8 * layered.BATCH_PHOTONS} photons, " in out
+    assert f"\n  {8 * layered_batch.BATCH_PHOTONS} photons, " in out
     assert "diffuse_reflectance: relative standard error 0.01 reached" in out
     assert Precision(0.01).is_reached(read_results("one.npz").estimates["diffuse_reflectance"])
 
@@ -552,10 +553,10 @@ def test_quiet_is_quiet(command, mci):
 
 
 def test_what_the_help_says_is_what_is_done():
-    assert quantities(Grid(1, 1, 1, 1, na=1)) == cli.QUANTITIES
-    assert doing.QUANTITY == cli.QUANTITY
+    assert quantities(Grid(1, 1, 1, 1, na=1)) == app.QUANTITIES
+    assert doing.QUANTITY == app.QUANTITY
     first = [f"{FIRST_LOOK * batch_photons(half_space(0.5, n=n)) / 1e6:.2g} million" for n in (1.4, 1.0)]
-    assert list(cli.FIRST_LOOKS) == first
+    assert list(app.FIRST_LOOKS) == first
 
 
 def test_version_and_help(command):

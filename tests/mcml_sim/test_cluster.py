@@ -11,15 +11,17 @@ import distributed
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, cluster, tracer
+from mcml_sim import Grid, InputError
 from mcml_sim.errors import ClusterError
-from mcml_sim.run import run_batches
-from mcml_sim.store import Store
-from mcml_sim.tally import Counts
+from mcml_sim.runs import cluster
+from mcml_sim.runs.batches import run_batches
+from mcml_sim.runs.store import Store
+from mcml_sim.tracing import orders_batch
+from mcml_sim.tracing.counts import Counts
 
 GRID = Grid(0.5, 8)
 BATCH, BATCHES = 1000, 24
-TRACE = partial(tracer.trace_batch, GRID, 9)
+TRACE = partial(orders_batch.trace_batch, GRID, 9)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +81,7 @@ def test_a_worker_that_would_give_other_bits_is_refused_by_name(workers, monkeyp
 
 def test_an_error_on_a_worker_rises_here(workers):
     with pytest.raises(TypeError, match="trace_batch"):
-        run_batches(partial(tracer.trace_batch, nonsense=1), BATCH, BATCH, scheduler=workers.scheduler_address)
+        run_batches(partial(orders_batch.trace_batch, nonsense=1), BATCH, BATCH, scheduler=workers.scheduler_address)
 
 
 def test_a_batch_that_kills_its_workers_is_given_up_by_name(workers, monkeypatch):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from mcml_sim.dispersion import LEAST_ALBEDO, SMALL_SQUARE, dispersion, squared_decay_rate
+from mcml_sim.exact.dispersion import LEAST_ALBEDO, SMALL_SQUARE, dispersion, squared_decay_rate
 
 
 @pytest.fixture(autouse=True)

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.special import expn
 
 from mcml_sim import Setting, exact
-from mcml_sim.by_albedo import BLOCK
+from mcml_sim.exact.by_albedo import BLOCK
 from tests.mcml_sim.half_space_twins import RealAxis, profile_along_contour
 
 SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Setting, SettingError, exact
-from mcml_sim.by_albedo import by_alpha
-from mcml_sim.half_space_transform import STANDARD, Rule
-from mcml_sim.hankel import profile
+from mcml_sim.exact.by_albedo import by_alpha
+from mcml_sim.exact.hankel import profile
+from mcml_sim.exact.transform import STANDARD, Rule
 
 BOTH = pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=["searchlight", "diffuse"])
 ALPHAS = np.array([[0.05], [0.3], [0.6], [0.9], [0.999], [1.0]])

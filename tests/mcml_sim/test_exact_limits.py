@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from mcml_sim.half_space_transform import FARTHEST_RADIUS, NEAREST_RADIUS
+from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS
 
 BOTH = pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=["searchlight", "diffuse"])
 # Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and

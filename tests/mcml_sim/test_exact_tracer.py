@@ -9,7 +9,7 @@ import pytest
 from scipy.stats import chi2
 
 from mcml_sim import Grid, Setting, exact, simulate_orders
-from mcml_sim.by_albedo import BLOCK
+from mcml_sim.exact.by_albedo import BLOCK
 
 ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
 CHANCE = 1e-3  # that a right answer fails one of the tests of one of the albedos

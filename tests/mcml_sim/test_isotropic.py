@@ -3,8 +3,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import isotropic, rng
-from mcml_sim.isotropic import FIRST_ROULETTE, MAX_ORDER, Lanes
+from mcml_sim.tracing import isotropic_event, rng
+from mcml_sim.tracing.isotropic_event import FIRST_ROULETTE, MAX_ORDER, Lanes
 
 
 def azimuth_words():
@@ -18,7 +18,7 @@ def azimuth_words():
 
 def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
     words = azimuth_words()
-    cosine = np.asarray(jax.jit(isotropic.azimuth_cosine)(words), np.float64)
+    cosine = np.asarray(jax.jit(isotropic_event.azimuth_cosine)(words), np.float64)
     exact = np.sin(np.pi * (words.view(np.int32) + 0.5) / 2.0**32)
     assert np.abs(cosine - exact).max() < 5e-7
     assert np.abs(cosine).max() <= 1
@@ -26,7 +26,7 @@ def test_azimuth_cosine_is_the_sine_to_5e_7_and_never_beyond_one():
 
 def test_azimuth_cosine_is_that_of_a_uniform_angle():
     words = np.random.default_rng(1).integers(0, 2**32, 10**6).astype(np.uint32)
-    angle = np.arccos(np.asarray(isotropic.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
+    angle = np.arccos(np.asarray(isotropic_event.azimuth_cosine(jnp.asarray(words)), np.float64)) / np.pi
     # Kolmogorov-Smirnov: 1.95 / sqrt(N) has a chance of 1e-3.
     rank = (np.arange(10**6) + 0.5) / 10**6
     assert np.abs(np.sort(angle) - rank).max() < 1.95e-3
@@ -37,7 +37,7 @@ def test_displacement_is_that_of_the_plane():
     rho, path = 10 ** source.uniform(-3, 2, 10**5), 10 ** source.uniform(-3, 1, 10**5)
     angle, sine = source.uniform(0, 6.3, 10**5), source.uniform(0, 1, 10**5)
     exact = np.hypot(rho + path * sine * np.cos(angle), path * sine * np.sin(angle))
-    fast = isotropic.displaced(*(jnp.asarray(v, jnp.float32) for v in (rho, path, sine**2, np.cos(angle))))
+    fast = isotropic_event.displaced(*(jnp.asarray(v, jnp.float32) for v in (rho, path, sine**2, np.cos(angle))))
     np.testing.assert_allclose(fast, exact, atol=3e-7 * (rho + path).max(), rtol=2e-6)
 
 
@@ -48,19 +48,19 @@ def lanes(z, order, last=MAX_ORDER, count=2**14):
 
 
 KEY = jnp.asarray(rng.batch_key(0, 0))
-ENTER = jax.jit(isotropic.enter, static_argnames="illumination")
-FLY = jax.jit(isotropic.fly, static_argnames="events")
+ENTER = jax.jit(isotropic_event.enter, static_argnames="illumination")
+FLY = jax.jit(isotropic_event.fly, static_argnames="events")
 
 
 def test_first_scatterings_lie_straight_below_at_exponential_depths():
-    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), isotropic.DOUBLINGS)
+    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), isotropic_event.DOUBLINGS)
     assert np.all(pool.place.real == 0)
     assert np.all(pool.order == 0)
     assert abs(np.mean(pool.place.imag) - 1) < 4 / 2**8
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():
-    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic.DOUBLINGS, "diffuse").place
+    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS, "diffuse").place
     rho, z = np.asarray(place.real, np.float64), np.asarray(place.imag, np.float64)
     path, square = np.hypot(rho, z), np.sort(z**2 / (rho**2 + z**2))
     assert abs(path.mean() - 1) < 4 / 2**9
@@ -114,24 +114,24 @@ def test_photons_are_stopped_at_their_last_order_and_nowhere_else():
 
 
 def test_half_the_photons_win_each_toss():
-    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic.DOUBLINGS).last)
-    counts = np.array([np.sum(last == stop) for stop in isotropic.DOUBLINGS])
+    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS).last)
+    counts = np.array([np.sum(last == stop) for stop in isotropic_event.DOUBLINGS])
     expected = 2**18 * np.append(0.5 ** np.arange(1, 8), 0.5**7)
     assert counts.sum() == 2**18
-    assert isotropic.DOUBLINGS[-1] == MAX_ORDER
+    assert isotropic_event.DOUBLINGS[-1] == MAX_ORDER
     assert np.all(np.abs(counts - expected) < 4 * np.sqrt(expected))
 
 
 def test_tosses_are_independent_of_the_depth_they_are_drawn_with():
-    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic.DOUBLINGS)
+    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS)
     z, loses = np.asarray(pool.place.imag, np.float64), np.asarray(pool.last) == FIRST_ROULETTE
     assert abs(z[loses].mean() - z[~loses].mean()) < 4 * np.sqrt(4 / 2**18)
 
 
 def test_roulette_weight_doubles_just_after_each_toss():
     orders = np.arange(1, MAX_ORDER + 1)
-    passed = np.searchsorted(isotropic.DOUBLINGS[:-1], orders)  # a photon that leaves at n has not tossed at n
-    np.testing.assert_array_equal(isotropic.roulette_weight(orders), 2**passed)
-    assert isotropic.roulette_weight(FIRST_ROULETTE) == 1
-    assert isotropic.roulette_weight(FIRST_ROULETTE + 1) == 2
-    assert isotropic.roulette_weight(MAX_ORDER) == 128
+    passed = np.searchsorted(isotropic_event.DOUBLINGS[:-1], orders)  # a photon that leaves at n has not tossed at n
+    np.testing.assert_array_equal(isotropic_event.roulette_weight(orders), 2**passed)
+    assert isotropic_event.roulette_weight(FIRST_ROULETTE) == 1
+    assert isotropic_event.roulette_weight(FIRST_ROULETTE + 1) == 2
+    assert isotropic_event.roulette_weight(MAX_ORDER) == 128

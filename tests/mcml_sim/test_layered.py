@@ -6,12 +6,13 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Layer, Medium, exact, half_space, layered
+from mcml_sim import Grid, Layer, Medium, exact, half_space
+from mcml_sim.tracing import layered_batch
 
 # Mismatched indices everywhere, forward, isotropic and backward scattering, every layer a few mean free paths.
 SMALL = Medium((Layer(1.4, 0.5, 9.5, 0.8, 0.2), Layer(1.2, 1, 4, 0, 0.3), Layer(1.5, 2, 3, -0.4, 0.3)), 1.0, 1.3)
 GRID = Grid(0.1, 8, 0.1, 8, na=6)
-BATCH = layered.BATCH_PHOTONS
+BATCH = layered_batch.BATCH_PHOTONS
 
 
 @dataclass
@@ -116,7 +117,7 @@ def twin(g=0.8):
 
 @lru_cache(maxsize=4)
 def fast(seed=1, photons=BATCH):
-    return layered.trace_batch(SMALL, GRID, seed, 0, photons)
+    return layered_batch.trace_batch(SMALL, GRID, seed, 0, photons)
 
 
 def means_of_twin(found):
@@ -198,11 +199,11 @@ def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one():
 def test_batches_and_seeds_are_different_photons():
     one = fast(1, 50_000)
     for seed, batch in ((1, 1), (2, 0)):
-        assert layered.trace_batch(SMALL, GRID, seed, batch, 50_000).reflected.sum() != one.reflected.sum()
+        assert layered_batch.trace_batch(SMALL, GRID, seed, batch, 50_000).reflected.sum() != one.reflected.sum()
 
 
 def test_the_number_of_lanes_does_not_change_a_bit():
-    many, few = fast(1, 50_000), layered.trace_batch(SMALL, GRID, 1, 0, 50_000, lanes=1024)
+    many, few = fast(1, 50_000), layered_batch.trace_batch(SMALL, GRID, 1, 0, 50_000, lanes=1024)
     for name, values in many.arrays().items():
         np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
 
@@ -212,7 +213,7 @@ ABSORBING = Medium((Layer(1.37, 5, 1, 0.3, 0.5), Layer(1.5, 30, 1, -0.3, 0.5), L
 
 def test_neither_does_it_where_weights_are_small():
     """Sums of weights of all sizes: with float64 added in the order of lanes, six arrays would differ."""
-    many, few = (layered.trace_batch(ABSORBING, GRID, 1, 0, 30_000, lanes=lanes) for lanes in (4096, 1024))
+    many, few = (layered_batch.trace_batch(ABSORBING, GRID, 1, 0, 30_000, lanes=lanes) for lanes in (4096, 1024))
     for name, values in many.arrays().items():
         np.testing.assert_array_equal(values, getattr(few, name), err_msg=name)
 
@@ -220,7 +221,7 @@ def test_neither_does_it_where_weights_are_small():
 @pytest.mark.parametrize("absorbs", [1e-4, 1e-7, 1e-10])
 def test_weak_absorption_keeps_its_digits(absorbs):
     """What a slab absorbs is in proportion to mu_a; 1 - mu_a / mu_t in float32 would be off by a fifth at 1e-7."""
-    d = layered.trace_batch(Medium((Layer(1, 5 * absorbs, 5, 0.5, 1),)), Grid(1, 5, 0.1, 10), 1, 0, 100_000)
+    d = layered_batch.trace_batch(Medium((Layer(1, 5 * absorbs, 5, 0.5, 1),)), Grid(1, 5, 0.1, 10), 1, 0, 100_000)
     error = np.sqrt(d.absorbed_squares[-1] - d.absorbed[-1] ** 2 / d.started)
     # 10.777 by adding and doubling, as absorption vanishes; at 1e-4 it is a thousandth less.
     assert 0 < error < 0.01 * d.absorbed[-1]
@@ -230,22 +231,22 @@ def test_weak_absorption_keeps_its_digits(absorbs):
 
 
 def test_one_photon_says_nothing_of_its_error():
-    d = layered.trace_batch(SMALL, GRID, 1, 0, 1)
+    d = layered_batch.trace_batch(SMALL, GRID, 1, 0, 1)
     assert np.all(np.isinf(d.absorbed_z_variance))
     assert np.all(np.isinf(d.absorbed_rz_variance))
 
 
 def test_another_medium_of_the_same_structure_is_not_compiled_again():
     fast()
-    before = layered.trace._cache_size()
+    before = layered_batch.trace._cache_size()
     other = Medium((Layer(1.1, 1, 2, 0.1, 3), Layer(1.1, 1, 0, 0, 1), Layer(1.2, 0, 0, 0, 2)))
-    layered.trace_batch(other, Grid(0.3, 8, 0.2, 8, na=6), 7, 3, 5000)
-    assert layered.trace._cache_size() == before
+    layered_batch.trace_batch(other, Grid(0.3, 8, 0.2, 8, na=6), 7, 3, 5000)
+    assert layered_batch.trace._cache_size() == before
 
 
 def spread_over_claim(seeds=40, photons=5_000):
     """Variance between runs over what each run claims, for all that has enough photons."""
-    runs = [means_of_fast(layered.trace_batch(SMALL, GRID, seed, 0, photons)) for seed in range(100, 100 + seeds)]
+    runs = [means_of_fast(layered_batch.trace_batch(SMALL, GRID, seed, 0, photons)) for seed in range(100, 100 + seeds)]
     means, variances = (np.array(part) for part in zip(*runs, strict=True))
     enough = means.mean(axis=0) > 30 / photons
     return means[:, enough].var(axis=0, ddof=1) / variances[:, enough].mean(axis=0)
@@ -263,7 +264,7 @@ def test_errors_are_those_of_repeated_runs(sidak):
 
 @lru_cache(maxsize=8)
 def one_layer(medium):
-    return layered.trace_batch(medium, Grid(0.5, 10), 3, 0, BATCH)
+    return layered_batch.trace_batch(medium, Grid(0.5, 10), 3, 0, BATCH)
 
 
 @pytest.mark.parametrize("alpha", [0.2, 0.6, 0.9, 0.99])
@@ -320,7 +321,7 @@ UNEVEN = Grid.from_edges(r=[0, 0.5, 1.5, 5], z=[0, 0.3, 0.9])
 def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     """Nine are more than are followed one by one in each photon; the `inner` rings end at r = 0.5."""
     whole = one_layer(Medium((Layer(1.4, 1, 9, 0.5, 0.9),)))
-    d = layered.trace_batch(Medium((Layer(1.4, 1, 9, 0.5, 0.9 / layers),) * layers), grid, 4, 0, BATCH)
+    d = layered_batch.trace_batch(Medium((Layer(1.4, 1, 9, 0.5, 0.9 / layers),) * layers), grid, 4, 0, BATCH)
     third = d.absorbed_z[: np.searchsorted(grid.z_edges, 0.299)].sum()
     assert third == pytest.approx(d.absorbed[: layers // 3].sum(), rel=1e-4)
     difference = whole.reflected[0].sum() - d.reflected[:inner].sum()
@@ -339,8 +340,8 @@ def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
 def test_errors_of_many_layers_are_those_of_few_groups_too():
     """A table so large that there are 8 groups; the same photons give the same errors but for the spread of 8."""
     medium = Medium((Layer(1.4, 1, 9, 0.5, 0.1),) * 9)
-    few = layered.trace_batch(medium, Grid(0.01, 999, 0.01, 999), 4, 0, 30_000)
-    many = layered.trace_batch(medium, Grid(0.1, 9, 0.1, 9), 4, 0, 30_000)
+    few = layered_batch.trace_batch(medium, Grid(0.01, 999, 0.01, 999), 4, 0, 30_000)
+    many = layered_batch.trace_batch(medium, Grid(0.1, 9, 0.1, 9), 4, 0, 30_000)
     np.testing.assert_allclose(few.absorbed, many.absorbed, rtol=1e-9)
     variances = [d.absorbed_squares[:-1] - d.absorbed[:-1] ** 2 / d.started for d in (few, many)]
     # Nine ratios of chi-squared of 7 and of 31 degrees of freedom; empty groups would make them a thousand.
@@ -350,7 +351,7 @@ def test_errors_of_many_layers_are_those_of_few_groups_too():
 def test_light_goes_through_glass_and_leaves_nothing_in_it():
     """A matched sheet above changes nothing but where the tissue begins."""
     tissue, air = Layer(1.37, 1, 20, 0.5, 0.2), Layer(1.0, 0, 0, 0, 0.1)
-    under = layered.trace_batch(Medium((air, tissue, air)), GRID, 1, 0, BATCH)
+    under = layered_batch.trace_batch(Medium((air, tissue, air)), GRID, 1, 0, BATCH)
     bare = one_layer(Medium((tissue,)))
     assert under.absorbed[0] == under.absorbed[2] == under.absorbed_z[0] == 0
     # The photons are those that have entered the tissue; on their way out they cross the air.
@@ -362,10 +363,10 @@ def test_light_goes_through_glass_and_leaves_nothing_in_it():
 
 
 def test_clear_glass_is_a_window():
-    one = layered.trace_batch(Medium((Layer(1.5, 0, 0, 0, 1),)), GRID, 1, 0, 1000)
+    one = layered_batch.trace_batch(Medium((Layer(1.5, 0, 0, 0, 1),)), GRID, 1, 0, 1000)
     assert one.ballistic == one.ballistic_squares == one.accounted == 1000
     sheets = Medium((Layer(1.5, 0, 0, 0, 1), Layer(1.2, 0, 0, 0, 1), Layer(1.5, 0, 0, 0, 1)))
-    d = layered.trace_batch(sheets, GRID, 1, 0, BATCH)
+    d = layered_batch.trace_batch(sheets, GRID, 1, 0, BATCH)
     inner, last = (0.3 / 2.7) ** 2, (0.5 / 2.5) ** 2
     # The photons start in the second sheet; all light stays on the axis and goes to and fro.
     reflected, transmitted, absorbed, cut = shares(d)

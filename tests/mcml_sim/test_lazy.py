@@ -10,7 +10,7 @@ import pytest
 
 import mcml_sim
 import profilefit
-from mcml_sim.lazy import attributes, carried_out
+from mcml_sim.cli.lazy import attributes, carried_out
 
 
 @pytest.mark.parametrize("package", [mcml_sim, profilefit])

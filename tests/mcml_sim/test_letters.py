@@ -5,8 +5,7 @@ import sys
 
 import pytest
 
-from mcml_sim.letters import NAME, STANDS_FOR
-from mcml_sim.terminal import mend_streams
+from mcml_sim.cli.terminal import NAME, STANDS_FOR, mend_streams
 
 LINE = "α 0.12 ± 0.03 → ▁▅█ √(1 − α) 漢"
 

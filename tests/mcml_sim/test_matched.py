@@ -8,10 +8,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, exact, matched, rng, tracer
-from mcml_sim.deposits import Deposits, shapes
-from mcml_sim.isotropic import DOUBLINGS
-from mcml_sim.medium import half_space
+from mcml_sim import Grid, exact
+from mcml_sim.media.medium import half_space
+from mcml_sim.tracing import matched_batch, orders_batch, rng
+from mcml_sim.tracing.deposits import Deposits, shapes
+from mcml_sim.tracing.isotropic_event import DOUBLINGS
 
 ALPHAS = [0.0, 0.05, 0.3, 0.6, 0.9, 0.97, 0.99, 0.999]
 PHOTONS = 2**17
@@ -22,7 +23,7 @@ UNEVEN = Grid.from_edges(r=MFP * np.array([0, 0.1, 0.5, 1.1, 3]), z=MFP * np.arr
 
 @lru_cache
 def traced(alpha, grid=GRID, batches=4, seed=0, photons=PHOTONS):
-    parts = [matched.trace_batch(half_space(alpha, MFP), grid, seed, batch, photons) for batch in range(batches)]
+    parts = [matched_batch.trace_batch(half_space(alpha, MFP), grid, seed, batch, photons) for batch in range(batches)]
     return sum(parts[1:], parts[0])
 
 
@@ -127,7 +128,7 @@ def test_the_comparison_sees_bins_that_are_off_by_10_percent(sidak):
 
 def test_errors_are_the_spread_over_seeds(sidak):
     seeds, photons = 40, 2**14
-    runs = [matched.trace_batch(half_space(0.9, MFP), GRID, seed, 0, photons) for seed in range(seeds)]
+    runs = [matched_batch.trace_batch(half_space(0.9, MFP), GRID, seed, 0, photons) for seed in range(seeds)]
     checked = {
         "reflected": [r.reflected_squares - r.reflected**2 / photons for r in runs],
         "absorbed": [r.absorbed_squares - r.absorbed**2 / photons for r in runs],
@@ -152,20 +153,20 @@ def equal(a, b):
 @pytest.mark.parametrize("grid", [GRID, Grid(0.5, 10, na=4)])
 def test_the_number_of_lanes_does_not_change_a_bit(grid):
     medium = half_space(0.9, MFP)
-    equal(*(matched.trace_batch(medium, grid, 3, 1, 30_000, lanes) for lanes in (512, 4096)))
+    equal(*(matched_batch.trace_batch(medium, grid, 3, 1, 30_000, lanes) for lanes in (512, 4096)))
 
 
 def test_depths_do_not_change_what_leaves():
     medium = half_space(0.9, MFP)
-    a = matched.trace_batch(medium, GRID, 3, 1, 30_000)
-    b = matched.trace_batch(medium, Grid(0.2 * MFP, 10, na=6), 3, 1, 30_000)
+    a = matched_batch.trace_batch(medium, GRID, 3, 1, 30_000)
+    b = matched_batch.trace_batch(medium, Grid(0.2 * MFP, 10, na=6), 3, 1, 30_000)
     for name in ("reflected", "reflected_squares", "absorbed", "accounted"):
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-4, err_msg=name)
 
 
 @pytest.mark.parametrize(("photons", "tells_spread"), [(1, False), (100, False), (200, True)])
 def test_a_few_photons_are_all_there(photons, tells_spread):
-    got = matched.trace_batch(half_space(0.7), GRID, 0, 0, photons)
+    got = matched_batch.trace_batch(half_space(0.7), GRID, 0, 0, photons)
     assert got.started == photons
     assert got.absorbed_rz.sum() == pytest.approx(got.absorbed[-1])
     assert np.all(np.isfinite(got.absorbed_rz_variance) == tells_spread)
@@ -173,23 +174,23 @@ def test_a_few_photons_are_all_there(photons, tells_spread):
 
 @pytest.mark.parametrize("grid", [Grid(0.1, 7), Grid(0.1, 7, na=3), Grid(0.1, 7, 0.2, 5), UNEVEN])
 def test_shapes_are_those_of_the_grid(grid):
-    got = matched.trace_batch(half_space(0.7), grid, 0, 0, 100).arrays()
+    got = matched_batch.trace_batch(half_space(0.7), grid, 0, 0, 100).arrays()
     assert {name: array.shape for name, array in got.items()} == shapes(grid, 1)
 
 
 def test_another_albedo_or_mean_free_path_compiles_nothing():
     traced(0.9)
-    compiled = [f._cache_size() for f in (matched._trace_visits, matched._counted)]
-    matched.trace_batch(half_space(0.123, 0.7), GRID, 0, 0, PHOTONS)
-    assert [f._cache_size() for f in (matched._trace_visits, matched._counted)] == compiled
+    compiled = [f._cache_size() for f in (matched_batch._trace_visits, matched_batch._counted)]
+    matched_batch.trace_batch(half_space(0.123, 0.7), GRID, 0, 0, PHOTONS)
+    assert [f._cache_size() for f in (matched_batch._trace_visits, matched_batch._counted)] == compiled
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1e-6, 0.1, 0.5, 0.9, 0.999, 1.0])
 def test_weights_are_powers_of_alpha_times_the_tosses_won(alpha):
-    values = matched.weights(alpha)
+    values = matched_batch.weights(alpha)
     assert np.all(np.diff(values.stops) >= 0)
     assert values.stops[0] >= 1
-    assert values.last <= matched.MAX_ORDER
+    assert values.last <= matched_batch.MAX_ORDER
     for n in (1, 2, 3, 10, 63, 64, 100, 700):
         if n <= values.last:
             won = np.sum(values.stops[:-1] < n)
@@ -199,30 +200,32 @@ def test_weights_are_powers_of_alpha_times_the_tosses_won(alpha):
 
 @pytest.mark.parametrize("alpha", [0.4, 0.5, 0.9])
 def test_weights_stay_around_the_threshold_once_they_have_fallen_to_it(alpha):
-    values = matched.weights(alpha)
-    later = values.leaving[values.stops[0] + 1 : min(values.last, matched.LONG_PATH)]
-    assert np.all(later < 2 * matched.THRESHOLD)
-    assert np.all(later > matched.THRESHOLD * alpha)
+    values = matched_batch.weights(alpha)
+    later = values.leaving[values.stops[0] + 1 : min(values.last, matched_batch.LONG_PATH)]
+    assert np.all(later < 2 * matched_batch.THRESHOLD)
+    assert np.all(later > matched_batch.THRESHOLD * alpha)
 
 
 def test_fixed_point_sums_hold_the_longest_batch():
     """All visits of a white batch, in units, stay inside int64."""
     key = jnp.asarray(rng.batch_key(0, 0))
-    values = matched.weights(1.0)
-    order = np.abs(np.asarray(tracer.trace(key, jnp.int32(2**14), jnp.asarray(values.stops)).order)[: 2**14])
+    values = matched_batch.weights(1.0)
+    order = np.abs(np.asarray(orders_batch.trace(key, jnp.int32(2**14), jnp.asarray(values.stops)).order)[: 2**14])
     visits = np.cumsum(values.visiting)[order].mean()
-    assert visits * tracer.BATCH_PHOTONS / matched.UNIT < 2**62
+    assert visits * orders_batch.BATCH_PHOTONS / matched_batch.UNIT < 2**62
 
 
 def test_a_lost_photon_is_noticed():
-    orders = np.zeros(2 * matched.MAX_ORDER + 1, np.int32)
+    orders = np.zeros(2 * matched_batch.MAX_ORDER + 1, np.int32)
     with pytest.raises(RuntimeError, match="photons were lost or made: 5 started and 0 ended"):
-        matched._deposits(np.zeros((2, 1), complex), orders, matched.weights(0.5), 5, 0.5, [np.zeros(0)] * 4)
+        matched_batch._deposits(
+            np.zeros((2, 1), complex), orders, matched_batch.weights(0.5), 5, 0.5, [np.zeros(0)] * 4
+        )
 
 
 def test_the_white_run_reweighted_agrees():
     """The same photons, drawn in another way: alpha^n of the order-resolved kernel."""
-    ends = tracer.trace(jnp.asarray(rng.batch_key(5, 0)), jnp.int32(PHOTONS), DOUBLINGS)
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(5, 0)), jnp.int32(PHOTONS), DOUBLINGS)
     order = np.asarray(ends.order)
     reflected = np.sum(0.5 ** order[order > 0]) / PHOTONS
     got = traced(0.5)
@@ -232,6 +235,6 @@ def test_the_white_run_reweighted_agrees():
 
 def test_x64_outside_changes_nothing():
     medium = half_space(0.9, MFP)
-    plain = matched.trace_batch(medium, GRID, 3, 1, 5000)
+    plain = matched_batch.trace_batch(medium, GRID, 3, 1, 5000)
     with jax.enable_x64(True):
-        equal(plain, matched.trace_batch(medium, GRID, 3, 1, 5000))
+        equal(plain, matched_batch.trace_batch(medium, GRID, 3, 1, 5000))

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer
-from mcml_sim.mci import MAX_BYTES, MAX_CELLS, MAX_RUNS, parse_mci, read_mci
+from mcml_sim.results.mci import MAX_BYTES, MAX_CELLS, MAX_RUNS, parse_mci, read_mci
 
 DATA = Path(__file__).parent / "data"
 MUTANTS = 12_000

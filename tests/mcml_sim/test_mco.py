@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium
-from mcml_sim.deposits import Deposits, shapes
 from mcml_sim.errors import OutputError
-from mcml_sim.mcml_files import read_mci, write_mco
-from mcml_sim.quantities import Tally
-from mcml_sim.simulation import simulate
+from mcml_sim.results.mci import read_mci
+from mcml_sim.results.mco import write_mco
+from mcml_sim.results.tally import Tally
+from mcml_sim.runs.simulation import simulate
+from mcml_sim.tracing.deposits import Deposits, shapes
 
 DATA = Path(__file__).parent / "data"
 ROUNDING = {"table": 5.1e-5, "A_l": 5.1e-4, "RAT": 5.1e-6}  # relative, of %12.4E, %12.4G and %-14.6G

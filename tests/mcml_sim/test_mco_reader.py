@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium, read_mco, write_mco
-from mcml_sim.deposits import Deposits, shapes
-from mcml_sim.mco_reader import parse_mco
-from mcml_sim.quantities import Tally
+from mcml_sim.results.mco import parse_mco
+from mcml_sim.results.tally import Tally
+from mcml_sim.tracing.deposits import Deposits, shapes
 
 # From the parameters to Rd_r as V1 prints them, its report of the time included.
 V1 = """A1 \t# Version number of the file format.

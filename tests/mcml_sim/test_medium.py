@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, Layer, Medium, half_space
-from mcml_sim.medium import MAX_LAYERS
+from mcml_sim.media.medium import MAX_LAYERS
 
 TISSUE = Layer(n=1.4, mu_a=1, mu_s=99, g=0.9, thickness=0.1)
 

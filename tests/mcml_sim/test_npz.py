@@ -10,7 +10,7 @@ import zipfile
 import numpy as np
 import pytest
 
-from mcml_sim.npz import MOST_MEMBERS, read_npz
+from mcml_sim.files.npz import MOST_MEMBERS, read_npz
 
 MOST = 10**6
 ARRAYS = {"one": np.arange(6.0).reshape(2, 3), "two": np.arange(4, dtype=">i4"), "name": np.array("hazard")}
@@ -122,7 +122,7 @@ def test_members_without_end_are_refused_before_they_are_listed():
 BOMB = """
 import resource, sys, time
 from pathlib import Path
-from mcml_sim.npz import read_npz
+from mcml_sim.files.npz import read_npz
 content = Path(sys.argv[1]).read_bytes()
 before, started = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss, time.perf_counter()
 try:

@@ -2,7 +2,8 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Layer, Medium, optics
+from mcml_sim import Layer, Medium
+from mcml_sim.media import fresnel
 
 
 def polarised(n1, n2, angle):
@@ -16,13 +17,13 @@ def polarised(n1, n2, angle):
 @pytest.mark.parametrize(("n1", "n2"), [(1.0, 1.5), (1.5, 1.0), (1.37, 1.4)])
 def test_fresnel_is_the_mean_of_the_textbooks_polarisations(n1, n2):
     angle = np.linspace(0.01, 0.99, 50) * (np.arcsin(min(n2 / n1, 1.0)))
-    reflectance, cosine = optics.fresnel(n1, n2, np.cos(angle))
+    reflectance, cosine = fresnel.fresnel(n1, n2, np.cos(angle))
     np.testing.assert_allclose(reflectance, np.mean(polarised(n1, n2, angle), axis=0), rtol=1e-9)
     np.testing.assert_allclose(np.sqrt(1 - cosine**2) * n2, n1 * np.sin(angle), rtol=1e-9)
 
 
 def test_fresnel_at_normal_incidence():
-    reflectance, cosine = optics.fresnel(1.0, 1.5, 1.0)
+    reflectance, cosine = fresnel.fresnel(1.0, 1.5, 1.0)
     assert reflectance == pytest.approx(0.04)
     assert cosine == 1.0
 
@@ -31,12 +32,12 @@ def test_half_of_the_light_is_polarised_at_brewsters_angle():
     angle = np.arctan(1.5)
     across, along = polarised(1.0, 1.5, angle)
     assert along == pytest.approx(0, abs=1e-30)
-    assert optics.fresnel(1.0, 1.5, np.cos(angle))[0] == pytest.approx(across / 2)
+    assert fresnel.fresnel(1.0, 1.5, np.cos(angle))[0] == pytest.approx(across / 2)
 
 
 def test_beyond_the_critical_angle_everything_is_reflected():
     critical = np.sqrt(1 - (1 / 1.5) ** 2)
-    reflectance, cosine = optics.fresnel(1.5, 1.0, np.array([0.0, 0.3, critical - 1e-9, critical + 1e-6]))
+    reflectance, cosine = fresnel.fresnel(1.5, 1.0, np.array([0.0, 0.3, critical - 1e-9, critical + 1e-6]))
     np.testing.assert_array_equal(reflectance[:3], 1)
     np.testing.assert_array_equal(cosine[:3], 0)
     assert reflectance[3] < 1
@@ -44,13 +45,13 @@ def test_beyond_the_critical_angle_everything_is_reflected():
 
 
 def test_grazing_light_is_reflected_unless_the_indices_are_equal():
-    assert optics.fresnel(1.0, 1.5, 0.0)[0] == 1
-    assert optics.fresnel(1.4, 1.4, 0.0) == (0, 0)
+    assert fresnel.fresnel(1.0, 1.5, 0.0)[0] == 1
+    assert fresnel.fresnel(1.4, 1.4, 0.0) == (0, 0)
 
 
 def test_equal_indices_neither_reflect_nor_bend():
     cosine = np.random.default_rng(0).random(1000).astype(np.float32)
-    reflectance, refracted = optics.fresnel(np.float32(1.37), np.float32(1.37), cosine)
+    reflectance, refracted = fresnel.fresnel(np.float32(1.37), np.float32(1.37), cosine)
     assert np.all(reflectance == 0)
     np.testing.assert_array_equal(refracted, cosine)
 
@@ -58,8 +59,8 @@ def test_equal_indices_neither_reflect_nor_bend():
 def test_fresnel_of_jax_arrays_is_that_of_numpy_in_single_precision():
     cosine = np.linspace(0, 1, 1001)
     for n1, n2 in ((1.0, 1.5), (1.5, 1.0)):
-        single = optics.fresnel(jnp.float32(n1), jnp.float32(n2), jnp.asarray(cosine, jnp.float32))
-        for fast, exact in zip(single, optics.fresnel(n1, n2, cosine), strict=True):
+        single = fresnel.fresnel(jnp.float32(n1), jnp.float32(n2), jnp.asarray(cosine, jnp.float32))
+        for fast, exact in zip(single, fresnel.fresnel(n1, n2, cosine), strict=True):
             assert fast.dtype == jnp.float32
             # Near the critical angle both rise as a square root, and 1e-7 in the cosine becomes 3e-4.
             assert np.all(np.isfinite(fast))
@@ -69,7 +70,7 @@ def test_fresnel_of_jax_arrays_is_that_of_numpy_in_single_precision():
 
 def test_a_first_layer_of_tissue_reflects_as_its_surface():
     medium = Medium((Layer(1.37, 1, 100, 0.9, 0.1), Layer(1.5, 1, 10, 0, 0.1)))
-    assert optics.specular_reflectance(medium) == pytest.approx((0.37 / 2.37) ** 2)
+    assert fresnel.specular_reflectance(medium) == pytest.approx((0.37 / 2.37) ** 2)
 
 
 @pytest.mark.parametrize("below", ["tissue", "nothing"])
@@ -78,8 +79,8 @@ def test_glass_reflects_with_all_orders_between_its_faces(below):
     medium = Medium((glass, tissue), 1.1) if below == "tissue" else Medium((glass,), 1.1, 1.37)
     top, bottom = (0.4 / 2.6) ** 2, (0.13 / 2.87) ** 2
     series = top + sum((1 - top) ** 2 * bottom * (top * bottom) ** k for k in range(20))
-    assert optics.specular_reflectance(medium) == pytest.approx(series, rel=1e-12)
+    assert fresnel.specular_reflectance(medium) == pytest.approx(series, rel=1e-12)
 
 
 def test_a_matched_surface_reflects_nothing():
-    assert optics.specular_reflectance(Medium((Layer(1.0, 1, 1, 0),))) == 0
+    assert fresnel.specular_reflectance(Medium((Layer(1.0, 1, 1, 0),))) == 0

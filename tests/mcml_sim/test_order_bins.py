@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from mcml_sim import order_bins as bins
-from mcml_sim.isotropic import MAX_ORDER, roulette_weight
+from mcml_sim.tracing import order_bins as bins
+from mcml_sim.tracing.isotropic_event import MAX_ORDER, roulette_weight
 
 ALPHAS = np.concatenate([[0.0, 1e-3], np.linspace(0.05, 0.95, 19), 1 - np.geomspace(0.04, 1e-6, 20), [1.0]])
 

@@ -3,8 +3,9 @@
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, Setting, exact, simulate_orders, tracer
-from mcml_sim.tally import estimate
+from mcml_sim import Grid, InputError, Setting, exact, simulate_orders
+from mcml_sim.results.estimate import estimate
+from mcml_sim.tracing import orders_batch
 
 ALPHAS = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99])
 
@@ -128,7 +129,7 @@ def test_every_photon_is_in_the_ledger(run):
 def test_covariance_is_the_scatter_of_batches(sidak):
     """200 small batches against the closed form of their sum; the error of a sample covariance is Wishart's."""
     grid, alphas, photons, batches = Grid.from_edges(r=[0, 0.2, 1, 4]), np.array([0.3, 0.6, 0.9, 0.98]), 20_000, 200
-    parts = [tracer.trace_batch(grid, 11, batch, photons) for batch in range(batches)]
+    parts = [orders_batch.trace_batch(grid, 11, batch, photons) for batch in range(batches)]
     total = sum(parts[1:], parts[0])
     run = simulate_orders(grid, 1)  # for its weights only
     weights = run.weights(alphas)

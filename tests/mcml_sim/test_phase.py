@@ -5,7 +5,8 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import chi2
 
-from mcml_sim import phase, rng
+from mcml_sim.media import phase
+from mcml_sim.tracing import rng
 
 every_g = pytest.mark.parametrize("g", [-0.9, -0.3, 0.0, 1e-9, 0.5, 0.9, 0.99])
 

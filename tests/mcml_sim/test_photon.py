@@ -6,19 +6,21 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from mcml_sim import Layer, Medium, optics, photon, rng
-from mcml_sim.photon import CUT, EVENTS_PER_TURN, FIRST_TOSS, MAX_EVENTS, REFLECTED, ROULETTED, THRESHOLD
+from mcml_sim import Layer, Medium
+from mcml_sim.media import fresnel
+from mcml_sim.tracing import layered_event, rng
+from mcml_sim.tracing.layered_event import CUT, EVENTS_PER_TURN, FIRST_TOSS, MAX_EVENTS, REFLECTED, ROULETTED, THRESHOLD
 
 KEY = jnp.asarray(rng.batch_key(5, 0))
 GO = jnp.bool_(True)
 NUMBER = 2**14
 # Layers 1 and 2 are matched; 3 is denser; above and below is air.
-STACK = photon.stack(Medium((Layer(1.4, 1, 9, 0.8, 5), Layer(1.4, 0, 2, -0.5, 1), Layer(1.6, 1, 1, 0, 2))), 1.0)
+STACK = layered_event.stack(Medium((Layer(1.4, 1, 9, 0.8, 5), Layer(1.4, 0, 2, -0.5, 1), Layer(1.6, 1, 1, 0, 2))), 1.0)
 
 
 def lanes(direction=(0.0, 0.0, 1.0), z=0.5, layer=1, weight=1.0, event=0):
     """Many photons in one state; negative weights wait."""
-    pool = photon.enter(jnp.arange(NUMBER, dtype=jnp.uint32), layer, 0)
+    pool = layered_event.enter(jnp.arange(NUMBER, dtype=jnp.uint32), layer, 0)
     ux, uy, uz = direction
     return pool._replace(
         down=jnp.full(NUMBER, z + 1j * uz, jnp.complex64),
@@ -30,12 +32,14 @@ def lanes(direction=(0.0, 0.0, 1.0), z=0.5, layer=1, weight=1.0, event=0):
 
 @jax.jit
 def scatter(pool, event=0):
-    return photon.scatter(GO, KEY, pool, pool.event + jnp.uint32(event), photon.material(STACK, pool.layer))
+    return layered_event.scatter(
+        GO, KEY, pool, pool.event + jnp.uint32(event), layered_event.material(STACK, pool.layer)
+    )
 
 
 @jax.jit
 def settle(pool):
-    return photon.settle(GO, KEY, STACK, pool, pool.event + jnp.uint32(EVENTS_PER_TURN - 1))
+    return layered_event.settle(GO, KEY, STACK, pool, pool.event + jnp.uint32(EVENTS_PER_TURN - 1))
 
 
 def direction_of(pool):
@@ -53,7 +57,7 @@ some_directions = pytest.mark.parametrize(
 
 def test_azimuth_is_cosine_and_sine_to_5e_7():
     v = np.linspace(-1, 1, 100_001, dtype=np.float32)
-    cosine, sine = (np.asarray(a, float) for a in jax.jit(photon.azimuth)(v))
+    cosine, sine = (np.asarray(a, float) for a in jax.jit(layered_event.azimuth)(v))
     np.testing.assert_allclose(cosine, np.cos(np.pi * v.astype(float)), atol=5e-7)
     np.testing.assert_allclose(sine, np.sin(np.pi * v.astype(float)), atol=5e-7)
     np.testing.assert_allclose(np.hypot(cosine, sine), 1, atol=5e-7)
@@ -65,7 +69,7 @@ def test_scattering_turns_by_g_and_evenly_around(direction, layer, g):
     # From deep inside an endless layer nobody waits.
     endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e6, layer=layer)
-    after, _ = photon.scatter(GO, KEY, pool, pool.event, photon.material(endless, pool.layer))
+    after, _ = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.material(endless, pool.layer))
     turned = direction_of(after)
     np.testing.assert_allclose(np.linalg.norm(turned, axis=0), 1, atol=2e-6)
     along = turned.T @ np.asarray(direction, float)
@@ -82,7 +86,7 @@ def test_free_paths_are_exponential_and_end_where_the_photon_is():
     direction = unit(1, 2, -2)
     endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e3, layer=2)
-    after, left = photon.scatter(GO, KEY, pool, pool.event, photon.material(endless, pool.layer))
+    after, left = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.material(endless, pool.layer))
     assert not np.any(left)
     paths = np.abs(np.asarray(after.place, complex)) / np.hypot(*direction[:2])
     assert kstest(paths, "expon", (0, 0.5)).pvalue > 1e-3
@@ -123,7 +127,7 @@ def test_a_matched_interface_lets_everyone_through_without_bending():
 def test_an_interface_reflects_by_fresnel_and_bends_by_snell():
     direction = unit(1, 1, -1)
     after = settle(lanes(direction, z=0.5, layer=3, weight=-1))
-    reflectance, cosine = optics.fresnel(1.6, 1.4, -direction[2])
+    reflectance, cosine = fresnel.fresnel(1.6, 1.4, -direction[2])
     reflected = np.asarray(after.layer) == 3
     assert abs(reflected.mean() - reflectance) < 4 * np.sqrt(reflectance / NUMBER)
     up, down = direction_of(after)[:, ~reflected], direction_of(after)[:, reflected]
@@ -175,7 +179,7 @@ def test_roulette_keeps_the_weight_of_all(weight, event, chance):
 
 def test_long_paths_toss_once_an_octave_and_not_where_they_are_cut():
     events = np.arange(0, MAX_EVENTS + EVENTS_PER_TURN, EVENTS_PER_TURN, dtype=np.uint32) + EVENTS_PER_TURN - 1
-    late = np.asarray(photon._is_late(jnp.asarray(events)))
+    late = np.asarray(layered_event._is_late(jnp.asarray(events)))
     assert np.sum(late) == np.log2(MAX_EVENTS // FIRST_TOSS)
 
 
@@ -191,8 +195,8 @@ def test_many_layers_are_gathered_as_few_are_selected():
     layer = jnp.asarray(np.r_[1:9, 3], jnp.int32)
     few = jnp.arange(8.0)
     many = jnp.arange(20.0)
-    np.testing.assert_array_equal(photon.pick(few, layer), layer - 1)
-    np.testing.assert_array_equal(photon.pick(many, layer), layer - 1)
+    np.testing.assert_array_equal(layered_event.pick(few, layer), layer - 1)
+    np.testing.assert_array_equal(layered_event.pick(many, layer), layer - 1)
 
 
 @pytest.mark.slow
@@ -202,10 +206,10 @@ def test_directions_keep_their_length_over_a_thousand_turns():
     @partial(jax.jit, static_argnames="turns")
     def walk(pool, turns):
         def turn(_, pool):
-            here = photon.material(endless, pool.layer)
+            here = layered_event.material(endless, pool.layer)
             for number in range(EVENTS_PER_TURN - 1):
-                pool, _ = photon.scatter(GO, KEY, pool, pool.event + number, here)
-            pool = photon.settle(GO, KEY, endless, pool, pool.event + EVENTS_PER_TURN - 1)
+                pool, _ = layered_event.scatter(GO, KEY, pool, pool.event + number, here)
+            pool = layered_event.settle(GO, KEY, endless, pool, pool.event + EVENTS_PER_TURN - 1)
             return pool._replace(event=pool.event + EVENTS_PER_TURN, weight=jnp.ones_like(pool.weight))
 
         return jax.lax.fori_loop(0, turns, turn, pool)

@@ -7,7 +7,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import pool
+from mcml_sim.tracing import pool
 
 
 class Timers(NamedTuple):

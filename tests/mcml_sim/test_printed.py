@@ -5,8 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from mcml_sim import Estimate, Grid, Layer, Medium, printed
-from mcml_sim.results import Results
+from mcml_sim import Estimate, Grid, Layer, Medium
+from mcml_sim.cli import printed
+from mcml_sim.results.tally_file import Results
 
 
 @pytest.mark.parametrize(

@@ -15,8 +15,8 @@ import numpy
 import typer
 from rich.console import Console
 from mcml_sim.errors import InputError
-from mcml_sim.program import Program
-from mcml_sim.store import DamagedBatch
+from mcml_sim.cli.program import Program
+from mcml_sim.runs.store import DamagedBatch
 
 app = typer.Typer()
 

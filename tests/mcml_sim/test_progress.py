@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from mcml_sim.progress import is_watched, rate, tracked, working
+from mcml_sim.runs.progress import is_watched, rate, tracked, working
 
 
 @pytest.mark.parametrize(

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Layer, Medium, simulate_orders
-from mcml_sim.deposits import Deposits, shapes
-from mcml_sim.quantities import Tally
-from mcml_sim.results import read_results, write_results
-from mcml_sim.simulation import simulate
+from mcml_sim.results.tally import Tally
+from mcml_sim.results.tally_file import read_results, write_results
+from mcml_sim.runs.simulation import simulate
+from mcml_sim.tracing.deposits import Deposits, shapes
 
 LAYERS = Medium((Layer(1.3, 1, 9, 0.7, 0.1), Layer(1.4, 2, 8, 0.5)), n_above=1.1, n_below=1.2)
 

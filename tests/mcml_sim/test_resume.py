@@ -19,8 +19,8 @@ CHILD = f"""
 import hashlib, sys
 from pathlib import Path
 from mcml_sim import Grid, Layer, Medium, simulate_orders
-from mcml_sim.layered import BATCH_PHOTONS
-from mcml_sim.simulation import simulate
+from mcml_sim.tracing.layered_batch import BATCH_PHOTONS
+from mcml_sim.runs.simulation import simulate
 
 def store(name):
     return Path(sys.argv[1], name) if len(sys.argv) > 1 else None
@@ -105,8 +105,8 @@ from dataclasses import dataclass
 from pathlib import Path
 import numpy as np
 from mcml_sim import StoreError
-from mcml_sim.run import run_batches
-from mcml_sim.store import Store
+from mcml_sim.runs.batches import run_batches
+from mcml_sim.runs.store import Store
 
 @dataclass
 class Bytes:

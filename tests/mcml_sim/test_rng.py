@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.stats import chi2
 
-from mcml_sim import rng
+from mcml_sim.tracing import rng
 
 PHOTONS, EVENTS = 4096, 64
 DRAWS = {"four": jax.jit(rng.draw), "three": jax.jit(rng.draw_three)}

@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, simulate_orders
-from mcml_sim.run import AHEAD, run_batches
-from mcml_sim.store import Store
-from mcml_sim.tally import Counts
-from mcml_sim.tracer import BATCH_PHOTONS
+from mcml_sim.runs.batches import AHEAD, run_batches
+from mcml_sim.runs.store import Store
+from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.orders_batch import BATCH_PHOTONS
 
 GRID = Grid(0.5, 8)
 PHOTONS = 5 * BATCH_PHOTONS // 2  # two batches and a half
@@ -36,7 +36,7 @@ def test_any_number_of_workers_gives_the_same_bits(alone, workers):
 
 def test_a_store_gives_the_same_bits_and_is_read_back(alone, tmp_path, monkeypatch):
     assert equal(simulate_orders(GRID, PHOTONS, seed=9, store=tmp_path), alone)
-    monkeypatch.setattr("mcml_sim.tracer.trace", None)  # nothing is traced again
+    monkeypatch.setattr("mcml_sim.tracing.orders_batch.trace", None)  # nothing is traced again
     assert equal(simulate_orders(GRID, PHOTONS, seed=9, store=tmp_path), alone)
 
 

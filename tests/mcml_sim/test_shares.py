@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, InputError, simulate_orders, trace_share, tracer
+from mcml_sim import Grid, InputError, simulate_orders, trace_share
+from mcml_sim.tracing import orders_batch
 
 GRID = Grid(0.5, 8)
-PHOTONS = tracer.BATCH_PHOTONS + 1000  # a whole batch and the beginning of another
+PHOTONS = orders_batch.BATCH_PHOTONS + 1000  # a whole batch and the beginning of another
 
 
 def files(folder):

@@ -3,21 +3,10 @@
 import numpy as np
 import pytest
 
-from mcml_sim import (
-    Grid,
-    InputError,
-    Layer,
-    Medium,
-    Precision,
-    StoreError,
-    exact,
-    half_space,
-    layered,
-    matched,
-    simulate,
-    simulation,
-)
-from mcml_sim.deposits import Deposits
+from mcml_sim import Grid, InputError, Layer, Medium, Precision, StoreError, exact, half_space, simulate
+from mcml_sim.runs import simulation
+from mcml_sim.tracing import layered_batch, matched_batch
+from mcml_sim.tracing.deposits import Deposits
 
 SLAB = Medium((Layer(1.4, 0.5, 9.5, 0.6, 0.1), Layer(1.2, 2.0, 8.0, 0.2, 0.2)), n_above=1.0, n_below=1.1)
 GRID = Grid(0.05, 20, 0.029, 10, na=6)
@@ -113,7 +102,7 @@ def test_the_surface_takes_its_share_first(tally):
 
 
 def test_workers_and_interruptions_change_no_bit(tmp_path, monkeypatch):
-    monkeypatch.setitem(simulation.BATCH_PHOTONS, layered, 4000)
+    monkeypatch.setitem(simulation.BATCH_PHOTONS, layered_batch, 4000)
     alone = simulate(SLAB, GRID, 22_000, seed=3, workers=1)
     simulate(SLAB, GRID, 9000, seed=3, store=tmp_path / "photons", workers=1)
     resumed = simulate(SLAB, GRID, 22_000, seed=3, store=tmp_path / "photons", workers=2)
@@ -137,7 +126,7 @@ def test_a_store_belongs_to_its_run(tmp_path, change, what):
 
 
 def test_precision_stops_at_the_first_look_that_reaches_it(monkeypatch):
-    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched, 1000)
+    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched_batch, 1000)
     medium = half_space(0.9)
     alpha_9 = 1 / np.sqrt(8000) * 1.2  # about what 8 batches give
     found = simulate(medium, Grid(0.1, 10), 10**6, precision=alpha_9)
@@ -150,7 +139,7 @@ def test_precision_stops_at_the_first_look_that_reaches_it(monkeypatch):
 
 
 def test_precision_in_bins_waits_for_the_last_of_them(monkeypatch):
-    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched, 1000)
+    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched_batch, 1000)
     never = simulate(half_space(0.5), Grid(1.0, 60), 17_000, precision=Precision(0.5, "reflectance_r"))
     assert never.photons == 17_000
 
@@ -168,7 +157,7 @@ def test_one_photon_says_nothing_of_its_error():
 @pytest.mark.slow
 def test_stopping_early_leaves_the_errors_honest(monkeypatch):
     """30 runs, each of which stops by its own error at 800 to 1600 photons: z of their means against the exact one."""
-    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched, 100)
+    monkeypatch.setitem(simulation.BATCH_PHOTONS, matched_batch, 100)
     runs = [simulate(half_space(0.8), Grid(1.0, 2), 6400, seed=s, precision=0.04, workers=1) for s in range(30)]
     z = [(float(t.diffuse_reflectance) - exact.reflectance(0.8)) / t.diffuse_reflectance.standard_error for t in runs]
     assert {t.photons for t in runs} == {800, 1600}

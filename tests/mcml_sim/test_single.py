@@ -4,7 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mcml_sim import Grid, InputError, Setting, exact, optics, phase, simulate_orders, single
+from mcml_sim import Grid, InputError, Setting, exact, simulate_orders
+from mcml_sim.exact import single_scattering
+from mcml_sim.media import fresnel, phase
 
 LN2 = np.log(2)
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 50.0, 40)])
@@ -26,8 +28,8 @@ def photons_that_scatter_once(setting, photons, seed):
     if setting.illumination == "diffuse":
         # Cosine-weighted light outside refracts on its way in; each photon weighs what the surface lets in.
         outside = np.sqrt(source.random(photons))
-        reflected, cosine = optics.fresnel(1.0, setting.n, outside)
-        passes = (1 - reflected) / single.entered(setting)
+        reflected, cosine = fresnel.fresnel(1.0, setting.n, outside)
+        passes = (1 - reflected) / single_scattering.entered(setting)
     down = np.stack([np.sqrt(1 - cosine**2), np.zeros(photons), cosine])
     place = source.exponential(size=photons) * down
     turn = phase.sample_henyey_greenstein(setting.g, source.random(photons))
@@ -38,7 +40,7 @@ def photons_that_scatter_once(setting, photons, seed):
     up = away[2] < 0
     place, away = place[:, up], away[:, up]
     path = place[2] / -away[2]
-    reflected, _ = optics.fresnel(setting.n, 1.0, -away[2])
+    reflected, _ = fresnel.fresnel(setting.n, 1.0, -away[2])
     exit_ = place + path * away
     return np.hypot(exit_[0], exit_[1]), np.broadcast_to(passes, photons)[up] * np.exp(-path) * (1 - reflected)
 
@@ -49,7 +51,7 @@ def deviations(setting, truth, seed=1, photons=1_000_000):
     radii, weights = photons_that_scatter_once(setting, photons, seed)
     bins = np.append(edges, np.inf)
     sums, squares = (np.histogram(radii, bins, weights=weights**power)[0] for power in (1, 2))
-    expected = single.ring_shares(edges, truth)
+    expected = single_scattering.ring_shares(edges, truth)
     return (sums / photons - expected) / np.sqrt(squares - sums**2 / photons) * photons
 
 
@@ -69,13 +71,14 @@ def test_a_phase_function_or_surface_that_is_slightly_another_is_seen(setting, s
 
 
 def test_order_resolved_run_leaves_there_after_one_scattering(run, sidak):
-    expected = single.ring_shares(run.grid.r_edges) * run.photons
+    expected = single_scattering.ring_shares(run.grid.r_edges) * run.photons
     z = (run.counts.exits[:, 0] - expected) / np.sqrt(expected)
     seen = expected > 25
     assert seen.sum() > 30
     assert np.abs(z[seen]).max() < sidak(seen.sum())
     # Against rings 3 % wider.
-    z = (run.counts.exits[:, 0] - single.ring_shares(1.03 * run.grid.r_edges) * run.photons) / np.sqrt(expected)
+    wider = single_scattering.ring_shares(1.03 * run.grid.r_edges) * run.photons
+    z = (run.counts.exits[:, 0] - wider) / np.sqrt(expected)
     assert np.abs(z[seen]).max() > sidak(seen.sum())
 
 
@@ -86,7 +89,7 @@ def test_order_resolved_runs_of_other_settings_do_so_too(setting, sidak):
     grid = Grid.from_edges(r=np.concatenate([[0.0], np.geomspace(0.02, 5.0, 12)]))
     found = simulate_orders(grid, 2**19, seed=9, setting=setting)
     for wider, is_right in ((1.0, True), (1.2, False)):
-        expected = single.ring_shares(wider * grid.r_edges, setting) * found.photons
+        expected = single_scattering.ring_shares(wider * grid.r_edges, setting) * found.photons
         z = (found.counts.exits[:, 0] - expected) / np.sqrt(expected)
         assert (np.abs(z[expected > 25]).max() < sidak(z.size)) == is_right
 
@@ -94,27 +97,27 @@ def test_order_resolved_runs_of_other_settings_do_so_too(setting, sidak):
 @pytest.mark.parametrize(("illumination", "total"), [("searchlight", (1 - LN2) / 2), ("diffuse", (1 - LN2) * 2 / 3)])
 def test_total_of_the_matched_isotropic_half_space(illumination, total):
     """int mu / (1 + mu) / 2 dmu, and the same with 2 mu' / (mu + mu')."""
-    assert single.ring_shares(EDGES, Setting(illumination)).sum() == pytest.approx(total, rel=1e-13)
+    assert single_scattering.ring_shares(EDGES, Setting(illumination)).sum() == pytest.approx(total, rel=1e-13)
 
 
 @pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
 def test_it_is_the_exact_half_space_where_nothing_scatters_twice(illumination):
     setting, alpha = Setting(illumination), 1e-9
     expected = np.diff(exact.cdf(EDGES, alpha, setting=setting)) * exact.reflectance(alpha, setting) / alpha
-    found = single.ring_shares(EDGES, setting)[:-1]
+    found = single_scattering.ring_shares(EDGES, setting)[:-1]
     # Second scattering adds alpha; differences of the cdf lose digits where little is left beyond.
     np.testing.assert_allclose(found, expected, rtol=1e-8, atol=1e-12)
 
 
 def test_density_at_the_source_is_half_a_photon_per_mean_free_path():
-    assert single.ring_shares([0, 1e-7])[0] == pytest.approx(0.5e-7, rel=1e-5)
+    assert single_scattering.ring_shares([0, 1e-7])[0] == pytest.approx(0.5e-7, rel=1e-5)
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_strength_at_the_source_is_what_the_nearest_ring_holds(setting):
     """The share within r is r (1 + O(r ln r)) of it: two small rings leave no more than 1e-4."""
-    inner, outer = single.ring_shares([0, 1e-6, 2e-6], setting)[:2] * single.entered(setting)
-    strength = single.source_strength(setting)
+    inner, outer = single_scattering.ring_shares([0, 1e-6, 2e-6], setting)[:2] * single_scattering.entered(setting)
+    strength = single_scattering.source_strength(setting)
     assert strength == pytest.approx((2 * inner - (inner + outer) / 2) / 1e-6, rel=1e-4)
     if setting.n == 1 and setting.g == 0:
         assert strength == pytest.approx(0.5, rel=1e-12)
@@ -126,47 +129,47 @@ def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):
     def integrand(mu):
         rate = np.sqrt((1 + mu) / (1 - mu))
         within = np.exp(-ring[0] * rate) - np.exp(-ring[1] * rate)
-        passes = 1 - optics.fresnel(setting.n, 1.0, mu)[0]
+        passes = 1 - fresnel.fresnel(setting.n, 1.0, mu)[0]
         return phase.pdf_henyey_greenstein(setting.g, -mu) * mu / (1 + mu) * within * passes
 
     critical = np.sqrt(max(1 - setting.n**-2, 0))
     expected, _ = quad(integrand, critical, 1, epsabs=1e-13, epsrel=1e-11, limit=400)
-    found = single.ring_shares(np.unique([0.0, *ring]), setting)
+    found = single_scattering.ring_shares(np.unique([0.0, *ring]), setting)
     assert found[0 if ring[0] == 0 else 1] == pytest.approx(expected, rel=1e-8)
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_finer_quadrature_changes_nothing(setting, monkeypatch):
-    single._density.cache_clear()
-    coarse, entered = single.ring_shares(EDGES, setting), single.entered(setting)
-    monkeypatch.setattr(single, "K_STEP", single.K_STEP / 1.7)
-    monkeypatch.setattr(single, "BEYOND_CRITICAL", np.exp(np.arange(-38.0, 45.0, single.K_STEP)))
-    monkeypatch.setattr(single, "T_STEP", single.T_STEP / 1.7)
-    monkeypatch.setattr(single, "T_LAST", 4.1)
+    single_scattering._density.cache_clear()
+    coarse, entered = single_scattering.ring_shares(EDGES, setting), single_scattering.entered(setting)
+    monkeypatch.setattr(single_scattering, "K_STEP", single_scattering.K_STEP / 1.7)
+    monkeypatch.setattr(single_scattering, "BEYOND_CRITICAL", np.exp(np.arange(-38.0, 45.0, single_scattering.K_STEP)))
+    monkeypatch.setattr(single_scattering, "T_STEP", single_scattering.T_STEP / 1.7)
+    monkeypatch.setattr(single_scattering, "T_LAST", 4.1)
     _clear_caches()
-    np.testing.assert_allclose(single.ring_shares(EDGES, setting), coarse, rtol=1e-9)
-    assert single.entered(setting) == pytest.approx(entered, rel=1e-12)
+    np.testing.assert_allclose(single_scattering.ring_shares(EDGES, setting), coarse, rtol=1e-9)
+    assert single_scattering.entered(setting) == pytest.approx(entered, rel=1e-12)
     _clear_caches()
 
 
 def _clear_caches():
-    single._density.cache_clear()
-    single._mean_transmittance.cache_clear()
+    single_scattering._density.cache_clear()
+    single_scattering._mean_transmittance.cache_clear()
 
 
 def test_narrow_and_far_rings_add_up_to_wide_ones():
     setting = Setting("diffuse", n=1.3, g=0.5)
     fine = np.concatenate([[0.0], np.geomspace(1e-4, 40.0, 400)])
-    shares = single.ring_shares(fine, setting)
+    shares = single_scattering.ring_shares(fine, setting)
     beyond = np.cumsum(shares[::-1])[::-1]
     for ring in (100, 300, 399):
-        assert beyond[ring] == pytest.approx(single.ring_shares([0, fine[ring]], setting)[-1], rel=1e-12)
+        assert beyond[ring] == pytest.approx(single_scattering.ring_shares([0, fine[ring]], setting)[-1], rel=1e-12)
     assert np.all(shares > 0)
 
 
 def test_the_denser_the_medium_the_less_comes_out():
     """Light leaves through a cone of the solid angle ~ pi / n^2."""
-    shares = [single.ring_shares([0, 1], Setting("diffuse", n=n)).sum() for n in (1.0, 1.5, 3.0)]
+    shares = [single_scattering.ring_shares([0, 1], Setting("diffuse", n=n)).sum() for n in (1.0, 1.5, 3.0)]
     assert shares[0] > 2 * shares[1] > 8 * shares[2]
 
 
@@ -181,11 +184,11 @@ def test_light_that_enters(n):
         - 2 * n**3 * (square + 2 * n - 1) / ((square + 1) * (n**4 - 1))
         + 8 * n**4 * (n**4 + 1) / ((square + 1) * (n**4 - 1) ** 2) * np.log(n)
     )
-    assert single.entered(Setting("diffuse", n=n)) == pytest.approx(1 - reflected, rel=1e-11)
-    assert single.entered(Setting("searchlight", n=n)) == pytest.approx(1 - ((n - 1) / (n + 1)) ** 2)
+    assert single_scattering.entered(Setting("diffuse", n=n)) == pytest.approx(1 - reflected, rel=1e-11)
+    assert single_scattering.entered(Setting("searchlight", n=n)) == pytest.approx(1 - ((n - 1) / (n + 1)) ** 2)
 
 
 @pytest.mark.parametrize("edges", [[1, 2], [0, 2, 1], [0, np.nan], 3.0, "rings"])
 def test_edges_must_be_those_of_rings(edges):
     with pytest.raises(InputError, match="r must"):
-        single.ring_shares(edges)
+        single_scattering.ring_shares(edges)

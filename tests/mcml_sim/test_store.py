@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, StoreError, simulate_orders
-from mcml_sim.deposits import Deposits, shapes
-from mcml_sim.run import run_batches
-from mcml_sim.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
-from mcml_sim.tally import Counts
+from mcml_sim.runs.batches import run_batches
+from mcml_sim.runs.store import STALE_AFTER, DamagedBatch, Store, cpu_class, require_ours
+from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.deposits import Deposits, shapes
 
 GRID = Grid(0.5, 3)
 MADE_BY = {"seed": 1, "grid": "abc"}
@@ -227,7 +227,7 @@ def test_arrays_that_are_no_counts_are_refused(wrong):
 )
 def test_a_seal_is_no_proof(store, tmp_path, monkeypatch, arrays, reason):
     """Anybody can seal a batch: what it claims is checked, and one that claims too much is not unpacked."""
-    monkeypatch.setattr("mcml_sim.store.MAX_BATCH", 2**20)
+    monkeypatch.setattr("mcml_sim.runs.store.MAX_BATCH", 2**20)
     store.save(0, COUNTS)
     with np.load(tmp_path / "batch-00000000.npz") as whole:
         fields = {**whole, **arrays}

@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from mcml_sim.tally import Counts, Estimate, covariance_factor, estimate
+from mcml_sim.results.estimate import Estimate, covariance_factor, estimate
+from mcml_sim.tracing.counts import Counts
 
 
 def photon_by_photon(counts, weights, photons):

@@ -5,7 +5,7 @@ import time
 import pytest
 
 from mcml_sim.errors import InputError
-from mcml_sim.text_file import MOST_JSON, MOST_LEVELS, MOST_TOML, parse_json, parse_toml, read_json, read_toml
+from mcml_sim.files.text_file import MOST_JSON, MOST_LEVELS, MOST_TOML, parse_json, parse_toml, read_json, read_toml
 
 
 def test_json_comes_back(tmp_path):

@@ -5,17 +5,18 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Setting, exact, order_bins, rng, tracer, white
-from mcml_sim.isotropic import DOUBLINGS, FIRST_ROULETTE, MAX_ORDER
-from mcml_sim.tally import estimate
+from mcml_sim import Grid, Setting, exact
+from mcml_sim.results.estimate import estimate
+from mcml_sim.tracing import half_space_event, order_bins, orders_batch, rng
+from mcml_sim.tracing.isotropic_event import DOUBLINGS, FIRST_ROULETTE, MAX_ORDER
 
 PHOTONS = 200_000
-LANES = tracer.LANES
+LANES = orders_batch.LANES
 
 
 def traced(photons, lanes=LANES):
     """Ends of the first photons of batch 0, seed 0."""
-    return tracer.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), DOUBLINGS, lanes=lanes)
+    return orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), DOUBLINGS, lanes=lanes)
 
 
 def slow_twin(photons, last_order, seed):
@@ -115,7 +116,7 @@ def test_rings_are_those_of_float64_edges(ends):
     rho = np.unique(ends[0].astype(np.float64))
     at = np.sort(np.random.default_rng(0).choice(rho[rho > 0], 50, replace=False))
     grid = Grid.from_edges(r=np.unique(np.concatenate([[0.0], at, at * (1 + 1e-5), np.geomspace(1e-3, 9, 30)])))
-    counts = tracer.trace_batch(grid, 0, 0, PHOTONS)
+    counts = orders_batch.trace_batch(grid, 0, 0, PHOTONS)
     left = ends[1] > 0
     expected = np.bincount(
         np.searchsorted(grid.r_edges, ends[0][left].astype(float), "right") - 1, minlength=grid.rings + 1
@@ -131,7 +132,7 @@ EXACT_ALPHAS = np.array([0.3, 0.7, 0.9, 0.97])
 def lit(request):
     """Half a million photons of either light."""
     grid = Grid.from_edges(r=RADII)
-    return request.param, tracer.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
+    return request.param, orders_batch.trace_batch(grid, 2, 0, 2**19, setting=Setting(request.param))
 
 
 def deviations(counts, illumination):
@@ -156,8 +157,8 @@ def test_the_exact_answer_to_the_other_light_is_told_apart(lit, sidak):
 
 def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
     illumination, counts = lit
-    where = white.half_space(Setting(illumination))
-    ends = tracer.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), DOUBLINGS, where)
+    where = half_space_event.half_space(Setting(illumination))
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), DOUBLINGS, where)
     rings = np.append(RADII, np.inf)
     general = np.histogram(np.asarray(ends.rho)[np.asarray(ends.order) == 3], bins=rings)[0] / 2**18
     fast = counts.exits[:, 2] / 2**19
@@ -166,15 +167,15 @@ def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
 
 
 def test_other_settings_take_the_general_kernel():
-    glass = tracer.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
-    free = tracer.trace_batch(Grid(1.0, 3), 0, 0, 20_000)
+    glass = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
+    free = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000)
     assert glass.is_closed
     # Under glass fewer than half of those that come up leave.
     assert glass.exits[:, 0].sum() < 0.6 * free.exits[:, 0].sum()
 
 
 def test_histogram_keeps_every_order_below_256(ends):
-    counts = tracer.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
+    counts = orders_batch.trace_batch(Grid(1.0, 1), 0, 0, PHOTONS)
     expected = np.bincount(ends[1][ends[1] > 0], minlength=257)[1:257]
     np.testing.assert_array_equal(counts.exits.sum(axis=0)[:256], expected)
     assert counts.is_closed

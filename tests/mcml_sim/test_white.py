@@ -5,8 +5,10 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Grid, Setting, exact, half_space, optics, rng, simulate, simulate_orders, tracer, white
-from mcml_sim.isotropic import DOUBLINGS
+from mcml_sim import Grid, Setting, exact, half_space, simulate, simulate_orders
+from mcml_sim.media.fresnel import fresnel as shipped_fresnel
+from mcml_sim.tracing import half_space_event, orders_batch, rng
+from mcml_sim.tracing.isotropic_event import DOUBLINGS
 
 EDGES = np.array([0, 0.1, 0.3, 0.6, 1, 2, 4, 8.0])
 SETTINGS = [
@@ -81,8 +83,11 @@ def table(rho, order):
 
 def traced(setting, photons):
     """Exit radius and order of the kernel, whatever the setting."""
-    ends = tracer.trace(
-        jnp.asarray(rng.batch_key(7, 0)), jnp.int32(photons), jnp.asarray(DOUBLINGS), white.half_space(setting)
+    ends = orders_batch.trace(
+        jnp.asarray(rng.batch_key(7, 0)),
+        jnp.int32(photons),
+        jnp.asarray(DOUBLINGS),
+        half_space_event.half_space(setting),
     )
     return np.asarray(ends.rho)[:photons], np.asarray(ends.order)[:photons]
 
@@ -113,7 +118,7 @@ def test_the_comparison_sees_another_setting(wrong, sidak):
 
 
 def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
-    ends = tracer.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(DOUBLINGS))
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(DOUBLINGS))
     isotropic = table(np.asarray(ends.rho)[:PHOTONS], np.asarray(ends.order)[:PHOTONS])
     z = deviations(table(*traced(Setting(), PHOTONS)), isotropic)
     assert np.abs(z).max() < sidak(z.size)
@@ -160,19 +165,19 @@ def test_diffuse_light_enters_at_the_exact_cosines(n):
     """Against the cumulative distribution of 2 mu T(mu), by the trapezoid rule on many more nodes."""
     critical = np.sqrt(max(1 - 1 / n**2, 0))
     mu = critical + (1 - critical) * np.linspace(0, 1, 2**21 + 1) ** 3
-    density = 2 * mu * (1 - optics.fresnel(n, 1.0, mu)[0])
+    density = 2 * mu * (1 - shipped_fresnel(n, 1.0, mu)[0])
     cdf = np.concatenate([[0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(mu))])
     xi = np.concatenate([np.geomspace(1e-9, 1e-3, 1000), np.linspace(1e-3, 1 - 1e-6, 10_000)]).astype(np.float32)
-    table = white.half_space(Setting("diffuse", n=n)).entry
-    found = np.asarray(white._entering(jnp.asarray(xi), table), float)
+    table = half_space_event.half_space(Setting("diffuse", n=n)).entry
+    found = np.asarray(half_space_event._entering(jnp.asarray(xi), table), float)
     np.testing.assert_allclose(found, np.interp(xi.astype(float) * cdf[-1], cdf, mu), atol=2e-6)
 
 
 def test_another_setting_does_not_compile_again():
     traced(Setting(n=1.31), 100)
-    before = tracer.trace._cache_size()
+    before = orders_batch.trace._cache_size()
     traced(Setting("diffuse", n=1.2, g=0.3), 100)
-    assert tracer.trace._cache_size() == before
+    assert orders_batch.trace._cache_size() == before
 
 
 @pytest.mark.slow

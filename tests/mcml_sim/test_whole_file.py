@@ -16,7 +16,7 @@ from textwrap import indent
 import pytest
 
 from mcml_sim.errors import OutputError
-from mcml_sim.whole_file import require_folder, require_target, require_writable, write_together, write_whole
+from mcml_sim.files.whole_file import require_folder, require_target, require_writable, write_together, write_whole
 
 NOBODY = 65534
 IS_ROOT = os.geteuid() == 0
@@ -44,7 +44,7 @@ BEGIN = """
 import os, sys
 from pathlib import Path
 from mcml_sim.errors import OutputError
-from mcml_sim.whole_file import *
+from mcml_sim.files.whole_file import *
 """
 BE_NOBODY = f"os.setgroups([]); os.setgid({NOBODY}); os.setuid({NOBODY})"
 

@@ -8,13 +8,13 @@ import pytest
 from scipy.stats import norm
 
 from mcml_sim import Grid, Setting, simulate_orders
-from mcml_sim.tally import covariance_factor
+from mcml_sim.results.estimate import covariance_factor
+from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.laws.base import Constants
 from profilefit.laws.burley import Burley
 from profilefit.laws.liang import Liang
 from profilefit.laws.published import SETS
 from profilefit.laws.rational import Rational
-from profilefit.profiles import Covariance, Profiles
 
 # A law's tests must not move with the records: this map is within 3e-6 of the exact A, its digits are frozen here.
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)

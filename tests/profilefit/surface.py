@@ -7,7 +7,7 @@ own equation (ch. V). The surface lets light through by Fresnel, and sends the r
 
 import numpy as np
 
-from mcml_sim import optics
+from mcml_sim.media import fresnel
 
 NODES = 60
 
@@ -15,12 +15,12 @@ NODES = 60
 def reflectance(alpha, setting):
     """A of `setting` (n >= 1, g = 0) at one albedo < 1, relative to the light that arrives, specular light apart."""
     mu, weights = _bundles(setting.n)
-    back = optics.fresnel(setting.n, 1.0, mu)[0]
+    back = fresnel.fresnel(setting.n, 1.0, mu)[0]
     every = np.append(mu, 1.0)  # and the beam
     h = _h(every, alpha)
     scattered = alpha / 2 * np.outer(mu * weights * h[:-1], h) / (mu[:, None] + every)
     if setting.illumination == "searchlight":
-        enters = np.append(0 * mu, 1 - optics.fresnel(setting.n, 1.0, 1.0)[0])
+        enters = np.append(0 * mu, 1 - fresnel.fresnel(setting.n, 1.0, 1.0)[0])
     else:
         enters = np.append(setting.n**2 * (1 - back) * 2 * mu * weights, 0.0)
     # Light that goes up under the surface: scattered from what entered, and from what the surface sent back.

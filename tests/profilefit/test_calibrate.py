@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting
-from profilefit import calibrate, catalogue, pipelines, recipe
 from profilefit.errors import RecipeError
-from profilefit.run import Run
+from profilefit.recipes import catalogue, pipelines, recipe, regenerate
+from profilefit.recipes.run import Run
 
 FITS = catalogue.fits_folder()
 
@@ -19,7 +19,7 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     said: list[str] = []
     run = Run("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
     with pytest.raises(RecipeError, match="start must be one of published, corrected, got 'improved'"):
-        calibrate.regenerate((recipe.find("albedo-liang", FITS), recipe.read(bad)), run)
+        regenerate.regenerate((recipe.find("albedo-liang", FITS), recipe.read(bad)), run)
     assert not said
     assert not Path(tmp_path / "store").exists()
 
@@ -45,7 +45,7 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path, mon
         exactly,
         replace(exactly, name="checked", setting=diffuse, check="orders"),
     )
-    written = calibrate.regenerate(recipes, run)
+    written = regenerate.regenerate(recipes, run)
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
     assert made == [
         ("albedo-rational-n1.4", refracted),

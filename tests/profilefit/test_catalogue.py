@@ -6,11 +6,11 @@ import pytest
 
 import profilefit
 from mcml_sim import Setting, exact
-from profilefit import catalogue, record
-from profilefit.catalogue import PROFILE_LAWS, REGENERATED, fits_folder, record_name, regenerated_settings
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
 from profilefit.laws.published import SETS
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.catalogue import PROFILE_LAWS, REGENERATED, fits_folder, record_name, regenerated_settings
 
 
 def constants_of(law, name):

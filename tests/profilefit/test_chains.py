@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from mcml_sim.compiling import Compiling
-from profilefit.chains import _curvature_adjustment, posterior
+from mcml_sim.cli.run import Compiling
 from profilefit.errors import InputError
-from profilefit.estimate import Problem, curvature, fit
+from profilefit.fitting.chains import _curvature_adjustment, posterior
+from profilefit.fitting.estimate import Problem, curvature, fit
+from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.laws.base import AlbedoLaw
-from profilefit.profiles import Covariance, Profiles
 
 # A chain of 50 autocorrelation times and 32 walkers holds 1600 independent points, thinned to 1000; 500 to be safe.
 INDEPENDENT = 500

@@ -7,10 +7,11 @@ import pytest
 from scipy.stats import chi2, kstest
 
 from mcml_sim import Grid, Setting, exact, simulate_orders
-from profilefit import crosscheck, load
-from profilefit.crosscheck import AGREE, DIFFER, compared, mahalanobis
-from profilefit.estimate import fit
-from profilefit.profiles import Profiles
+from profilefit import load
+from profilefit.fitting.estimate import fit
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes import crosscheck
+from profilefit.recipes.crosscheck import AGREE, DIFFER, compared, mahalanobis
 
 EDGES = np.concatenate([[0.0], np.geomspace(0.02, 30.0, 25)])
 FREE = ("k", "h")

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError, exact
-from profilefit import derived
-from profilefit.derived import AtAlbedo, Known, Quantity
-from profilefit.discrepancy import discrepancy
-from profilefit.estimate import fit
-from profilefit.profiles import Profiles
-from profilefit.record import plain
+from profilefit.fitting import derived
+from profilefit.fitting.derived import AtAlbedo, Known, Quantity
+from profilefit.fitting.discrepancy import discrepancy
+from profilefit.fitting.estimate import fit
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes.record import plain
 
 ALPHA = 1.0 - np.linspace(0.95, 0.07, 10) ** 2
 EDGES = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 30)])

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from profilefit.discretisation import by_width, discretisation_error, widened
-from profilefit.estimate import fit
-from profilefit.objectives import rings_of
-from profilefit.profiles import Profiles
+from profilefit.fitting.estimate import fit
+from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes.summary import by_width, discretisation_error, widened
 
 ALPHA = 1.0 - np.linspace(0.9, 0.3, 7) ** 2
 FREE = ("b1", "c3")

@@ -7,12 +7,12 @@ import pytest
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
-from profilefit.estimate import Problem, discrepancy_covariance, fit, residual_structure, sensitivity
+from profilefit.fitting.estimate import Problem, discrepancy_covariance, fit, residual_structure, sensitivity
+from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.profiles import Covariance, Profiles
+from profilefit.fitting.solver import solve, solve_batch
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.liang_albedo import LiangAlbedo
-from profilefit.objectives import rings_of
-from profilefit.profiles import Covariance, Profiles
-from profilefit.solver import solve, solve_batch
 
 REPLICATES = 200
 

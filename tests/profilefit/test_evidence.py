@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import __version__
-from profilefit import folder
 from profilefit.errors import InputError, OutputError
-from profilefit.evidence import digest, made, processor, require_apart, stale
+from profilefit.recipes import folder
+from profilefit.recipes.evidence import digest, made, processor, require_apart, stale
 
 FITS = folder.fits_folder()
 

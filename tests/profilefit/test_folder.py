@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from profilefit.errors import InputError, OtherRecords
-from profilefit.folder import fits_folder, records_folder
+from profilefit.recipes.folder import fits_folder, records_folder
 
 
 def test_what_was_asked_for_comes_first_then_what_is_here_then_what_is_shipped(tmp_path, monkeypatch):

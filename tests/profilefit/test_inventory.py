@@ -3,10 +3,10 @@
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue
 from profilefit.errors import InputError, RecordError
-from profilefit.inventory import albedo_laws, find, profile_laws, sampled_laws
 from profilefit.laws.base import AlbedoLaw
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import albedo_laws, find, profile_laws, sampled_laws
 
 FITS = catalogue.fits_folder()
 

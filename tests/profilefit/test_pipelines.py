@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit import catalogue, recipe
-from profilefit.pipelines import inversion_error, needs_photons, printed_sets
+from profilefit.recipes import catalogue, recipe
+from profilefit.recipes.pipelines import inversion_error, needs_photons, printed_sets
 
 FITS = catalogue.fits_folder()
 
 
 def test_inversion_error_is_zero_for_an_exact_sampler_and_not_for_the_papers():
     class Exactly:
-        setting = exact.SEARCHLIGHT
+        setting = Setting()
 
         class sampler:
             sample = staticmethod(lambda xi, alpha: exact.quantile(xi, alpha))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, InputError, Setting, SettingError, exact, simulate_orders
-from profilefit.profiles import COVARIANCE_RANK, FEWEST_EFFECTIVE_SAMPLES, Covariance, Profiles
+from profilefit.fitting.profiles import COVARIANCE_RANK, FEWEST_EFFECTIVE_SAMPLES, Covariance, Profiles
 
 ALPHAS = [0.3, 0.6, 0.9, 0.97]
 

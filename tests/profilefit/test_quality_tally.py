@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, Setting, exact, simulate_orders
-from profilefit import quality, quality_tally
-from profilefit.targets import RUN_EDGES, ring_edges
+from profilefit.fitting import quality
+from profilefit.recipes import quality_tally
+from profilefit.recipes.targets import RUN_EDGES, ring_edges
 
 ALPHA = np.array([0.5, 0.9])
 

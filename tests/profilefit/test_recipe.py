@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting
-from profilefit.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder, record_name
 from profilefit.errors import InputError, RecipeError
-from profilefit.objectives import OBJECTIVES
-from profilefit.recipe import PIPELINES, available, find, read
+from profilefit.fitting.objectives import OBJECTIVES
+from profilefit.recipes.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder, record_name
+from profilefit.recipes.recipe import PIPELINES, available, find, read
 
 GOOD = """
 title = "A fit"

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim.text_file import MOST_JSON
-from profilefit import record, schema
-from profilefit.catalogue import fits_folder
+from mcml_sim.files.text_file import MOST_JSON
 from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.recipes import record, schema
+from profilefit.recipes.catalogue import fits_folder
 
 NAMED = {"law": "liang", "pipeline": "profile", "setting": {"illumination": "searchlight", "n": 1.0, "g": 0.0}}
 CONTENT = {**NAMED, "constants": {"b": {"regenerated": 0.1}, "a": {"regenerated": 2.0}}}

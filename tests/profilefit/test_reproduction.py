@@ -6,11 +6,18 @@ import json
 import numpy as np
 import pytest
 
-from mcml_sim.setting import Setting
-from profilefit.profiles import Profiles
-from profilefit.protocol import Protocol7, cut_radius, fit_coefficients
-from profilefit.reproduction import CORRECTED_B0, PUBLISHED, judge, law_energy, printed_coefficients, readings
-from profilefit.truth import ExactTruth
+from mcml_sim.media.setting import Setting
+from profilefit.fitting.profiles import Profiles
+from profilefit.recipes.paper.protocol import Protocol7, cut_radius, fit_coefficients
+from profilefit.recipes.paper.reproduction import (
+    CORRECTED_B0,
+    PUBLISHED,
+    judge,
+    law_energy,
+    printed_coefficients,
+    readings,
+)
+from profilefit.recipes.paper.truth import ExactTruth
 
 
 @pytest.fixture(scope="module")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.run import PHOTONS, REFRACTED_PHOTONS, Run
+from profilefit.recipes.run import PHOTONS, REFRACTED_PHOTONS, Run
 
 SETTINGS = {
     Setting(): "",

@@ -7,8 +7,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.sampling import (
+from profilefit.fitting.sampling import (
     BATCH,
     LAST,
     ExactTarget,
@@ -17,6 +16,7 @@ from profilefit.sampling import (
     lit_beyond_edge,
     sampler_quality,
 )
+from profilefit.laws.base import ProfileLaw, Sampler
 
 ALPHA = 0.9
 STEP = 2.0**-24  # what the last step of xi leaves out

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit.solver import CONVERGED, MAX_STEPS, Solution, solve, solve_batch
+from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Solution, solve, solve_batch
 
 X = np.linspace(0, 3, 20)
 

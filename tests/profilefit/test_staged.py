@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
+from profilefit.fitting.profiles import Covariance, Profiles
+from profilefit.fitting.staged import PerAlbedo, fit_coefficient_laws, fit_per_albedo, length_exponents, trimmed
 from profilefit.laws.published import SETS
-from profilefit.profiles import Covariance, Profiles
-from profilefit.staged import PerAlbedo, fit_coefficient_laws, fit_per_albedo, length_exponents, trimmed
 
 ALPHAS = np.linspace(0.2, 0.98, 9)
 DR = 0.02

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue, recipe, starts
 from profilefit.errors import RecipeError
-from profilefit.estimate import fit
+from profilefit.fitting.estimate import fit
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.solver import CONVERGED, Solution
 from profilefit.laws import published
-from profilefit.profiles import Profiles
-from profilefit.solver import CONVERGED, Solution
-from profilefit.targets import truth_of
+from profilefit.recipes import catalogue, recipe, starts
+from profilefit.recipes.targets import truth_of
 
 FITS = catalogue.fits_folder()
 

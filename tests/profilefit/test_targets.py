@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import Grid, exact, simulate_orders
-from profilefit import catalogue, recipe
 from profilefit.errors import RecipeError
-from profilefit.recipe import Albedos, Rings
-from profilefit.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
+from profilefit.recipes import catalogue, recipe
+from profilefit.recipes.recipe import Albedos, Rings
+from profilefit.recipes.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
 
 FITS = catalogue.fits_folder()
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from profilefit.walking import walk
+from profilefit.fitting.chains import walk
 
 SCALES = np.array([1.0, 30.0])
 

@@ -17,7 +17,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-IMPORTED = ("mcml_sim.cli", "mcml_sim.command", "profilefit.cli", *(f"profilefit.commands.{name}" for name in (
+IMPORTED = ("mcml_sim.cli.app", "mcml_sim.cli.run", "profilefit.cli", *(f"profilefit.commands.{name}" for name in (
     "choose", "export", "fit", "regenerate", "report",
 )))  # fmt: skip
 STREAMS = ("stdout", "stderr")

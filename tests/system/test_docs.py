@@ -16,8 +16,9 @@ import typer
 
 import mcml_sim
 import profilefit
-from mcml_sim import cli as mcml_sim_cli
-from profilefit import cli, inventory
+from mcml_sim.cli.app import app as mcml_sim_cli
+from profilefit import cli
+from profilefit.recipes import inventory
 from profilefit.shader.export import export
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -59,7 +60,7 @@ def test_docstrings_become_lists_formulas_and_prose(monkeypatch):
 
 # What is to be typed
 
-COMMANDS = {"profilefit": typer.main.get_command(cli.app), "mcml-sim": typer.main.get_command(mcml_sim_cli.app)}
+COMMANDS = {"profilefit": typer.main.get_command(cli.app), "mcml-sim": typer.main.get_command(mcml_sim_cli)}
 PAGES = ["README.md", *sorted(path.relative_to(ROOT).as_posix() for path in DOCS.glob("[gsh]*/*.md"))]
 
 

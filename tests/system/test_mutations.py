@@ -27,17 +27,17 @@ from typing import Any
 import pytest
 
 from mcml_sim.errors import InputError, OutputError, StoreError
-from mcml_sim.mcml_files import read_mci
-from mcml_sim.results import read_results
-from profilefit import recipe, record
-from profilefit.choose import scene
+from mcml_sim.results.mci import read_mci
+from mcml_sim.results.tally_file import read_results
 from profilefit.commands.report import report
 from profilefit.errors import RecordError, ShaderError
-from profilefit.inventory import find
 from profilefit.measured import reading
+from profilefit.recipes import recipe, record
+from profilefit.recipes.inventory import find
 from profilefit.report.page.document import write_page
 from profilefit.shader import emit
 from profilefit.shader.export import LANGUAGES, export
+from profilefit.studies.choose import scene
 from tests.system import mutations, processes
 
 # A record alone in its folder is normalised with the shipped map, and the command says so.

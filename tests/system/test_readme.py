@@ -5,11 +5,11 @@ from pathlib import Path
 
 import pytest
 
-from profilefit import record
-from profilefit.inventory import profile_laws
+from profilefit.recipes import record
+from profilefit.recipes.inventory import profile_laws
 from profilefit.report import fill, sections
-from profilefit.report.all_laws import measured_profile
-from profilefit.report.law_tables import markdown_laws, markdown_sections
+from profilefit.report.tables.all_laws import measured_profile
+from profilefit.report.tables.law_tables import markdown_laws, markdown_sections
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -1,17 +1,122 @@
-"""The explorer as one piece of HTML: style, script, shaders, laws and the exact table, nothing beside it."""
+"""The explorer as one piece of HTML: style, script, shaders, laws and the exact table, nothing beside it.
+
+The exact half space goes in as a small table, rows of albedos, columns of radii: ln(R_d l^2 / A) + kappa x and
+ln(cdf / x), x = r/l, at even u and ln x, where sqrt(1 - alpha) = 1 - (1 - u^3)^2 crowds the rows at both ends.
+`exact.js` puts polynomials of six points through both. Between the knots, for A up to 0.9999, R_d is right to 4e-6 for
+r within 99.5 % of the energy and the cdf to 1e-6 everywhere; nearer to white to 1e-4 and 1e-5.
+"""
 
 from __future__ import annotations
 
+import base64
 import json
-from dataclasses import asdict
+import re
+from dataclasses import asdict, dataclass
+from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 
+import numpy as np
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
 from profilefit.materials import MATERIALS
-from profilefit.report.explorer.laws import first, offered
+from profilefit.recipes.inventory import Named, profile_laws
 from profilefit.report.explorer.still import still
-from profilefit.report.explorer.truth import GRID, LIGHTS, baked
+from profilefit.scenes.stage.exact_table import LEAST_ALPHA, log_profile
+from profilefit.shader.export import export
+
+PREFIX = "law"  # of the names in each text: one law runs at a time
+FIRST = ("hazard-diffuse", "hazard")  # what is shown at the start, if it is there
+TITLES = {
+    "burley": "normalized diffusion",
+    "burley_diffuse_mfp": "normalized diffusion by diffuse mfp",
+    "liang": "Liang et al.",
+    "dipole": "dipole",
+    "better_dipole": "better dipole",
+}
+ORDER = ("hazard", "quantile", "burley", "burley_diffuse_mfp", "liang", "gaussians", "better_dipole", "dipole")
+
+
+@dataclass(frozen=True)
+class Offered:
+    """id for addresses; name of the law; light that its constants belong to; label for readers; text in GLSL ES."""
+
+    id: str
+    name: str
+    light: str
+    label: str
+    text: str
+
+
+def offered(folder: Path) -> list[Offered]:
+    """Every law of a matched surface that has a text, the best first; records are those in `folder`."""
+    found = []
+    for named in sorted(profile_laws(folder), key=_place):
+        try:
+            text = export(named, folder, "glsl-es", PREFIX)
+        except InputError:  # a law without a closed form
+            continue
+        found.append(Offered(address(named), named.name, named.setting.illumination, _label(named), text))
+    return found
+
+
+def first(laws: list[Offered]) -> str:
+    """The id of the law to begin with."""
+    there = [law.id for law in laws]
+    return next((name for name in FIRST if name in there), there[0])
+
+
+def address(named: Named) -> str:
+    """The id of a law: its label, without what the address of a page may not hold."""
+    return re.sub(r"[^\w.]+", "-", named.label)
+
+
+def _place(named: Named) -> int:
+    kind = named.name.partition(":")[0]
+    return ORDER.index(kind) if kind in ORDER else len(ORDER)
+
+
+def _label(named: Named) -> str:
+    kind, _, count = named.name.partition(":")
+    title = TITLES.get(kind, f"{count} Gaussians" if count else kind)
+    if not named.records:
+        return f"{title}, {named.constants}" if named.constants else title
+    return title if named.records[0].replace("-diffuse", "") == title else f"{title}: {named.records[0]}"
+
+
+@dataclass(frozen=True)
+class Grid:
+    """rows of albedos, columns of radii; low, high the first and last x [mfp]."""
+
+    rows: int = 65
+    columns: int = 111
+    low: float = 1e-4
+    high: float = 1e4
+
+    def told(self) -> dict[str, float]:
+        """For JSON."""
+        return asdict(self)
+
+
+GRID = Grid()
+LIGHTS = ("searchlight", "diffuse")
+
+
+@lru_cache(maxsize=len(LIGHTS))
+def baked(illumination: str, grid: Grid = GRID) -> str:
+    """A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64. Takes a second."""
+    setting = Setting(illumination)
+    s = 1.0 - (1.0 - np.linspace(0.0, 1.0, grid.rows) ** 3) ** 2
+    alpha = np.maximum((1.0 - s) * (1.0 + s), LEAST_ALPHA)
+    y = np.linspace(np.log(grid.low), np.log(grid.high), grid.columns)
+    reflectance = np.asarray(exact.reflectance(alpha, setting))
+    profile = log_profile(y, alpha, setting) - np.log(reflectance)[:, None]
+    cdf = np.log(np.asarray(exact.cdf(np.exp(y), alpha[:, None], setting=setting))) - y
+    numbers = np.concatenate([reflectance / alpha, profile.ravel(), cdf.ravel()])
+    return base64.b64encode(numbers.astype("<f4").tobytes()).decode("ascii")
+
 
 # In this order: each file uses only what comes before it, but for what runs later.
 SCRIPTS = ("exact", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")

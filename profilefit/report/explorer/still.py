@@ -12,12 +12,12 @@ from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
 from mcml_sim import Setting, exact
-from profilefit import catalogue
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS
-from profilefit.report.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
-from profilefit.shader.stage.combining import srgb_codes
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.recipes import catalogue
+from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
+from profilefit.scenes.stage.combining import srgb_codes
+from profilefit.scenes.stage.step_edge import step_response
 
 Floats = NDArray[np.float64]
 MATERIAL, LAW, SETTING = "skin1", "hazard", Setting("diffuse")

@@ -2,26 +2,51 @@
 
 from __future__ import annotations
 
+import base64
+import io
+import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from html import escape
+from html import escape, unescape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
 
-from mcml_sim.version import __version__
-from mcml_sim.whole_file import require_writable, write_whole
-from profilefit import record
+from fontTools import subset
+from fontTools.ttLib import TTFont
+from matplotlib import font_manager
+
+from mcml_sim.files.version import __version__
+from mcml_sim.files.whole_file import require_writable, write_whole
+from profilefit.recipes import record
 from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
-from profilefit.report.page.failures import failures
-from profilefit.report.page.lettering import font_face
 from profilefit.report.page.markup import element, section
 from profilefit.report.page.measured import Measured
 from profilefit.report.page.provenance import provenance
-from profilefit.report.page.shader import shader
-from profilefit.report.page.speed import speed
-from profilefit.report.source import Source
+from profilefit.report.page.sections import failures, shader, speed
+from profilefit.report.records import Source
+
+FAMILY = "DejaVu Sans"
+NAMES = [0, 1, 2, 13, 14]  # of the font's own table: copyright, name, style, licence
+
+
+def font_face(svgs: Iterable[str]) -> str:
+    """A CSS rule with those letters of DejaVu Sans that the texts of these figures use, as WOFF."""
+    texts = (text for svg in svgs for text in re.findall(r">([^<>]+)</(?:text|tspan)>", svg))
+    letters = "".join(sorted(set("".join(unescape(text) for text in texts))))
+    font = TTFont(font_manager.findfont(FAMILY))
+    options = subset.Options(layout_features=[], hinting=False, name_IDs=NAMES)
+    options.drop_tables += ["FFTM"]  # when its editor saved it
+    cutter = subset.Subsetter(options)
+    cutter.populate(text=letters)
+    cutter.subset(font)
+    font.flavor = "woff"
+    file = io.BytesIO()
+    font.save(file)
+    data = base64.b64encode(file.getvalue()).decode()
+    return f"@font-face{{font-family:'{FAMILY}';src:url(data:font/woff;base64,{data}) format('woff')}}"
+
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"

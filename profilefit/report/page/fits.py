@@ -2,15 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+import tempfile
+from collections.abc import Callable, Iterator
 from html import escape
+from pathlib import Path
 
-from profilefit.report.figures import PAPER, plans, record_plans
-from profilefit.report.page.drawings import drawn
-from profilefit.report.page.markup import command, details, element, markup
+from profilefit.report.figures.canvas import only
+from profilefit.report.figures.record_figures import PAPER, Plan, plans, record_plans
+from profilefit.report.page.markup import command, details, element, markup, paragraph
 from profilefit.report.page.provenance import again
-from profilefit.report.source import Source
-from profilefit.report.tables import record_tables, summary
+from profilefit.report.page.vector import inline
+from profilefit.report.records import Source
+from profilefit.report.tables.record_tables import record_tables, summary
+
+# What a figure shows, by how its name begins.
+CAPTIONS = {
+    "liang-7-profile": "Equation (7): r R_d of photons, of the exact half space, of the law printed and regenerated.",
+    "liang-7-error": "R_d of the law over the exact one, less 1; the band holds photon noise and model discrepancy.",
+    "liang-8-albedo": "The map from A to alpha, and its errors to the right.",
+    "liang-11-a": "Coefficient a of (7) over alpha: fits at each albedo, the law (11) printed and regenerated.",
+    "liang-13-b": "Coefficient b of (7) over alpha: fits at each albedo, the law (13) printed and regenerated.",
+    "liang-15-c": "Coefficient c of (7) over alpha: fits at each albedo, the law (15) printed and regenerated.",
+    "liang-19-inverse": "The inverse cdf (19)-(20): printed, regenerated and exact.",
+    "inversion-error": "Largest error of inverse cdfs in the share of the light, by albedo.",
+    "constants": "Printed constants against regenerated ones. z: their distance over the error.",
+    "quality": "Error over the single-scattering albedo, at albedos that were not fitted.",
+    "residuals": "What the fit leaves.",
+    "corner": "Posterior draws, 39 and 86 % of them inside the lines. Lines across: regenerated; dashed: printed.",
+}
+
+
+def drawn(plan: Plan, source: Source) -> str:
+    """The figure of a plan as part of a page; where it cannot be drawn, why."""
+    reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
+    if reason:
+        return paragraph(f"{plan.name}: {reason}", "dim")
+    return drawing(plan.name, lambda out: plan.draw(source, out, name=plan.name))
+
+
+def drawing(name: str, draw: Callable[[Path], list[Path]]) -> str:
+    """The figure `name` that `draw` writes into a folder."""
+    with tempfile.TemporaryDirectory() as folder, only("svg"):
+        (file,) = draw(Path(folder))
+        svg = file.read_text(encoding="utf-8")
+    return inline(svg, name, caption(name))
+
+
+def caption(name: str) -> str:
+    """What a figure shows: by its name, or by how that begins."""
+    return CAPTIONS.get(name) or CAPTIONS[name.split("-")[0]]
 
 
 def overview(source: Source) -> str:

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mcml_sim.text_file import MOST_JSON, parse_json
-from mcml_sim.whole_file import read_whole
-from profilefit import evidence
+from mcml_sim.files.text_file import MOST_JSON, parse_json
+from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
+from profilefit.recipes import evidence
 from profilefit.report.page.markup import command, paragraph
 from profilefit.report.page.vector import checked, inline
 

@@ -6,14 +6,12 @@ import hashlib
 import shlex
 from collections.abc import Iterator, Mapping
 
-from profilefit import catalogue
-from profilefit.evidence import digest
-from profilefit.report.columns import column_table
-from profilefit.report.content import Content
-from profilefit.report.digits import ABSENT
+from profilefit.recipes import catalogue
+from profilefit.recipes.evidence import digest
+from profilefit.recipes.run import preset_photons
 from profilefit.report.page.markup import command, markup, paragraph
-from profilefit.report.source import Source
-from profilefit.run import preset_photons
+from profilefit.report.records import Content, Source
+from profilefit.report.tables.cells import ABSENT, column_table
 
 SHOWN = 12  # letters of a SHA-256
 

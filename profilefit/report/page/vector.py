@@ -8,7 +8,7 @@ from itertools import groupby
 from types import MappingProxyType
 from xml.etree import ElementTree
 
-from profilefit.report.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
+from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
 from profilefit.report.page.markup import element
 
 # A colour of the figures -> the page's variable for it, which has another value on a dark page.

@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from profilefit import record
 from profilefit.errors import RecordError
-from profilefit.inventory import Named, albedo_laws, profile_laws
+from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.laws.quantile import Quantile
-from profilefit.pipelines import QUALITY_ALBEDOS
-from profilefit.quality import albedo_quality, profile_quality
-from profilefit.targets import albedo_values
+from profilefit.recipes import record
+from profilefit.recipes.inventory import Named, albedo_laws, profile_laws
+from profilefit.recipes.pipelines import QUALITY_ALBEDOS
+from profilefit.recipes.targets import albedo_values
 
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted
 # Rounding shall not show beside the model's error, nor change it.

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from profilefit import catalogue, inventory
 from profilefit.errors import InputError
-from profilefit.inventory import Named
 from profilefit.laws.base import AlbedoLaw
+from profilefit.recipes import catalogue, inventory
+from profilefit.recipes.inventory import Named
 from profilefit.shader import emit
 
 REGENERATED = "regenerated"

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.inventory import Named, profile_laws
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
+from profilefit.recipes.inventory import Named, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.grid import ULP
 

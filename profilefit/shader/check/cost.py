@@ -17,9 +17,9 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit import catalogue
-from profilefit.inventory import Named
 from profilefit.laws.base import ProfileLaw
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import Named
 from profilefit.shader import emit
 from profilefit.shader.check.evaluate import Board
 from profilefit.shader.context import check_errors, full_screen, program

@@ -11,7 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.shader.check.bounds import Bound
+from profilefit.recipes.inventory import Named
+from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.evaluate import Values
 
 Floats = NDArray[np.float64]
@@ -179,3 +180,24 @@ def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
             median = np.abs(value[:, value.shape[1] // 2, None])
             wrong[:, 1:] = step < -STEPS_OF_SAMPLE * ULP * (np.abs(before) + median)
         return [np.isnan(value), np.isinf(value), value < 0, wrong]
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One law or map, judged.
+
+    rounding  errors that float32 makes, worst, by the names of `quality` [-]; measured of the GPU against the exact
+    inside    what must not be, where the law says that it holds; outside elsewhere
+    """
+
+    of: Named
+    model: ModelError
+    rounding: dict[str, float]
+    measured: dict[str, float]
+    inside: Count
+    outside: Count
+    bounds: tuple[Bound, ...]
+
+    @property
+    def broken(self) -> tuple[Bound, ...]:
+        return tuple(bound for bound in self.bounds if bound.broken)

@@ -11,8 +11,8 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.inventory import Named
-from profilefit.quality import ENERGY_WITHIN, NEAREST
+from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.recipes.inventory import Named
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.shader.check.evaluate import ShaderLaw, Values, half_extension
 

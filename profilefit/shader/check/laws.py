@@ -2,6 +2,8 @@
 
 Every law is held to its own model error: rounding below a tenth of it, the errors of the record met by the GPU's own
 numbers, and nothing that is no number, infinite, negative or goes the wrong way where the law says that it holds.
+
+Each text is also translated line by line into numpy and run in float64, where rounding is out of sight.
 """
 
 from __future__ import annotations
@@ -11,23 +13,61 @@ from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.inventory import Named
+from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.pipelines import inversion_error
-from profilefit.quality import ENERGY_WITHIN, NEAREST, profile_quality
+from profilefit.recipes.inventory import Named
+from profilefit.recipes.pipelines import inversion_error
 from profilefit.shader.check import bounds, claims, grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.evaluate import ShaderLaw, Values
-from profilefit.shader.check.grid import Arguments, Spread, bad_numbers
-from profilefit.shader.check.twin import Twin
-from profilefit.shader.check.verdict import Verdict
+from profilefit.shader.check.grid import XI, Arguments, Spread, Verdict, bad_numbers
+from profilefit.shader.languages import translated
 
 Floats = NDArray[np.float64]
+# Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
+STEP = 1e-4
+NEAREST_XI, FARTHEST_XI = 1e-4, 1.0 - 1e-5
+
+
+class Twin:
+    """The numpy twin of a text with names of that prefix."""
+
+    def __init__(self, name: str, text: str) -> None:
+        self._names: dict[str, Any] = {}
+        exec(compile(translated(text, "python"), f"{name}.py", "exec"), self._names)
+        self._name = name
+
+    def radius(self, xi: Floats, alpha: Floats) -> Floats:
+        """x = r/l at xi, as the text draws it."""
+        shape = self._names[f"{self._name}_shape"](alpha)
+        return np.asarray(self._names[f"{self._name}_radius"](xi, shape))
+
+    def mismatch(self, shader: ShaderLaw, alpha: Floats, lowest: float = 0.0) -> Spread | None:
+        """|P_pdf dx/dxi - 1| of the GPU's P_pdf at the radii of the text's own map, where one xi draws a radius.
+
+        alpha  (m,) [-]; lowest the least xi that is judged [-]
+        """
+        if alpha.size == 0:
+            return None
+        inner = (max(NEAREST_XI, lowest) < XI) & (XI < FARTHEST_XI)
+        xi, albedo = np.broadcast_arrays(XI[None, :], alpha[:, None])
+        x = self.radius(xi, albedo)
+        rest = np.minimum(xi, 1.0 - xi)
+        slope = (self.radius(xi + STEP * rest, albedo) - self.radius(xi - STEP * rest, albedo)) / (2.0 * STEP * rest)
+        earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
+        single = np.zeros(x.shape, bool)
+        single[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
+        error = np.abs(shader.values(x, xi, albedo).pdf * slope - 1.0)
+        at = Arguments(albedo, x, xi, np.array(1.0))
+        return grid.spread(error, single & inner, at, of_share=True)
+
+
 Mask = NDArray[np.bool_]
 PROFILE, EVERYWHERE, CDF, SAMPLE, PDF, OWN = "R_d", "R_d everywhere", "cdf", "sample", "pdf", "pdf of the map"
 JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}

@@ -10,13 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from profilefit.inventory import Named
+from profilefit.recipes.inventory import Named
 from profilefit.shader.check import bounds, claims, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.evaluate import ShaderMap
-from profilefit.shader.check.grid import ULP, Count, bad_numbers
+from profilefit.shader.check.grid import ULP, Count, Verdict, bad_numbers
 from profilefit.shader.check.validity import Range
-from profilefit.shader.check.verdict import Verdict
 
 Floats = NDArray[np.float64]
 # Even in A, and even in sqrt(1 - alpha) as `quality.albedo_quality`: both as the GPU sees them.

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from profilefit import record
-from profilefit.inventory import Named
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.laws.burley import Burley, BurleyDiffuseMfp
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.laws.rational import Rational
+from profilefit.recipes import record
+from profilefit.recipes.inventory import Named
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-from profilefit.choose import cost
-from profilefit.choose.cost import COVERED, PUBLISHED, Ratios, milliseconds
-from profilefit.choose.options import NOTHING, Option, sampled
 from profilefit.errors import InputError
+from profilefit.studies.choose import cost
+from profilefit.studies.choose.cost import COVERED, PUBLISHED, Ratios, milliseconds
+from profilefit.studies.choose.options import NOTHING, Option, sampled
 
 SEVENTEEN = Option("separable", 17)
 

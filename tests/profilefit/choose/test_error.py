@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit.choose.case import STEEPEST, Case, Within
-from profilefit.choose.error import error
-from profilefit.choose.options import NOTHING, Option
 from profilefit.errors import InputError
+from profilefit.studies.choose.case import STEEPEST, Case, Within
+from profilefit.studies.choose.error import error
+from profilefit.studies.choose.options import NOTHING, Option
 
 WITHIN = Within()
 

@@ -7,11 +7,10 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
-from profilefit.choose.filtered import filtered, passes
-from profilefit.choose.gaussian_filter import OneGaussian, fitted
-from profilefit.choose.options import Option
-from profilefit.choose.response import FARTHEST, NEAR, Beyond, response
-from profilefit.shader.stage.separable_kernel import Separable
+from profilefit.scenes.skin.separable_kernel import Separable
+from profilefit.studies.choose.filtered import OneGaussian, filtered, fitted, passes
+from profilefit.studies.choose.options import Option
+from profilefit.studies.choose.response import FARTHEST, NEAR, Beyond, response
 
 X = np.array([0.125, 0.625, 1.625])
 DEPTH = np.arcsinh(FARTHEST / NEAR)

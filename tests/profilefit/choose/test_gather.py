@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from profilefit.choose.gather import LEAST_COSINE, OWN, drawn, estimates
-from profilefit.choose.response import beyond, response
-from profilefit.shader.truth.edge_estimate import by_law, edge_estimate, shifted_points
+from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points
+from profilefit.studies.choose.gather import LEAST_COSINE, OWN, drawn, estimates
+from profilefit.studies.choose.response import beyond, response
 from tests.profilefit.choose.conftest import DIFFUSE, MFP
 
 ALPHA = (0.9, 0.8, 0.7)

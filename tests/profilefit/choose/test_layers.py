@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium
-from profilefit.choose.case import Within
-from profilefit.choose.layers import OneLayer, Rings, one_layer
 from profilefit.errors import InputError
+from profilefit.studies.choose.case import Within
+from profilefit.studies.choose.layers import OneLayer, Rings, one_layer
 
 WITHIN = Within()
 

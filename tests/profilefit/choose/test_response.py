@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from profilefit.choose.response import averaged, beyond, response
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.scenes.stage.step_edge import step_response
+from profilefit.studies.choose.response import averaged, beyond, response
 from tests.profilefit.choose.conftest import DIFFUSE
 
 ALPHA = 0.85

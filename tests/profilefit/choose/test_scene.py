@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.choose.scene import read
 from profilefit.errors import InputError
+from profilefit.studies.choose.scene import read
 
 SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
 SMALL = """\

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from profilefit import catalogue
 from profilefit.commands.check import asked
 from profilefit.errors import ShaderError
-from profilefit.evidence import stale
+from profilefit.recipes import catalogue
+from profilefit.recipes.evidence import stale
 from profilefit.shader.context import open_context
 
 FITS = catalogue.fits_folder()

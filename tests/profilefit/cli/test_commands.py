@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue
+from profilefit.recipes import catalogue
 
 RECIPE = """
 title = "A small one"

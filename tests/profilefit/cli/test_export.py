@@ -3,8 +3,8 @@
 import shutil
 from pathlib import Path
 
-from profilefit import catalogue
-from profilefit.inventory import find
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import find
 from profilefit.shader.export import export
 
 FITS = catalogue.fits_folder()

@@ -9,12 +9,12 @@ from pathlib import Path
 import pytest
 import typer
 
-import mcml_sim.cli
+import mcml_sim.cli.app
 import profilefit.cli
-from mcml_sim import command as mcml_command
+from mcml_sim.cli import run as mcml_command
 
 ROOT = Path(__file__).resolve().parents[3]
-PROGRAMS = {"profilefit": profilefit.cli.app, "mcml-sim": mcml_sim.cli.app}
+PROGRAMS = {"profilefit": profilefit.cli.app, "mcml-sim": mcml_sim.cli.app.app}
 LINES, COLUMNS = 24, 80
 # What takes more than a few seconds is only held against the options that there are.
 CHEAP = (
@@ -85,7 +85,7 @@ def test_files_of_examples_are_said_to_be_of_the_command_that_copies_them():
     """An installed wheel has no examples/ in the folder that one works in."""
     for one in SUBCOMMANDS.values():
         assert ("examples/" in one.epilog) == ("of profilefit examples:" in one.epilog)
-    assert not any("examples/" in text for text in (profilefit.cli.HELP, mcml_sim.cli.HELP))
+    assert not any("examples/" in text for text in (profilefit.cli.HELP, mcml_sim.cli.app.HELP))
 
 
 @pytest.mark.parametrize("line", CHEAP)
@@ -111,7 +111,7 @@ def test_what_is_asked_for_is_what_is_done(program, name):
 def test_mcml_sim_fits_a_screen_too(capsys, monkeypatch):
     monkeypatch.setattr("sys.argv", ["mcml-sim", "--help"])
     with pytest.raises(SystemExit):
-        mcml_sim.cli.main()
+        mcml_sim.cli.app.main()
     lines = capsys.readouterr().out.splitlines()
     assert len(lines) < LINES
     assert max(map(len, lines)) <= COLUMNS

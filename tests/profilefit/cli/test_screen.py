@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from mcml_sim.screen import typed
-from profilefit import catalogue, record
+from mcml_sim.cli.screen import typed
+from profilefit.recipes import catalogue, record
 
 FITS = catalogue.fits_folder()
 COLOUR = re.compile(r"\x1b\[(?:\d+;)*3[0-7]m")

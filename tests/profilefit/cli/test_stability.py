@@ -6,8 +6,8 @@ import shutil
 
 import pytest
 
-from profilefit import catalogue
-from profilefit.evidence import stale
+from profilefit.recipes import catalogue
+from profilefit.recipes.evidence import stale
 
 FITS = catalogue.fits_folder()
 

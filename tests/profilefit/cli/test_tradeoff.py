@@ -6,8 +6,8 @@ import json
 import pytest
 
 from profilefit.commands.tradeoff import is_alike, keep, read
-from profilefit.evidence import digest
-from profilefit.folder import fits_folder
+from profilefit.recipes.evidence import digest
+from profilefit.recipes.folder import fits_folder
 
 
 def test_an_unknown_part_is_one_line(command, tmp_path):

@@ -6,13 +6,13 @@ import sys
 
 import pytest
 
-from profilefit import catalogue, recipe, record
 from profilefit.cli import words
 from profilefit.cli.check import Precision
 from profilefit.commands.check import HALF
+from profilefit.recipes import catalogue, recipe, record
 from profilefit.shader.export import LANGUAGES
-from profilefit.stability.atlas import FUNCTIONS
-from profilefit.tradeoff.parts import PARTS
+from profilefit.studies.stability.atlas import FUNCTIONS
+from profilefit.studies.tradeoff.parts import PARTS
 
 FITS = catalogue.fits_folder()
 HEAVY = ("jax", "scipy", "matplotlib", "moderngl", "optimistix")  # take seconds together, which no shell has
@@ -85,7 +85,7 @@ for command in (*(c for panel in PANELS.values() for c in panel), None):
     assert PROGRAM._status() == 0
 sys.argv = ["profilefit", "report", "--nonsense"]
 assert PROGRAM._status() == 2
-import mcml_sim.cli
+import mcml_sim.cli.app
 print("LOADED", [name for name in {HEAVY!r} if name in sys.modules])
 """
     done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, timeout=60)

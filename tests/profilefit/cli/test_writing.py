@@ -10,10 +10,10 @@ from pathlib import Path
 
 import pytest
 
-from profilefit import record
-from profilefit.catalogue import fits_folder
 from profilefit.errors import OutputError
-from profilefit.report.canvas import canvas, save
+from profilefit.recipes import record
+from profilefit.recipes.catalogue import fits_folder
+from profilefit.report.figures.canvas import canvas, save
 
 EXPORT = ("export", "burley", "--out")
 NOBODY = 65534

@@ -7,10 +7,11 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Setting, exact, single
+from mcml_sim import Setting, exact
+from mcml_sim.exact import single_scattering
+from profilefit.fitting.quality import profile_quality
 from profilefit.laws.beam_diffusion import BeamDiffusion, once_scattered_within
 from profilefit.laws.diffusion import fresnel_moments
-from profilefit.quality import profile_quality
 
 
 def summed_over_depths(r, alpha, n, number=200_000):
@@ -53,7 +54,7 @@ def test_profile_is_the_authors_sum(n):
 @pytest.mark.parametrize("n", [0.8, 1.0, 1.4])
 def test_single_scattering_is_the_simulators(n):
     edges = np.concatenate([[0.0], np.geomspace(1e-3, 20, 30)])
-    within = np.cumsum(single.ring_shares(edges, Setting(n=n))[:-1])
+    within = np.cumsum(single_scattering.ring_shares(edges, Setting(n=n))[:-1])
     with jax.enable_x64(True):
         np.testing.assert_allclose(once_scattered_within(jnp.asarray(edges[1:]), n), within, rtol=1e-12)
         if n == 1.0:  # all of it, by hand: int mu / (1 + mu) dmu / 2

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
+from profilefit.fitting.quality import albedo_quality
 from profilefit.laws import published
 from profilefit.laws.chiang import Chiang
-from profilefit.quality import albedo_quality
 
 LAW = Chiang(Setting("diffuse"), **published.constants("chiang_albedo"))
 

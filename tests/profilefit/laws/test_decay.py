@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.laws.decay import NEAR_WHITE, decay_rate
+from profilefit.laws.escape import NEAR_WHITE, decay_rate
 
 ALPHA = np.unique(np.concatenate([1 - np.linspace(0, 1, 201) ** 2, 1 - np.geomspace(1e-10, 1, 60)]))
 

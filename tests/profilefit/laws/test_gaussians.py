@@ -7,11 +7,11 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.estimate import Problem
+from profilefit.fitting.estimate import Problem
+from profilefit.fitting.objectives import rings_of
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.solver import solve
 from profilefit.laws.gaussians import Gaussians, law_class
-from profilefit.objectives import rings_of
-from profilefit.profiles import Profiles
-from profilefit.solver import solve
 
 # Four Gaussians fitted to the exact profile, rounded.
 FOUR = {

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
+from profilefit.fitting.quality import albedo_quality
 from profilefit.laws import published
 from profilefit.laws.van_de_hulst import VanDeHulst
-from profilefit.quality import albedo_quality
 
 LAW = VanDeHulst(Setting("diffuse"), **published.constants("van_de_hulst_albedo"))
 

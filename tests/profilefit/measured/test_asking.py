@@ -8,10 +8,10 @@ import pytest
 import profilefit
 from mcml_sim import Setting, half_space
 from profilefit.errors import InputError, SettingError
-from profilefit.measured.asking import asked
 from profilefit.measured.fitting import fitted
-from profilefit.measured.question import Known, Question
+from profilefit.measured.problem import Known, Question
 from profilefit.measured.reading import read
+from profilefit.measured.workflow import asked
 
 DATA = Path(__file__).parents[3] / "examples"
 PHANTOM = DATA / "phantom.csv"  # alpha .95, l 1.1 mm

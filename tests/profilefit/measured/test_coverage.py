@@ -8,16 +8,15 @@ import pytest
 from scipy import stats
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
-from profilefit import catalogue
-from profilefit.measured.answer import Answer, answered
-from profilefit.measured.chain import posterior
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import fitted
+from profilefit.measured.identifiability import told
 from profilefit.measured.law_error import origin
-from profilefit.measured.question import Question
+from profilefit.measured.problem import Question
 from profilefit.measured.reading import read
 from profilefit.measured.replicates import steadied
-from profilefit.measured.telling import told
+from profilefit.measured.result import Answer, answered, posterior
+from profilefit.recipes import catalogue
 
 pytestmark = pytest.mark.slow
 

@@ -9,19 +9,18 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue
 from profilefit.errors import InputError
-from profilefit.measured.answer import Answer, answered
-from profilefit.measured.candidates import advised
-from profilefit.measured.chain import posterior
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import Found, fitted
+from profilefit.measured.identifiability import relative_errors, told
 from profilefit.measured.law_error import origin, relative_error
 from profilefit.measured.model import Model, u_of
-from profilefit.measured.question import Known, Question
+from profilefit.measured.optimal_design import advised
+from profilefit.measured.problem import Known, Question
 from profilefit.measured.reading import read
+from profilefit.measured.result import Answer, answered, posterior
 from profilefit.measured.solving import FARTHEST_LN, LONGEST
-from profilefit.measured.telling import relative_errors, told
+from profilefit.recipes import catalogue
 
 DATA = Path(__file__).parents[3] / "examples"
 LAW = catalogue.load("hazard")

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.measured.data import Measured
-from profilefit.measured.limits import MOST_ROWS, require_workable
+from profilefit.measured.data import MOST_ROWS, Measured, require_workable
 
 
 def points(rows):

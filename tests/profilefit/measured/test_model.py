@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue
 from profilefit.errors import InputError
 from profilefit.measured import derived
 from profilefit.measured.model import BLOCK, Model, alpha_of, u_of
-from profilefit.measured.question import held_albedo
+from profilefit.measured.problem import held_albedo
+from profilefit.recipes import catalogue
 
 LAW = catalogue.load("hazard")
 POINT = np.array([u_of(0.9), np.log(1.3), np.log(0.7)])

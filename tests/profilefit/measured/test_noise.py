@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit import catalogue
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import fitted
 from profilefit.measured.law_error import origin
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.noise import noise
-from profilefit.measured.question import Question
+from profilefit.measured.problem import Question
+from profilefit.recipes import catalogue
 
 LAW = catalogue.load("hazard")
 SOURCE = origin("hazard", "regenerated", Setting(), catalogue.fits_folder())

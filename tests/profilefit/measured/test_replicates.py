@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from profilefit.measured.chain import likelihood
 from profilefit.measured.misfit import alone, gaussianised, scatter_chance
 from profilefit.measured.replicates import steadied, trend_freedom, widening
+from profilefit.measured.result import likelihood
 
 ROWS, COUNT = 40, 3
 

@@ -9,11 +9,11 @@ import pytest
 from rich.console import Console
 
 from mcml_sim import exact
-from profilefit import catalogue
-from profilefit.inventory import albedo_laws, profile_laws, sampled_laws
-from profilefit.quality import profile_quality
-from profilefit.report.all_laws import for_each, measured_profile, measured_samplers
-from profilefit.report.law_tables import NOTHING, content, every_law, markdown_laws, markdown_samplers, measured
+from profilefit.fitting.quality import profile_quality
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import albedo_laws, profile_laws, sampled_laws
+from profilefit.report.tables.all_laws import for_each, measured_profile, measured_samplers
+from profilefit.report.tables.law_tables import NOTHING, content, every_law, markdown_laws, markdown_samplers, measured
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])

@@ -4,8 +4,8 @@ import io
 
 from rich.console import Console
 
-from profilefit import catalogue, inventory
-from profilefit.report import check_tables
+from profilefit.recipes import catalogue, inventory
+from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
 from profilefit.shader.check.cost import WORKS, Cost
 from profilefit.shader.check.grid import Count, Spread

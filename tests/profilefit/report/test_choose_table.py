@@ -7,14 +7,14 @@ import pytest
 from rich.console import Console
 
 from mcml_sim import Setting
-from profilefit.choose.case import Case, Within
-from profilefit.choose.choice import Predicted, chosen
-from profilefit.choose.cost import shipped
-from profilefit.choose.error import Error
-from profilefit.choose.layers import OneLayer
-from profilefit.choose.options import NOTHING, Option
-from profilefit.choose.scene import Budget, Scene
-from profilefit.report.choose_table import choose_table, content, headline
+from profilefit.report.tables.choose_table import choose_table, content, headline
+from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.choice import Predicted, chosen
+from profilefit.studies.choose.cost import shipped
+from profilefit.studies.choose.error import Error
+from profilefit.studies.choose.layers import OneLayer
+from profilefit.studies.choose.options import NOTHING, Option
+from profilefit.studies.choose.scene import Budget, Scene
 
 ONE = ((0.5, 0.5),) * 3
 SCENE = Scene("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))

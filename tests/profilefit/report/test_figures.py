@@ -9,13 +9,13 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from profilefit import catalogue
 from profilefit.errors import OutputError, RecordError
+from profilefit.recipes import catalogue
 from profilefit.report import draw_all
-from profilefit.report.canvas import only
-from profilefit.report.figures import PAPER, plans
-from profilefit.report.residual_figure import energy_within
-from profilefit.report.source import DRAWS, Source, coefficients
+from profilefit.report.figures.canvas import only
+from profilefit.report.figures.record_figures import PAPER, plans
+from profilefit.report.figures.residual_figure import energy_within
+from profilefit.report.records import DRAWS, Source, coefficients
 
 SHIPPED = catalogue.fits_folder()
 SMALL_CORNER = "corner-albedo-liang"

@@ -6,10 +6,10 @@ import shutil
 import numpy as np
 import pytest
 
-from profilefit import catalogue
-from profilefit.report.canvas import canvas
-from profilefit.report.inversion_figure import _caption, _draw, _points, inversion_figure
-from profilefit.report.source import Source
+from profilefit.recipes import catalogue
+from profilefit.report.figures.canvas import canvas
+from profilefit.report.figures.inversion_figure import _caption, _draw, _points, inversion_figure
+from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
 

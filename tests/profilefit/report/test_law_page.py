@@ -9,10 +9,10 @@ import pytest
 
 import profilefit
 from mcml_sim import Setting
-from profilefit import inventory, record
-from profilefit.report.content import largest_error
-from profilefit.report.digits import to_error
-from profilefit.report.law_page import index_text, law_pages, page_text
+from profilefit.recipes import inventory, record
+from profilefit.report.records import largest_error
+from profilefit.report.tables.cells import to_error
+from profilefit.report.tables.law_page import index_text, law_pages, page_text
 
 FITS = Path(__file__).resolve().parents[3] / "fits"
 

@@ -5,9 +5,9 @@ import copy
 import numpy as np
 import pytest
 
-from profilefit import catalogue, record
+from profilefit.recipes import catalogue, record
 from profilefit.report import markdown_constants, markdown_quality
-from profilefit.report.content import converged, largest_error
+from profilefit.report.records import converged, largest_error
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
 FITS = {name: content for name, content in RECORDS.items() if "constants" in content}

@@ -6,8 +6,8 @@ from dataclasses import fields
 import numpy as np
 from rich.console import Console
 
-from profilefit.report.sampler_tables import sampler_tables
-from profilefit.sampling import SamplerQuality
+from profilefit.fitting.sampling import SamplerQuality
+from profilefit.report.tables.law_tables import sampler_tables
 
 
 def rendered(width: int, **given) -> list[str]:

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from profilefit.report.spark import BLOCKS, span, spark
+from profilefit.report.tables.cells import BLOCKS, span, spark
 
 
 def test_powers_of_ten_are_even_steps():

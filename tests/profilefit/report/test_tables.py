@@ -8,10 +8,10 @@ from collections import Counter
 import pytest
 from rich.console import Console
 
-from profilefit import catalogue, record
-from profilefit.report import digits, quality_tables, tables
-from profilefit.report.content import converged, known_errors, largest_error, z_score
-from profilefit.report.evidence_tables import evidence_tables
+from profilefit.recipes import catalogue, record
+from profilefit.report.records import converged, known_errors, largest_error, z_score
+from profilefit.report.tables import cells, quality_tables, record_tables
+from profilefit.report.tables.evidence_tables import evidence_tables
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
 FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
@@ -39,7 +39,7 @@ def failed(content: dict) -> dict:
 @pytest.mark.parametrize("name", RECORDS)
 def test_a_narrow_screen_loses_and_breaks_nothing(name, width):
     """Lines may end elsewhere, but between the same words: none is cut, abbreviated or broken inside a number."""
-    parts = tables.record_tables(RECORDS[name])
+    parts = record_tables.record_tables(RECORDS[name])
     narrow = rendered(parts, width)
     assert max(map(len, narrow.splitlines())) <= width
     assert Counter(narrow.split()) == Counter(rendered(parts, 400).split())
@@ -47,17 +47,17 @@ def test_a_narrow_screen_loses_and_breaks_nothing(name, width):
 
 @pytest.mark.parametrize("width", [100, 80])
 def test_the_summary_fits_and_names_every_record(width):
-    text = rendered([tables.summary(RECORDS)], width)
+    text = rendered([record_tables.summary(RECORDS)], width)
     assert max(map(len, text.splitlines())) <= width
     assert "…" not in text
     assert all(name in text for name in RECORDS)
-    assert Counter(text.split()) == Counter(rendered([tables.summary(RECORDS)], 400).split())
+    assert Counter(text.split()) == Counter(rendered([record_tables.summary(RECORDS)], 400).split())
 
 
 @pytest.mark.parametrize("name", FITS)
 def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
     content = FITS[name]
-    lines = rendered([tables.constants_table(content)], 100).splitlines()
+    lines = rendered([record_tables.constants_table(content)], 100).splitlines()
     headers = lines[2].split()
     known = known_errors(content["constants"])
     assert lines[1].split() == ["±"] * len(known)
@@ -82,43 +82,43 @@ def test_constants_are_the_record_s_to_two_digits_of_their_error(name):
 @pytest.mark.parametrize("name", FITS)
 def test_quality_shows_the_mean_and_the_worst_of_every_set(name):
     content = FITS[name]
-    text = rendered(tables.quality_tables(content), 100)
+    text = rendered(record_tables.quality_tables(content), 100)
     for values in (content["quality"][s] for s in ("published", "corrected", "regenerated") if s in content["quality"]):
         for key in ("rel", "ks", "l1", "inversion_error"):
             if key in values:
                 worst = max(values[key])
-                assert (f"{worst:.3f}" if worst >= 0.01 else digits.significant(worst)) in text
+                assert (f"{worst:.3f}" if worst >= 0.01 else cells.significant(worst)) in text
         if "delta_A" in values:
-            assert digits.significant(values["delta_A"]) in text
+            assert cells.significant(values["delta_A"]) in text
 
 
 def test_a_failed_fit_says_why_wherever_it_is_shown():
     name, content = next(item for item in FITS.items() if "rel" in item[1]["quality"]["regenerated"])
     broken = failed(content)
-    detail = rendered(tables.record_tables(broken), 100)
+    detail = rendered(record_tables.record_tables(broken), 100)
     assert detail.count("FAILED") == 1 + sum("FAILED" in line for line in _stages(content))
     assert REASON in " ".join(detail.split())
     assert "No credible intervals" in detail
     assert "no law" in " ".join(detail.split())
-    assert REASON in " ".join(rendered([tables.summary({name: broken})], 200).split())
-    assert "→ FAILED" in rendered([tables.summary({name: broken})], 200)
-    assert "FAILED" not in rendered([tables.constants_table(content)], 100)
+    assert REASON in " ".join(rendered([record_tables.summary({name: broken})], 200).split())
+    assert "→ FAILED" in rendered([record_tables.summary({name: broken})], 200)
+    assert "FAILED" not in rendered([record_tables.constants_table(content)], 100)
 
 
 def test_z_is_the_distance_in_the_errors_that_add():
     """The printed b0 is 70 standard errors from the one that was fitted; without a printed value there is no z."""
-    lines = rendered([tables.constants_table(FITS["liang-whole"])], 80).splitlines()
+    lines = rendered([record_tables.constants_table(FITS["liang-whole"])], 80).splitlines()
     b0 = FITS["liang-whole"]["constants"]["b0"]
     apart = (b0["published"] - b0["regenerated"]) / math.hypot(
         b0["statistical_error"], b0["discretisation_error"], b0["model_error"]
     )
     assert next(line.split()[-1] for line in lines if line.startswith("b0 ")) == f"{apart:+.0f}"
     assert "z: published less regenerated" in " ".join(" ".join(lines).split())
-    assert "z" not in rendered([tables.constants_table(FITS["hazard"])], 80).splitlines()[2].split()
+    assert "z" not in rendered([record_tables.constants_table(FITS["hazard"])], 80).splitlines()[2].split()
 
 
 def test_the_summary_has_the_worst_of_each_set_and_a_block_for_every_stretch_of_alpha():
-    text = rendered([tables.summary(RECORDS)], 80)
+    text = rendered([record_tables.summary(RECORDS)], 80)
     rows = {line.split()[0]: line for line in text.splitlines() if line.split()[:1] and line.split()[0] in RECORDS}
     assert set(rows) == set(RECORDS)
     assert "0.79 → 0.13 → 0.14" in rows["liang-whole"]
@@ -140,7 +140,7 @@ def test_a_record_shows_its_errors_over_alpha():
 
 
 def _stages(content):
-    return rendered(tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
+    return rendered(record_tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
 
 
 def test_three_errors_are_told_apart_and_old_records_have_none_of_it():
@@ -150,16 +150,16 @@ def test_three_errors_are_told_apart_and_old_records_have_none_of_it():
         constant["discretisation_error"] = constant["model_error"] = None
         if number == 0:
             constant |= {"statistical_error": 0.0011, "discretisation_error": 0.0022, "model_error": 0.033}
-    line = next(x for x in rendered([tables.constants_table(content)], 80).splitlines() if x.startswith("a0 "))
+    line = next(x for x in rendered([record_tables.constants_table(content)], 80).splitlines() if x.startswith("a0 "))
     assert line.split()[2:5] == ["0.0011", "0.0022", "0.033"]
     process = {"amplitude": 0.0123, "amplitude_error": 0.0011, "length_r": 2.0, "length_s": 0.5, "rms": 0.009}
     told = {**content, "discrepancy": {**process, "gain": None, "result": "found"}}
-    text = " ".join(rendered([tables.fit_facts(told)], 100).split())
+    text = " ".join(rendered([record_tables.fit_facts(told)], 100).split())
     assert "discrepancy amplitude 0.0123 ± 0.0011; residuals 0.0090 rms" in text
     assert "reaching 0.50 in √(1 − α), 2.0 in ln r; found" in text
     for constant in content["constants"].values():
         del constant["discretisation_error"], constant["model_error"]
-    old = rendered([tables.constants_table(content), tables.fit_facts(content)], 80)
+    old = rendered([record_tables.constants_table(content), record_tables.fit_facts(content)], 80)
     assert "± dr" not in old
     assert "amplitude" not in old
 
@@ -168,13 +168,13 @@ def test_a_chain_that_is_too_short_says_so():
     content = copy.deepcopy(next(content for content in FITS.values() if converged(content)))
     kind = next(iter(content["posterior"]))
     content["posterior"][kind]["result"] = "chain of 1000 steps is under 50 autocorrelation times (90)"
-    assert "FAILED: chain of 1000 steps is under 50" in rendered([tables.fit_facts(content)], 100)
+    assert "FAILED: chain of 1000 steps is under 50" in rendered([record_tables.fit_facts(content)], 100)
 
 
 def test_brackets_of_units_are_no_markup():
     content = copy.deepcopy(next(iter(FITS.values())))
     content["title"] = content["note"] = "lengths in [mfp], [bold]not bold[/bold]"
-    text = rendered(tables.record_tables(content), 200)
+    text = rendered(record_tables.record_tables(content), 200)
     assert text.count("[bold]not bold[/bold]") == 2
 
 
@@ -221,25 +221,25 @@ def test_readings_are_shown_best_first_and_any_key_may_be_absent():
     ],
 )
 def test_digits_end_with_those_of_the_error(value, error, text):
-    assert digits.to_error(value, error) == text
+    assert cells.to_error(value, error) == text
 
 
 def test_decimal_points_stand_in_one_column():
-    padded = digits.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
+    padded = cells.on_the_point(["-0.0064", "14.0", "30", "1.2e-05", "–"])
     from_right = {len(text) - (text.index(".") if "." in text else len(text.rstrip())) for text in padded}
     assert from_right == {len(".2e-05")}
     assert [text.strip() for text in padded] == ["-0.0064", "14.0", "30", "1.2e-05", "–"]
 
 
 def test_an_interval_has_two_digits_of_its_half_width():
-    assert digits.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
-    assert digits.interval(None) == "–"
+    assert cells.interval((0.0621350586906, 0.0625785745179)) == "0.06214 … 0.06258"
+    assert cells.interval(None) == "–"
 
 
 def test_second_opinions_are_told():
     """How many random starts reach the best optimum, and whether photons agree with the exact profile."""
     content = RECORDS["hazard"]
-    text = " ".join(rendered([tables.fit_facts(content)], 100).split())
+    text = " ".join(rendered([record_tables.fit_facts(content)], 100).split())
     tried, check = content["starts"], content["crosscheck"]
     best = round(tried["share_best"] * tried["count"])
     assert f"{best} of {tried['count']} reach the best optimum" in text
@@ -248,4 +248,4 @@ def test_second_opinions_are_told():
     assert all(f"{count}: " in text for count in others)
     assert f"photons {check['result']}" in text
     assert f"in {check['rank']} directions" in text
-    assert "random starts" not in rendered([tables.fit_facts(RECORDS["hazard-n1.4"])], 100)
+    assert "random starts" not in rendered([record_tables.fit_facts(RECORDS["hazard-n1.4"])], 100)

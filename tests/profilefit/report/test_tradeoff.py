@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from profilefit.report import tradeoff_figure as figure
-from profilefit.report.canvas import canvas
-from profilefit.report.labels import Label, box_of, place_labels, renderer_of
-from profilefit.report.tradeoff_tables import tradeoff_tables
-from profilefit.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.report.figures import tradeoff_figure as figure
+from profilefit.report.figures.canvas import canvas
+from profilefit.report.figures.labels import Label, box_of, place_labels, renderer_of
+from profilefit.report.tables.tradeoff_tables import tradeoff_tables
+from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
 
 NUMBERS = {"a": (1.0, 0.5), "b": (2.0, 0.1), "normalized diffusion": (2.1, 0.11), "slow": (40.0, 0.8)}
 POINTS = tuple(

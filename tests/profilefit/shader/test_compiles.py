@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from profilefit import catalogue, inventory
 from profilefit.errors import ShaderError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
 from profilefit.shader.context import program
 

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import profilefit
-from profilefit import catalogue
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import law_class
+from profilefit.recipes import catalogue
 from profilefit.shader import emit
 
 BURLEY = profilefit.load("burley", "published")

@@ -11,9 +11,9 @@ import moderngl
 import numpy as np
 import pytest
 
-from profilefit import catalogue
 from profilefit.errors import InputError, ShippedMap
-from profilefit.inventory import find
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import find
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.export import LANGUAGES, TARGETS, commented, export

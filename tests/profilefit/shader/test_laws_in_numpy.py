@@ -5,7 +5,6 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit import catalogue, inventory
 from profilefit.laws.beam_diffusion import BeamDiffusion
 from profilefit.laws.burley import BurleyDiffuseMfp
 from profilefit.laws.diffusion import DiffusionLaw
@@ -14,6 +13,7 @@ from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.laws.quantile import Quantile
+from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
 
 FITS = catalogue.fits_folder()

@@ -2,9 +2,9 @@
 
 import pytest
 
-from profilefit import catalogue
 from profilefit.errors import InputError
-from profilefit.stability import atlas
+from profilefit.recipes import catalogue
+from profilefit.studies.stability import atlas
 
 FITS = catalogue.fits_folder()
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from profilefit.stability import axes
-from profilefit.stability.layout import LENGTHS, Grid
+from profilefit.studies.stability import layout
+from profilefit.studies.stability.layout import LENGTHS, Grid
 
 DTYPES = (np.float16, np.float32, np.float64)
 
@@ -38,12 +38,12 @@ def test_lengths_reach_both_ends_of_what_is_accepted_and_beyond(dtype):
     [(0.0, "0"), (2.0**-24, "2^-24"), (1 - 2.0**-53, "1-2^-53"), (0.25, "0.25"), (np.inf, "inf"), (1.0, "1")],
 )
 def test_numbers_as_a_person_writes_them(value, text):
-    assert axes.shown(value) == text
+    assert layout.shown(value) == text
 
 
 def test_a_span_says_all_where_it_is_all():
-    axis = axes.Axis("α", "-", np.array([0.0, 0.5, 1.0]))
+    axis = layout.Axis("α", "-", np.array([0.0, 0.5, 1.0]))
     assert axis.span(0, 2) == "all α"
     assert axis.span(1, 2) == "α 0.5 … 1"
     assert axis.span(1, 1) == "α 0.5"
-    assert axes.Axis("of", "-", np.arange(2.0), ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"
+    assert layout.Axis("of", "-", np.arange(2.0), ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"

@@ -6,15 +6,13 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from profilefit import catalogue, inventory
-from profilefit.inventory import find
-from profilefit.stability import axes, maps, misuse, model
-from profilefit.stability.causes import CAUSES, UNEXPLAINED
-from profilefit.stability.cells import Cells
-from profilefit.stability.classes import Verdict
-from profilefit.stability.laws import limits_of
-from profilefit.stability.layout import ALPHA_OF, CDF, FLOAT64, MODEL, REFLECTANCE_OF, SAMPLE, TEXT16
-from profilefit.stability.regions import explained, regions_of
+from profilefit.recipes import catalogue, inventory
+from profilefit.recipes.inventory import find
+from profilefit.studies.stability import layout, maps, misuse, model
+from profilefit.studies.stability.cells import Cells, Verdict
+from profilefit.studies.stability.laws import limits_of
+from profilefit.studies.stability.layout import ALPHA_OF, CDF, FLOAT64, MODEL, REFLECTANCE_OF, SAMPLE, TEXT16
+from profilefit.studies.stability.regions import CAUSES, UNEXPLAINED, explained, regions_of
 
 FITS = catalogue.fits_folder()
 
@@ -101,7 +99,7 @@ def test_a_wrong_constant_of_our_own_map_is_a_failure():
 
 def red_cells(**changed):
     """A tensor of half precision, red where l is 1 and where it is not accepted; the text in float32 is right."""
-    alpha, length = axes.Axis("α", "-", np.array([0.5])), axes.Axis("l", "length", np.array([1.0, 2.0**-14]))
+    alpha, length = layout.Axis("α", "-", np.array([0.5])), layout.Axis("l", "length", np.array([1.0, 2.0**-14]))
     one = np.ones((1, 2))
     codes = np.array([[Verdict.RIGHT, Verdict.INACCURATE]], np.int8)
     cells = Cells(

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from profilefit.stability.cells import absolute, judged, relative, steps_down, steps_up
-from profilefit.stability.classes import Verdict, red
+from profilefit.studies.stability.cells import Verdict, absolute, judged, red, relative, steps_down, steps_up
 
 BOUND = 1e-3
 

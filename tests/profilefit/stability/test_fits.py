@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit import catalogue
-from profilefit.stability import fits
+from profilefit.recipes import catalogue
+from profilefit.studies.stability import fits
 
 
 @pytest.mark.slow

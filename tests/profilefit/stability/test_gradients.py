@@ -1,10 +1,10 @@
 """Derivatives are those of differences, and what has none says so."""
 
-from profilefit import catalogue, inventory
+from profilefit.recipes import catalogue, inventory
 from profilefit.shader.check import validity
-from profilefit.stability import gradients
-from profilefit.stability.classes import Verdict
-from profilefit.stability.regions import regions_of
+from profilefit.studies.stability import gradients
+from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.regions import regions_of
 
 FITS = catalogue.fits_folder()
 

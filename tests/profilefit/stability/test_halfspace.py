@@ -3,10 +3,9 @@
 import numpy as np
 
 from mcml_sim import Setting, exact
-from profilefit.stability import halfspace
-from profilefit.stability.cells import absolute, judged
-from profilefit.stability.classes import Verdict
-from profilefit.stability.layout import CDF
+from profilefit.studies.stability import halfspace
+from profilefit.studies.stability.cells import Verdict, absolute, judged
+from profilefit.studies.stability.layout import CDF
 
 X, ALPHA = np.array([0.0, 1e-3, 0.1, 1.0, 10.0, 1e3, np.inf]), np.array([0.0, 1e-6, 0.5, 1.0])
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit import catalogue
 from profilefit.convert import alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.quantile import depth, radius
+from profilefit.recipes import catalogue
 
 
 def test_a_dark_medium_keeps_the_digits_of_its_reflectance():

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from profilefit import catalogue
-from profilefit.inventory import find
-from profilefit.stability import misuse
-from profilefit.stability.classes import Verdict
-from profilefit.stability.layout import FLOAT64
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import find
+from profilefit.studies.stability import misuse
+from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.layout import FLOAT64
 
 FITS = catalogue.fits_folder()
 

@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit import catalogue
-from profilefit.inventory import find, profile_laws
+from profilefit.fitting.quality import profile_quality
 from profilefit.laws.beam_diffusion import BeamDiffusion
-from profilefit.quality import profile_quality
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
-from profilefit.stability.arithmetic import EXTENDED, Text
-from profilefit.stability.classes import Verdict
-from profilefit.stability.laws import MEASURED, _computed, limits_of
-from profilefit.stability.layout import CDF, FLOAT64, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, Grid
-from profilefit.stability.reference import Right
+from profilefit.studies.stability.arithmetic import EXTENDED, Text
+from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.laws import MEASURED, _computed, limits_of
+from profilefit.studies.stability.layout import CDF, FLOAT64, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, Grid
+from profilefit.studies.stability.reference import Right
 
 FITS = catalogue.fits_folder()
 

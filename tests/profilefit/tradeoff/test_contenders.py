@@ -8,8 +8,8 @@ import pytest
 import profilefit
 from mcml_sim import exact
 from profilefit.errors import InputError
-from profilefit.tradeoff import contenders, laws
-from profilefit.tradeoff.tabulated import table_contender
+from profilefit.studies.tradeoff import contenders, laws
+from profilefit.studies.tradeoff.contenders import table_contender
 
 
 def test_fast_forms_are_the_laws():

@@ -8,8 +8,8 @@ import pytest
 
 import profilefit
 from profilefit.laws.burley import BurleySampler
-from profilefit.tradeoff.contenders import made
-from profilefit.tradeoff.counting import count, described
+from profilefit.studies.tradeoff.contenders import made
+from profilefit.studies.tradeoff.counting import count, described
 
 
 def test_counts_what_the_answer_needs_once_for_each_point_or_material():

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from profilefit import catalogue
-from profilefit.tradeoff import fits
-from profilefit.tradeoff.fits import Estimate, Trial
+from profilefit.recipes import catalogue
+from profilefit.studies.tradeoff import fits
+from profilefit.studies.tradeoff.fits import Estimate, Trial
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 import profilefit
-from profilefit.tradeoff import contenders, laws
-from profilefit.tradeoff.stopwatch import Rates
+from profilefit.studies.tradeoff import contenders, laws
+from profilefit.studies.tradeoff.stopwatch import Rates
 
 SMALL = laws.Sizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
 

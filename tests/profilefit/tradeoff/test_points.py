@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from profilefit.tradeoff.points import BEATEN, FRONT, TIED, Measured, Point, front, standings
+from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Measured, Point, front, standings
 
 
 def point(cost, error, worst=None, spread=0.0):

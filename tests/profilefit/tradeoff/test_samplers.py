@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 import profilefit
-from profilefit.shader.truth.edge_estimate import by_law, by_quantile, edge_estimate, random_points
-from profilefit.tradeoff import samplers
-from profilefit.tradeoff.contenders import YARDSTICK, made
+from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points
+from profilefit.studies.tradeoff import samplers
+from profilefit.studies.tradeoff.contenders import YARDSTICK, made
 
 ALPHA, EDGE = 0.8, 1.0
 SMALL = samplers.Sizes((ALPHA,), (EDGE,), 40)

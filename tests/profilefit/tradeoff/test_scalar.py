@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.tradeoff import scalar, truth
+from profilefit.studies.tradeoff import scalar, truth
 
 ALPHA = 0.8
 

@@ -5,8 +5,8 @@ import time
 import numpy as np
 import pytest
 
-from profilefit.tradeoff import stopwatch
-from profilefit.tradeoff.stopwatch import Rates
+from profilefit.studies.tradeoff import stopwatch
+from profilefit.studies.tradeoff.stopwatch import Rates
 
 
 def test_works_take_turns_after_an_untimed_one():

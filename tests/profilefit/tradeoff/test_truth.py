@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.tradeoff import truth
-from profilefit.tradeoff.points import standings
+from profilefit.studies.tradeoff import truth
+from profilefit.studies.tradeoff.points import standings
 
 
 def test_reference_is_the_exact_profile():

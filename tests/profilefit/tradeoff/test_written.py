@@ -7,8 +7,8 @@ import re
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.tradeoff import machine, parts, written
-from profilefit.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff import parts, stopwatch, written
+from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
 
 POINTS = (
     Point("p", "one", "few", Measured(1.0, 0.9, 1.1), Measured(0.5, 0.4, 0.6), Measured.exactly(0.7), {"photons": 3}),
@@ -50,10 +50,10 @@ def test_json_has_the_same():
 
 
 def test_machine_is_named():
-    facts = machine.facts(pinned=True)
+    facts = stopwatch.facts(pinned=True)
     assert facts["processor"]
     assert facts["cores"].endswith("pinned to one")
-    assert all(version in machine.caption(facts) for version in (facts["jax"], facts["processor"]))
+    assert all(version in stopwatch.caption(facts) for version in (facts["jax"], facts["processor"]))
 
 
 def test_parts_come_in_their_own_order():

@@ -2,10 +2,10 @@
 
 import pytest
 
-from profilefit import catalogue
-from profilefit.inventory import profile_laws
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import profile_laws
 from profilefit.report.explorer import explorer_section
-from profilefit.report.explorer.laws import address
+from profilefit.report.explorer.fragment import address
 
 PAGE = (
     '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">{}'

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit import catalogue
-from profilefit.quality import profile_quality
-from profilefit.report.explorer.laws import first, offered
-from profilefit.shader.stage.combining import srgb_codes
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.fitting.quality import profile_quality
+from profilefit.recipes import catalogue
+from profilefit.report.explorer.fragment import first, offered
+from profilefit.scenes.stage.combining import srgb_codes
+from profilefit.scenes.stage.step_edge import step_response
 
 ROUNDING = 1e-5  # relative, of R_d in float32: `profilefit check` finds at most 2.3e-6; this is another float32
 TABLE = 2e-5  # of the exact solution between the knots of the explorer's table

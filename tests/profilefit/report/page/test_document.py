@@ -8,15 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from profilefit import catalogue, evidence
 from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.recipes import catalogue, evidence
 from profilefit.report.page.document import PARTS, write_page
-from profilefit.report.page.failures import failures
 from profilefit.report.page.fits import record_part
 from profilefit.report.page.measured import Measured
-from profilefit.report.page.shader import shader
-from profilefit.report.page.speed import speed
-from profilefit.report.source import Source
+from profilefit.report.page.sections import failures, shader, speed
+from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
 DATA = Path(__file__).parent / "data"

@@ -8,8 +8,8 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from profilefit.report.columns import column_table
 from profilefit.report.page.markup import command, details, markup, section
+from profilefit.report.tables.cells import column_table
 
 
 def cells(html: str, tag: str) -> list[str]:

@@ -7,8 +7,8 @@ import xml.etree.ElementTree as ET
 import numpy as np
 import pytest
 
-from profilefit.report.canvas import BLUE, GREY, canvas, styled
-from profilefit.report.page.lettering import font_face
+from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
+from profilefit.report.page.document import font_face
 from profilefit.report.page.vector import VARIABLES, checked, inline
 
 NOBODY_SEES = r'<path [^>]*style="fill: none"[^>]*>'

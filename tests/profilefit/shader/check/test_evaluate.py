@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import profilefit
-from profilefit import catalogue
 from profilefit.errors import ShaderError
+from profilefit.recipes import catalogue
 from profilefit.shader import emit
 from profilefit.shader.check.cost import costs
 from profilefit.shader.check.evaluate import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half

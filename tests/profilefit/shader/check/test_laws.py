@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from profilefit import catalogue, inventory
 from profilefit.errors import InputError, RecordError
+from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
 from profilefit.shader.check import bounds, grid, validity
 from profilefit.shader.check.bounds import Bound

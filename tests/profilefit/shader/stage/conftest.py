@@ -2,8 +2,8 @@
 
 import pytest
 
-from profilefit.shader.stage import scattering
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.stage import scattering
+from profilefit.scenes.stage.stage import Stage
 
 
 @pytest.fixture

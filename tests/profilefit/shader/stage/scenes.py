@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from profilefit.shader.stage import head, skin_texture
-from profilefit.shader.stage.camera import Camera
-from profilefit.shader.stage.material import translucent
-from profilefit.shader.stage.mesh import parameters, sheet
-from profilefit.shader.stage.scene import Light, Part, Scene
+from profilefit.scenes.skin import head, texture
+from profilefit.scenes.skin.material import translucent
+from profilefit.scenes.skin.scene import Light, Part, Scene
+from profilefit.scenes.stage.camera import Camera
+from profilefit.scenes.stage.mesh import parameters, sheet
 
 RADIUS = 10.0
 
@@ -16,7 +16,7 @@ RADIUS = 10.0
 def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
     u, v = parameters(60, 90)
     mesh = sheet(radius * head.ball(u, v), u, v, closed=True)
-    return Part(replace(mesh, position=mesh.position + np.array(centre)), skin_texture.plain((0.8, 0.5, 0.3)))
+    return Part(replace(mesh, position=mesh.position + np.array(centre)), texture.plain((0.8, 0.5, 0.3)))
 
 
 def scene(direction, *parts, kind="orthographic"):

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 import profilefit
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.scene import FACE, head_scene
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth.reference import gathered
-from profilefit.shader.truth.surface import seen
+from profilefit.scenes.skin.scene import FACE, head_scene
+from profilefit.scenes.skin.truth import gathered
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface import seen
 from tests.profilefit.shader.stage import edges
 from tests.profilefit.shader.stage.scenes import scene
 

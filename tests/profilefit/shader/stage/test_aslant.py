@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.shader.stage.exact_law import ExactLaw
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 
 ALPHA, MFP = 0.8, 8.0

@@ -3,14 +3,14 @@
 import numpy as np
 import pytest
 
-from profilefit.shader.stage import blue_noise
+from profilefit.scenes.stage import pattern
 
 SIDE = 32
 
 
 @pytest.fixture(scope="module")
 def ranks():
-    return blue_noise.ranks(SIDE, seed=3)
+    return pattern.ranks(SIDE, seed=3)
 
 
 def low_power(tile):
@@ -38,7 +38,7 @@ def test_every_level_is_spread_evenly(ranks, share):
 
 
 def test_two_channels_are_independent():
-    tile = blue_noise.shifts()
+    tile = pattern.shifts()
     assert tile.shape == (64, 64, 2)
     assert 0 < tile.min() < tile.max() < 1
     assert abs(np.corrcoef(tile[..., 0].ravel(), tile[..., 1].ravel())[0, 1]) < 4 / 64  # four standard errors

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.shader.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.buffers import flat, step_edge
 
 
 def spoilt(name, value, mask=1.0):

@@ -3,13 +3,13 @@
 import numpy as np
 import pytest
 
-from profilefit.shader.stage import lattice
+from profilefit.scenes.stage import pattern
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3, 4, 16, 17, 60, 64, 255, 256])
 def test_cell_tiles_the_torus(samples):
     """Area 1 / n, and both edges lead from a point to a point: shifts within it reach everything once."""
-    found = lattice.best(samples)
+    found = pattern.best(samples)
     np.testing.assert_allclose(abs(np.linalg.det(found.cell)), 1 / samples, rtol=1e-6)
     steps = np.round(found.cell[:, 1] * samples)
     off = found.cell[:, 0] - steps * found.generator / samples
@@ -19,8 +19,8 @@ def test_cell_tiles_the_torus(samples):
 @pytest.mark.parametrize("samples", [17, 64, 256])
 def test_points_are_far_apart(samples):
     """At least 0.8 of the least distance in the densest packing, (2 / sqrt(3) / n)^(1/2); random points are not."""
-    points = lattice.points(samples)
-    assert least_distance(points) > 0.8 * np.sqrt(2 / np.sqrt(3) / samples)
+    spread = pattern.points(samples)
+    assert least_distance(spread) > 0.8 * np.sqrt(2 / np.sqrt(3) / samples)
     assert least_distance(np.random.default_rng(1).random((samples, 2))) < 0.4 * np.sqrt(2 / np.sqrt(3) / samples)
 
 

@@ -7,10 +7,10 @@ import pytest
 
 from mcml_sim import exact
 from profilefit.errors import InputError
-from profilefit.shader.stage.buffers import flat, step_edge
-from profilefit.shader.stage.exact_law import ExactLaw
-from profilefit.shader.stage.sampling import CHANNELS, KINDS, Sampling
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.sampling import CHANNELS, KINDS, Sampling
+from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 
 ALPHA = 0.8

@@ -5,11 +5,11 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.shader.stage import head, skin_texture
-from profilefit.shader.stage.camera import Camera
-from profilefit.shader.stage.material import translucent
-from profilefit.shader.stage.mesh import parameters, sheet
-from profilefit.shader.stage.scene import head_scene
+from profilefit.scenes.skin import head, texture
+from profilefit.scenes.skin.material import translucent
+from profilefit.scenes.skin.scene import head_scene
+from profilefit.scenes.stage.camera import Camera
+from profilefit.scenes.stage.mesh import parameters, sheet
 
 
 @pytest.fixture(scope="module")
@@ -47,12 +47,12 @@ def test_the_band_floats_before_the_brow(scene):
 
 def test_texture_is_skin_with_fine_detail():
     reflectance = translucent("skin1").reflectance
-    texture = skin_texture.skin(reflectance, columns=512)
-    assert texture.shape == (256, 512, 3)
-    assert 0 < texture.min() < texture.max() < 1
-    np.testing.assert_allclose(np.median(texture, axis=(0, 1)), reflectance, rtol=0.05)
-    np.testing.assert_array_equal(texture, skin_texture.skin(reflectance, columns=512))
-    cheek = texture[115:125, 200:300]
+    face = texture.skin(reflectance, columns=512)
+    assert face.shape == (256, 512, 3)
+    assert 0 < face.min() < face.max() < 1
+    np.testing.assert_allclose(np.median(face, axis=(0, 1)), reflectance, rtol=0.05)
+    np.testing.assert_array_equal(face, texture.skin(reflectance, columns=512))
+    cheek = face[115:125, 200:300]
     assert np.ptp(cheek[..., 1]) > 0.3 * reflectance[1]
 
 

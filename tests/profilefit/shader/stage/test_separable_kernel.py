@@ -5,10 +5,15 @@ import pytest
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.laws.skin_gaussians import FALLOFF
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.separable_kernel import PUBLISHED_STRENGTH, Separable, exact_quartile, kernel_quartile
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.skin.separable_kernel import (
+    FALLOFF,
+    PUBLISHED_STRENGTH,
+    Separable,
+    exact_quartile,
+    kernel_quartile,
+)
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 
 # The authors' own table of 17 taps (SeparableSSS.h, SSSS_QUALITY 1): offset, and weights of red, green and blue.

@@ -7,13 +7,12 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.shader.stage.buffers import flat, step_edge
-from profilefit.shader.stage.camera import Camera
-from profilefit.shader.stage.combining import srgb_codes, to_srgb
-from profilefit.shader.stage.coverage import covered, covering
-from profilefit.shader.stage.sampling import Sampling
-from profilefit.shader.stage.scene import head_scene
-from profilefit.shader.stage.stage import Stage
+from profilefit.scenes.skin.scene import head_scene
+from profilefit.scenes.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.camera import Camera
+from profilefit.scenes.stage.combining import srgb_codes, to_srgb
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage, covered, covering
 from tests.profilefit.shader.stage.scenes import RADIUS, ball, scene
 
 SIZE = (64, 48)

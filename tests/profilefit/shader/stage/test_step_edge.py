@@ -5,11 +5,11 @@ import pytest
 
 import profilefit
 from mcml_sim import Setting, exact
-from profilefit.shader.stage.buffers import step_edge
-from profilefit.shader.stage.exact_law import ExactLaw
-from profilefit.shader.stage.sampling import KINDS, Sampling
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.scenes.stage.buffers import step_edge
+from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.sampling import KINDS, Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.step_edge import step_response
 from tests.profilefit.shader.stage import edges
 
 ALPHA = 0.8

@@ -9,10 +9,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from profilefit.shader.stage.buffers import flat
-from profilefit.shader.stage.sampling import CHANNELS, KINDS, Sampling
-from profilefit.shader.stage.stage import Stage
-from profilefit.shader.truth.edge_estimate import UNIFORM_SHARE, by_law
+from profilefit.scenes.stage.buffers import flat
+from profilefit.scenes.stage.sampling import CHANNELS, KINDS, Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.step_edge import UNIFORM_SHARE, by_law
 from tests.profilefit.shader.stage import edges
 
 ALPHA, MFP = np.array([0.9, 0.8, 0.6]), np.array([3.0, 2.0, 1.5])  # 1 mm is a pixel

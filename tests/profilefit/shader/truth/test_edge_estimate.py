@@ -7,9 +7,9 @@ from scipy.stats import chi2
 import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.shader.stage import lattice
-from profilefit.shader.stage.lattice import WRAPS
-from profilefit.shader.truth.edge_estimate import (
+from profilefit.scenes.stage import pattern
+from profilefit.scenes.stage.pattern import WRAPS
+from profilefit.scenes.stage.step_edge import (
     Gather,
     by_law,
     by_quantile,
@@ -17,8 +17,8 @@ from profilefit.shader.truth.edge_estimate import (
     edge_estimate,
     random_points,
     shifted_points,
+    step_response,
 )
-from profilefit.shader.truth.step_edge import step_response
 
 SEARCHLIGHT, DIFFUSE = Setting(), Setting("diffuse")
 PLACES = (np.arange(16) - 7.5) / 2.0
@@ -113,7 +113,7 @@ def test_atoms_weigh_nothing():
 @pytest.mark.parametrize("samples", [1, 17, 64])
 def test_points_by_default_are_the_stage_s(samples):
     """Its lattice, moved as a whole by less than the edges of a cell; of a shift over the torus none is near enough."""
-    base, edges = lattice.points(samples), lattice.best(samples).cell
+    base, edges = pattern.points(samples), pattern.best(samples).cell
 
     def shares(shifted):
         moved = (shifted - base + 0.5) % 1.0 - 0.5

@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.shader.truth.exact_table import exact_table
+from profilefit.scenes.stage.exact_table import exact_table
 
 REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
 RADII = np.geomspace(1.1e-5, 2.9e3, 41)

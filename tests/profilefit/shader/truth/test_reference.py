@@ -5,11 +5,11 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.shader.stage import buffers
-from profilefit.shader.truth.exact_table import exact_table
-from profilefit.shader.truth.reference import gathered, own_share, refined
-from profilefit.shader.truth.step_edge import step_response
-from profilefit.shader.truth.surface import Surface, View, seen
+from profilefit.scenes.skin.truth import gathered, own_share, refined
+from profilefit.scenes.stage import buffers
+from profilefit.scenes.stage.exact_table import exact_table
+from profilefit.scenes.stage.step_edge import step_response
+from profilefit.scenes.stage.surface import Surface, View, seen
 
 VIEW = View(*np.diag([1.0, 1.0, -1.0]), pixel=0.5)
 DIFFUSE = Setting("diffuse")

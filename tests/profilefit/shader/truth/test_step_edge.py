@@ -8,8 +8,8 @@ import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError, SettingError
 from profilefit.laws.gaussians import law_class
-from profilefit.shader.truth import step_edge
-from profilefit.shader.truth.step_edge import step_response
+from profilefit.scenes.stage import step_edge
+from profilefit.scenes.stage.step_edge import step_response
 
 DIFFUSE = Setting("diffuse")
 PLACES = np.array([-30.0, -4.0, -0.5, -1e-3, -1e-7, 0.0, 1e-4, 0.03, 1.0, 4.0])

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.shader.stage import buffers
-from profilefit.shader.truth.surface import LEAST_COSINE, Surface, View, seen
+from profilefit.scenes.stage import buffers
+from profilefit.scenes.stage.surface import LEAST_COSINE, Surface, View, seen
 
 RIGHT, UP, FORWARD = np.diag([1.0, 1.0, -1.0])
 NORMAL = np.array([0.5, -0.3, np.sqrt(1.0 - 0.34)])

@@ -1,0 +1,1 @@
+"""The mcml-sim command, and what both commands have in common."""

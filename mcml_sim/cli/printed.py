@@ -1,0 +1,86 @@
+"""The lines that mcml-sim prints of a run: its totals with errors, its speed, and what its precision asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from mcml_sim.results.estimate import Estimate
+from mcml_sim.results.tally import Precision
+from mcml_sim.results.tally_file import Results
+
+# What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.
+TOTALS = {
+    "specular_reflectance": "specular reflectance",
+    "diffuse_reflectance": "diffuse reflectance",
+    "absorbed": "absorbed fraction",
+    "transmittance": "transmittance",
+    "ballistic_transmittance": "  of it ballistic",
+}
+MOST_DIGITS = 12  # of a printed value after the point
+SMALLEST = 1e-4  # value that is printed without an exponent
+SLOW = 1e4  # photons/s; faster is printed in millions
+SHORT = 0.05  # compiling that is not worth a word [s]
+
+
+def totals(kept: Results) -> Iterator[str]:
+    """A line for each share of the light, and one for their sum."""
+    for name, title in TOTALS.items():
+        yield _line(title, told(kept.estimates[name]))
+    if kept.cut > 0:
+        yield _line("still inside, cut", f"{kept.cut:.2g}")
+    yield _line("all of these", told(kept.estimates["energy"]))
+
+
+def _line(title: str, text: str) -> str:
+    return f"{title:<22} {text}"
+
+
+def told(estimate: Estimate) -> str:
+    """A value and its standard error with two digits, such as 0.23783 ± 0.00042."""
+    value, error = float(estimate.value), float(estimate.standard_error)
+    if not math.isfinite(error):
+        return f"{value:.6g} ± unknown"
+    if error <= 0:
+        return "0 (no photon seen)" if not estimate.effective_samples else f"{value:.6g}"
+    place = math.floor(math.log10(error))
+    if 0 < value < SMALLEST:
+        digits = max(math.floor(math.log10(value)) - place + 1, 0)
+        return f"{value:.{digits}e} ± {error:.1e}"
+    digits = min(max(1 - place, 0), MOST_DIGITS)
+    return f"{value:.{digits}f} ± {error:.{digits}f}"
+
+
+def speed(photons: int, seconds: float, compiling: float) -> str:
+    """Photons a second of the time that was not spent in compiling [s]."""
+    tracing = max(seconds - compiling, 1e-3)
+    rate = photons / tracing
+    return f"{times(seconds, compiling)}, " + (
+        f"{rate / 1e6:.3g} M photons/s" if rate >= SLOW else f"{rate:.0f} photons/s"
+    )
+
+
+def times(seconds: float, compiling: float) -> str:
+    """How long a run took, and of that how long it took to compile."""
+    if compiling < SHORT:
+        return f"{seconds:.1f} s"
+    return f"{max(seconds - compiling, 0):.1f} s and {compiling:.1f} s to compile"
+
+
+def answer(estimate: Estimate, goal: Precision, photons: int) -> str:
+    """Whether the precision was reached, and if not, what would reach it."""
+    if goal.is_reached(estimate):
+        return f"{goal.quantity}: relative standard error {goal.relative_error:g} reached"
+    value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
+    if not (np.all(value > 0) and np.all(np.isfinite(error))):
+        return (
+            f"{goal.quantity}: {goal.relative_error:g} not reached; some bins saw too little light to tell what would"
+        )
+    found = float(np.max(error / value))
+    needed = photons * (found / goal.relative_error) ** 2
+    return (
+        f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
+        "photons in all would reach it, and these are kept: ask for more --photons"
+    )

@@ -1,0 +1,166 @@
+"""Around any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status."""
+
+from __future__ import annotations
+
+import _thread
+import contextlib
+import os
+import signal
+import sys
+import threading
+import time
+import traceback
+import warnings
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import typer
+from rich.console import Console
+
+from mcml_sim.cli.lazy import INTERRUPTED
+from mcml_sim.cli.terminal import mend_streams
+from mcml_sim.errors import Notice
+
+ANSWERS = (0, 1)
+BAD_INPUT = 2
+FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
+AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
+LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
+NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
+
+
+def accepted() -> str:
+    """How to put right a command that was not understood."""
+    return "--help shows what is accepted"
+
+
+def unchanged(text: str) -> str:
+    """What a library error says, as it says it."""
+    return text
+
+
+def one_line(text: str) -> str:
+    """A text as one line that a terminal only prints.
+
+    Names of files and words in them may hold line breaks, escape sequences or marks that turn the direction of
+    writing: everything that is not to be seen is spelled as Python spells it. Of a long text the middle is left out.
+    """
+    if len(text) > LONGEST:
+        text = f"{text[: LONGEST - KEPT_END]} ... {text[-KEPT_END:]}"
+    return "".join(letter if letter.isprintable() else ascii(letter)[1:-1] for letter in text)
+
+
+@dataclass(frozen=True)
+class Program:
+    """A command with its subcommands.
+
+    mendable  the errors that are the user's to mend; remedied what they say, in words of the command line
+    stopped   what to do after Ctrl-C; hint after a command that was not understood
+    """
+
+    name: str
+    app: typer.Typer
+    mendable: tuple[type[Exception], ...]
+    stopped: Callable[[], str]
+    hint: Callable[[], str] = accepted
+    remedied: Callable[[str], str] = unchanged
+
+    def main(self) -> None:
+        """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
+        mend_streams()
+        found: list[Warning | str] = []
+        with warnings.catch_warnings():
+            warnings.filterwarnings("error", category=RuntimeWarning)  # of arithmetic: such numbers make no answer
+            warnings.simplefilter("always", Notice)
+            warnings.showwarning = lambda message, *_: found.append(message)
+            with _lost_interrupts() as lost:
+                status = self._status()
+            status = INTERRUPTED if lost else status
+            if status == INTERRUPTED:
+                self.say(self.stopped())
+            # What libraries tell their callers is not shown; and an error is one line.
+            notices = dict.fromkeys(str(one) for one in found if isinstance(one, Notice))
+            for text in notices if status in ANSWERS else ():
+                self.say(text)
+        sys.exit(status)
+
+    def say(self, text: object) -> None:
+        """A line on stderr: one, whatever the text holds."""
+        Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(
+            f"{self.name}: {one_line(str(text))}", markup=False
+        )
+
+    def _status(self) -> int:
+        """Do the subcommand, and say what went wrong."""
+        try:
+            # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
+            status = int(self.app(prog_name=self.name, standalone_mode=False) or 0)
+            sys.stdout.flush()
+            return status
+        except self.mendable as error:
+            self.say(self.remedied(str(error)))
+        except typer.TyperException as error:
+            if message := error.format_message():  # without arguments typer has shown the help and says no more
+                self.say(f"{message} ({self.hint()})")
+        except (KeyboardInterrupt, typer.Abort):
+            return INTERRUPTED
+        except (BrokenPipeError, SystemExit) as end:  # as in `| head`; typer and rich make an exit of it
+            if isinstance(end, SystemExit) and not isinstance(end.__context__, BrokenPipeError):
+                raise
+            _let_go_of_stdout()
+            return NOBODY_READS
+        except OSError as error:  # what is printed goes to a full disk
+            self.say(f"cannot print: {error.strerror or error}")
+            _let_go_of_stdout()
+        except RuntimeWarning:
+            self.say("no answer: a number on the way is beyond double precision; check units and sizes")
+        except Exception as error:
+            if sys.flags.dev_mode:
+                raise
+            kind, place = type(error).__name__, traceback.extract_tb(error.__traceback__)[-1]
+            first = next(iter(str(error).splitlines()), "")
+            self.say(
+                f"a fault of this program, please report it: {kind} in {Path(place.filename).name}:{place.lineno}: "
+                f"{first[:KEPT_END]} (PYTHONDEVMODE=1 shows where)"
+            )
+            return FAULT
+        return BAD_INPUT
+
+
+@contextlib.contextmanager
+def _lost_interrupts() -> Iterator[list[bool]]:
+    """An item for each Ctrl-C that Python dropped, which comes again.
+
+    That is one that falls into a callback of the garbage collector, as jax has one, or into __del__: nothing can be
+    raised from there.
+    """
+    lost: list[bool] = []
+    at_work, here = True, threading.get_ident()
+    before = sys.unraisablehook
+
+    def again() -> None:
+        time.sleep(AGAIN)
+        if at_work and hasattr(signal, "pthread_kill"):
+            signal.pthread_kill(here, signal.SIGINT)  # ends a wait, too
+        elif at_work:
+            _thread.interrupt_main()
+
+    def hook(told: sys.UnraisableHookArgs) -> None:
+        if not issubclass(told.exc_type, KeyboardInterrupt):
+            before(told)
+            return
+        lost.append(True)
+        _thread.start_new_thread(again, ())  # threading's locks may be held by what the collector interrupted
+
+    sys.unraisablehook = hook
+    try:
+        yield lost
+    finally:
+        at_work = False
+        sys.unraisablehook = before
+
+
+def _let_go_of_stdout() -> None:
+    """Have Python not try once more as it ends."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

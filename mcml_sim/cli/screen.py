@@ -1,0 +1,56 @@
+"""Where a command writes: results to stdout and nothing else there; notes and progress to stderr."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import sys
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console, RenderableType
+from rich.measure import Measurement
+
+from mcml_sim.files.plain import as_json
+
+WIDEST = 1000  # columns that any table fits
+WIDTH = 100  # columns of what goes into a file or a pipe, which have no width of their own; COLUMNS sets another
+
+
+def screen(width: int = WIDTH) -> Console:
+    """stdout, as wide as the terminal, or as COLUMNS says, or `width` [characters]; rich heeds NO_COLOR."""
+    return Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else width)
+
+
+def notes(quiet: bool) -> Console:
+    """stderr, for what is said besides the result."""
+    return Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
+
+
+def show(parts: list[RenderableType], console: Console) -> None:
+    """Print each with a blank line after it."""
+    for part in parts:
+        put(part, console)
+        console.print()
+
+
+def put(part: RenderableType, console: Console) -> None:
+    """Print a table at the width that its numbers need: a cut number reads as another one, a wrapped line does not."""
+    usual = console.width
+    console.width = max(usual, Measurement.get(console, console.options.update(max_width=WIDEST), part).minimum)
+    console.print(part)
+    console.width = usual
+
+
+def print_json(value: Any) -> None:
+    """The one way in which --json prints: nothing but JSON, NaN and infinities as null."""
+    text = as_json(value)
+    encoding = (sys.stdout.encoding or "").lower().replace("-", "")
+    sys.stdout.write(text if encoding == "utf8" else as_json(value, ascii_only=True))
+
+
+def typed() -> str:
+    """The command as it was typed; `python -m` goes by the name of the package."""
+    program = Path(sys.argv[0])
+    name = program.parent.name if program.name == "__main__.py" else program.name
+    return shlex.join([name, *sys.argv[1:]])

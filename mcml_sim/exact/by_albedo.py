@@ -1,0 +1,112 @@
+"""Functions of an albedo's transform on arrays of radii and albedos of any shape: numpy's, or jax's.
+
+Numpy arrays go through compiled code a block at a time, so that no shape of them compiles anew, and an albedo's
+transform is kept. Jax arrays may be traced: nothing is known of them but their shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import lru_cache, partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.exact.transform import STANDARD, Rule, Transform, solve
+
+Floats = NDArray[np.float64]
+
+Kernel = Callable[[Transform, jax.Array, jax.Array], jax.Array]
+"""(transform, alpha, x) -> what is asked, at radii or shares x of any shape, of one albedo."""
+
+BLOCK = 64
+
+
+def by_alpha(kernel: Kernel, x: Any, alpha: Any, illumination: str, rule: Rule = STANDARD) -> Any:
+    """The kernel on x broadcast against alpha, float64 arrays; a jax array if one of them is."""
+    if isinstance(x, jax.Array) or isinstance(alpha, jax.Array):
+        return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), illumination, rule)
+    x, alpha = np.broadcast_arrays(x, alpha)
+    out = np.empty(x.shape)
+    # Worked out at once, even where the caller is being traced: what is kept must hold no tracer.
+    with jax.enable_x64(True), jax.core.eval_context():
+        started = []  # all, before the first is waited for
+        for value in np.unique(alpha):
+            here = alpha == value
+            transform = _transform(float(value), illumination, rule)
+            started.append((here, [_of_block(kernel, transform, value, block) for block in blocks(x[here])]))
+        for here, parts in started:
+            out[here] = np.concatenate(parts)[: np.count_nonzero(here)]
+    return out
+
+
+def elementwise(function: Callable[[jax.Array], jax.Array], alpha: Any) -> Any:
+    """`function` of each albedo by itself, a float64 array."""
+    if isinstance(alpha, jax.Array):
+        return _traced_each(function, alpha)
+    with jax.enable_x64(True), jax.core.eval_context():
+        parts = [_each(function, block) for block in blocks(alpha.ravel())]
+        return np.concatenate([np.empty(0), *parts])[: alpha.size].reshape(alpha.shape)
+
+
+def forget() -> None:
+    """Let go of all transforms that were kept."""
+    _transform.cache_clear()
+
+
+@lru_cache(maxsize=512)
+def _transform(alpha: float, illumination: str, rule: Rule) -> Transform:
+    return _solve(np.float64(alpha), illumination, rule)
+
+
+_solve = jax.jit(solve, static_argnums=(1, 2))
+
+
+@partial(jax.jit, static_argnums=0)
+def _of_block(kernel: Kernel, transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
+    return kernel(transform, alpha, x)
+
+
+@partial(jax.jit, static_argnums=0)
+def _each(function: Callable[[jax.Array], jax.Array], alpha: jax.Array) -> jax.Array:
+    return jax.vmap(function)(alpha)
+
+
+def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
+    """Pieces of x (n,) of one length, the last one filled up with its last number."""
+    full = np.pad(x, (0, -x.size % size), mode="edge") if x.size else x
+    return list(full.reshape(-1, size))
+
+
+@partial(jax.jit, static_argnums=(0, 3, 4))
+def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, illumination: str, rule: Rule) -> jax.Array:
+    shape = jnp.broadcast_shapes(x.shape, alpha.shape)
+    albedos = alpha.ravel()
+    transforms = _map(lambda a: solve(a, illumination, rule), albedos, at_once=1)
+    owner = np.broadcast_to(np.arange(albedos.size).reshape(alpha.shape), shape).ravel()
+
+    def one(pair: tuple[jax.Array, jax.Array]) -> jax.Array:
+        own, at = pair
+        value = kernel(jax.tree.map(lambda leaf: leaf[own], transforms), albedos[own], at)
+        return jnp.where(jnp.isnan(at + albedos[own]), jnp.nan, value)
+
+    return _map(one, (jnp.asarray(owner), jnp.broadcast_to(x, shape).ravel()), at_once=BLOCK).reshape(shape)
+
+
+@partial(jax.jit, static_argnums=0)
+def _traced_each(function: Callable[[jax.Array], jax.Array], alpha: jax.Array) -> jax.Array:
+    return _map(function, alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
+
+
+def _map(function: Callable, arguments: Any, at_once: int) -> Any:
+    """vmap of at most so many at a time; what fills the last ones up is cut off."""
+    size = jax.tree.leaves(arguments)[0].size
+    if size <= at_once:
+        return jax.vmap(function)(arguments)
+    fill = -size % at_once
+    full = jax.tree.map(lambda leaf: jnp.pad(leaf, (0, fill), mode="edge"), arguments)
+    mapped = jax.lax.map(function, full, batch_size=at_once)
+    return jax.tree.map(lambda leaf: leaf[:size], mapped)

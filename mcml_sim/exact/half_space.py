@@ -1,0 +1,163 @@
+"""The functions of `mcml_sim.exact`, which says what they take and how far they hold."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.errors import InputError, SettingError
+from mcml_sim.exact import dispersion, hankel
+from mcml_sim.exact.by_albedo import by_alpha, elementwise
+from mcml_sim.exact.transform import STANDARD, Transform, reflectance_over_alpha
+from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
+from mcml_sim.media.setting import ILLUMINATIONS, Setting
+
+Floats = NDArray[np.float64]
+Numbers = ArrayLike | jax.Array
+
+SEARCHLIGHT = Setting()
+FINER = STANDARD.scaled(1.5)
+
+# What an argument of this name is, and its least and greatest value.
+ARGUMENTS = {
+    "alpha": ("a single-scattering albedo in [0, 1]", 0.0, 1.0),
+    "mfp": ("a mean free path > 0, from 1e-100 to 1e+100", 1e-100, 1e100),  # its square is a float64
+    "r": ("a radius >= 0", 0.0, np.inf),
+    "xi": ("a share of the energy in [0, 1]", 0.0, 1.0),
+}
+
+
+def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Floats:
+    """Total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
+
+    R^(0), which equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu) mu dmu
+    under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12. Its
+    derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
+    """
+    _require_solved(setting)
+    (albedo,) = _all_checked(alpha=alpha)
+    return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo))
+
+
+def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
+    """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A. 2 pi r R_d tends to alpha/2 at r = 0."""
+    _require_solved(setting)
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    values = by_alpha(hankel.profile, radius / length, albedo, setting.illumination)
+    return _scalar_or_array(values / length**2)
+
+
+def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
+    """Share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
+    _require_solved(setting)
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting.illumination))
+
+
+def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
+    """Radius within which the share `xi` in [0, 1] of the reflected energy leaves [length]; cdf(quantile(xi)) = xi.
+
+    The derivative at xi = 1, infinite, is given as 0.
+    """
+    _require_solved(setting)
+    share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
+    traced = isinstance(share, jax.Array) or isinstance(albedo, jax.Array)
+    values = (_radius_within if traced else partial(by_alpha, _radius))(share, albedo, setting.illumination)
+    return _scalar_or_array(values * length)
+
+
+def decay_rate(alpha: Numbers) -> float | Floats:
+    """kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls off as e^{-kappa r / mfp} r^-2 [-]."""
+    return _scalar_or_array(elementwise(dispersion.decay_rate, *_all_checked(alpha=alpha)))
+
+
+def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
+    """Relative change of `profile` with half as many nodes again in each of its three quadratures, none in common [-].
+
+    Their errors fall exponentially with the number of nodes, so nearly all of the change is the error of `profile`:
+    that of quadrature, and of rounding, which differs too. It knows nothing of what both take for granted: the
+    equation of transfer, and the limit closer to the source than 1e-6 mfp. 0 where the profile is 0 or infinite.
+    """
+    _require_solved(setting)
+    radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    x = radius / length
+    coarse, fine = (by_alpha(hankel.profile, x, albedo, setting.illumination, rule) for rule in (STANDARD, FINER))
+    xp = jnp if isinstance(fine, jax.Array) else np
+    same = coarse == fine
+    return _scalar_or_array(xp.abs(xp.where(same, 1.0, coarse) / xp.where(same, 1.0, fine) - 1.0))
+
+
+_reflectance = {name: partial(reflectance_over_alpha, illumination=name) for name in ILLUMINATIONS}
+
+
+def _cdf(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
+    return hankel.cdf(transform, x)
+
+
+def _ring_density(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
+    return hankel.ring_density(transform, x) / transform.reflectance
+
+
+def _radius(transform: Transform, alpha: jax.Array, xi: jax.Array) -> jax.Array:
+    return hankel.radius_within(transform, xi)
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(2,))
+def _radius_within(xi: jax.Array, alpha: jax.Array, illumination: str) -> jax.Array:
+    return by_alpha(_radius, xi, alpha, illumination)
+
+
+@_radius_within.defjvp
+def _radius_within_jvp(illumination: str, primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    """Of the implicit function: cdf(x, alpha) = xi."""
+    (xi, alpha), (d_xi, d_alpha) = primals, tangents
+    radius = _radius_within(xi, alpha, illumination)
+    x = jnp.where(xi == 1.0, 1.0, radius)
+    _, d_cdf = jax.jvp(lambda a: by_alpha(_cdf, x, a, illumination), (alpha,), (d_alpha,))
+    density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, illumination))
+    return radius, (d_xi - d_cdf) / density
+
+
+def _require_solved(setting: Setting) -> None:
+    if not (isinstance(setting, Setting) and setting.is_matched_isotropic):
+        raise SettingError(f"the exact half space has n = 1 and g = 0, got {setting}: simulate it instead")
+
+
+def _all_checked(**given: Any) -> list[Any]:
+    """Each as `_checked`; InputError if their shapes do not broadcast."""
+    require_own_process()
+    values = {name: _checked(name, value) for name, value in given.items()}
+    require_one_shape(**values)
+    return list(values.values())
+
+
+def _checked(name: str, value: Any) -> Any:
+    """A float64 array: of numpy, with InputError for what is out of range, or as it was of jax, with nan for it."""
+    what, low, high = ARGUMENTS[name]
+    if isinstance(value, jax.Array):
+        _require_double(name, value)
+        return jnp.where((value >= low) & (value <= high), value, jnp.nan)
+    numbers = checked_numbers(name, value, what)
+    outside = ~((numbers >= low) & (numbers <= high))
+    if np.any(outside):
+        raise InputError(f"{name} must be {what}, got {float(numbers[outside].flat[0])}")
+    return numbers
+
+
+def _require_double(name: str, value: jax.Array) -> None:
+    on = jnp.result_type(float) == np.float64
+    if not (on and value.dtype == np.float64):
+        got = f"{value.dtype}" + ("" if on else " outside of it")
+        raise InputError(f"{name} must be a float64 array within jax.enable_x64(True), got {got}")
+
+
+def _scalar_or_array(values: Any) -> Any:
+    """As jax gave it, or else a float for scalars."""
+    if isinstance(values, jax.Array):
+        return values
+    return float(values) if np.ndim(values) == 0 else np.asarray(values)

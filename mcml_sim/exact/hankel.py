@@ -1,0 +1,106 @@
+"""The reflectance profile from its transform: the inverse Hankel transform, over jax.numpy.
+
+    R_d(r) = (1/2 pi) int_0^inf k R^(k) J0(k r) dk
+    int_0^r 2 pi r' R_d(r') dr' = r int_0^inf R^(k) J1(k r) dk
+
+J is the real part of the Hankel function H^(1), which decays above the real axis. So k may run along the contour of
+`half_space_transform`, where H0^(1)(z) = -(2i/pi) K0(-iz) and H1^(1)(z) = -(2/pi) K1(-iz): no zeros, no cancellation,
+and full relative accuracy far into the exponential tail. On the way H1's pole at k = 0 is passed, which is all of the
+energy, and leaves that beyond r. Lengths are in mean free paths; `x` is r in them.
+"""
+
+from __future__ import annotations
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mcml_sim.exact.bessel import bessel_k
+from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS, Transform
+
+MAX_STEPS = 60  # of Newton's method, which takes twelve at most where xi < 1 - 1e-8
+NO_LIGHT = 1e100  # mfp: nothing is left there but in white light, and products are finite
+SETTLED = 4e-15  # of the logarithm of a share: its rounding
+
+
+def profile(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
+    """R_d [1/mfp^2] at radii x >= 0 of any shape; infinite at the source, 0 at infinity."""
+    somewhere = jnp.where((x == 0.0) | (x == jnp.inf), 1.0, x)
+    value = alpha * (ring_density(transform, somewhere) / (2.0 * np.pi * somewhere))
+    return jnp.where(x == jnp.inf, 0.0, jnp.where((x == 0.0) & (alpha > 0.0), jnp.inf, jnp.where(x == 0.0, 0.0, value)))
+
+
+def cdf(transform: Transform, x: jax.Array) -> jax.Array:
+    """Share of the reflected energy that leaves within x, >= 0 and of any shape."""
+    somewhere = jnp.where(x == jnp.inf, 1.0, x)
+    within = 1.0 - _energy_beyond(transform, somewhere)
+    return jnp.where(x == jnp.inf, 1.0, within * jnp.minimum(x / NEAREST_RADIUS, 1.0))
+
+
+def ring_density(transform: Transform, x: jax.Array) -> jax.Array:
+    """2 pi x R_d(x) / alpha [1/mfp] at finite radii x >= 0 of any shape; 1/2 at the source."""
+    inside = _solved(transform, x)
+    # Nothing of A is left in the sum, nor of its derivative in alpha, which white light has infinite.
+    total = jax.lax.stop_gradient(transform.reflectance)
+    rest = transform.value - (_concentrated(inside) * total)[..., None]
+    waves = bessel_k(0, -1j * transform.k * inside[..., None])
+    density = inside * jnp.sum((transform.weight * transform.k * (-2j / np.pi) * rest * waves).real, axis=-1)
+    return jnp.maximum(density, 0.0) * (inside / jnp.maximum(x, inside)) ** 2
+
+
+def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
+    """Radius within which the share xi in [0, 1], of any shape, leaves.
+
+    Newton's method for the logarithm of the share beyond. Its slope falls from 1/2A at the source to kappa far away,
+    so that from a point on the near side, such as the first, every step ends on that side and closer.
+    """
+    share = jnp.where(xi == 1.0, 0.0, xi)
+    target = -jnp.log1p(-share)
+
+    def excess(x: jax.Array) -> tuple[jax.Array, jax.Array]:
+        beyond = jnp.maximum(_energy_beyond(transform, x), 1e-300)
+        beyond = jnp.where(x < NEAREST_RADIUS, 1.0 - (1.0 - beyond) * x / NEAREST_RADIUS, beyond)
+        return target + jnp.log(beyond), ring_density(transform, x) / (transform.reflectance * beyond)
+
+    def is_far(state: tuple[jax.Array, jax.Array, jax.Array]) -> jax.Array:
+        step, x, change = state
+        return (step < MAX_STEPS) & jnp.any(jnp.abs(change) > 1e-13 * x)
+
+    def improve(state: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
+        step, x, _ = state
+        error, slope = excess(x)
+        change = jnp.where(jnp.abs(error) > SETTLED, jnp.maximum(error / slope, -0.9 * x), 0.0)
+        return step + 1, x + change, change
+
+    first = 2.0 * transform.reflectance * target
+    _, x, _ = jax.lax.while_loop(is_far, improve, (jnp.zeros((), int), first, first))
+    return jnp.where(xi == 1.0, jnp.inf, x)
+
+
+def _energy_beyond(transform: Transform, x: jax.Array) -> jax.Array:
+    """Share of the reflected energy that leaves beyond x, or beyond NEAREST_RADIUS if that is farther."""
+    inside = _solved(transform, x)
+    # Next to the derivative in alpha of A, infinite in white light, no other counts.
+    white = transform.pole > 0.0
+    held = jax.tree.map(lambda leaf: jnp.where(white, jax.lax.stop_gradient(leaf), leaf), transform)
+    here = _concentrated(inside)
+    rest = held.value - (here * held.reflectance)[..., None]
+    waves = bessel_k(1, -1j * held.k * inside[..., None])
+    energy = inside * jnp.sum((held.weight * (2.0 / np.pi) * rest * waves).real, axis=-1)
+    beyond = held.pole * (1.0 - here) + energy / held.reflectance
+    beyond = jnp.clip(beyond, 0.0, 1.0) * inside / jnp.maximum(x, inside)
+    return beyond + (1.0 - beyond) * (1.0 - held.reflectance / transform.reflectance)
+
+
+def _concentrated(x: jax.Array) -> jax.Array:
+    """Share of the energy that, for the sake of the sums, is taken away at the source, where it adds nothing to R_d(x).
+
+    Far away only what R^ has beside R^(0) counts, which the sum would else be left with as a small difference; near
+    the source R^(0) would be the large part.
+    """
+    return x * x / (1.0 + x * x)
+
+
+def _solved(transform: Transform, x: jax.Array) -> jax.Array:
+    """The nearest radius that the contour reaches; white light ends in R_d ~ x^-3."""
+    return jnp.clip(x, NEAREST_RADIUS, jnp.where(transform.pole > 0.0, FARTHEST_RADIUS, NO_LIGHT))

@@ -1,0 +1,134 @@
+"""JSON and TOML that others wrote: read up to a bound, and refused in one line where no program should go on with it.
+
+The parsers of Python take numbers beyond floating point for infinity, and recurse as deep as brackets nest; texts may
+hold halves of characters that no file can be written with; a key that stands twice in JSON is taken once.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import re
+import tomllib
+from collections import Counter
+from collections.abc import Iterable
+from typing import Any
+
+from mcml_sim.errors import InputError
+from mcml_sim.files.whole_file import read_whole
+
+MOST_JSON = 2**21  # bytes; the largest file that ships, where arithmetic fails, has two fifths of it
+MOST_TOML = 2**18  # a thousand layers are a third of it
+MOST_LEVELS = 32  # records nest seven deep
+MOST_DIGITS = 300  # of a whole number in JSON, which floating point can hold
+# The time of tomllib goes with the square of the names in a key: a.a.a.a = 1.
+LONG_KEY = re.compile(
+    r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MOST_LEVELS  # noqa: UP031
+)
+LONGEST_SHOWN = 40  # characters of a number or key in a message
+
+
+def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
+    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: is not JSON: ...`."""
+    content = read_whole(path, most)
+    try:
+        return parse_json(content, most)
+    except ValueError as error:
+        raise InputError(f"{path}: is not JSON: {error}") from None
+
+
+def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, Any]:
+    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: is not TOML: ...`."""
+    content = read_whole(path, most)
+    try:
+        return parse_toml(content, most)
+    except ValueError as error:
+        raise InputError(f"{path}: is not TOML: {error}") from None
+
+
+def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) -> Any:
+    """What JSON text says; ValueError in one line if it is none, or not to be trusted (see above).
+
+    infinite  whether Infinity is a number, as Python writes it; NaN never is one
+    """
+    text = _text(content, most)
+
+    def constant(name: str) -> float:
+        if infinite and name == "Infinity":
+            return math.inf
+        raise ValueError(f"{name}, which is no number")
+
+    try:
+        found = json.loads(
+            text, parse_float=_number, parse_int=_whole, parse_constant=constant, object_pairs_hook=_object
+        )
+    except RecursionError:
+        raise ValueError(_too_deep()) from None
+    return _checked(found)
+
+
+def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
+    """What TOML text says; ValueError in one line if it is none, or not to be trusted (see above)."""
+    text = _text(content, most)
+    if LONG_KEY.search(text):
+        raise ValueError(_too_deep())
+    try:
+        found = tomllib.loads(text, parse_float=_number)
+    except RecursionError:
+        raise ValueError(_too_deep()) from None
+    _checked(found)
+    return found
+
+
+def _text(content: bytes, most: int) -> str:
+    if len(content) > most:
+        raise ValueError(f"more than {most} bytes")
+    return content.decode("utf-8-sig")
+
+
+def _number(text: str) -> float:
+    number = float(text)
+    if math.isinf(number) and "inf" not in text:  # TOML may say inf
+        raise ValueError(f"the number {_short(text)}, beyond floating point")
+    return number
+
+
+def _whole(text: str) -> int:
+    if len(text) > MOST_DIGITS:
+        raise ValueError(f"a whole number of {len(text)} digits")
+    return int(text)
+
+
+def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    found = dict(pairs)
+    if len(found) < len(pairs):
+        twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
+        raise ValueError(f"the key {_short(repr(twice))} twice in one object")
+    return found
+
+
+def _checked(value: Any) -> Any:
+    """The same; ValueError if it nests too deep, or has half a character."""
+    level = [value]
+    for _ in range(MOST_LEVELS + 1):
+        level = [inner for one in level for inner in _inside(one)]
+        if not level:
+            return value
+    raise ValueError(_too_deep())
+
+
+def _inside(value: Any) -> Iterable[Any]:
+    if isinstance(value, str) and not value.isascii():
+        value.encode()  # UnicodeEncodeError is a ValueError, in one line
+    if isinstance(value, dict):
+        return [*value, *value.values()]
+    return value if isinstance(value, list) else ()
+
+
+def _too_deep() -> str:
+    return f"tables or lists nested more than {MOST_LEVELS} deep"
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."

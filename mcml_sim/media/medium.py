@@ -1,0 +1,132 @@
+"""Layered media: what light meets on its way down."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.errors import InputError
+from mcml_sim.media.checks import is_number, shown
+
+MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
+
+
+@dataclass(frozen=True)
+class Layer:
+    """A homogeneous plane layer. Any one unit of length; InputError on values that no physics allows.
+
+    n          refractive index [-], > 0
+    mu_a       absorption coefficient [1/length], >= 0
+    mu_s       scattering coefficient [1/length], >= 0; 0 is clear glass
+    g          mean cosine of the scattering angle [-], -1 < g < 1 (also 1 where nothing scatters)
+    thickness  [length], > 0; infinite only for the last layer of a medium
+    """
+
+    n: float
+    mu_a: float
+    mu_s: float
+    g: float
+    thickness: float = math.inf
+
+    def __post_init__(self) -> None:
+        _require_index("n", self.n)
+        for name in ("mu_a", "mu_s"):
+            value = getattr(self, name)
+            if not (is_number(value) and math.isfinite(value) and value >= 0):
+                raise InputError(f"{name} must be a coefficient >= 0, got {shown(value)}")
+        if not math.isfinite(self.mu_t):
+            raise InputError(f"mu_a + mu_s must be finite, got {shown(self.mu_a)} and {shown(self.mu_s)}")
+        if not (is_number(self.g) and (-1 < self.g < 1 or (self.g == 1 and self.mu_s == 0))):
+            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
+        if not (is_number(self.thickness) and self.thickness > 0):
+            raise InputError(f"thickness must be > 0, or infinite in the last layer, got {shown(self.thickness)}")
+
+    @property
+    def mu_t(self) -> float:
+        """Extinction coefficient mu_a + mu_s [1/length]."""
+        return self.mu_a + self.mu_s
+
+    @property
+    def alpha(self) -> float:
+        """Single-scattering albedo mu_s / mu_t [-]; 0 in clear glass."""
+        return self.mu_s / self.mu_t if self.mu_t else 0.0
+
+    @property
+    def mfp(self) -> float:
+        """Mean free path 1 / mu_t [length]; infinite in clear glass."""
+        return 1 / self.mu_t if self.mu_t else math.inf
+
+    @property
+    def similar(self) -> Layer:
+        """The isotropic layer of equal reduced scattering mu_s' = mu_s (1 - g), which looks the same from afar.
+
+        Similarity is an approximation: it fails within a few mean free paths of the source.
+        """
+        return replace(self, mu_s=self.mu_s * (1 - self.g), g=0.0)
+
+
+@dataclass(frozen=True)
+class Medium:
+    """Layers from the surface down, and the refractive indices above and below them.
+
+    Only the last layer may be infinitely thick; then there is no below, and n_below is not used.
+    """
+
+    layers: tuple[Layer, ...]
+    n_above: float = 1.0
+    n_below: float = 1.0
+
+    def __post_init__(self) -> None:
+        layers = tuple(self.layers) if isinstance(self.layers, (list, tuple)) else (self.layers,)
+        object.__setattr__(self, "layers", layers)
+        for layer in layers:
+            if not isinstance(layer, Layer):
+                raise InputError(f"layers must be Layer objects, got {shown(layer)}")
+        if not 1 <= len(layers) <= MAX_LAYERS:
+            raise InputError(f"a medium must have 1 to {MAX_LAYERS} layers, got {len(layers)}")
+        _require_index("n_above", self.n_above)
+        _require_index("n_below", self.n_below)
+        for number, layer in enumerate(layers[:-1], start=1):
+            if math.isinf(layer.thickness):
+                raise InputError(f"thickness may be infinite in the last layer only, got it in layer {number}")
+        if self.is_half_space and not layers[-1].mu_t:
+            raise InputError("an infinitely thick layer must scatter or absorb, got mu_a = mu_s = 0")
+
+    @property
+    def is_half_space(self) -> bool:
+        """True if light cannot come out below."""
+        return math.isinf(self.layers[-1].thickness)
+
+    @property
+    def is_matched_isotropic_half_space(self) -> bool:
+        """True if the medium is one infinite layer that neither refracts at its surface nor prefers a direction."""
+        (first, *others) = self.layers
+        return not others and self.is_half_space and first.g == 0 and first.n == self.n_above and first.mu_t > 0
+
+    @property
+    def z_edges(self) -> NDArray[np.float64]:
+        """Depths of the interfaces [length], (layers + 1,); the last may be infinite."""
+        return np.concatenate([[0.0], np.cumsum([layer.thickness for layer in self.layers])])
+
+
+def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -> Medium:
+    """One infinite layer under air.
+
+    alpha  single-scattering albedo mu_s / (mu_a + mu_s) [-], 0 ... 1
+    mfp    mean free path 1 / (mu_a + mu_s) [length]: of the light itself, not the reduced one where g != 0
+    n      refractive index [-]
+    g      mean cosine of the scattering angle [-]
+    """
+    if not (is_number(alpha) and 0 <= alpha <= 1):
+        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {shown(alpha)}")
+    if not (is_number(mfp) and math.isfinite(mfp) and mfp > 0):
+        raise InputError(f"mfp must be a mean free path > 0, got {shown(mfp)}")
+    return Medium((Layer(n=n, mu_a=(1 - alpha) / mfp, mu_s=alpha / mfp, g=g),))
+
+
+def _require_index(name: str, value: object) -> None:
+    if not (is_number(value) and math.isfinite(value) and value > 0):
+        raise InputError(f"{name} must be a refractive index > 0, got {shown(value)}")

@@ -1,0 +1,43 @@
+"""Which light falls on which surface: a half-space profile means nothing without it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mcml_sim.errors import InputError
+from mcml_sim.media.checks import is_number, shown
+
+ILLUMINATIONS = ("searchlight", "diffuse")
+
+
+@dataclass(frozen=True)
+class Setting:
+    """The light and the surface that a half-space profile belongs to.
+
+    illumination  "searchlight", a normally incident pencil beam (MCML's), or "diffuse", cosine-weighted light
+    n             refractive index of the half space over that outside [-], > 0
+    g             mean cosine of the scattering angle [-], -1 < g < 1
+
+    Profiles, laws and records of different settings never mix.
+    """
+
+    illumination: str = "searchlight"
+    n: float = 1.0
+    g: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.illumination not in ILLUMINATIONS:
+            raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(self.illumination)}")
+        if not (is_number(self.n) and math.isfinite(self.n) and self.n > 0):
+            raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
+        if not (is_number(self.g) and -1 < self.g < 1):
+            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
+
+    @property
+    def is_matched_isotropic(self) -> bool:
+        """True where the surface does not refract and scattering has no preferred direction."""
+        return self.n == 1.0 and self.g == 0.0
+
+    def __str__(self) -> str:
+        return f"{self.illumination}, n = {self.n:g}, g = {self.g:g}"

@@ -1,0 +1,1 @@
+"""What a run found, with errors, and the files that hold it."""

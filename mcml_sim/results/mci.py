@@ -1,0 +1,238 @@
+"""MCML's input files: a .mci names runs, each with an output file, photons, bins and layers. Lengths in cm.
+
+The format is that of MCML V1 (Wang, Jacques & Zheng 1995, and the function ReadParm of its mcmlio.c): a version, the
+number of runs, and for each run
+
+    NAME.mco A              output file, and A or B
+    1000000                 photons
+    0.01 0.01               dz dr
+    40 50 1                 nz nr na
+    3                       layers
+    1.0                     n above
+    1.37 1 100 0.9 0.1      n mu_a mu_s g thickness, a line for each layer
+    1.0                     n below
+
+A # starts a comment, blank lines may stand anywhere, and words after the values of a line are not read, as in V1; nor
+is what follows the last run. Comments may have any bytes. Unlike V1, a number too many is an error, since it tells of
+a line too many, and so is a word that is not quite a number, of which V1 reads what it can: 1 photon of 1e6. V1 wrote
+text for B as for A, so B is read and makes no difference. Beyond V1, g may be negative, and the last thickness may be
+`inf`; the 1E8 that V1's users write for that stays a length.
+"""
+
+from __future__ import annotations
+
+import io
+import itertools
+import os
+import posixpath
+import re
+from dataclasses import dataclass
+
+from mcml_sim.errors import InputError
+from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.checks import MAX_PHOTONS
+from mcml_sim.media.grid import MAX_BINS, MAX_CELLS, Grid
+from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
+
+# Bounds of a file and of what it asks for: far beyond any use, near enough that a slip of the pen fails at once and
+# not after hours or gigabytes.
+MAX_BYTES = 2**21
+MAX_LINES = 2**20
+MAX_RUNS = 10_000
+MAX_NAME = 255  # characters; what V1 and most file systems hold
+LENGTHS = (1e-12, 1e12)  # [cm]
+COEFFICIENTS = (1e-12, 1e12)  # [1/cm]; or 0
+INDICES = (0.01, 100.0)
+
+WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
+DECIMAL = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
+INFINITE = re.compile(r"\+?inf(inity)?", re.IGNORECASE)
+FORMAT = re.compile(r"[ab][^.]*", re.IGNORECASE)
+# What bytes that are no UTF-8 become; in comments they may stand.
+STRAY = re.compile(r"[\udc80-\udcff]")
+# What V1 drops from a line: control characters that are no white space (old DOS files end in one).
+CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
+LONGEST_SHOWN = 40  # characters of a word in a message
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a .mci file. Lengths in cm."""
+
+    output: str
+    """Name of the output file, as it stands in the input."""
+    format: str
+    """"A" or "B", as it stands in the input; the output is text in both cases, as V1's is."""
+    photons: int
+    dz: float
+    """Width of the depth bins [cm]."""
+    dr: float
+    """Width of the rings [cm]."""
+    nz: int
+    nr: int
+    na: int
+    """Numbers of depths, rings and exit angles."""
+    medium: Medium
+
+    @property
+    def grid(self) -> Grid:
+        """The bins, in cm. Made when asked for: thousands of runs with fine grids would fill the memory."""
+        return Grid(self.dr, self.nr, self.dz, self.nz, na=self.na)
+
+
+def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
+    """The runs of a V1 .mci file, in their order. Lengths in cm, coefficients in 1/cm.
+
+    InputError in one line, `FILE:LINE: expected ..., got ...`, for everything that is not such a file, and for runs
+    beyond the bounds above: 1e13 photons, 65536 bins an axis, 2^21 cells a table, 1000 layers, 10000 runs, 2 MiB.
+    """
+    return parse_mci(read_whole(path, MAX_BYTES), str(path))
+
+
+def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
+    """What `read_mci` gives for a file of this name and content."""
+    lines = Lines(name, _checked(name, content))
+    (version,) = lines.take(1, "the file version, 1.0")
+    if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
+        raise lines.error("the file version, 1.0", _shown(version))
+    (word,) = lines.take(1, "the number of runs")
+    taken: set[str] = set()
+    return tuple(read_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
+
+
+class Lines:
+    """The data lines of a file, one after the other, and where they stand."""
+
+    def __init__(self, name: str, content: bytes) -> None:
+        self._name = name
+        # Not splitlines(): it breaks lines where no editor does, and their numbers would be off. One after the other,
+        # since a list of empty lines takes eight times their bytes. A mark that some editors put first is no text.
+        self._lines = io.TextIOWrapper(io.BytesIO(content + b"\n"), "utf-8-sig", errors="surrogateescape")
+        self._number = 0
+
+    def take(self, count: int, expected: str, optional: int = 0) -> list[str]:
+        """The first `count` words of the next line that has any, and up to `optional` more; no number may follow."""
+        for line in self._lines:
+            self._number += 1
+            if self._number > MAX_LINES:
+                raise self.error(expected, f"more than {MAX_LINES} lines before it")
+            wanted = count + optional
+            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=wanted + 1)
+            if len(words) > wanted and _is_number(words[wanted]):
+                raise self.error(f"{expected} alone", f"{wanted + _numbers(words[wanted:])} values")
+            if len(words) >= count:
+                return [self._text(word) for word in words[:wanted]]
+            if words:
+                raise self.error(f"{count} values, {expected}", f"{len(words)}: {_shown(' '.join(words))}")
+        raise self.error(expected, "the end of the file")
+
+    def _text(self, word: str) -> str:
+        if stray := STRAY.search(word):
+            raise self.error("text in UTF-8", f"the byte {ord(stray[0]) - 0xDC00:#04x}")
+        return word
+
+    def error(self, expected: str, got: str) -> InputError:
+        """What to raise about the line that was read last."""
+        return InputError(f"{self._name}:{self._number}: expected {expected}, got {got}")
+
+    def whole(self, name: str, word: str, most: int) -> int:
+        """A whole number from 1 to `most`."""
+        if WHOLE.fullmatch(word) and 1 <= int(word) <= most:
+            return int(word)
+        raise self.error(f"{name}, a whole number from 1 to {most}", _shown(word))
+
+    def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
+        """A number within bounds, both included."""
+        if DECIMAL.fullmatch(word) and bounds[0] <= float(word) <= bounds[1]:
+            return float(word) + 0.0  # no -0
+        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", _shown(word))
+
+    def coefficient(self, name: str, word: str) -> float:
+        """A coefficient, which may be 0, but not so little that no float32 holds the mean free path."""
+        if DECIMAL.fullmatch(word) and float(word) == 0:
+            return 0.0
+        return self.decimal(name, word, COEFFICIENTS, or_else="0 or ")
+
+
+def read_run(lines: Lines, taken: set[str]) -> Run:
+    """The run that the next lines are of; `taken` are the output files of those before it."""
+    output, form = _output(lines, taken)
+    (word,) = lines.take(1, "the number of photons")
+    photons = lines.whole("the number of photons", word, MAX_PHOTONS)
+    words = lines.take(2, "dz and dr")
+    dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words, strict=True))
+    words = lines.take(3, "nz, nr and na")
+    axes = zip(("nz", "nr", "na"), words, strict=True)
+    nz, nr, na = (lines.whole(f"{name}, a number of bins", word, MAX_BINS) for name, word in axes)
+    for name, cells in (("nr nz", nr * nz), ("nr na", nr * na)):
+        if cells > MAX_CELLS:
+            raise lines.error(f"{name}, the cells of a table, to be at most {MAX_CELLS}", str(cells))
+    return Run(output, form, photons, dz, dr, nz, nr, na, _medium(lines))
+
+
+def _output(lines: Lines, taken: set[str]) -> tuple[str, str]:
+    """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
+    name, *form = lines.take(1, "the name of an output file, and A or B", optional=1)
+    if len(name) > MAX_NAME or not name.isprintable():
+        raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", _shown(name))
+    if form and not FORMAT.fullmatch(form[0]):
+        raise lines.error("A or B after the name (a name holds no spaces)", _shown(form[0]))
+    same = posixpath.normpath(name)
+    if same in taken:
+        raise lines.error("an output file that no other run has", _shown(name))
+    taken.add(same)
+    return name, "B" if form and form[0][0] in "bB" else "A"
+
+
+def _medium(lines: Lines) -> Medium:
+    (word,) = lines.take(1, "the number of layers")
+    number = lines.whole("the number of layers", word, MAX_LAYERS)
+    n_above = _index(lines, "n above the layers")
+    layers = tuple(_layer(lines, at, number) for at in range(1, number + 1))
+    return Medium(layers, n_above, _index(lines, "n below the layers"))
+
+
+def _index(lines: Lines, name: str) -> float:
+    (word,) = lines.take(1, name)
+    return lines.decimal(name, word, INDICES)
+
+
+def _layer(lines: Lines, at: int, number: int) -> Layer:
+    of = f"of layer {at} of {number}"
+    n, mu_a, mu_s, g, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
+    values = {
+        "n": lines.decimal(f"n {of}", n, INDICES),
+        "mu_a": lines.coefficient(f"mu_a {of} in 1/cm", mu_a),
+        "mu_s": lines.coefficient(f"mu_s {of} in 1/cm", mu_s),
+        "g": lines.decimal(f"g {of}", g, (-1.0, 1.0)),
+    }
+    if abs(values["g"]) == 1 and (values["mu_s"] > 0 or values["g"] < 0):
+        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", _shown(g))
+    if at == number and INFINITE.fullmatch(thickness):
+        if values["mu_a"] == values["mu_s"] == 0:
+            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{_shown(mu_a)} and {_shown(mu_s)}")
+        return Layer(**values)
+    return Layer(**values, thickness=lines.decimal(f"thickness {of} in cm", thickness, LENGTHS))
+
+
+def _checked(name: str, content: bytes) -> bytes:
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{name}: expected a .mci file of at most {MAX_BYTES} bytes, got a longer one")
+    before, null, _ = content.partition(b"\x00")
+    if null:
+        line = before.replace(b"\r\n", b"\n").replace(b"\r", b"\n").count(b"\n") + 1
+        raise InputError(f"{name}:{line}: expected text in UTF-8, got the byte 0x00")
+    return content
+
+
+def _is_number(word: str) -> bool:
+    return bool(DECIMAL.fullmatch(word) or INFINITE.fullmatch(word))
+
+
+def _numbers(words: list[str]) -> int:
+    """How many numbers there are before the first other word."""
+    return sum(1 for _ in itertools.takewhile(_is_number, " ".join(words).split()))
+
+
+def _shown(word: str) -> str:
+    return repr(word if len(word) <= LONGEST_SHOWN else f"{word[: LONGEST_SHOWN - 3]}...")

@@ -1,0 +1,277 @@
+"""MCML's output files: written as MCML 1.2.2 does, and read back as far as a reflectance profile needs."""
+
+from __future__ import annotations
+
+import math
+import os
+import reprlib
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.errors import InputError
+from mcml_sim.files.version import __version__
+from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
+from mcml_sim.media.grid import Grid
+from mcml_sim.results.mci import DECIMAL, Lines, Run, read_run
+from mcml_sim.results.tally import Tally
+
+Floats = NDArray[np.float64]
+Name = str | os.PathLike[str]
+
+ENDLESS = 1e8  # the thickness that V1's users write for infinite [cm]
+EVEN = 1e-9  # relative error of edges that are even but for rounding
+NUMBERS_A_LINE = 5
+
+HEAD = (
+    "A1 \t# Version number of the file format.\n\n"
+    "####\n"
+    "# Data categories include: \n"
+    "# InParm, RAT, \n"
+    "# A_l, A_z, Rd_r, Rd_a, Tt_r, Tt_a, \n"
+    "# A_rz, Rd_ra, Tt_ra \n"
+    "####\n\n"
+)
+
+
+def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
+    """Write what `simulate` found as a V1 .mco file, whole or not at all. Lengths of the tally must be in cm.
+
+    The grid must have even rings and depths, as an .mco has; where it does not resolve angles, there is one bin of
+    them. An infinite thickness becomes 1E+08 cm. Two arguments in the other order are taken as well. InputError on
+    anything else; OutputError if the file cannot be written.
+    """
+    found, name = (path, tally) if isinstance(path, Tally) else (tally, path)
+    if not isinstance(found, Tally):
+        raise InputError(f"tally must be what simulate gave, got {reprlib.repr(found)}")
+    file = checked_path(name)
+    write_whole(file, mco_text(found, file.name))
+
+
+def mco_text(tally: Tally, name: str) -> str:
+    """What `write_mco` writes into a file of that name."""
+    return "".join(_sections(tally, name))
+
+
+def made_by(seed: int) -> str:
+    """The line of an .mco that stands where V1 reports its time, which would make equal runs differ."""
+    return f"# Made by mcml-sim {__version__}, seed {seed}.\n"
+
+
+@dataclass(frozen=True)
+class _Bins:
+    """Even bins, as an .mco has them [cm, rad], and V1's measures of them."""
+
+    dz: float
+    dr: float
+    nz: int
+    nr: int
+    na: int
+
+    @classmethod
+    def of(cls, grid: Grid) -> _Bins:
+        if grid.z_edges is None:
+            raise InputError(f"grid must resolve depths for an .mco, give it dz and nz, got {grid!r}")
+        widths = (_even_width("depths", grid.z_edges), _even_width("rings", grid.r_edges))
+        return cls(*widths, nz=grid.depths, nr=grid.rings, na=max(grid.angles, 1))
+
+    @property
+    def da(self) -> float:
+        return math.pi / 2 / self.na
+
+    @property
+    def areas(self) -> Floats:
+        """Of the rings [cm^2], (nr,)."""
+        return np.asarray(2 * math.pi * (np.arange(self.nr) + 0.5) * self.dr**2, np.float64)
+
+    @property
+    def solid_angles(self) -> Floats:
+        """V1's, width times middle [sr], (na,)."""
+        return 2 * math.pi * np.sin((np.arange(self.na) + 0.5) * self.da) * self.da
+
+    @property
+    def projected_solid_angles(self) -> Floats:
+        """Exact solid angles times the cosine of their middles [sr], (na,)."""
+        return 2 * math.pi * np.sin(2 * (np.arange(self.na) + 0.5) * self.da) * math.sin(self.da / 2)
+
+
+def _sections(tally: Tally, name: str) -> Iterator[str]:
+    bins = _Bins.of(tally.grid)
+    specular = float(tally.specular_reflectance)
+    share = (1 - specular) / tally.deposits.started
+    reflected = share * _folded(tally.deposits.reflected, 0)
+    transmitted = share * _folded(tally.deposits.transmitted, 0)
+    transmitted[0, 0] += share * float(tally.deposits.ballistic)
+    absorbed = share * _folded(_folded(tally.deposits.absorbed_rz, 0), 1)
+    layers = share * tally.deposits.absorbed
+    yield HEAD
+    yield f"{made_by(tally.seed)}\n"
+    yield _parameters(tally, bins, name)
+    yield _totals(specular, reflected.sum(), layers[-1], transmitted.sum())
+    yield _column("A_l #Absorption as a function of layer. [-]", layers[:-1], "%12.4G\n")
+    yield _column("A_z #A[0], [1],..A[nz-1]. [1/cm]", share * _folded(tally.deposits.absorbed_z, 0) / bins.dz)
+    yield _column("Rd_r #Rd[0], [1],..Rd[nr-1]. [1/cm2]", reflected.sum(axis=1) / bins.areas)
+    yield _column("Rd_a #Rd[0], [1],..Rd[na-1]. [sr-1]", reflected.sum(axis=0) / bins.solid_angles)
+    yield _column("Tt_r #Tt[0], [1],..Tt[nr-1]. [1/cm2]", transmitted.sum(axis=1) / bins.areas)
+    yield _column("Tt_a #Tt[0], [1],..Tt[na-1]. [sr-1]", transmitted.sum(axis=0) / bins.solid_angles)
+    exits = bins.areas[:, None] * bins.projected_solid_angles
+    yield _table("A_rz", "A[r][z]. [1/cm3]", "nz", absorbed / (bins.areas[:, None] * bins.dz))
+    yield _table("Rd_ra", "Rd[r][angle]. [1/(cm2sr)].", "na", reflected / exits)
+    yield _table("Tt_ra", "Tt[r][angle]. [1/(cm2sr)].", "na", transmitted / exits)
+
+
+def _parameters(tally: Tally, bins: _Bins, name: str) -> str:
+    layers = "".join(
+        "\t".join(map(_number, (one.n, one.mu_a, one.mu_s, one.g, _finite(one.thickness)))) + f"\t# layer {at}\n"
+        for at, one in enumerate(tally.medium.layers, start=1)
+    )
+    word = "".join(letter if letter.isprintable() and letter not in " #" else "_" for letter in name)
+    return (
+        "InParm \t\t\t# Input parameters. cm is used.\n"
+        f"{word} \tA\t\t# output file name, ASCII.\n"
+        f"{tally.photons} \t\t\t# No. of photons\n"
+        f"{_number(bins.dz)}\t{_number(bins.dr)}\t\t# dz, dr [cm]\n"
+        f"{bins.nz}\t{bins.nr}\t{bins.na}\t# No. of dz, dr, da.\n\n"
+        f"{len(tally.medium.layers)}\t\t\t\t\t# Number of layers\n"
+        "#n\tmua\tmus\tg\td\t# One line for each layer\n"
+        f"{_number(tally.medium.n_above)}\t\t\t\t\t# n for medium above\n"
+        f"{layers}"
+        f"{_number(tally.medium.n_below)}\t\t\t\t\t# n for medium below\n\n"
+    )
+
+
+def _totals(specular: float, reflected: float, absorbed: float, transmitted: float) -> str:
+    return (
+        "RAT #Reflectance, absorption, transmission. \n"
+        f"{specular:<14.6G} \t#Specular reflectance [-]\n"
+        f"{reflected:<14.6G} \t#Diffuse reflectance [-]\n"
+        f"{absorbed:<14.6G} \t#Absorbed fraction [-]\n"
+        f"{transmitted:<14.6G} \t#Transmittance [-]\n\n"
+    )
+
+
+def _column(title: str, values: Floats, form: str = "%12.4E\n") -> str:
+    return f"{title}\n{form * len(values) % tuple(values.tolist())}\n"
+
+
+def _table(key: str, title: str, last: str, values: Floats) -> str:
+    what = title.partition("[")[0]
+    lines = (
+        f"# {title}",
+        f"# {what}[0][0], [0][1],..[0][{last}-1]",
+        f"# {what}[1][0], [1][1],..[1][{last}-1]",
+        "# ...",
+        f"# {what}[nr-1][0], [nr-1][1],..[nr-1][{last}-1]",
+        key,
+    )
+    rows, rest = divmod(values.size, NUMBERS_A_LINE)
+    form = ("%12.4E " * NUMBERS_A_LINE + "\n") * rows + "%12.4E " * rest
+    return "\n".join(lines) + "\n" + form % tuple(values.ravel().tolist()) + "\n"
+
+
+def _folded(weights: Floats, axis: int) -> Floats:
+    """The last bin along an axis, an overflow, added to the one before it."""
+    last = weights.shape[axis] - 1
+    folded = np.delete(weights, last, axis)
+    index = [slice(None)] * weights.ndim
+    index[axis] = slice(last - 1, last)
+    folded[tuple(index)] += np.take(weights, [last], axis)
+    return folded
+
+
+def _even_width(name: str, edges: Floats) -> float:
+    """Width of the bins; InputError if they differ by more than rounding."""
+    width = float(edges[1])
+    widths = np.diff(edges)
+    if not np.allclose(edges, width * np.arange(len(edges)), rtol=EVEN, atol=0):
+        raise InputError(
+            f"grid must have {name} of equal width for an .mco, got widths from {widths.min():g} to {widths.max():g}"
+        )
+    return width
+
+
+def _finite(thickness: float) -> float:
+    return ENDLESS if math.isinf(thickness) else thickness
+
+
+def _number(value: float) -> str:
+    """As V1 prints it, six digits, unless the number has more."""
+    short = f"{value:.6G}"
+    return short if float(short) == value else repr(float(value))
+
+
+MAX_BYTES = 2**27  # tables of 2^21 cells take 30 MB each
+HEAD_BYTES = 2**16  # hold what comes before the parameters
+LARGEST = 1e30  # of a printed number
+
+
+@dataclass(frozen=True, eq=False)
+class Output:
+    """What an .mco says of a run and of the light that it reflected. Lengths in cm.
+
+    run                   parameters: photons, bins, medium
+    specular_reflectance  light that never entered [-]
+    diffuse_reflectance   light that entered and left through the top [-]
+    reflectance_r         (nr,) Rd_r, averages over the rings [1/cm^2]; the last one holds all light beyond it too
+    """
+
+    run: Run
+    specular_reflectance: float
+    diffuse_reflectance: float
+    reflectance_r: Floats
+
+
+def read_mco(path: str | os.PathLike[str]) -> Output:
+    """Parameters, totals and Rd_r of a V1 .mco file. InputError in one line, `FILE:LINE: expected ..., got ...`."""
+    return parse_mco(read_whole(path, MAX_BYTES), str(path))
+
+
+def parse_mco(content: bytes, name: str) -> Output:
+    """What `read_mco` gives for a file of this name and content."""
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
+    lines = Lines(name, content.replace(b"\x00", b"\xff"))
+    _beginning(lines)
+    run = read_run(lines, set())
+    _keyword(lines, "RAT")
+    specular, diffuse, _, _ = _read_column(lines, "RAT", 4)
+    for key, size in (("A_l", len(run.medium.layers)), ("A_z", run.nz)):
+        _keyword(lines, key)
+        _read_column(lines, key, size)
+    _keyword(lines, "Rd_r")
+    return Output(run, specular, diffuse, np.array(_read_column(lines, "Rd_r", run.nr)))
+
+
+def begins_mco(path: str | os.PathLike[str]) -> bool:
+    """Whether a file begins as an .mco does, down to its parameters."""
+    try:
+        _beginning(Lines(str(path), read_whole(path, HEAD_BYTES)))
+    except InputError:
+        return False
+    return True
+
+
+def _beginning(lines: Lines) -> None:
+    (version,) = lines.take(1, "the file version, A1")
+    if version != "A1":
+        raise lines.error("the file version, A1", repr(version[:8]))
+    _keyword(lines, "InParm")
+
+
+def _keyword(lines: Lines, key: str) -> None:
+    (word,) = lines.take(1, f"the section {key}")
+    if word != key:
+        raise lines.error(f"the section {key}", repr(word[:20]))
+
+
+def _read_column(lines: Lines, key: str, size: int) -> list[float]:
+    numbers = []
+    for at in range(size):
+        what = f"number {at + 1} of {size} of {key}"
+        (word,) = lines.take(1, what)
+        if not DECIMAL.fullmatch(word):
+            raise lines.error(what, repr(word[:20]))
+        numbers.append(lines.decimal(what, word, (0.0, LARGEST)))
+    return numbers

@@ -1,0 +1,159 @@
+"""The order-resolved run: one simulation without absorption answers for every albedo, and for its derivative."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.errors import InputError
+from mcml_sim.exact import single_scattering
+from mcml_sim.media.checks import (
+    checked_numbers,
+    checked_whole,
+)
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.setting import Setting
+from mcml_sim.results import estimate
+from mcml_sim.results.estimate import Estimate
+from mcml_sim.tracing import order_bins
+from mcml_sim.tracing.counts import Counts, Ledger
+from mcml_sim.tracing.isotropic_event import MAX_ORDER, roulette_weight
+
+Floats = NDArray[np.float64]
+
+SEARCHLIGHT = Setting()
+
+
+@dataclass(frozen=True, eq=False)
+class Orders:
+    """Photons of a white half space by ring and number of scatterings; lengths in mean free paths [mfp].
+
+    Every method takes the single-scattering albedo `alpha` in [0, 1], a number or an array, InputError otherwise;
+    estimates have the shape of alpha, then that of the rings. All albedos come from the same photons, so their
+    errors are strongly correlated: `covariance_factor` says how. What was scattered once is known exactly and not
+    taken from the photons (`once`), so standard errors and effective samples are those of the rest. Photons with more
+    than 8192 scatterings are cut: `cut` bounds what that takes from the reflectance.
+    """
+
+    grid: Grid
+    photons: int
+    seed: int
+    setting: Setting
+    counts: Counts
+    """The whole-numbered result from which all estimates come."""
+
+    def reflectance(self, alpha: ArrayLike) -> Estimate:
+        """Total diffuse reflectance A [-], beyond the last ring included."""
+        return self._of_row(self.counts.exits.sum(axis=0), self._shares.sum(), alpha)
+
+    def energy(self, alpha: ArrayLike) -> Estimate:
+        """Integral of 2 pi r R_d over each ring [-]."""
+        return self._estimate(self.ring_order_counts, self._shares[:-1], alpha)
+
+    def overflow(self, alpha: ArrayLike) -> Estimate:
+        """Reflectance beyond the last ring [-]."""
+        return self._of_row(self.counts.exits[-1], self._shares[-1], alpha)
+
+    def profile(self, alpha: ArrayLike) -> Estimate:
+        """Mean of R_d over the area of each ring [1/mfp^2]: not its value at the middle, R_d rises as 1/r to r = 0."""
+        return self.energy(alpha).scaled(1 / self.grid.r_areas)
+
+    def profile_derivative(self, alpha: ArrayLike) -> Estimate:
+        """d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
+        albedo = _checked_alpha(alpha)
+        weights, ones = order_bins.weight_derivatives(albedo), np.ones_like(albedo)
+        slope = self._from_weights(self.ring_order_counts, weights, np.multiply.outer(ones, self._shares[:-1]))
+        return slope.scaled(1 / self.grid.r_areas)
+
+    def once(self, alpha: ArrayLike) -> Floats:
+        """Light scattered exactly once, by ring, the last beyond the last ring [-]: part of `energy`, without error."""
+        return np.multiply.outer(_checked_alpha(alpha), self._shares)
+
+    def covariance_factor(self, alpha: ArrayLike, rank: int = 8, overflow: bool = False) -> tuple[Floats, float]:
+        """Covariance of `energy` between albedos, ring by ring, in closed form.
+
+        alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
+        of any one variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
+        condition number 1e16), so a small rank holds all there is. Between rings i != j the covariance is
+        -E_i E_j / (N - 1), E without `once`, which no factor holds: next to nothing when there are many rings. With
+        `overflow` a last row stands for the light beyond the last ring.
+        """
+        albedos = np.atleast_1d(_checked_alpha(alpha))
+        if albedos.ndim != 1:
+            raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
+        limit = checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
+        counts = self.counts.exits if overflow else self.ring_order_counts
+        return estimate.covariance_factor(counts[:, 1:], self.weights(albedos)[:, 1:], self.photons, limit)
+
+    def merged(self, r_edges: ArrayLike) -> Orders:
+        """The same photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
+        grid = Grid.from_edges(r=r_edges)
+        index = np.searchsorted(self.grid.r_edges, grid.r_edges)
+        if index[-1] >= self.grid.r_edges.size or np.any(self.grid.r_edges[index] != grid.r_edges):
+            raise InputError(f"r_edges must be edges of the run's own grid, got {grid.rings} rings that are not")
+        exits = np.add.reduceat(self.counts.exits, index, axis=0)  # the last piece gathers all beyond the last edge
+        return replace(self, grid=grid, counts=replace(self.counts, exits=exits))
+
+    def cut(self, alpha: ArrayLike) -> float | Floats:
+        """Upper bound on the reflectance that ending photons at the highest order took away [-]."""
+        lost = self.entered * float(roulette_weight(MAX_ORDER)) * self.counts.cut / self.photons
+        return _scalar_or_array(lost * _checked_alpha(alpha) ** MAX_ORDER)
+
+    @property
+    def ledger(self) -> Ledger:
+        """What became of every photon started."""
+        return self.counts.ledger
+
+    @property
+    def ring_order_counts(self) -> NDArray[np.int64]:
+        """Photons by ring and bin of order, without the overflow, int64 (rings, bins)."""
+        return self.counts.exits[:-1]
+
+    @property
+    def orders(self) -> Floats:
+        """Representative order of each bin [-], float64 (bins,)."""
+        return order_bins.MEAN_ORDERS
+
+    def weights(self, alpha: ArrayLike) -> Floats:
+        """What one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
+        return self.entered * order_bins.weights(_checked_alpha(alpha))
+
+    @property
+    def entered(self) -> float:
+        """Share of the light that the surface lets in [-]; the photons counted are of that."""
+        return single_scattering.entered(self.setting)
+
+    @cached_property
+    def _shares(self) -> Floats:
+        """`once` at alpha = 1, (rings + 1,)."""
+        return self.entered * single_scattering.ring_shares(self.grid.r_edges, self.setting)
+
+    def _estimate(self, counts: NDArray[np.int64], shares: Floats, alpha: ArrayLike) -> Estimate:
+        albedo = _checked_alpha(alpha)
+        return self._from_weights(counts, order_bins.weights(albedo), np.multiply.outer(albedo, shares))
+
+    def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
+        """Estimate from `exact`, the light scattered once, and the counted photons that were scattered again."""
+        again = estimate.estimate(counts[:, 1:], self.entered * weights[..., 1:], self.photons)
+        return replace(again, value=again.value + exact)
+
+    def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
+        """Estimate from one row of counts, in the shape of alpha."""
+        rows = self._estimate(counts[None, :], np.array([share]), alpha)
+        parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
+        return Estimate(*map(_scalar_or_array, parts))
+
+
+def _checked_alpha(alpha: ArrayLike) -> Floats:
+    albedos = checked_numbers("alpha", alpha, "a single-scattering albedo in [0, 1]")
+    outside = ~((albedos >= 0) & (albedos <= 1))
+    if np.any(outside):
+        raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {albedos[outside].flat[0]:g}")
+    return albedos
+
+
+def _scalar_or_array(values: Floats) -> float | Floats:
+    return values if np.ndim(values) else float(values)

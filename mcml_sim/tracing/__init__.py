@@ -1,0 +1,1 @@
+"""Photons: random numbers, pools of lanes, one event, one batch, and what it counts."""

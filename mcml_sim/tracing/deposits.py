@@ -1,0 +1,82 @@
+"""Where the weight of photons went: the sums of one or more batches, which add."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, fields
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.media.grid import Grid
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Deposits:
+    """Weight of photons that entered with weight 1 each, in float64.
+
+    A photon leaves at most once, so for what leaves, `..._squares` (the sum of squared weights) gives variances of a
+    bin and of any union of bins. It is absorbed at many places, so there the variance comes from the spread between
+    groups of photons: `..._variance` estimates the variance of the sum beside it.
+    """
+
+    started: int
+    """Photons."""
+    reflected: Floats
+    """Weight out of the top, by ring (the last row: beyond the last ring) and angle, (rings + 1, angles or 1)."""
+    reflected_squares: Floats
+    transmitted: Floats
+    """Weight out of the bottom that was scattered, like `reflected`."""
+    transmitted_squares: Floats
+    ballistic: Floats
+    """Weight out of the bottom that was never scattered, ()."""
+    ballistic_squares: Floats
+    absorbed: Floats
+    """Weight absorbed by each layer, and by all of them together in the last entry, (layers + 1,)."""
+    absorbed_squares: Floats
+    """Squares of what one photon left in each layer, and in all."""
+    accounted: Floats
+    """Weight that left, was absorbed, or was cut, (): `started` but for roulette's luck."""
+    accounted_squares: Floats
+    cut: Floats
+    """Weight still inside at the last event allowed, ()."""
+    absorbed_rz: Floats
+    """Weight absorbed by ring and depth, overflows last, (rings + 1, depths + 1); (0, 0) if depth is not resolved."""
+    absorbed_rz_variance: Floats
+    absorbed_z: Floats
+    """The same by depth, (depths + 1,) or (0,)."""
+    absorbed_z_variance: Floats
+
+    def __add__(self, other: Deposits) -> Deposits:
+        return Deposits(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
+
+    def arrays(self) -> dict[str, NDArray]:
+        """Everything, by name, as a store keeps it."""
+        return {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
+
+    @classmethod
+    def from_arrays(cls, arrays: Mapping[str, NDArray], shapes: Mapping[str, tuple[int, ...]]) -> Deposits:
+        """What `arrays` gave; ValueError if something is missing, no sum, or has another shape than `shapes`."""
+        for name, shape in shapes.items():
+            if name not in arrays:
+                raise ValueError(f"{name} is missing")
+            if arrays[name].shape != shape:
+                raise ValueError(f"{name} has shape {arrays[name].shape}, not {shape}")
+            # A variance is infinite where one group of photons is all there is.
+            if not np.all(np.isfinite(arrays[name]) | (name.endswith("_variance") & (arrays[name] == np.inf))):
+                raise ValueError(f"{name} is no sum over photons")
+        values = {name: np.asarray(arrays[name], np.float64) for name in shapes if name != "started"}
+        return cls(started=int(arrays["started"]), **values)
+
+
+def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
+    """Shape of every field of Deposits for a grid and a number of layers."""
+    exits = (grid.rings + 1, max(grid.angles, 1))
+    rz = (grid.rings + 1, grid.depths + 1) if grid.depths else (0, 0)
+    z = (grid.depths + 1,) if grid.depths else (0,)
+    by_name = {"reflected": exits, "transmitted": exits, "ballistic": (), "absorbed": (layers + 1,), "accounted": ()}
+    moments = {name + end: shape for name, shape in by_name.items() for end in ("", "_squares")}
+    spreads = {"absorbed_rz": rz, "absorbed_rz_variance": rz, "absorbed_z": z, "absorbed_z_variance": z}
+    return {"started": (), "cut": (), **moments, **spreads}

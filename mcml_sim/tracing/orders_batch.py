@@ -1,0 +1,132 @@
+"""One numbered batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
+
+Since random words belong to (photon, event), and ends to photons, the number of lanes does not change a bit.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array, lax
+from numpy.typing import NDArray
+
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.setting import Setting
+from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
+from mcml_sim.tracing.bins import rounded_up
+from mcml_sim.tracing.counts import Counts
+from mcml_sim.tracing.isotropic_event import DOUBLINGS, MAX_ORDER, Lanes
+from mcml_sim.tracing.pool import BATCH_PHOTONS, LANES
+
+MATCHED = Setting()
+EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
+
+ROULETTED, CUT = len(order_bins.LAST_ORDERS), len(order_bins.LAST_ORDERS) + 1
+COLUMNS = CUT + 1
+
+
+class Ends(NamedTuple):
+    """How each photon of a batch ended, arrays (BATCH_PHOTONS,) by photon number."""
+
+    rho: Array
+    """Where, distance from the beam [mfp], float32."""
+    order: Array
+    """After n scatterings, int32: n out of the surface, -n inside (roulette, or cut at MAX_ORDER), 0 never started."""
+
+
+def trace_batch(
+    grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES, setting: Setting = MATCHED
+) -> Counts:
+    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64.
+
+    Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
+    kernel is the one that needs no directions.
+    """
+    key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(DOUBLINGS)
+    if setting.is_matched_isotropic:
+        ends = trace(key, number, stops, None, lanes, illumination=setting.illumination)
+    else:
+        ends = trace(key, number, stops, half_space_event.half_space(setting), lanes)
+    edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns())
+    histogram = np.asarray(_histogram(ends, edges, columns)).astype(np.int64)
+    counts = Counts(
+        exits=histogram[:, :ROULETTED],
+        rouletted=int(histogram[:, ROULETTED].sum()),
+        cut=int(histogram[:, CUT].sum()),
+        started=photons,
+    )
+    counts.require_closed()
+    return counts
+
+
+@partial(jax.jit, static_argnames=("lanes", "events", "illumination"), compiler_options=pool.COMPILER_OPTIONS)
+def trace(
+    key: Array,
+    photons: Array,
+    stops: Array,
+    where: half_space_event.HalfSpace | None = None,
+    lanes: int = LANES,
+    events: int = EVENTS_PER_TURN,
+    illumination: str = "searchlight",
+) -> Ends:
+    """The ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
+
+    `where` is the half space and its light, by default matched and isotropic under this `illumination`. `stops` as in
+    `isotropic_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
+    nothing but the speed.
+    """
+
+    def enter(photon: Array) -> Lanes | half_space_event.Lanes:
+        if where is None:
+            return isotropic_event.enter(key, photon, stops, illumination)
+        return half_space_event.enter(key, photon, stops, where)
+
+    def turn(flying: Lanes | half_space_event.Lanes, ends: Array) -> tuple[Lanes | half_space_event.Lanes, Array]:
+        if isinstance(flying, Lanes):
+            flying = isotropic_event.fly(key, flying, events)
+        elif where is not None:
+            flying = half_space_event.fly(key, flying, events, where)
+        return flying, recorded(ends, flying)
+
+    return as_ends(pool.follow(enter, turn, no_ends(), photons, lanes))
+
+
+def no_ends() -> Array:
+    """rho + i order of photons that were never started, and of nobody at last, complex64 (BATCH_PHOTONS + 1,)."""
+    return jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64)
+
+
+def as_ends(ends: Array) -> Ends:
+    """The parts of rho + i order of all photons."""
+    return Ends(ends.real[:-1], ends.imag[:-1].astype(jnp.int32))
+
+
+def recorded(ends: Array, lanes: Lanes | half_space_event.Lanes) -> Array:
+    """Write the lanes that ended to their photons' places, rho + i order.
+
+    The others write too, beyond the last photon: a branch that no processor can foresee costs more.
+    """
+    place = jnp.where(lanes.ended, lanes.photon.astype(jnp.int32), BATCH_PHOTONS)
+    order = jnp.where(lanes.stopped, -lanes.order, lanes.order)
+    return ends.at[place].set(lax.complex(lanes.place.real, order.astype(jnp.float32)), mode="promise_in_bounds")
+
+
+@jax.jit
+def _histogram(ends: Ends, edges: Array, columns: Array) -> Array:
+    """Count photons by ring (and beyond the last, in the last row) and column: int32 (rings + 1, COLUMNS)."""
+    ring = jnp.searchsorted(edges[1:], ends.rho, side="right", method="scan_unrolled").astype(jnp.int32)
+    size = len(edges) * COLUMNS
+    cell = jnp.where(ends.order == 0, size, ring * COLUMNS + columns[ends.order + MAX_ORDER])
+    return jnp.zeros(size, jnp.int32).at[cell].add(1, mode="drop").reshape(len(edges), COLUMNS)
+
+
+def _columns() -> NDArray[np.int32]:
+    """Column of the histogram for each end, at index order + MAX_ORDER."""
+    columns = np.full(2 * MAX_ORDER + 1, ROULETTED, np.int32)
+    columns[0] = CUT
+    columns[MAX_ORDER + 1 :] = order_bins.BIN_OF_ORDER
+    return columns

@@ -1,0 +1,1 @@
+"""Data and a law become constants with errors."""

@@ -1,0 +1,339 @@
+"""Model discrepancy: what a law gets wrong, as a random function of radius and albedo, and what that does to a fit.
+
+A law is not the truth: truth = law (1 + delta), delta small. Its residuals are smooth and repeat each other, so they
+are no independent noise. Here delta is a Gaussian process of mean zero over ln r and sqrt(1 - alpha) (Kennedy and
+O'Hagan, J. R. Statist. Soc. B 63, 2001), with Matern's covariance (nu = 3/2) along each:
+
+    cov(delta, delta') = sigma^2 m(|ln r - ln r'| / l_r) m(|s - s'| / l_s),   m(d) = (1 + sqrt(3) d) e^(-sqrt(3) d)
+
+Amplitude sigma and both lengths are those of greatest likelihood, the photons' noise known and the constants of the law
+free (restricted maximum likelihood: Patterson and Thompson, Biometrika 58, 1971, since a fit bends into its residuals).
+Another draw of that process would have led the fit elsewhere: the derivative of the optimum turns its covariance into
+the constants' model error, and the law that was fitted is off by what remains of delta after the fit has followed it.
+A fit to r R_d unweighted (objective "radial") lets the law go where the profile fades: there delta counts in units of
+the profile's source limit, alpha / 4 pi r, instead of the profile itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+import optimistix as optx
+from jax import Array
+from numpy.typing import NDArray
+
+from profilefit.fitting.estimate import Fit, Problem, sensitivity
+from profilefit.fitting.objectives import Rings
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.laws.liang import QUANTILES
+
+Floats = NDArray[np.float64]
+Live = NDArray[np.bool_]
+GROUPS = 20  # of rings along r: the process is smooth on that scale, and a matrix of its cube is inverted
+# Lengths between a fraction of the spacing and a few times the range: beyond either the likelihood knows no more.
+SHORTEST, LONGEST = 0.5, 3.0
+NUGGET = 1e-3  # of the amplitude's square, left to each ring alone: without it the finest scale decides on the largest
+LEFT_OUT = 1e-3  # share of a variance that the rank of the photons' covariance may leave out: noise of its own
+SEEN = 3.9  # gain in log likelihood that three parameters exceed by chance in one of twenty (chi^2 / 2)
+SHARES = 400  # nodes of an inverse cdf between which it is a straight line
+MAX_STEPS = 300
+TOLERANCE = 1e-3  # of ln amplitude and of the lengths: a hundredth of what data can tell
+FOUND, NOT_SEEN = "found", "not seen: noise alone explains the residuals"
+FAILED = f"no convergence in {MAX_STEPS} steps: amplitude and lengths are where they stopped"
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """The process that a law's residuals are a draw of.
+
+    amplitude        sigma [-], of the relative error of ring energies; amplitude_error of it
+    length_r         in ln r [-]; NaN where the fit sees no rings; length_s in sqrt(1 - alpha) [-]
+    gain             of log likelihood over noise alone; infinite where the truth has none
+    rms              of the residuals themselves [-], smaller than the amplitude: the fit has followed what it could
+    covariance       (p, p) of the constants: their model error
+    result           whether there is one, or what failed
+    u (g,), s (m,), influence (p, m, g): where delta was looked at, and d constants / d delta
+    """
+
+    amplitude: float
+    amplitude_error: float
+    length_r: float
+    length_s: float
+    gain: float
+    rms: float
+    result: str
+    covariance: Floats
+    u: Floats
+    s: Floats
+    influence: Floats
+
+    def content(self) -> dict[str, Any]:
+        """What a record says of it."""
+        return {name: getattr(self, name) for name in FACTS}
+
+    def arrays(self) -> dict[str, Floats]:
+        """What a record keeps beside it, for `read`."""
+        return {f"discrepancy_{name}": getattr(self, name) for name in KEPT}
+
+    def law_covariance(self, u: Floats, s: Floats, slope: Floats) -> Floats:
+        """Covariance (k, k) of the law that was fitted, less the truth, at points (k,) of ln r and sqrt(1 - alpha).
+
+        slope  (k, p) d law / d constants there, in what `unit` calls 1: where the fit follows delta, less is left
+        """
+        joint = self._kernel(s, self.s, self.length_s)[:, :, None] * self._kernel(u, self.u, self.length_r)[:, None, :]
+        own = self._kernel(s, s, self.length_s) * self._kernel(u, u, self.length_r)
+        followed = self.amplitude**2 * np.einsum("kp,pai,lai->kl", slope, self.influence, joint, optimize=True)
+        return self.amplitude**2 * own - followed - followed.T + slope @ self.covariance @ slope.T
+
+    def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
+        if not np.isfinite(length):  # a fit that sees no rings knows of no radius
+            return np.ones((one.size, other.size))
+        return np.asarray(_matern(np.abs(one[:, None] - other), length))
+
+
+FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
+KEPT = ("u", "s", "influence")
+
+
+def read(content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Discrepancy | None:
+    """The discrepancy of a record; None where it has none, as records before this had, or where its fit failed."""
+    facts = content.get("discrepancy")
+    if not facts or facts["amplitude"] is None or "discrepancy_u" not in arrays:
+        return None
+    values: dict[str, Any] = {name: np.nan if facts[name] is None else facts[name] for name in FACTS}
+    values |= {name: np.asarray(arrays[f"discrepancy_{name}"], float) for name in KEPT}
+    return Discrepancy(**values, covariance=np.asarray(content["covariance"]["model"], float))
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Relative residuals of a law on groups of neighbouring rings.
+
+    table      (m, g) law less data over what counts as 1 [-]; live where a group counts
+    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha)
+    slope      (m, g, p) d table / d constants; noise (g, m, k) factors of the photons' relative covariance
+    influence  (p, m, g) d constants / d delta, `delta` of all the rings of a group
+    """
+
+    table: Floats
+    live: Live
+    u: Floats
+    s: Floats
+    slope: Floats
+    noise: Floats
+    influence: Floats
+
+
+def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
+    """The process behind the residuals of `fit` to `profiles`, and the error that it leaves in the constants."""
+    size = len(fit.free)
+    if not fit.solution.converged:
+        why, none, unknown = f"no fit: {fit.result}", np.zeros(0), np.full((size, size), np.nan)
+        nan = float("nan")
+        return Discrepancy(nan, nan, nan, nan, nan, nan, why, unknown, none, none, np.zeros((size, 0, 0)))
+    return of_residuals(residuals(fit, profiles))
+
+
+def of_residuals(data: Residuals) -> Discrepancy:
+    """The process that makes these residuals likeliest."""
+    u, s, y, slope, noise = _flat(data)
+    steps_u, steps_s = _scales(data.u), _scales(data.s)
+    limits = np.log(np.stack([steps_u, steps_s]))
+    begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), 0.0, 0.0])
+    with jax.enable_x64(True):
+        arrays = tuple(map(jnp.asarray, (u, s, y, slope, noise, limits)))
+        found, curved, worth, code = _likeliest(jnp.asarray(begin), arrays)
+        found, curved, worth = np.asarray(found), np.asarray(curved), float(worth)
+    amplitude = float(np.exp(found[0]))
+    length_u, length_s = np.exp(np.asarray(_lengths(found, limits)))
+    gain = worth if np.any(noise) else np.inf
+    kernel_u, kernel_s = _kernel(data.u, length_u), _kernel(data.s, length_s)
+    across = data.influence, kernel_s, kernel_u, data.influence
+    covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
+    result = (FOUND if gain > SEEN else NOT_SEEN) if int(code) == 0 else FAILED
+    shown_u = float(length_u) if data.u.size > 1 else np.nan
+    rms = float(np.sqrt(np.mean(y**2)))
+    facts = amplitude, amplitude * _error(curved), shown_u, float(length_s), gain, rms, result
+    return Discrepancy(*facts, covariance, data.u, data.s, data.influence)
+
+
+def residuals(fit: Fit, profiles: Profiles) -> Residuals:
+    """What `discrepancy` looks at: rings from 0.01 mfp to 99.5 % of the energy that the fit used, in groups."""
+    problem, rings = Problem(fit.objective, fit.free), fit.rings
+    gain = sensitivity(problem, fit.solution, fit.law, rings)
+    energy, slope = predicted(problem, fit.law, rings)
+    albedos = np.asarray(rings.weight)[:, None] > 0
+    if fit.objective in ("albedo", "reflectance"):
+        return _one_ring(profiles, energy, slope, gain, albedos)
+    data, counted = profiles.energy, albedos & (np.asarray(rings.used) > 0)
+    judged = counted & (data > 0) & (profiles.cdf[:, 1:] <= ENERGY_WITHIN)
+    judged &= profiles.r_edges[1:] > NEAREST
+    u = np.log(np.sqrt(profiles.r_edges[1:] * np.maximum(profiles.r_edges[:-1], 0.25 * profiles.r_edges[1:])))
+    group = _groups(u, np.any(judged, axis=0))
+    member = (group[:, None] == np.unique(group)).astype(float)  # (n, g)
+    unit = unit_energy(fit.objective, profiles.energy, profiles.alpha, profiles.r_edges)
+    own, seen, live = energy * judged @ member, data * judged @ member, (judged @ member) > 0
+    safe = np.where(live, unit * judged @ member, 1.0)
+    tilt = np.einsum("aip,ai,ig->agp", slope, judged.astype(float), member) / safe[..., None]
+    whole = np.append(member, member[-1:], axis=0)  # the light beyond the last ring goes with it
+    parts = gain * np.concatenate([unit, profiles.beyond[:, None]], axis=1)
+    middle = (u * judged.sum(axis=0)) @ member / np.maximum(judged.sum(axis=0) @ member, 1)
+    noise = _noise(profiles, judged, member, safe)
+    return Residuals(np.where(live, (own - seen) / safe, 0.0), live, middle, _s(profiles), tilt, noise, parts @ whole)
+
+
+def unit_energy(objective: str, energy: Floats, alpha: Floats, r_edges: Floats) -> Floats:
+    """What counts as 1 of delta (m, n): the ring's own `energy`, or that of the source limit of r R_d."""
+    return 0.5 * alpha[:, None] * np.diff(r_edges) if objective == "radial" else energy
+
+
+def predicted(problem: Problem, law: Any, rings: Rings) -> tuple[Floats, Floats]:
+    """Ring energies of a law as the problem's objective means them (m, n), and their derivatives (m, n, p)."""
+    with jax.enable_x64(True):
+        theta = jnp.asarray(law.vector(problem.free))
+        energy, slope = _predicted(problem, theta, jax.tree.map(jnp.asarray, law), rings)
+    return np.asarray(energy), np.asarray(slope)
+
+
+def _one_ring(profiles: Profiles, energy: Floats, slope: Floats, gain: Floats, live: Live) -> Residuals:
+    """The same for a map between alpha and A, which sees all light as one ring."""
+    total, m = profiles.reflectance[:, None], profiles.alpha.size
+    whole = (gain * np.column_stack([profiles.energy, profiles.beyond])).sum(axis=2, keepdims=True)
+    noise = np.zeros((1, m, 1))
+    if profiles.covariance is not None:
+        everything = np.ones((m, len(profiles.covariance.factor)))
+        noise = _root(profiles.covariance.sandwich(np.eye(m)[:, :, None] * everything) / (total @ total.T))[None]
+    live = live & np.isfinite(energy) & np.all(np.isfinite(slope), axis=2)  # a map may end before alpha = 1
+    table = np.where(live, energy / total - 1.0, 0.0)
+    return Residuals(table, live, np.zeros(1), _s(profiles), slope / total[..., None], noise, whole)
+
+
+def _s(profiles: Profiles) -> Floats:
+    return np.sqrt(1.0 - profiles.alpha)
+
+
+def _groups(u: Floats, judged: Live) -> NDArray[np.intp]:
+    """The group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
+    inner = u[judged]
+    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(GROUPS, inner.size) + 1)
+    group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
+    known = np.unique(group[judged])
+    return known[np.abs(group[:, None] - known).argmin(axis=1)]
+
+
+def _noise(profiles: Profiles, judged: Live, member: Floats, law: Floats) -> Floats:
+    """Factors (g, m, k) of the relative covariance of groups: rings of one group add up, photons are shared."""
+    groups = member.shape[1]
+    if profiles.covariance is None:
+        return np.zeros((groups, profiles.alpha.size, 1))
+    factor = profiles.covariance.factor[: member.shape[0]] * judged.T[:, :, None]
+    blocks = np.einsum("iak,ibk,ig->gab", factor, factor, member, optimize=True)
+    return np.stack([_root(block / np.outer(unit, unit)) for block, unit in zip(blocks, law.T, strict=True)])
+
+
+def _root(covariance: Floats) -> Floats:
+    value, vector = np.linalg.eigh(covariance)
+    return np.asarray(vector * np.sqrt(np.maximum(value, 0.0)))
+
+
+def _flat(data: Residuals):
+    """Live points in one row: u, s, residual (n,), slope (n, p) with columns of unit length, noise (n, n)."""
+    a, g = np.nonzero(data.live)
+    slope = data.slope[a, g]
+    length = np.linalg.norm(slope, axis=0)
+    noise = np.einsum("gak,gbk->gab", data.noise, data.noise)
+    full = np.where(g[:, None] == g, noise[g[:, None], a[:, None], a], 0.0)
+    full += LEFT_OUT * np.diag(np.diag(full))
+    return data.u[g], data.s[a], data.table[a, g], slope / np.where(length > 0, length, 1.0), full
+
+
+def _scales(x: Floats) -> Floats:
+    """The shortest and the longest length worth looking at."""
+    if x.size < 2:
+        return np.ones(2)
+    return np.array([SHORTEST * np.min(np.diff(np.sort(x))), LONGEST * np.ptp(x)])
+
+
+def _lengths(theta, limits):
+    """ln of both lengths, kept between their limits."""
+    return limits[:, 0] + (limits[:, 1] - limits[:, 0]) / (1.0 + jnp.exp(-theta[1:]))
+
+
+def _kernel(x: Floats, length: float) -> Floats:
+    return np.asarray(_matern(np.abs(x[:, None] - x), length))
+
+
+def _matern(distance, length):
+    scaled = np.sqrt(3.0) * distance / length
+    return (1.0 + scaled) * jnp.exp(-scaled)
+
+
+def _loss(theta: Array, args) -> Array:
+    """Minus the restricted log likelihood."""
+    u, s, y, slope, noise, limits = args
+    length_u, length_s = jnp.exp(_lengths(theta, limits))
+    kernel = _matern(jnp.abs(u[:, None] - u), length_u) * _matern(jnp.abs(s[:, None] - s), length_s)
+    return _restricted(jnp.exp(2.0 * theta[0]) * (kernel + NUGGET * jnp.eye(y.size)) + noise, y, slope)
+
+
+def _restricted(covariance: Array, y: Array, slope: Array) -> Array:
+    """Minus the log likelihood of `y` but for `slope` times anything (Patterson and Thompson's (3))."""
+    root = jnp.linalg.cholesky(covariance)
+    both = jax.scipy.linalg.solve_triangular(root, jnp.column_stack([slope, y]), lower=True)
+    white, rest = both[:, :-1], both[:, -1]
+    inner = jnp.linalg.cholesky(white.T @ white)
+    explained = jax.scipy.linalg.solve_triangular(inner, white.T @ rest, lower=True)
+    logs = jnp.sum(jnp.log(jnp.diag(root))) + jnp.sum(jnp.log(jnp.diag(inner)))
+    return logs + 0.5 * (rest @ rest - explained @ explained)
+
+
+@eqx.filter_jit
+def _likeliest(begin, args):
+    """theta, the curvature of the loss there, the gain over noise alone, and 0 if it converged."""
+    solver: Any = optx.BFGS(TOLERANCE, TOLERANCE)
+    found: Any = optx.minimise(_loss, solver, begin, args, max_steps=MAX_STEPS, throw=False)
+    noise, y, slope = args[4], args[2], args[3]
+    floor = jnp.diag(jnp.where(jnp.diag(noise) > 0, 0.0, 1.0))
+    gain = _restricted(noise + floor, y, slope) - _loss(found.value, args)
+    converged = found.result == optx.RESULTS.successful
+    return found.value, jax.hessian(_loss)(found.value, args), gain, jnp.where(converged, 0, 1)
+
+
+@eqx.filter_jit
+def _predicted(problem: Problem, theta, law, rings: Rings):
+    def energy(vector):
+        return _energy(problem.objective, law.with_vector(problem.free, vector), rings)
+
+    return energy(theta), jax.jacfwd(energy)(theta)
+
+
+def _energy(objective: str, law, rings: Rings) -> Array:
+    edges, alpha = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha)
+    if objective in ("albedo", "reflectance"):
+        return law.reflectance(alpha)[:, None]
+    if objective == "radial":
+        r = 0.5 * (edges[1:] + edges[:-1])
+        a, b, c = law.coefficients(alpha[:, None])
+        return 2.0 * jnp.pi * jnp.diff(edges) * (a * r + b) / (r + c)
+    if objective in QUANTILES:
+        xi = 1.0 - jnp.geomspace(1.0, 1e-4, SHARES)
+        radii = law.sampler.unclipped(xi, alpha[:, None])
+        inside = jax.vmap(lambda nodes: jnp.interp(edges, nodes, xi))(radii)
+        return rings.reflectance[:, None] * jnp.diff(inside, axis=-1)
+    return jnp.diff(law.unscaled_energy(edges, alpha[:, None]), axis=-1)
+
+
+def _error(curved: Floats) -> float:
+    """Standard error of ln amplitude from the curvature (3, 3) of the loss, lengths free unless it is blind to them."""
+    keep = np.diag(curved) > 1e-3
+    if not keep[0]:
+        return np.inf
+    inverse = np.linalg.pinv(curved[np.ix_(keep, keep)], hermitian=True)
+    return float(np.sqrt(max(inverse[0, 0], 0.0)))

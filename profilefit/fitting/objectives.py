@@ -1,0 +1,187 @@
+"""What a fit makes small: one function an objective, from a law and ring energies to residuals, a row an albedo.
+
+Every objective is a differentiable function of the law **and** of the ring energies, weights included, so that the
+photon noise of the energies propagates to the constants without another formula. The weighting decides the constants of
+a law that is not the truth: it belongs to the objective's name, and each record states it. None is differentiated by
+alpha, whose derivatives are infinite at alpha = 1.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from mcml_sim.errors import InputError
+from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
+from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+
+Values = Array | NDArray[np.float64]
+# A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
+EVERYWHERE = 1e9
+# An error of the cdf weighs as much as a relative error of the profile twenty times its size.
+SHARE_WEIGHT = 20.0
+NO_LIMITS = (0.0, 0.0, 0.0)
+# Near white the profile close to its source changes with 1 - alpha only, while A and kappa go with its root: two
+# albedos this near to white see the sign of the root's term, and their rise must be more than this (relative).
+WHITEST, LEAST_RISE = (1.0 - 1e-5, 1.0), 4e-5
+DARK = 1e-12  # energy of a ring that holds none
+
+
+class Rings(eqx.Module):
+    """The part of `Profiles` that residuals read, as one pytree.
+
+    alpha (m,); r_edges (n + 1,) [mfp]; energy (m, n) [-]; beyond (m,) [-]; used (m, n) 1 where a ring counts, else 0
+    weight (m,) 1 where an albedo counts, else 0; limits (3,) weights of the energy limit, of the source limit
+    and of rising with alpha
+    xi (k,) shares of energy for quantiles
+    """
+
+    alpha: Values
+    r_edges: Values
+    energy: Values
+    beyond: Values
+    used: Values
+    weight: Values
+    limits: Values
+    xi: Values
+
+    @property
+    def reflectance(self) -> Array:
+        """A (m,) [-]."""
+        return self.energy.sum(axis=-1) + self.beyond
+
+    @property
+    def cdf(self) -> Array:
+        """(m, n + 1) share of energy within each edge."""
+        inside = jnp.cumsum(self.energy, axis=-1)
+        return jnp.concatenate([jnp.zeros_like(inside[:, :1]), inside], axis=-1) / self.reflectance[:, None]
+
+
+def energy(law, rings: Rings) -> Array:
+    """Whole profile: ring energies, each ring's relative error weighted by its share of the energy; and the limits.
+
+    The sum of squares of a profile's rings is the energy-weighted mean of (law/data - 1)^2. Two more rows an albedo
+    hold the unscaled law to its limits: total energy A, and 2 pi r R_d -> alpha/2 at the source.
+    """
+    alpha = rings.alpha[:, None]
+    inside = law.unscaled_energy(rings.r_edges, alpha)
+    data = jnp.where((rings.used > 0) & (rings.energy > 0), rings.energy, 1.0)
+    weight = rings.used / jnp.sqrt(data * rings.reflectance[:, None])
+    misfit = weight * (jnp.diff(inside, axis=-1) - rings.energy)
+    total = law.unscaled_energy(EVERYWHERE, rings.alpha) / rings.reflectance - 1.0
+    source = law.source_strength(rings.alpha) / (0.5 * rings.alpha) - 1.0
+    return jnp.concatenate([misfit, (rings.limits[0] * total)[:, None], (rings.limits[1] * source)[:, None]], axis=1)
+
+
+def relative(law, rings: Rings) -> Array:
+    """Whole profile on a log-spaced eye: relative errors of ring energies, even in ln r; and of the cumulated energy.
+
+    The rings from `NEAREST` to the radius of `ENERGY_WITHIN` weigh as much as they are wide in ln r, so that their sum
+    of squares is the mean square of (law/data - 1), the `rel` of `quality`. The rows after them hold the errors of the
+    cdf at all edges, `SHARE_WEIGHT` times as heavy, since `ks` must be that much smaller than `rel`. The
+    last rows resist a law that falls with alpha next to white, ring by ring: absorption must not add light.
+    """
+    alpha = rings.alpha[:, None]
+    inside = law.unscaled_energy(rings.r_edges, alpha)
+    widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
+    judged = (rings.r_edges[:-1] >= NEAREST * (1.0 - 1e-9)) & (rings.cdf[:, 1:] <= ENERGY_WITHIN)
+    weight = jnp.where(judged, rings.used * widths, 0.0)
+    weight = jnp.sqrt(weight / jnp.maximum(weight.sum(axis=-1, keepdims=True), 1e-300))
+    data = jnp.where(
+        (weight > 0) & (rings.energy > 0), rings.energy, 1.0
+    )  # also where nothing counts: E^2 in a derivative must not underflow
+    misfit = weight * (jnp.diff(inside, axis=-1) / data - 1.0)
+    shares = inside / law.unscaled_energy(EVERYWHERE, alpha) - rings.cdf
+    falling = rings.limits[2] / np.sqrt(rings.alpha.size) * jnp.broadcast_to(_fall(law, rings), misfit.shape)
+    return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, falling], axis=1)
+
+
+def _fall(law, rings: Rings) -> Array:
+    """(n,) how far the energy of each ring falls short of rising with alpha next to white; 0 where it rises."""
+    inside = law.unscaled_energy(rings.r_edges, jnp.array(WHITEST)[:, None])
+    darker, white = jnp.diff(inside, axis=-1)
+    lit = (darker > DARK) & (white > DARK)
+    ratio = jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)
+    return jnp.where(lit, jnp.maximum(jnp.log(ratio) + LEAST_RISE, 0.0), 0.0)
+
+
+def radial(law, rings: Rings) -> Array:
+    """As published: r R_d at the ring centres, unweighted, over the rings that the trimming (6) keeps."""
+    r = 0.5 * (rings.r_edges[1:] + rings.r_edges[:-1])
+    a, b, c = law.coefficients(rings.alpha[:, None])
+    data = rings.energy / (2.0 * jnp.pi * jnp.diff(rings.r_edges))  # r R_d: the area is 2 pi r dr
+    return rings.used * ((a * r + b) / (r + c) - data)
+
+
+def albedo(law, rings: Rings) -> Array:
+    """alpha(A) - alpha, unweighted over the albedos given."""
+    return (law.alpha(rings.reflectance) - rings.alpha)[:, None]
+
+
+def reflectance(law, rings: Rings) -> Array:
+    """A(alpha) - A, unweighted over the albedos given."""
+    return (law.reflectance(rings.alpha) - rings.reflectance)[:, None]
+
+
+def radius(law, rings: Rings) -> Array:
+    """g(xi) minus the radius within which the share xi of the energy leaves [mfp], unweighted in xi."""
+    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) - _quantile(rings)
+
+
+def relative_radius(law, rings: Rings) -> Array:
+    """g(xi) over the radius within which the share xi of the energy leaves, minus 1 [-], unweighted in xi."""
+    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) / _quantile(rings) - 1.0
+
+
+def share(law, rings: Rings) -> Array:
+    """Whole profile: the share of the energy within g(xi), minus xi, unweighted in xi [-]."""
+    x = law.sampler.unclipped(rings.xi, rings.alpha[:, None])
+    inner = _interpolate(jnp.abs(x), rings.r_edges, rings.cdf) * jnp.sign(x)
+    return inner - rings.xi
+
+
+_ALL = (energy, relative, radial, albedo, reflectance, radius, relative_radius, share)
+OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective in _ALL}
+
+
+def rings_of(profiles: Profiles, used=None, limits=NO_LIMITS, xi=()) -> Rings:
+    """The residuals' view of `profiles`.
+
+    Rings with too few effective photons, or outside `used`, do not count, and neither do albedos whose reflectance,
+    or whose outermost share of energy in `xi`, rests on too few. InputError if none is left.
+    """
+    keep = profiles.trusted & (profiles.energy > 0)
+    if used is not None:
+        keep &= used
+    smallest = min([*xi, *(1.0 - np.asarray(xi)), 1.0])
+    weight = profiles.albedo_samples * smallest >= FEWEST_EFFECTIVE_SAMPLES
+    if not np.any(weight):
+        needed = f"{FEWEST_EFFECTIVE_SAMPLES / smallest:.0f}"
+        raise InputError(f"too few photons: no albedo rests on {needed} effective ones, as this fit needs; trace more")
+    return Rings(
+        profiles.alpha,
+        profiles.r_edges,
+        profiles.energy,
+        profiles.beyond,
+        keep.astype(float),
+        weight.astype(float),
+        np.asarray(limits, float),
+        np.asarray(xi, float),
+    )
+
+
+def _quantile(rings: Rings) -> Array:
+    """(m, k) radii at the shares xi, linear in the cdf between edges."""
+    return _interpolate(jnp.broadcast_to(rings.xi, (rings.alpha.size, rings.xi.size)), rings.cdf, rings.r_edges)
+
+
+def _interpolate(x: Array, nodes: Values, values: Values) -> Array:
+    """Row by row linear interpolation; `nodes` and `values` broadcast to a row for each row of x."""
+    nodes = jnp.broadcast_to(nodes, (x.shape[0], nodes.shape[-1]))
+    values = jnp.broadcast_to(values, (x.shape[0], values.shape[-1]))
+    return eqx.filter_vmap(jnp.interp)(x, nodes, values)

@@ -1,0 +1,183 @@
+"""Profiles: reflectance profiles of several albedos on rings, with their errors. What every fit sees."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import exact
+from mcml_sim.errors import InputError
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.setting import Setting
+from mcml_sim.results.orders import Orders
+
+Floats = NDArray[np.float64]
+# Albedos of one ring are reweightings of the same photons and nearly dependent: few directions carry their variance,
+# and each record states the largest share of any one variance that is left out.
+COVARIANCE_RANK = 8
+# A reweighted ring that rests on fewer photons than this has a standard error that is itself unknown by a tenth,
+# and that collapses where the heavy photons are missing altogether.
+FEWEST_EFFECTIVE_SAMPLES = 50.0
+# Directions of a ring below this share of its largest are rounding where few photons arrived: E has no part in them.
+FAINTEST = 1e-3
+
+
+@dataclass(frozen=True)
+class Covariance:
+    """Covariance of ring energies between rings and albedos, in the closed form of a multinomial tally.
+
+    factor   (rings + 1, alphas, rank): within ring i, cov(E_i(a), E_i(b)) = (L_i L_i^T)_ab; the light beyond the last
+             ring is one more
+    energy   (alphas, rings + 1) energies E that were counted: between rings i != j, cov(E_i(a), E_j(b)) =
+             -E_i(a) E_j(b) / (photons - 1)
+    dropped  the largest share of any one variance that the truncation to `rank` leaves out
+    """
+
+    factor: Floats
+    energy: Floats
+    photons: int
+    dropped: float
+
+    @property
+    def rank(self) -> int:
+        return self.factor.shape[-1]
+
+    def sandwich(self, weights: Floats) -> Floats:
+        """Covariance (p, p) of the sums over alphas and rings of `weights` (p, alphas, n) times ring energy.
+
+        Rings at the end that only one of the two knows count for nothing: a fit to trimmed rings sees no light beyond,
+        and a tally without an overflow has none.
+        """
+        rings = min(weights.shape[-1], len(self.factor))
+        within = np.einsum("pai,iak->pik", weights[..., :rings], self.factor[:rings])
+        ring = np.einsum("pai,ai->pi", weights[..., :rings], self.energy[:, :rings])
+        total = ring.sum(axis=1)
+        between = np.outer(total, total) - ring @ ring.T
+        return np.einsum("pik,qik->pq", within, within) - between / max(self.photons - 1, 1)
+
+    def draws(self, number: int, seed: int) -> Floats:
+        """Noise of ring energies (number, alphas, rings + 1) as another run's photons would have it, taken for normal.
+
+        Photons are shared out: what one ring gets, another lacks. So noise that is independent between rings, as of
+        Poisson counts, is drawn first, and then freed of the fluctuation t of its total [standard deviations]. Within
+        the directions L that each ring keeps, E = sqrt(photons - 1) L y: v of covariance 1 + y y^T, less t y.
+        """
+        generator = np.random.default_rng(seed)
+        root = self.energy.T[:, :, None] / np.sqrt(max(self.photons - 1, 1))
+        unit = np.linalg.norm(self.factor, axis=2, keepdims=True)
+        unit = np.where(unit > 0, unit, 1.0)
+        y = np.einsum("ika,iao->ik", np.linalg.pinv(self.factor / unit, rcond=FAINTEST), root / unit)
+        size = 1.0 + np.sum(y**2, axis=1)
+        rest = np.sqrt(max(1.0 - float(np.sum(1.0 - 1.0 / size)), 0.0))  # photons that no ring saw
+        v = generator.standard_normal((number, *y.shape)) + generator.standard_normal((number, len(y), 1)) * y
+        total = np.einsum("rik,ik->r", v, y / size[:, None]) + rest * generator.standard_normal(number)
+        return np.einsum("iak,rik->rai", self.factor, v - total[:, None, None] * y, optimize=True)
+
+
+@dataclass(frozen=True)
+class Profiles:
+    """Reflectance profiles in units of the mean free path (l = 1).
+
+    alpha              (m,) single-scattering albedos [-]
+    r_edges            (n + 1,) ring edges from 0 [mfp]
+    energy             (m, n) energy reflected through each ring, per unit incident [-]: the integral of 2 pi r R_d
+    standard_error     (m, n) of `energy`; zero where the truth has no noise
+    effective_samples  (m, n) photons that the estimate really rests on; infinite where it has no noise
+    beyond             (m,) energy reflected beyond the last edge [-]
+    covariance         between all rings and albedos; None where the truth has no noise, or where nobody asked for it
+    source             what made them: "orders" (photons), "exact"
+    """
+
+    alpha: Floats
+    r_edges: Floats
+    energy: Floats
+    standard_error: Floats
+    effective_samples: Floats
+    beyond: Floats
+    source: str
+    setting: Setting
+    photons: int | None = None
+    covariance: Covariance | None = None
+
+    @classmethod
+    def from_orders(cls, orders: Orders, alpha: ArrayLike, correlated: bool = True) -> Profiles:
+        """Reweight one order-resolved run to every albedo in `alpha`; with `correlated`, their covariance too."""
+        albedos = _albedos(alpha)
+        energy = orders.energy(albedos)
+        value = np.asarray(energy.value)
+        beyond = np.asarray(orders.overflow(albedos).value)
+        covariance = None
+        if correlated:
+            rank = min(COVARIANCE_RANK, albedos.size)
+            factor, dropped = orders.covariance_factor(albedos, rank, overflow=True)
+            counted = np.column_stack([value, beyond]) - orders.once(albedos)
+            covariance = Covariance(factor, counted, orders.photons, dropped)
+        return cls(
+            albedos,
+            orders.grid.r_edges,
+            value,
+            np.asarray(energy.standard_error),
+            np.asarray(energy.effective_samples),
+            beyond,
+            "orders",
+            orders.setting,
+            orders.photons,
+            covariance,
+        )
+
+    @classmethod
+    def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:
+        """The exact half space on rings: integrals over them, without noise."""
+        where = setting or Setting()
+        albedos, edges = _albedos(alpha), Grid.from_edges(r=r_edges).r_edges
+        total = np.asarray(exact.reflectance(albedos, setting=where))
+        inside = total[:, None] * np.asarray(exact.cdf(edges, albedos[:, None], setting=where))
+        energy = np.diff(inside, axis=1)
+        zero, infinite = np.zeros_like(energy), np.full_like(energy, np.inf)
+        return cls(albedos, edges, energy, zero, infinite, total - inside[:, -1], "exact", where)
+
+    @property
+    def r_areas(self) -> Floats:
+        """Ring areas [mfp^2], (n,)."""
+        return np.pi * np.diff(self.r_edges**2)
+
+    @property
+    def r(self) -> Floats:
+        """Ring centres [mfp], (n,)."""
+        return 0.5 * (self.r_edges[1:] + self.r_edges[:-1])
+
+    @property
+    def value(self) -> Floats:
+        """Ring averages of R_d [1/mfp^2], (m, n)."""
+        return self.energy / self.r_areas
+
+    @property
+    def reflectance(self) -> Floats:
+        """Total reflectance A [-], (m,)."""
+        return self.energy.sum(axis=1) + self.beyond
+
+    @property
+    def cdf(self) -> Floats:
+        """Share of the reflected energy within each edge, (m, n + 1)."""
+        inside = np.concatenate([np.zeros((self.alpha.size, 1)), np.cumsum(self.energy, axis=1)], axis=1)
+        return inside / self.reflectance[:, None]
+
+    @property
+    def albedo_samples(self) -> Floats:
+        """(m,) equally weighted photons that would give the reflectance within the rings this relative error."""
+        total, variance = self.energy.sum(axis=1), np.sum(self.standard_error**2, axis=1)
+        return np.divide(total**2, variance, out=np.full_like(total, np.inf), where=variance > 0)
+
+    @property
+    def trusted(self) -> NDArray[np.bool_]:
+        """(m, n) rings with enough effective samples for their standard error to mean something."""
+        return self.effective_samples >= FEWEST_EFFECTIVE_SAMPLES
+
+
+def _albedos(alpha: ArrayLike) -> Floats:
+    values = np.atleast_1d(np.asarray(alpha, float))
+    if values.ndim != 1 or not np.all((values > 0) & (values <= 1)):
+        raise InputError(f"alpha must be a list of albedos in (0, 1], got {alpha!r}")
+    return values

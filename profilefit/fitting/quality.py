@@ -1,0 +1,134 @@
+"""How far a law is from the exact profile: one name and one definition for each measure, used everywhere.
+
+rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l, r at 99.5 % of the energy]
+ks       max over r of |cdf_law - cdf_exact|
+l1       half the integral of |2 pi r (R_law - R_exact)| over r, over A: misplaced energy
+mse, r2  of R'_d = r R_d on an even grid over [0, r'_max], the range of the trimming (6) of Liang et al.; `_halves` of
+         its first and second half, as in that paper's Table 1
+delta_A  max |A_law - A_exact|
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import exact
+from mcml_sim.media.setting import Setting
+from profilefit.fitting.trimming import trimmed_radius
+from profilefit.laws.base import AlbedoLaw, ProfileLaw
+
+Floats = NDArray[np.float64]
+NEAREST = 0.01
+ENERGY_WITHIN = 0.995
+RADII = 400
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Measures of a profile law at each albedo (m,); the halves are (m, 2)."""
+
+    alpha: Floats
+    rel: Floats
+    ks: Floats
+    l1: Floats
+    mse: Floats
+    r2: Floats
+    mse_halves: Floats
+    r2_halves: Floats
+
+
+def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
+    """Measure a law against the exact profile of its own setting at each albedo in `alpha` (m,)."""
+    albedos = np.atleast_1d(np.asarray(alpha, float))
+    rows = [_at(law, float(value)) for value in albedos]
+    return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
+
+
+def r_squared(data: Floats, law: Floats) -> float:
+    """1 - sum (data - law)^2 / sum (data - mean)^2."""
+    return float(1.0 - np.sum((data - law) ** 2) / np.sum((data - data.mean()) ** 2))
+
+
+@dataclass(frozen=True)
+class _Truth:
+    """The exact half space where the measures look: log-spaced radii, far log-spaced edges, even radii [mfp]."""
+
+    r: Floats
+    profile: Floats
+    far: Floats
+    cdf: Floats
+    even: Floats
+    scaled: Floats
+
+
+@lru_cache(maxsize=256)
+def _truth(alpha: float, setting: Setting) -> _Truth:
+    outer = float(exact.quantile(ENERGY_WITHIN, alpha, setting=setting))
+    r = np.geomspace(NEAREST, outer, RADII)
+    far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
+    profile = np.asarray(exact.profile(r, alpha, setting=setting))
+    walked = np.append(r, outer + np.arange(1, 9) / 8)  # (6) may stop one stride beyond
+    cut = trimmed_radius(walked, walked * np.asarray(exact.profile(walked, alpha, setting=setting)))
+    even = (np.arange(RADII) + 0.5) / RADII * cut
+    scaled = even * np.asarray(exact.profile(even, alpha, setting=setting))
+    return _Truth(r, profile, far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
+
+
+def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:
+    truth = _truth(alpha, law.setting)
+    rel = np.mean(np.abs(law.profile(truth.r, alpha) / truth.profile - 1.0))
+    law_cdf = law.cdf(truth.far, alpha)
+    ks = np.max(np.abs(law_cdf - truth.cdf))
+    # Half the total variation between two measures on fine rings, each of total A.
+    l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(truth.cdf)))
+    model = truth.even * law.profile(truth.even, alpha)
+    (mse, r2), *halves = (
+        (float(np.mean((truth.scaled[part] - model[part]) ** 2)), r_squared(truth.scaled[part], model[part]))
+        for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))
+    )
+    mse_halves, r2_halves = zip(*halves, strict=True)
+    return float(rel), float(ks), float(l1), mse, r2, mse_halves, r2_halves
+
+
+@dataclass(frozen=True)
+class AlbedoQuality:
+    """Measures of an A -> alpha map.
+
+    delta_A      max |A_law(alpha) - A| over alpha in [0, 1]; where it is NaN the law has no A, and counts as |A - 1|
+    delta_alpha  max |alpha_law(A) - alpha|; largest_s max |sqrt(1 - alpha_law) / sqrt(1 - alpha) - 1|, alpha < 1
+    monotone     whether alpha_law rises all the way; at_one alpha_law(A = 1); fold A where it turns (1 if it does not)
+    """
+
+    delta_A: float
+    delta_alpha: float
+    largest_s: float
+    monotone: bool
+    at_one: float
+    fold: float
+
+
+def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
+    """Measure a map on 1000 albedos even in sqrt(1 - alpha), and its shape on reflectances even in [0, 1]."""
+    s = (np.arange(1000) + 0.5) / 1000
+    alpha = 1.0 - s**2
+    truth = np.asarray(exact.reflectance(alpha, setting=law.setting))
+    mapped = np.asarray(law.reflectance(alpha))
+    mapped_alpha = np.asarray(law.alpha(truth))
+    with np.errstate(invalid="ignore"):
+        ratio = np.sqrt(1.0 - mapped_alpha) / s
+    even = np.linspace(0.0, 1.0, 20001)
+    curve = np.asarray(law.alpha(even))
+    rising = np.diff(curve) > 0
+    fold = 1.0 if rising.all() else float(even[np.argmax(~rising)])
+    return AlbedoQuality(
+        float(np.max(np.where(np.isnan(mapped), 1.0 - truth, np.abs(mapped - truth)))),
+        float(np.max(np.abs(mapped_alpha - alpha))),
+        float(np.max(np.abs(np.nan_to_num(ratio, nan=np.inf) - 1.0))),
+        bool(rising.all()),
+        float(law.alpha(1.0)),
+        fold,
+    )

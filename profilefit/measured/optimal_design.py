@@ -1,0 +1,102 @@
+"""Which further measurement would tell most: predicted errors of the worst-known quantity, by the Fisher information.
+
+A measurement with derivatives g by the coordinates and standard error sigma adds g g^T / sigma^2 to the information.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.measured.fitting import Found
+from profilefit.measured.identifiability import relative_errors
+from profilefit.measured.law_error import WITHIN
+from profilefit.measured.model import NAMES, SCALE
+
+Floats = NDArray[np.float64]
+CALIBRATED = 0.01  # relative error of a total reflectance or of a reference standard that is easily had
+REPEATS = 4
+# Radii, in mean free paths, where one more point could be measured; only those within 99.5 % of the energy.
+NEAREST, FARTHEST, RADII = 0.03, 60.0, 32
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A measurement that could be made.
+
+    kind      "point", "reflectance", "scale" or "repeats"; inner, outer radii of a point or ring [unit], else NaN
+    value     what it would find; error the standard error that it would have
+    relative  predicted relative errors of mu_s', mu_a and a free scale with it [-]
+    """
+
+    kind: str
+    inner: float
+    outer: float
+    value: float
+    error: float
+    relative: dict[str, float]
+
+    @property
+    def worst(self) -> tuple[str, float]:
+        name = max(self.relative, key=lambda one: self.relative[one])
+        return name, self.relative[name]
+
+
+@dataclass(frozen=True)
+class Advice:
+    """The worst-known quantity with its relative error, and the best candidate of each kind, best first."""
+
+    name: str
+    now: float
+    candidates: tuple[Candidate, ...]
+
+
+def advised(found: Found) -> Advice:
+    """Rank what could be measured besides by the largest relative error that it would leave."""
+    now = relative_errors(found, found.statistical)
+    name = max(now, key=lambda one: now[one])
+    best: dict[str, Candidate] = {}
+    for one in [*_points(found), *_others(found)]:
+        if one.kind not in best or one.worst[1] < best[one.kind].worst[1]:
+            best[one.kind] = one
+    return Advice(name, now[name], tuple(sorted(best.values(), key=lambda one: one.worst[1])))
+
+
+def _points(found: Found) -> list[Candidate]:
+    """One more point or ring anywhere, as precise as the data are, in the median."""
+    data, model = found.data, found.problem.model
+    width = float(np.median((data.outer - data.inner) / (data.outer + data.inner)))
+    r = found.values["l"] * np.geomspace(NEAREST, FARTHEST, RADII)
+    r = r[model.shares(found.point, r * (1.0 + width)) < WITHIN]
+    inner, outer = r * (1.0 - width), r * (1.0 + width)
+    light, slopes = model.linearised(found.point, inner, outer)
+    errors = data.relative_error * light[:-1]
+    rows = zip(inner, outer, light[:-1], errors, slopes[:-1], strict=True)
+    return [_candidate(found, "point", float(a), float(b), float(v), float(e), slope) for a, b, v, e, slope in rows]
+
+
+def _others(found: Found) -> list[Candidate]:
+    (*_, reflectance), slopes = found.predicted[0], found.predicted[1]
+    scale = found.values["scale"]
+    four = {name: one / np.sqrt(REPEATS) for name, one in relative_errors(found, found.statistical).items()}
+    out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
+    if found.question.total is None and found.data.medium is None:  # a simulation has told it already
+        error = CALIBRATED * reflectance
+        out.append(_candidate(found, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
+    if SCALE in found.question.free and found.question.scale is None:
+        slope = scale * np.eye(len(NAMES))[SCALE]
+        out.append(_candidate(found, "scale", np.nan, np.nan, scale, CALIBRATED * scale, slope))
+    return out
+
+
+def _candidate(
+    found: Found, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
+) -> Candidate:
+    free = list(found.question.free)
+    rows = np.vstack([found.jacobian, slope[free] / error])
+    gain = np.linalg.pinv(rows)
+    covariance = np.zeros((len(NAMES), len(NAMES)))
+    covariance[np.ix_(free, free)] = gain @ gain.T
+    return Candidate(kind, inner, outer, value, error, relative_errors(found, covariance))

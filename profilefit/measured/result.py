@@ -1,0 +1,317 @@
+"""All that a fit has to say: what it found, what it can tell, what would tell more; and the same as plain content.
+
+The posterior of the fit's coordinates is walked by emcee over the compiled model. Priors are flat in
+s = sqrt(1 - alpha), in ln l and in ln k: nothing is known of the units, and alpha may be 1. Errors made from replicates
+share a scale that is itself an estimate: with that unknown the likelihood is Student's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.fitting.chains import Walk, walk
+from profilefit.measured import derived
+from profilefit.measured.data import Measured
+from profilefit.measured.fitting import LEVEL, Found
+from profilefit.measured.identifiability import Telling, told
+from profilefit.measured.model import FLOCK, NAMES, U, u_of
+from profilefit.measured.optimal_design import Advice, advised
+from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, descended
+from profilefit.recipes import record
+
+Floats = NDArray[np.float64]
+KEPT = 4000
+MAX_STEPS = 20_000
+ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
+WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not hold
+
+
+def posterior(found: Found, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
+    """Walk over the free coordinates of a fit: samples (k, p)."""
+    free, centre = list(found.question.free), found.point
+    reach = np.full(centre.size, FARTHEST_LN)
+
+    def log_density(points: Floats) -> Floats:
+        full = np.repeat(centre[None], len(points), axis=0)
+        full[:, free] = points
+        inside = np.all(np.abs(full - centre)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
+            np.abs(full[:, U]) < FARTHEST_U + ROOM
+        )
+        rise = found.problem.costs(np.clip(full, centre - 3 * reach, centre + 3 * reach)) - found.minimum.cost
+        value = likelihood(rise, len(free), found.data.pooled)
+        if U in free:  # ds/du: what is flat in s
+            value = value - np.logaddexp(0.0, full[:, U]) - np.logaddexp(0.0, -full[:, U])
+        return np.where(inside & np.isfinite(value), value, -np.inf)
+
+    spread = np.minimum(np.sqrt(np.diag(found.statistical)[free]), WIDEST)
+    start = centre[free] + spread * np.random.default_rng(seed).standard_normal((FLOCK, len(free)))
+    return walk(log_density, start, centre[free], seed, max_steps, KEPT)
+
+
+def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
+    """ln likelihood (m,) where chi-square has risen by `rise` (m,): normal, or Student's in `free` coordinates."""
+    if np.isinf(pooled):
+        return -0.5 * rise
+    return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
+
+
+def points(found: Found, samples: Floats) -> Floats:
+    """The coordinates (k, 3) of samples (k, p) of the free ones."""
+    full = np.repeat(found.point[None], len(samples), axis=0)
+    full[:, list(found.question.free)] = samples
+    return full
+
+
+Ends = tuple[float | None, float | None]
+BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
+GREY = 0.9  # albedo that advice is given for where the data leave it open altogether
+
+
+@dataclass(frozen=True)
+class Answer:
+    """A fit judged. telling, advice and walk are None where the fit failed, walk also where the chain had no bounds.
+
+    Where the data do not exclude the end of what a coordinate may be (alpha = 1, say: chi-square there is within the
+    square of the 95 % quantile, 3.84 of known errors, of the least), the optimum is no estimate and the derivatives
+    there are no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
+    no value; the others keep their interval, and a value if it lies inside. No value lies outside its own interval.
+    The limit is a quantile of the posterior, whose prior is flat in sqrt(1 - alpha) >= 0: it covers at 95 % or more.
+    Without a chain it is the end of the two-sided interval of the profile likelihood: 97.5 %. At an end no interval
+    knows of the law's own error.
+    """
+
+    found: Found
+    telling: Telling | None
+    advice: Advice | None
+    walk: Walk | None
+
+    @cached_property
+    def draws(self) -> dict[str, Floats]:
+        """Posterior draws (k,) of every quantity; empty without a chain."""
+        if self.walk is None:
+            return {}
+        return self._quantities(points(self.found, self.walk.samples))
+
+    @cached_property
+    def whole_draws(self) -> dict[str, Floats]:
+        """The same, each moved by an error of the law and, where one is seen, of the misfit.
+
+        Empty if none is known, or where derivatives, which carry them over, are no errors: at an end.
+        """
+        found = self.found
+        if self.walk is None or not self.told or not (found.misfit.detected or found.rel is not None):
+            return {}
+        free = list(found.question.free)
+        others = found.of_law + (found.of_misfit if found.misfit.detected else 0.0)
+        moved = points(found, self.walk.samples)
+        generator = np.random.default_rng(len(moved))
+        zero, joint = np.zeros(len(free)), others[np.ix_(free, free)]
+        moved[:, free] += generator.multivariate_normal(zero, joint, len(moved), method="eigh")
+        return self._quantities(moved)
+
+    def _quantities(self, points: Floats) -> dict[str, Floats]:
+        data = self.found.data
+        reflectance = self.found.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
+        return derived.quantities(points, reflectance)
+
+    @property
+    def moving(self) -> tuple[str, ...]:
+        """The quantities that the fit decided."""
+        return tuple(name for name, one in self.found.gradients.items() if np.any(one[list(self.found.question.free)]))
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """Those with symmetric errors: none where an end is not excluded, or where the fit failed."""
+        opened = self.telling is None or any(one.is_open for one in self.telling.intervals)
+        return () if opened or not self.found.minimum.converged else self.moving
+
+    def ends(self, name: str) -> tuple[bool, bool]:
+        """Whether the data exclude neither how little nor how much a quantity may be: (low, high)."""
+        of = {one.name: (one.open_low, one.open_high) for one in (self.telling.intervals if self.telling else ())}
+        (dark, white), (short, long) = of.get("alpha", (False, False)), of.get("l", (False, False))
+        return {
+            "A": (dark, white),
+            "alpha": (dark, white),
+            "mu_s'": (dark or long, short),
+            "mu_a": (white or long, short),
+        }.get(name, of.get(name, (False, False)))
+
+    def value(self, name: str) -> float | None:
+        """The best value: of what was held, or has an error or an interval, and lies inside; else None."""
+        value = self.found.values[name]
+        if name not in self.moving:
+            return value
+        intervals = [one for one in (self.interval(name), self.whole_interval(name)) if one is not None]
+        if any(self.ends(name)) or not (intervals or name in self.told):
+            return None
+        inside = all(low is not None and high is not None and low <= value <= high for low, high in intervals)
+        return value if inside else None
+
+    def interval(self, name: str) -> Ends | None:
+        """95 % by the data's errors alone: of the posterior draws; without a chain, of the profile likelihood.
+
+        Both ends, or one and None: a one-sided limit.
+        """
+        if name in self.draws and name in self.moving:
+            return self._middle(name, self.draws[name])
+        found = [one for one in (self.telling.intervals if self.telling else ()) if one.name == name]
+        return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
+
+    def whole_interval(self, name: str) -> Ends | None:
+        """95 % by all errors together: data, law, and misfit where one is seen; None where these are not known."""
+        held = name not in self.whole_draws or name not in self.moving
+        return None if held else self._middle(name, self.whole_draws[name])
+
+    def _middle(self, name: str, draws: Floats) -> Ends | None:
+        ends = self.ends(name)
+        outside = 1.0 - LEVEL if any(ends) else 0.5 * (1.0 - LEVEL)
+        low, high = np.quantile(draws, [outside, 1.0 - outside])
+        return _closed(float(low), float(high), ends)
+
+
+def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
+    """The ends of an interval that are not open; None if both are."""
+    return None if all(opened) else (None if opened[0] else low, None if opened[1] else high)
+
+
+def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
+    """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate.
+
+    Where numbers on the way are none, that is the fit's result, and nothing is told of it.
+    """
+    if not (found.minimum.converged or found.minimum.at_edge):
+        return Answer(found, None, None, None)
+    try:
+        with np.errstate(over="raise", divide="raise", invalid="raise"):
+            return _judged(found, seed, walk)
+    except (FloatingPointError, np.linalg.LinAlgError):
+        return Answer(replace(found, minimum=replace(found.minimum, result=BEYOND)), None, None, None)
+
+
+def _judged(found: Found, seed: int, walk: bool) -> Answer:
+    telling = told(found)
+    # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
+    endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in telling.intervals)
+    walked = posterior(found, seed) if walk and found.question.free and not endless else None
+    answer = Answer(found, telling, advised(_inside(found, telling)), walked)
+    _ = found.misfit, answer.draws, answer.whole_draws  # worked out when first asked for: they fail here or never
+    return answer
+
+
+def _inside(found: Found, telling: Telling) -> Found:
+    """A fit at an edge moved to the other end of what alpha may be: from the edge no measurement seems to help."""
+    if not found.minimum.at_edge:
+        return found
+    (alpha,) = [one for one in telling.intervals if one.name == "alpha"]
+    start = found.point.copy()
+    start[U] = u_of(
+        next((x for x, is_open in ((alpha.low, alpha.open_low), (alpha.high, alpha.open_high)) if not is_open), GREY)
+    )
+    others = tuple(at for at in found.question.free if at != U)
+    return replace(found, minimum=descended(found.problem, start, others))
+
+
+def known_medium(data: Measured) -> dict[str, float]:
+    """The first layer of the medium that a simulation was of, by the quantities that it has."""
+    if data.medium is None:
+        return {}
+    layer = data.medium.layers[0].similar
+    return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
+
+
+def content(answer: Answer, law: str, constants: str) -> dict[str, Any]:
+    """Everything, as JSON takes it; errors of the law are null where they are not known.
+
+    Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
+    """
+    found = answer.found
+    data, question = found.data, found.question
+    body = {
+        "data": {
+            "file": data.source,
+            "sha256": data.digest,
+            "unit": data.unit,
+            "kind": "rings" if data.rings else "points",
+            "errors": data.errors,
+            "errors_are_bounds": data.bounded,
+            "notes": data.notes,
+            "medium": data.medium,
+            "inner": data.inner,
+            "outer": data.outer,
+            "value": data.value,
+            "sigma": found.sigma,
+            "freedom": data.freedom if np.isfinite(data.pooled) else None,
+            "pooled_freedom": data.pooled if np.isfinite(data.pooled) else None,
+            "photons": data.photons if np.isfinite(data.photons) else None,
+        },
+        "law": {
+            "name": law,
+            "constants": constants,
+            "setting": question.law.setting,
+            "record": None if found.source is None else found.source.path.name,
+            "record_sha256": None if found.source is None else found.source.digest,
+            "rel": found.rel,
+        },
+        "free": [NAMES[at] for at in question.free],
+        "held": question.held,
+        "known": {"A": question.total, "scale": question.scale},
+        "result": found.minimum.result,
+        "steps": found.minimum.steps,
+        "widening": found.widening,
+        "quantile_95": found.quantile,
+        "quantities": _quantities(answer),
+        "correlation": _correlation(answer),
+        "light": found.light,
+        "residuals": found.minimum.residuals,
+        "versions": record.versions(),
+    }
+    if answer.telling is not None and answer.advice is not None:
+        body["misfit"] = {
+            **vars(found.misfit),
+            "detected": found.misfit.detected,
+            "within_law": found.misfit.within_law,
+        }
+        body["telling"] = {**vars(answer.telling), "told": answer.telling.told}
+        body["advice"] = answer.advice
+        body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
+    if answer.walk is not None:
+        body["posterior"] = {k: v for k, v in vars(answer.walk).items() if k not in ("samples", "log_density")}
+    plain: dict[str, Any] = record.plain(body)
+    return plain
+
+
+def _quantities(answer: Answer) -> dict[str, Any]:
+    found = answer.found
+    kinds: dict[str, Floats | None] = {
+        "statistical": found.statistical if answer.told else None,
+        "law": found.of_law if answer.told and found.rel is not None else None,
+    }
+    if answer.telling is not None:
+        kinds["misfit"] = found.of_misfit if answer.told else None
+    errors = {kind: found.errors(one) if one is not None else {} for kind, one in kinds.items()}
+    truth = known_medium(found.data)
+    return {
+        name: {
+            "value": answer.value(name),
+            "at_edge": any(answer.ends(name)),
+            "unit": derived.unit_of(name, found.data.unit),
+            **{f"{kind}_error": one.get(name) if name in answer.told else None for kind, one in errors.items()},
+            "interval_95_data": answer.interval(name),
+            "interval_95_total": answer.whole_interval(name),
+            "of_file": truth.get(name),
+        }
+        for name in found.values
+    }
+
+
+def _correlation(answer: Answer) -> dict[str, Any]:
+    names = answer.told
+    if not names:
+        return {}
+    joint = derived.correlation(answer.found.gradients, answer.found.statistical, names)
+    return {"names": names, "matrix": joint}

@@ -1,0 +1,78 @@
+"""The whole way from a file to an answer in one call: what `profilefit fit` does in a shell, for Python."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw
+from profilefit.measured.data import Measured
+from profilefit.measured.fitting import fitted
+from profilefit.measured.law_error import origin
+from profilefit.measured.problem import Known, Question, held_albedo
+from profilefit.measured.reading import read
+from profilefit.measured.result import Answer, answered
+from profilefit.recipes import catalogue
+
+HOLDABLE = ("alpha", "A", "l")
+
+
+def asked(
+    data: Measured | Path | str,
+    law: str = "hazard",
+    constants: str = "regenerated",
+    setting: Setting | None = None,
+    held: Mapping[str, float] | None = None,
+    total: Known | None = None,
+    scale: float | Known | None = 1.0,
+    seed: int = 0,
+    walk: bool = True,
+    folder: Path | None = None,
+) -> Answer:
+    """Fit a medium to a measured or simulated profile, and judge the fit.
+
+    data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
+    law        its name, and which constants, as for `catalogue.load`
+    setting    the light and the surface; by default a pencil beam, on the surface of the medium that was simulated
+    held       what stays where it is: alpha or A [-], l [unit of the data]
+    total      the total reflectance A [-], if that was measured too
+    scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
+    seed       of the posterior's walkers; walk whether to let them: without, intervals are those of the data alone
+    folder     of the records, by default the ones shipped
+
+    InputError, SettingError or RecordError on what cannot be fitted; a fit that fails is an Answer that says so.
+    """
+    measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
+    records, where = folder or catalogue.fits_folder(), setting or _own_setting(measured)
+    chosen = catalogue.load(law, constants, where, records)
+    question = Question(chosen, _held(chosen, held or {}, scale), total, scale if isinstance(scale, Known) else None)
+    return answered(fitted(measured, question, origin(law, constants, where, records)), seed, walk)
+
+
+def _own_setting(measured: Measured) -> Setting:
+    medium = measured.medium
+    return Setting() if medium is None else Setting(n=medium.layers[0].n / medium.n_above)
+
+
+def _held(law: ProfileLaw, held: Mapping[str, float], scale: float | Known | None) -> dict[str, float]:
+    """The coordinates that stay, by name."""
+    if unknown := [name for name in held if name not in HOLDABLE]:
+        raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
+    if {"alpha", "A"} <= set(held):
+        raise InputError("held must have one of alpha and A, which say the same, got both")
+    values = {"l" if name == "l" else "alpha": _value(law, name, value) for name, value in held.items()}
+    if scale is None or isinstance(scale, Known):
+        return values
+    return {**values, "scale": _positive("scale", scale)}
+
+
+def _value(law: ProfileLaw, name: str, value: float) -> float:
+    return _positive("held l", value) if name == "l" else held_albedo(law, name, value)
+
+
+def _positive(name: str, value: float) -> float:
+    if not value > 0:
+        raise InputError(f"{name} must be a number > 0, got {value!r}")
+    return value

@@ -1,0 +1,121 @@
+"""The paper's fit of (7) at one albedo, with each choice that it leaves unsaid as a field.
+
+Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
+Software); equation numbers are that paper's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.solver import solve_batch
+from profilefit.fitting.trimming import trimmed_radius, walk
+
+Floats = NDArray[np.float64]
+EPSILON = 0.005  # of the trimming (6)
+
+
+@dataclass(frozen=True)
+class Protocol7:
+    """What (6)-(7) leave unsaid: how wide rings are, where their centre is, what is trimmed where, what R' carries.
+
+    rings    of the truth merged into one [-]
+    centre   "middle", or "corrected": MCML's (i + 1/2 + 1 / (12 (i + 1/2))) dr
+    trimmed  "r R_d", R'_d itself, or "R_d"
+    stop     "walk" of (6); "stride before" the one where the walk ends; "ring", the first one low enough
+    fitted   "r R_d", "2 pi r R_d" or "R_d"
+    """
+
+    rings: int = 1
+    centre: str = "middle"
+    trimmed: str = "r R_d"
+    stop: str = "walk"
+    fitted: str = "r R_d"
+
+    def describe(self, ring_width: float) -> str:
+        return (
+            f"{self.fitted} on rings of {self.rings * ring_width:g} l, centre {self.centre}; (6) on {self.trimmed}, "
+            f"stop at the {self.stop}"
+        )
+
+
+@dataclass(frozen=True)
+class Coefficients:
+    """a, b, c of (7) at each albedo: alpha (m,), values (m, 3) in units of l, cut (m,) r'_max [mfp]."""
+
+    alpha: Floats
+    values: Floats
+    cut: Floats
+
+    def at(self, alpha: Floats) -> Coefficients:
+        where = np.searchsorted(self.alpha, alpha)
+        return Coefficients(self.alpha[where], self.values[where], self.cut[where])
+
+
+def profiles_at(profiles: Profiles, alpha: Floats) -> Profiles:
+    """The same rings for some of the albedos only; `alpha` must be among them."""
+    rows = np.searchsorted(profiles.alpha, alpha)
+    return Profiles(
+        profiles.alpha[rows],
+        profiles.r_edges,
+        profiles.energy[rows],
+        profiles.standard_error[rows],
+        profiles.effective_samples[rows],
+        profiles.beyond[rows],
+        profiles.source,
+        profiles.setting,
+    )
+
+
+def fit_coefficients(profiles: Profiles, protocol: Protocol7, mfp: float = 1.0) -> Coefficients:
+    """(7) at each albedo by unweighted least squares over the rings that (6) keeps; `mfp` in units of (6)'s strides."""
+    edges, energy = _merged(profiles, protocol.rings)
+    r = _centres(edges, protocol.centre)
+    value = energy / (np.pi * np.diff(edges**2))
+    quantities = {"R_d": value, "r R_d": r * value, "2 pi r R_d": 2 * np.pi * r * value}
+    data = quantities[protocol.fitted]
+    cut = np.array([cut_radius(r * mfp, row, protocol.stop) / mfp for row in quantities[protocol.trimmed]])
+    used = (r <= cut[:, None]).astype(float)
+    scale = data[:, :1]
+    starts = np.stack([_linear_start(r, row, keep > 0) for row, keep in zip(data / scale, used, strict=True)])
+    solutions = solve_batch(_rational_misfit, starts, (np.broadcast_to(r, data.shape), data / scale, used))
+    return Coefficients(profiles.alpha, np.stack([s.parameters for s in solutions]) * scale ** [1, 1, 0], cut)
+
+
+def _merged(profiles: Profiles, rings: int) -> tuple[Floats, Floats]:
+    """Edges [mfp] and energies [-] with every `rings` rings in one; what is left over at the end is dropped."""
+    whole = profiles.energy.shape[1] // rings
+    energy = profiles.energy[:, : whole * rings].reshape(profiles.alpha.size, whole, rings).sum(axis=2)
+    return profiles.r_edges[: whole * rings + 1 : rings], energy
+
+
+def _centres(edges: Floats, centre: str) -> Floats:
+    """Where a ring's mean stands [mfp]."""
+    index = np.arange(edges.size - 1) + 0.5
+    return (index + (1 / (12 * index) if centre == "corrected" else 0.0)) * edges[1]
+
+
+def cut_radius(r: Floats, quantity: Floats, stop: str) -> float:
+    """r'_max in the unit of r."""
+    if stop == "ring":
+        low = quantity <= EPSILON * np.max(quantity)
+        return float(r[np.argmax(low)]) if low.any() else float(r[-1])
+    end = trimmed_radius(r, quantity, EPSILON)
+    visited = walk(float(r[-1]))
+    return float(visited[visited < end - 1e-9][-1]) if stop == "stride before" else end
+
+
+def _linear_start(r: Floats, y: Floats, used: NDArray[np.bool_]) -> Floats:
+    """a, b, c from y (r + c) = a r + b, linear in all three; a plain guess where that gives no pole left of zero."""
+    columns = np.stack([r, np.ones_like(r), -y], axis=1)[used]
+    found = np.linalg.lstsq(columns, (y * r)[used], rcond=None)[0]
+    return np.asarray(found if found[2] > 0 else [-0.05, 0.5, 0.5], np.float64)
+
+
+def _rational_misfit(p, item):
+    r, data, used = item
+    return used * ((p[0] * r + p[1]) / (r + p[2]) - data)

@@ -1,0 +1,353 @@
+"""Which of the paper's constants come out of its own protocol, under which reading of what it leaves unsaid.
+
+Source: Liang et al., a subsurface scattering method from an accurate fit of the reflectance profile (Journal of
+Software); equation numbers are that paper's. It does not state ring width, ring centre, the quantity that (6) trims,
+where its albedos stand or how residuals are weighted, so every choice here is one *reading* with its own constants.
+
+Constants trade against each other, so a reading is judged twice: by its constants and by the curve they draw.
+Nothing starts a search at a printed constant: on a surface with a kink the search stays there and "finds" it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import exact
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.solver import solve
+from profilefit.laws import published
+from profilefit.recipes.paper.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
+from profilefit.recipes.paper.truth import ExactTruth, Truth
+
+Floats = NDArray[np.float64]
+# A law is reproduced when its curve is within 5 % rms of the printed one over the albedos, and each constant too.
+CURVE_TOLERANCE = 0.05
+CONSTANT_TOLERANCE = 0.05
+INVERSE_EPSILON = 0.01  # of (19)
+LENGTH = "(10), (12), (14)"  # how a, b, c depend on l
+_PRINTED = {**published.constants("liang_albedo"), **published.constants("liang")}
+PUBLISHED = {
+    equation: {name: _PRINTED[name] for name in names.split()}
+    for equation, names in {
+        "(8)": "p q w",
+        "(11)": "a1 a2 a3",
+        "(13)": "b0 b1 b2 b3 b4",
+        "(15)": "c1 c2 c3",
+        "(20)": "g1 g2 g3 g4 h1 h2 h3",
+    }.items()
+} | {LENGTH: {"a": -1.0, "b": 0.0, "c": 1.0}}
+CORRECTED_B0 = published.constants("liang", "corrected")["b0"]
+# The printed b0 and what it might be a misprint of, each with the reason to consider it.
+B0_CANDIDATES = {
+    "as printed": 0.461,
+    "digits dropped and swapped: 0.0641": CORRECTED_B0,
+    "decimal point: 0.0461": 0.0461,
+    "2 pi carried in R': 0.461 / 2 pi": 0.461 / (2 * np.pi),
+    "2 pi carried twice: 0.461 / 4 pi^2": 0.461 / (4 * np.pi**2),
+}
+PROTOCOLS = (
+    Protocol7(rings=5),
+    Protocol7(stop="ring"),
+    Protocol7(stop="stride before"),
+    Protocol7(centre="corrected"),
+    Protocol7(trimmed="R_d"),
+    Protocol7(fitted="2 pi r R_d"),
+)
+ALPHA_RANGE = np.linspace(0.05, 0.995, 190)  # where curves of a, b, c are compared
+REFLECTANCE_RANGE = np.linspace(0.02, 1.0, 99)
+INVERSE_ALPHAS, INVERSE_SHARES = np.linspace(0.1, 0.99, 90), np.linspace(0.02, 0.98, 97)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One reading of one equation: what it chose, what came out, how far from print.
+
+    constant_distance  the largest |found / printed - 1| of a constant (|found - printed| for exponents of l) [-]
+    curve_distance     rms of found curve / printed curve - 1 over its range [-]; curve_maximum its largest
+    verdict            `judge` of the two distances
+    """
+
+    equation: str
+    choices: str
+    constants: dict[str, float]
+    published: dict[str, float]
+    constant_distance: float
+    curve_distance: float
+    curve_maximum: float
+    verdict: str
+    evidence: str
+
+
+def judge(constant_distance: float, curve_distance: float) -> str:
+    """The verdict on a reading: the curve decides, the constants say whether the data could pin them."""
+    if not curve_distance <= CURVE_TOLERANCE:
+        return "not reproduced"
+    return "reproduced" if constant_distance <= CONSTANT_TOLERANCE else "curve only"
+
+
+def albedo_law(reflectance, p):
+    """(8): alpha [-] at A [-]."""
+    return p[0] * reflectance / (reflectance**2 + p[1] * reflectance + p[2])
+
+
+def a_law(alpha, p):
+    """(9)-(11): a [1/mfp]."""
+    return p[0] * alpha + p[1] * 10.0 ** (p[2] * (alpha - 1.0))
+
+
+def b_law(alpha, p):
+    """(12)-(13): b [-]."""
+    return p[0] * alpha ** ((p[1] * (alpha - p[2]) ** 2 + p[3]) * alpha + p[4])
+
+
+def c_law(alpha, p):
+    """(14)-(15): c [mfp]."""
+    return p[0] * np.e ** (p[1] * alpha) + p[2]
+
+
+def k1_law(alpha, p):
+    """(20): k1 [mfp]."""
+    return p[0] * alpha ** (p[1] * alpha ** p[2] + p[3])
+
+
+def k2_law(alpha, p):
+    """(20): k2 [mfp]."""
+    return p[0] * alpha ** (p[1] * alpha + p[2])
+
+
+def samplings() -> dict[str, Floats]:
+    """Where albedos may stand: evenly in alpha, in A, in sqrt(1 - alpha). A choice, and no data."""
+    table = np.concatenate([np.linspace(0.01, 0.99, 197), 1.0 - np.geomspace(9e-3, 1e-5, 60)])
+    of_reflectance = np.interp(np.linspace(0.05, 0.9, 20), np.asarray(exact.reflectance(table)), table)
+    return {
+        "alpha even, .05 to .95 and .99": np.append(np.arange(1, 20) / 20, 0.99),
+        "A even, 20 from .05 to .9": of_reflectance,
+        "sqrt(1 - alpha) even, alpha .05 to .995": 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 20) ** 2,
+    }
+
+
+def readings(truth: Truth | None = None) -> tuple[Reading, ...]:
+    """Every reading of every equation, the winners and their serious competitors, recomputed from `truth`."""
+    source = truth or ExactTruth()
+    grids = samplings()
+    profiles = source.profiles(np.unique(np.concatenate(list(grids.values()))))
+    return (
+        *_albedo_readings(source, grids),
+        *_coefficient_readings(profiles, grids),
+        *_length_readings(source.profiles(np.array([0.5, 0.9, 0.99]))),
+        *_inverse_readings(profiles, grids),
+    )
+
+
+def law_energy(r: Floats, alpha: Floats, b0: float) -> Floats:
+    """A cdf(r) of (17) with the printed a, c and exponents and this b0 [-]: r, alpha (m,)."""
+    a, b, c = printed_coefficients(alpha, b0)
+    return 2 * np.pi * (a * r + (b - a * c) * np.log1p(r / c))
+
+
+def printed_coefficients(alpha: Floats, b0: float = PUBLISHED["(13)"]["b0"]) -> tuple[Floats, Floats, Floats]:
+    """a [1/mfp], b [-], c [mfp] of (9)-(15) as printed, b0 apart."""
+    exponents = list(PUBLISHED["(13)"].values())[1:]
+    return a_law(alpha, _printed("(11)")), b_law(alpha, [b0, *exponents]), c_law(alpha, _printed("(15)"))
+
+
+def _printed(equation: str) -> Floats:
+    return np.array(list(PUBLISHED[equation].values()))
+
+
+def _reading(equation: str, choices: str, found, curves: tuple[Floats, Floats], evidence: str, printed=None) -> Reading:
+    """Measure `found` against print; `curves` are found and printed over the range."""
+    printed = printed or PUBLISHED[equation]
+    constants = dict(zip(printed, map(float, np.atleast_1d(found)), strict=True))
+    of_length = equation == LENGTH
+    gaps = [abs(v - printed[k]) if of_length else abs(v / printed[k] - 1) for k, v in constants.items()]
+    off = np.abs(curves[0] / curves[1] - 1)
+    gap, rms = float(max(gaps)), float(np.sqrt(np.mean(off**2)))
+    distances = gap, rms, float(off.max())
+    return Reading(equation, choices, constants, dict(printed), *distances, judge(gap, rms), evidence)
+
+
+def _misfit_of(law: Callable) -> Callable:
+    return lambda p, item: item[2] * (law(item[0], p) - item[1])  # item: x, data, weight
+
+
+# One function object a law, so that each compiles once.
+_MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)}
+
+
+def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Floats:
+    """Constants of a law by least squares, residuals in units of the largest datum."""
+    weights = np.broadcast_to(weight / np.max(np.abs(data)), data.shape)
+    return solve(_MISFITS[law], start, (x, data, weights)).parameters
+
+
+def _held(columns: list[Floats], data: Floats) -> Floats:
+    """Amplitudes of a law whose exponent is held at its printed value."""
+    return np.asarray(np.linalg.lstsq(np.stack(columns, axis=1), data, rcond=None)[0], np.float64)
+
+
+def _albedo_readings(source: Truth, grids: dict[str, Floats]) -> list[Reading]:
+    """(8), a fit of alpha(A): where the albedos stand, and how residuals count."""
+    found = []
+    hundred = np.arange(1, 100) / 100
+    for name, alpha in {**grids, "alpha even, .01 to .99": hundred}.items():
+        reflectance = source.reflectance(alpha)
+        weights = {"alpha": np.ones_like(alpha), "alpha, relative": 1 / alpha}
+        if alpha is hundred:  # to first order a residual in A, without the kink where (8) has no inverse
+            weights = {"A": np.gradient(reflectance, alpha)}
+        for residual, weight in weights.items():
+            constants = _fit(albedo_law, reflectance, alpha, [4.0, 2.5, 0.7], weight)
+            misfit = np.abs(albedo_law(reflectance, _printed("(8)")) - alpha)[reflectance <= 0.75].max()
+            curves = albedo_law(REFLECTANCE_RANGE, constants), albedo_law(REFLECTANCE_RANGE, _printed("(8)"))
+            evidence = f"the printed (8) is within {misfit:.4f} of these alphas up to A = .75"
+            found.append(_reading("(8)", f"{name}; residual in {residual}", constants, curves, evidence))
+    return found
+
+
+def _coefficient_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
+    """(11), (13), (15) under the plain protocol at every sampling, and every other protocol at the last one."""
+    plain, width = fit_coefficients(profiles, Protocol7()), float(profiles.r_edges[1])
+    choices = Protocol7().describe(width)
+    last, alpha = list(grids.items())[-1]
+    found = []
+    for name, here in grids.items():
+        found += _law_readings(plain.at(here), f"{choices}; {name}", exponent_free=True)
+    only = profiles_at(profiles, alpha)
+    for protocol in PROTOCOLS:
+        found += _law_readings(fit_coefficients(only, protocol), f"{protocol.describe(width)}; {last}")
+    return found + _misprint_readings(plain.at(alpha), f"{choices}; {last}", only)
+
+
+def _law_readings(points: Coefficients, choices: str, exponent_free: bool = False) -> list[Reading]:
+    """The laws through one set of coefficients, printed exponents held and perhaps free as well."""
+    alpha, (a, b, c) = points.alpha, points.values.T
+    a3, c2 = PUBLISHED["(11)"]["a3"], PUBLISHED["(15)"]["c2"]
+    a1, a2 = _held([alpha, 10.0 ** (a3 * (alpha - 1))], a)
+    c1, c3 = _held([np.exp(c2 * alpha), np.ones_like(alpha)], c)
+    b_free = _fit(b_law, alpha, b, [0.08, 4.0, 0.3, 2.0, 1.0])
+    corrected = {**PUBLISHED["(13)"], "b0": CORRECTED_B0}
+    cases = [
+        ("(11)", a_law, a, [a1, a2, a3], "exponent held", PUBLISHED["(11)"]),
+        ("(13)", b_law, b, b_free, "all free", PUBLISHED["(13)"]),
+        ("(13) with b0 = .0641", b_law, b, b_free, "all free", corrected),
+        ("(15)", c_law, c, [c1, c2, c3], "exponent held", PUBLISHED["(15)"]),
+    ]
+    if exponent_free:
+        a_free, c_free = _fit(a_law, alpha, a, [-0.005, 0.002, 20.0]), _fit(c_law, alpha, c, [0.02, 3.0, 0.1])
+        cases.append(("(11)", a_law, a, a_free, "exponent free", PUBLISHED["(11)"]))
+        cases.append(("(15)", c_law, c, c_free, "exponent free", PUBLISHED["(15)"]))
+    cuts = f"r'_max {points.cut.min():.2f} to {points.cut.max():.2f} l"
+    return [_law_reading(*case, alpha, choices, cuts) for case in cases]
+
+
+def _law_reading(equation, law, data, constants, held, print_set, alpha, choices, cuts) -> Reading:
+    printed = np.array(list(print_set.values()))
+    ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
+    evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
+    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set)
+
+
+def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Reading]:
+    """b0 alone, printed exponents held: which number is it, and does (17) then hold the energy it must?"""
+    alpha, b = points.alpha, points.values[:, 1]
+    shape = printed_coefficients(alpha, 1.0)[1]
+    fitted = float(shape @ b / (shape @ shape))
+    total = profiles.reflectance
+    a_factor = float(np.mean(points.values[:, 0] / printed_coefficients(alpha)[0]))
+    found = []
+    for why, candidate in B0_CANDIDATES.items():
+        r_max = -candidate * shape / printed_coefficients(alpha)[0]
+        share = law_energy(r_max, alpha, candidate) / total
+        evidence = (
+            f"cdf(r_max) of (17), which must be 1: {share.min():.3f} to {share.max():.3f}; r_max {r_max.min():.1f} to "
+            f"{r_max.max():.1f} l; a of the same fits is {a_factor:.3f} of print: no factor missing"
+        )
+        curves = (b, candidate * shape)
+        found.append(_reading("(13) b0", f"{why}; {choices}", fitted, curves, evidence, {"b0": candidate}))
+    return found
+
+
+def _length_readings(profiles: Profiles) -> list[Reading]:
+    """Exponents of l: strides of (6) stay as they are while the mean free path changes, rings scale with it."""
+    lengths = np.geomspace(0.1, 10.0, 7)
+    powers = {"r R_d": (-1, 0, 1), "R_d": (-2, -1, 1)}  # of l in a, b, c, by dimension
+    found = []
+    for fitted, power in powers.items():
+        protocol = Protocol7(fitted=fitted, trimmed="r R_d")
+        units = lengths[:, None, None] ** np.array(power, float)
+        values = units * np.stack([fit_coefficients(profiles, protocol, mfp).values for mfp in lengths])
+        slopes = np.polyfit(np.log(lengths), np.log(np.abs(values)).reshape(lengths.size, -1), 1)[0].reshape(-1, 3)
+        mean, printed = slopes.mean(axis=0), np.array([-1.0, 0.0, 1.0])
+        spread = ", ".join(f"{low:.3f} to {high:.3f}" for low, high in zip(slopes.min(0), slopes.max(0), strict=True))
+        curves = lengths[:, None] ** mean, lengths[:, None] ** printed
+        evidence = f"alpha .5, .9, .99: exponents of a, b, c {spread}"
+        choices = f"{fitted} fitted; l .1 to 10 units of the strides of (6), rings of {profiles.r_edges[1]:g} l"
+        found.append(_reading(LENGTH, choices, mean, curves, evidence))
+    return found
+
+
+def _inverse_readings(profiles: Profiles, grids: dict[str, Floats]) -> list[Reading]:
+    """(19)-(20): where shares stand and what is made small; k1 and k2 by linear least squares at each albedo."""
+    wanted = [*np.arange(1, 10) / 10, 0.95, 0.99]
+    chosen = profiles.alpha[[np.argmin(np.abs(profiles.alpha - a)) for a in wanted]]
+    rows = [profiles.cdf[i] for i in np.searchsorted(profiles.alpha, chosen)]
+    edges = profiles.r_edges
+    cuts = fit_coefficients(profiles, Protocol7()).at(chosen).cut
+    even = np.arange(1, 100) / 100
+    by_share = [(even, np.interp(even, row, edges)) for row in rows]
+    by_ring = [_within(row, edges, row <= 0.95) for row in rows]
+    by_cut = [_within(row, edges, edges <= cut) for row, cut in zip(rows, cuts, strict=True)]
+    by_law = [_law_quantiles(float(a), even) for a in chosen]
+    cases = (
+        ("rings to cdf = .95", by_ring, "r, relative"),
+        ("xi even, .01 to .99", by_share, "xi"),
+        ("xi even, .01 to .99", by_share, "r"),
+        ("rings to r'_max of (6)", by_cut, "r"),
+        ("(17) with b0 = .0641 for truth, xi even, .01 to .99", by_law, "xi"),
+    )
+    return [_inverse_reading(chosen, points, residual, name) for name, points, residual in cases]
+
+
+def _within(shares: Floats, radii: Floats, keep: NDArray[np.bool_]) -> tuple[Floats, Floats]:
+    """Shares and radii of the edges kept, r = 0 left out."""
+    return shares[1:][keep[1:]], radii[1:][keep[1:]]
+
+
+def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
+    """Shares and radii of the paper's own cdf (17) after (18)."""
+    a, b, _ = printed_coefficients(np.array(alpha), CORRECTED_B0)
+    r = np.linspace(0.0, -b / a, 4001)
+    energy = law_energy(r, np.array(alpha), CORRECTED_B0)
+    return xi, np.interp(xi, energy / energy[-1], r)
+
+
+def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading:
+    k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
+    found = np.concatenate([_fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])])
+    # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
+    printed = _printed("(20)")
+    curves, laws = (_bracket(found), _bracket(printed)), _both_k(alpha, printed)
+    off = [float(np.sqrt(np.mean((k / law - 1) ** 2))) for k, law in zip((k1, k2), laws, strict=True)]
+    evidence = f"alpha .1 to .9 by .1, .95, .99: k1, k2 at each one are {off[0]:.3f}, {off[1]:.3f} rms from (20)"
+    return _reading("(20)", f"{name}; residual in {residual}", found, curves, evidence)
+
+
+def _both_k(alpha: Floats, p: Floats) -> tuple[Floats, Floats]:
+    return k1_law(alpha, p[:4]), k2_law(alpha, p[4:])
+
+
+def _bracket(p: Floats) -> Floats:
+    """k1 xi - k2 of (19), (alphas, shares)."""
+    k1, k2 = _both_k(INVERSE_ALPHAS, p)
+    return k1[:, None] * INVERSE_SHARES - k2[:, None]
+
+
+def _inverse_amplitudes(xi: Floats, r: Floats, residual: str) -> Floats:
+    """k1, k2 [mfp] of (19): linear in both; a residual in xi is one in r times the density."""
+    shape = np.sqrt(xi) * np.log(1 + INVERSE_EPSILON - xi)
+    weight = {"r": np.ones_like(r), "r, relative": 1 / r, "xi": np.gradient(xi, r)}[residual]
+    return _held([xi * shape * weight, -shape * weight], r * weight)

@@ -1,0 +1,213 @@
+"""What becomes of a recipe: each pipeline makes its truth, fits, judges, and gives a record's content and arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Orders, exact
+from profilefit.errors import RecipeError
+from profilefit.fitting import staged
+from profilefit.fitting.estimate import Fit, fit
+from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.quality import albedo_quality, profile_quality
+from profilefit.laws import published
+from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.recipes import catalogue, quality_tally, starts
+from profilefit.recipes.crosscheck import crosscheck
+from profilefit.recipes.paper.reproduction import readings
+from profilefit.recipes.paper.table1 import printed_halves, table1
+from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
+from profilefit.recipes.recipe import Albedos, Recipe, Rings
+from profilefit.recipes.run import Run
+from profilefit.recipes.summary import Arrays, curves, described, errors_by_name
+from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
+
+Floats = NDArray[np.float64]
+Made = tuple[dict[str, Any], Arrays]
+EVIDENCE_RINGS = Rings(last=30.0, dr=0.01)
+QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
+
+
+def needs_photons(recipe: Recipe) -> bool:
+    """Whether a recipe needs the order-resolved run of its setting."""
+    return "orders" in (recipe.truth, recipe.check)
+
+
+def _albedo(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+    profiles = truth_of(recipe, light)
+    result, found = _fitted(recipe, run, profiles, light)
+    content, arrays = _described(recipe, run, profiles, result)
+    laws = {**_printed_laws(recipe, run), "regenerated": result.law}
+    content["quality"] = {name: _albedo_quality(law, light) for name, law in laws.items()}
+    arrays |= {"reflectance": profiles.reflectance, "reflectance_error": profiles.standard_error.sum(axis=1)}
+    return content | found, arrays
+
+
+def _profile(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+    profiles = truth_of(recipe, light)
+    result, found = _fitted(recipe, run, profiles, light)
+    content, arrays = _described(recipe, run, profiles, result)
+    content["quality"] = _compare(recipe, run, result.law, light)
+    content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
+    return content | found, arrays | curves(profiles)
+
+
+def _inverse(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+    profiles = truth_of(recipe, light)
+    result, found = _fitted(recipe, run, profiles, light)
+    content, arrays = _described(recipe, run, profiles, result)
+    alpha = albedo_values(QUALITY_ALBEDOS)
+    laws = {"regenerated": result.law}
+    if printed := _printed_laws(recipe, run).get("published"):  # corrections are of the profile, not of its inverse
+        laws["published"] = printed
+    measured = {name: {"inversion_error": inversion_error(law, alpha)} for name, law in laws.items()}
+    content["quality"] = {"alpha": alpha, **measured}
+    return content | found, arrays | curves(profiles) | {"shares": np.asarray(result.rings.xi)}
+
+
+def _as_published(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+    rings = recipe.rings
+    if rings is None:
+        raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
+    start = starts.starting_law(recipe, run.out)
+    truths = {mfp: truth_of(recipe, light, mfp) for mfp in recipe.mfp}
+    points = {m: staged.fit_per_albedo(truth, start, m, rings.trim, rings.epsilon) for m, truth in truths.items()}
+    profiles, unit = truths[1.0], points[1.0]
+    laws = staged.fit_coefficient_laws(unit, start, recipe.held)
+    by_stage = {
+        name: float(value)
+        for law in laws.values()
+        for name, value in zip(law.names, law.solution.parameters, strict=True)
+    }
+    used, _ = staged.trimmed(profiles, rings.trim, rings.epsilon)
+    result = _fit(recipe, profiles, start.with_vector(tuple(by_stage), list(by_stage.values())), used)
+    content, arrays = _described(recipe, run, profiles, result)
+    content["stages"] = {
+        "coefficient_laws": {
+            letter: {
+                "constants": dict(zip(law.names, law.solution.parameters, strict=True)),
+                "standard_error": errors_by_name(law.names, law.covariance),
+                "result": law.solution.result,
+                "condition_number": law.solution.condition_number,
+            }
+            for letter, law in laws.items()
+        },
+        "length_exponents": staged.length_exponents(tuple(points.values())) if len(points) > 1 else {},
+        "per_albedo_failures": {f"{m:g}": sum(r != "converged" for r in p.results) for m, p in points.items()},
+    }
+    content["quality"] = _compare(recipe, run, result.law, light)
+    content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
+    arrays |= {"coefficients": unit.values, "coefficient_errors": unit.standard_error, "r_trim": unit.r_trim}
+    return content, arrays | curves(profiles)
+
+
+def _evidence(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+    if recipe.truth == "orders" and light is not None:
+        truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
+    else:
+        truth = ExactTruth()
+    laws = _regenerated_laws(run)
+    found = {"readings": readings(truth), "table1": table1(truth, laws), "halves": printed_halves()}
+    return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
+
+
+PIPELINES: dict[str, Callable[[Recipe, Run, Orders | None], Made]] = {
+    "albedo": _albedo,
+    "profile": _profile,
+    "inverse": _inverse,
+    "as-published": _as_published,
+    "evidence": _evidence,
+}
+
+
+def inversion_error(law: Any, alpha: Floats) -> Floats:
+    """max over xi in [0, 0.999] of |cdf_exact(sample(xi)) - xi| at each albedo (m,) [-]."""
+    xi = np.linspace(0.0, 0.999, 500)
+    errors = [np.max(np.abs(exact.cdf(law.sampler.sample(xi, a), float(a), setting=law.setting) - xi)) for a in alpha]
+    return np.array(errors)
+
+
+def _fitted(recipe: Recipe, run: Run, profiles: Profiles, light: Orders | None) -> tuple[Fit, dict[str, Any]]:
+    """The fit of a recipe, and what random starts and the other truth say of it."""
+    start, found = starts.starting_law(recipe, run.out), {}
+    result = _fit(recipe, profiles, start)
+    if recipe.random_starts:
+        tried = starts.random_starts(result, start, recipe.random_starts, run.seed)
+        found["starts"] = tried.content()
+        if tried.best is not None and tried.beats_own:
+            run.say(f"{recipe.name}: {tried.result}")
+            result = _fit(recipe, profiles, start.with_vector(result.free, list(map(float, tried.best))))
+    if recipe.check and light is not None:
+        found["crosscheck"] = crosscheck(result, profiles, light).content()
+    return result, found
+
+
+def _fit(recipe: Recipe, profiles: Profiles, start: Constants, used: NDArray[np.bool_] | None = None) -> Fit:
+    weighting = recipe.weighting
+    shares = (np.arange(weighting.shares) + 0.5) / max(weighting.shares, 1) * weighting.last_share
+    limits = (weighting.energy_limit, weighting.source_limit, weighting.rising)
+    return fit(profiles, start, weighting.objective, starts.free(recipe, start), used, limits, tuple(shares))
+
+
+def _described(recipe: Recipe, run: Run, profiles: Profiles, result: Fit) -> Made:
+    printed = next(iter(printed_sets(recipe).values()), {})
+    return described(result, profiles, printed, run.seed, run.max_chain)
+
+
+def printed_sets(recipe: Recipe) -> dict[str, dict[str, float]]:
+    """The printed constants of a recipe's law and setting by their names; the first one counts as the published one."""
+    key = f"{recipe.law}_albedo" if recipe.pipeline == "albedo" else recipe.law
+    sets = [s for s in published.SETS if (s.law, s.setting) == (key, recipe.setting)]
+    return {s.name if i else "published": dict(s.constants) for i, s in enumerate(sets)}
+
+
+def _printed_laws(recipe: Recipe, run: Run) -> dict[str, Any]:
+    """The laws that the printed constants make."""
+    kind: Any = starts.law_class(recipe)
+    given: dict[str, Any] = {"setting": recipe.setting}
+    if recipe.pipeline != "albedo":
+        given["albedo"] = catalogue.normalisation(recipe.setting, run.out)
+    return {name: kind(**given, **values) for name, values in printed_sets(recipe).items()}
+
+
+def _compare(recipe: Recipe, run: Run, law: Any, light: Orders | None) -> dict[str, Any]:
+    """The measures of every set of constants of this law, at albedos that were not fitted."""
+    alpha = albedo_values(QUALITY_ALBEDOS)
+    table: dict[str, Any] = {"alpha": alpha}
+    for name, one in {**_printed_laws(recipe, run), "regenerated": law}.items():
+        measured = asdict(_profile_quality(one, alpha, light))
+        table[name] = {key: value for key, value in measured.items() if key != "alpha"}
+    return table
+
+
+def _profile_quality(law: ProfileLaw, alpha: Floats, light: Orders | None) -> Any:
+    if law.setting.is_matched_isotropic or light is None:
+        return profile_quality(law, alpha)
+    return quality_tally.profile_quality(law, light, alpha)
+
+
+def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
+    if law.setting.is_matched_isotropic or light is None:
+        return albedo_quality(law)
+    return quality_tally.albedo_quality(law, light)
+
+
+def _regenerated_laws(run: Run) -> dict[str, ProfileLaw]:
+    """The laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
+    laws = {}
+    for label, law, name in (
+        ("normalized diffusion, regenerated", "burley", "burley-whole"),
+        ("paper, regenerated as published", "liang", "liang-as-published"),
+        ("paper, regenerated whole", "liang", "liang-whole"),
+    ):
+        path = run.out / f"{name}.json"
+        if not path.exists():
+            path = catalogue.fits_folder() / path.name
+            run.say(f"compared with the shipped record {name}: {run.out} has none")
+        laws[label] = catalogue.load(law, str(path), folder=run.out)
+    return laws

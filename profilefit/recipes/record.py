@@ -1,0 +1,104 @@
+"""Records: fits/*.json is what came out of a recipe, and everything needed to judge it or to make it again.
+
+The same recipe, seed and versions on one CPU class write the same bytes: no dates, no times, sorted keys. Samples and
+curves that figures need lie beside it in an .npz of the same name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+from collections.abc import Mapping
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcml_sim.files.npz import read_npz
+from mcml_sim.files.plain import plain as to_plain
+from mcml_sim.files.text_file import MOST_JSON, parse_json
+from mcml_sim.files.whole_file import read_whole, require_folder, write_together
+from profilefit.errors import InputError, RecordError
+from profilefit.recipes import schema
+
+FORMAT = 1
+# Twelve digits are beyond any error here, and within what a repeated run gives again.
+DIGITS = 12
+MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
+LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
+
+
+def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
+    """Write `name`.json and `name`.npz into `folder`, both or neither. OutputError names the file and the reason."""
+    body = plain({"format": FORMAT, "name": name, **content})
+    contents: dict[Path, bytes | str] = {}
+    if arrays:
+        file = io.BytesIO()
+        np.savez_compressed(file, allow_pickle=False, **arrays)
+        contents[folder / f"{name}.npz"] = file.getvalue()
+    path = folder / f"{name}.json"
+    contents[path] = json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+    require_folder(folder)
+    write_together(contents)
+    return path
+
+
+def read(path: Path, whole: bool = False) -> dict[str, Any]:
+    """Read a record; RecordError says which file and what is wrong with it.
+
+    Its law, pipeline, setting and constants must be there: that is what a law is made from. A `whole` record holds
+    everything that `profilefit report` shows.
+    """
+    if not schema.is_line(path.stem):  # it is shown, and stands in exported texts
+        raise RecordError(f"{str(path)!r}: the name of a record must be {schema.TEXT.words}")
+    if not path.exists():
+        raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
+    try:
+        content = parse_json(read_whole(path, MOST_JSON))
+    except InputError as error:
+        raise RecordError(f"{path}: cannot be read ({str(error).rpartition('got: ')[2]})") from None
+    except ValueError as error:
+        raise RecordError(f"{path}: is not a record: {error}") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
+        raise RecordError(f"{path}: is not a record of format {FORMAT}, got {found}")
+    if text := schema.problem(content, whole):
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    return content
+
+
+def read_arrays(path: Path) -> dict[str, np.ndarray]:
+    """The arrays beside a record (`path` is the .json)."""
+    file = path.with_suffix(".npz")
+    try:
+        with file.open("rb") as opened:
+            return read_npz(opened.read(MOST_ARRAYS + 1), MOST_ARRAYS)
+    except FileNotFoundError:
+        raise RecordError(f"{file}: the samples and curves of this record are missing; regenerate it") from None
+    except (OSError, ValueError) as error:
+        raise RecordError(f"{file}: is damaged ({error}); regenerate it") from None
+
+
+def available(folder: Path) -> dict[str, Path]:
+    """The records of a folder by name, in order."""
+    return {path.stem: path for path in sorted(folder.glob("*.json"))}
+
+
+def digest(*arrays: np.ndarray) -> str:
+    """SHA-256 of the numbers that were fitted, to tell whether two records saw the same data."""
+    sha = hashlib.sha256()
+    for array in arrays:
+        sha.update(np.ascontiguousarray(array).tobytes())
+    return sha.hexdigest()
+
+
+def versions() -> dict[str, str]:
+    """The libraries that decide the numbers."""
+    return {name: version(name) for name in LIBRARIES}
+
+
+def plain(value: Any) -> Any:
+    """`mcml_sim.files.plain` with the digits of a record: numbers, text, lists, dicts; None for what is not finite."""
+    return to_plain(value, DIGITS)

@@ -1,0 +1,222 @@
+"""Where fits begin: at the constants that a recipe names, and at random ones around them, to see which end better."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.errors import RecipeError
+from profilefit.fitting.estimate import Fit, Problem, discrepancy_covariance, judged
+from profilefit.fitting.solver import Solution, solve_batch
+from profilefit.laws import gaussians, published
+from profilefit.laws.base import Constants
+from profilefit.recipes import catalogue
+from profilefit.recipes.recipe import Recipe
+
+Floats = NDArray[np.float64]
+# Where a law without published constants begins, and one with such constants whose recipe says start = "none".
+OWN_START = "none"
+STARTS: dict[str, dict[str, float]] = {
+    "hazard": {  # within a tenth of the exact profile
+        **{"h0": 1.5, "h1": -0.2, "h2": -0.2, "c0": 0.5, "c1": 0.3, "c2": 0.2},
+        **{"a0": 0.5, "a1": -0.25, "a2": 0.04, "b0": 0.17, "b1": -0.2, "b2": 0.06},
+    },
+    "quantile": {  # within a hundredth of the exact share of energy
+        **{"a0": 0.1, "a1": 0.3, "a2": -0.15, "b0": 0.9, "b1": -0.3, "b2": 0.2},
+        **{"c0": 0.05, "c1": -0.01, "c2": -0.004},
+    },
+    **{f"gaussians:{n}": gaussians.law_class(n).start() for n in range(1, gaussians.MOST + 1)},
+    "rational": {"b": 0.5, "c": 2.0, "d": 1.0},  # the limits hold for any, and these give A within 0.1
+}
+# A random start multiplies each constant by e^(SPREAD * normal): two of three within a factor of two. It keeps its
+# sign, since most laws are not defined beyond; a constant that is 0 starts at SPREAD * normal.
+SPREAD = float(np.log(2.0))
+# Two solutions are one optimum if their costs [relative] and their constants are this near: constants as a share of
+# their size, or of their misfit error, which a small one among large ones needs.
+SAME_COST, SAME_CONSTANT, SAME_IN_ERROR = 1e-6, 1e-3, 0.1
+ROUNDING = 1e-20  # a cost that float64 residuals cannot tell from none
+MOST_OUTCOMES = 12
+OWN_IS_BEST = "no random start found a better optimum than the recipe's own start"
+OWN_IS_BEATEN = "a random start found a better optimum than the recipe's own start: the fit is that one"
+NONE_CONVERGED = "no start converged"
+
+
+def law_class(recipe: Recipe) -> type[Constants]:
+    """The class that a recipe's law names; RecipeError if there is none."""
+    known = _laws(recipe)
+    if recipe.law not in known:
+        raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
+    return known[recipe.law]
+
+
+def require_known(recipe: Recipe) -> None:
+    """RecipeError if a recipe names a law, a starting set or a constant that there is not."""
+    kind = law_class(recipe)
+    if not _start_constants(recipe) and recipe.pipeline != "evidence":
+        accepted = [*_published_names(recipe), *([OWN_START] if recipe.law in STARTS else [])]
+        raise RecipeError(
+            f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
+        )
+    if kind.seen_by(recipe.weighting.objective) and not free(recipe, kind):
+        raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
+    unknown = [name for name in recipe.held if name not in kind.constant_names()]
+    if unknown:
+        raise RecipeError(f"{recipe.path}: held must name constants of {recipe.law}, got {', '.join(unknown)}")
+
+
+def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
+    """The constants that a recipe moves."""
+    return tuple(name for name in kind.seen_by(recipe.weighting.objective) if name not in recipe.held)
+
+
+def starting_law(recipe: Recipe, folder: Path) -> Any:
+    """The law that a fit starts from, in the recipe's setting; constants named in `held` keep their values of here.
+
+    Constants of another setting are numbers to start from like any others. `folder` holds the records of A.
+    """
+    given: dict[str, Any] = {"setting": recipe.setting, **_start_constants(recipe)}
+    if recipe.pipeline != "albedo":
+        given["albedo"] = catalogue.normalisation(recipe.setting, folder)
+    return law_class(recipe)(**given)
+
+
+def _laws(recipe: Recipe) -> Mapping[str, type[Constants]]:
+    return catalogue.ALBEDO_LAWS if recipe.pipeline == "albedo" else catalogue.PROFILE_LAWS
+
+
+def _published_key(recipe: Recipe) -> str:
+    return f"{recipe.law}_albedo" if recipe.pipeline == "albedo" else recipe.law
+
+
+def _published_names(recipe: Recipe) -> list[str]:
+    return [s.name for s in published.SETS if s.law == _published_key(recipe)]
+
+
+def _start_constants(recipe: Recipe) -> dict[str, float]:
+    if recipe.start == OWN_START or not _published_names(recipe):
+        return STARTS.get(recipe.law, {})
+    return published.constants(_published_key(recipe), recipe.start)
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Where some of the starts ended: how many, the cost over the best one's [-], constants, and what the solver said.
+
+    Of those that failed in the same way only the one of lowest cost is told.
+    """
+
+    count: int
+    cost_ratio: float
+    result: str
+    constants: dict[str, float]
+
+
+@dataclass(frozen=True)
+class RandomStarts:
+    """What fits from random constants found.
+
+    count       of random starts; seed and rule say which
+    share_best  of them that reach the best optimum [-]: its cost within 1e-6, and its constants as near as `_same` says
+    result      whether one beats the recipe's own start
+    outcomes    the distinct ones, best first; `others` starts ended in still other ones
+    best        (p,) constants of the best optimum, None if no start converged
+    """
+
+    count: int
+    seed: int
+    rule: str
+    share_best: float
+    result: str
+    outcomes: tuple[Outcome, ...]
+    others: int
+    best: Floats | None
+
+    @property
+    def beats_own(self) -> bool:
+        return self.result == OWN_IS_BEATEN
+
+    def content(self) -> dict[str, Any]:
+        """What a record says of it."""
+        return {name: value for name, value in vars(self).items() if name != "best"}
+
+
+def random_starts(own: Fit, start: Constants, count: int, seed: int) -> RandomStarts:
+    """Repeat the fit `own`, which began at `start`, from `count` random constants, all in one batch."""
+    constants = start.vector(own.free)
+    begins = spread_out(constants, count, seed)
+    data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (count, *np.shape(leaf))), (start, own.rings))
+    found = solve_batch(Problem(own.objective, own.free), begins, data)
+    rule = f"constant x e^({SPREAD:.3g} normal), around the recipe's start"
+    return summarised(own.solution, [judged(one, own.free) for one in found], own.free, seed, rule)
+
+
+def spread_out(constants: Floats, count: int, seed: int) -> Floats:
+    """Random constants (count, p) around `constants` (p,)."""
+    normal = SPREAD * np.random.default_rng(seed).standard_normal((count, constants.size))
+    return np.where(constants == 0, normal, constants * np.exp(normal))
+
+
+def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
+    """Group the solutions by where they ended, and say whether one is better than the recipe's own."""
+    converged = [one for one in (own, *found) if one.converged]
+    best = min(converged, key=lambda one: one.cost, default=None)
+    if best is None:
+        result = NONE_CONVERGED
+    else:
+        result = OWN_IS_BEST if own.converged and _as_cheap(own, best) else OWN_IS_BEATEN
+        best = own if result == OWN_IS_BEST else best
+    groups = _groups(found)
+    unit = max(best.cost if best is not None else min(_cost(one) for one in (own, *found)), ROUNDING)
+    outcomes = [Outcome(len(g), _cost(g[0]) / unit, g[0].result, _named(names, g[0])) for g in groups]
+    reached = sum(_same(one, best) for one in found) if best is not None else 0
+    return RandomStarts(
+        len(found),
+        seed,
+        rule,
+        reached / len(found),
+        result,
+        tuple(outcomes[:MOST_OUTCOMES]),
+        sum(outcome.count for outcome in outcomes[MOST_OUTCOMES:]),
+        None if best is None else best.parameters,
+    )
+
+
+def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
+    """Solutions that are one optimum, or that failed in the same way, together, each group and all by cost."""
+    groups: list[list[Solution]] = []
+    for one in sorted(found, key=lambda one: (not one.converged, _cost(one))):
+        home = next((group for group in groups if _same(one, group[0])), None)
+        if home is None:
+            groups.append([one])
+        else:
+            home.append(one)
+    return groups
+
+
+def _same(one: Solution, other: Solution) -> bool:
+    """Whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
+    if not (one.converged and other.converged):
+        return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
+    error = np.sqrt(np.diag(discrepancy_covariance(other)))
+    near = np.maximum(SAME_CONSTANT * np.abs(other.parameters), SAME_IN_ERROR * error)
+    return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
+
+
+def _as_cheap(one: Solution, other: Solution) -> bool:
+    return one.cost <= other.cost * (1.0 + SAME_COST) + ROUNDING
+
+
+def _cost(one: Solution) -> float:
+    """The cost, infinite where the residuals are not finite."""
+    return one.cost if np.isfinite(one.cost) else np.inf
+
+
+def _named(names: tuple[str, ...], one: Solution) -> dict[str, float]:
+    return dict(zip(names, map(float, one.parameters), strict=True))

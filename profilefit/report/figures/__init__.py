@@ -1,0 +1,1 @@
+"""Functions of records and measurements to figures."""

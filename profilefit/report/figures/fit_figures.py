@@ -1,0 +1,135 @@
+"""Figures of a fit of one's own data: the light with its residuals, and the posterior of what was fitted."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import corner
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+from profilefit.measured.derived import unit_of
+from profilefit.measured.result import Answer
+from profilefit.report.figures.canvas import (
+    BLACK,
+    BLUE,
+    DATA,
+    GREY,
+    VERMILION,
+    WHOLE,
+    canvas,
+    legend_below,
+    save,
+    styled,
+)
+from profilefit.report.figures.corner_figure import LEVELS
+
+BINS = 24
+ENDS = 1.15  # how far axes go beyond the data
+CURVE = 64  # radii of the fitted line
+LABEL_DISTANCE = 0.3  # of an axis name, in panels
+
+
+@styled
+def residual_figure(answer: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
+    """Light per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
+    found, data = answer.found, answer.found.data
+    figure = canvas(5.6)
+    top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+    unit = data.unit or "unit of r"
+    r, half = data.r, 0.5 * (data.outer - data.inner)
+    line = np.geomspace(r[0] / ENDS, r[-1] * ENDS, CURVE)
+    inner, outer = (line * 0.999, line * 1.001) if data.rings else (line, line)
+    light = found.problem.model.linearised(found.point, inner, outer)[0][:-1]
+    top.plot(line, light, label="fitted law", **WHOLE)
+    seen = data.value > 0
+    top.errorbar(
+        r[seen], data.value[seen], yerr=found.sigma[seen], xerr=half[seen] if data.rings else None,
+        label="data, one standard error" + (", width of the ring" if data.rings else ""), **DATA,
+    )  # fmt: skip
+    top.set(xscale="log", yscale="log", ylabel=f"light per area [1/{unit}²]")
+    residual = (data.value - found.light) / found.sigma
+    below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
+    below.axhspan(-1, 1, color=GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
+    below.axhline(0.0, color=BLUE, linewidth=1.0)
+    below.plot(r, residual, color=BLACK, marker="o", markersize=3.0, linewidth=0.6)
+    if found.rel is not None and answer.telling is not None:
+        band = found.law_size / found.sigma
+        below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="the law's own error")
+        below.plot(r, -band, color=VERMILION, linestyle="--", linewidth=0.9)
+    span = max(3.0, 1.15 * float(np.max(np.abs(residual))))
+    below.set(xlabel=f"r [{unit}]", ylabel="(data − law) / σ [-]", ylim=(-span, span))
+    legend_below(figure, [top, below])
+    return save(figure, out, name)
+
+
+@styled
+def posterior_figure(answer: Answer, out: Path, name: str = "fit-corner") -> list[Path]:
+    """The posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
+    names = shown(answer)
+    if not names:
+        return []
+    samples = np.column_stack([answer.draws[one] for one in names])
+    size = len(names)
+    figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
+    corner.corner(
+        samples, fig=figure, bins=BINS, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
+        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
+        contour_kwargs={"linewidths": 0.6},
+    )  # fmt: skip
+    grid = np.array(figure.axes).reshape(size, size)
+    for row in range(size):
+        for column in range(row + 1):
+            _dressed(grid[row, column], row, column)
+            _marked(grid[row, column], [answer.value(names[at]) for at in (column, row)], row != column)
+    for at, one in enumerate(names):
+        unit = unit_of(one, answer.found.data.unit)
+        label = f"{_symbol(one)} [{unit or '-'}]"
+        grid[size - 1, at].set_xlabel(label)
+        grid[size - 1, at].xaxis.set_label_coords(0.5, -LABEL_DISTANCE)
+        if at:
+            grid[at, 0].set_ylabel(label)
+            grid[at, 0].yaxis.set_label_coords(-LABEL_DISTANCE, 0.5)
+    figure.subplots_adjust(left=0.14, right=0.98, bottom=0.12, top=0.94, wspace=0.08, hspace=0.08)
+    figure.suptitle("39 % and 86 % of the posterior, by the data's errors alone; lines: best fit", fontsize=9)
+    return save(figure, out, name)
+
+
+def shown(answer: Answer) -> tuple[str, ...]:
+    """The quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
+    if answer.walk is None:
+        return ()
+    free = answer.found.question.free
+    if len(free) == 1:
+        return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
+    return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in answer.moving)
+
+
+def _marked(ax: Axes, best: list[float | None], is_pair: bool) -> None:
+    """Thin lines at the best fit, where it is a value."""
+    if best[0] is not None:
+        ax.axvline(best[0], color=BLACK, linewidth=0.8)
+    if is_pair and best[1] is not None:
+        ax.axhline(best[1], color=BLACK, linewidth=0.8)
+
+
+def _symbol(name: str) -> str:
+    return {"alpha": "α", "mu_s'": "µs′", "mu_a": "µa"}.get(name, name)
+
+
+def _dressed(ax: Axes, row: int, column: int) -> None:
+    """Few numbers, none with an offset that the reader must add."""
+    ax.grid(False)
+    axes: list[Any] = [ax.xaxis] if row == column else [ax.xaxis, ax.yaxis]
+    for axis in axes:
+        axis.set_major_locator(MaxNLocator(3, prune="both"))
+        axis.set_major_formatter(ScalarFormatter(useOffset=False))
+    for text in ax.get_xticklabels():
+        text.set_rotation(45)
+    ax.tick_params(labelsize=7, length=2, pad=2)
+    if column > 0 and row != column:
+        ax.set_yticklabels([])
+    if row < ax.get_subplotspec().get_gridspec().nrows - 1:  # type: ignore[union-attr]
+        ax.set_xticklabels([])

@@ -1,0 +1,99 @@
+"""What a fit leaves: by ring and albedo for a profile, by share of light for an inverse cdf, by albedo for a map."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import matplotlib
+import numpy as np
+from matplotlib.axes import Axes
+from numpy.typing import NDArray
+
+from mcml_sim import exact
+from profilefit.laws.base import ProfileLaw
+from profilefit.recipes.recipe import Albedos
+from profilefit.recipes.targets import albedo_values
+from profilefit.report.figures.canvas import BLACK, BLUE, albedo_axis, canvas, save, styled
+from profilefit.report.records import Fitted, Source
+
+Floats = NDArray[np.float64]
+ALBEDOS = 6  # of a record's albedos, in order
+WITHIN = 0.995  # of the energy, as in quality.ENERGY_WITHIN: beyond it no measure looks
+MOST_RINGS = 60  # drawn: the paper's 400 even rings would hide each other
+SHARES = np.linspace(0.0, 0.999, 400)
+COLOURS = "viridis"  # from dark to light with alpha
+HEIGHT = 3.2  # [inch]
+
+
+@styled
+def residual_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
+    """Of a profile law: energy of a ring over that of the data, less 1 [-], with the data's standard errors.
+
+    Of an inverse cdf: exact cdf(r(xi)) - xi [-]. Of a map: alpha or A, whichever was fitted, less that of the data [-].
+    """
+    fitted = source.needed(record_name)
+    figure = canvas(HEIGHT)
+    ax = figure.subplots()
+    draw = {"albedo": _of_map, "inverse": _of_inverse}.get(fitted.content["pipeline"], _of_profile)
+    draw(ax, fitted)
+    ax.axhline(0.0, color=BLACK, linewidth=0.8)
+    return save(figure, out, name or f"residuals-{record_name}")
+
+
+def _of_map(ax: Axes, fitted: Fitted) -> None:
+    """Of what was fitted: alpha at the data's A, or A at the data's alpha."""
+    alpha = albedo_values(Albedos(**fitted.content["protocol"]["albedos"]), fitted.law.setting)
+    reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
+    if fitted.content["protocol"]["weighting"]["objective"] == "albedo":
+        left, error = np.asarray(fitted.law.alpha(reflectance)) - alpha, error * np.gradient(alpha, reflectance)
+        what = "α"
+    else:
+        left, what = np.asarray(fitted.law.reflectance(alpha)) - reflectance, "A"
+    ax.errorbar(alpha, left, error, color=BLUE, marker="o", markersize=2.6, linewidth=0.8, elinewidth=0.8)
+    albedo_axis(ax)
+    ax.set_ylabel(f"{what} of the map less {what} of the data [-]")
+
+
+def _of_inverse(ax: Axes, fitted: Fitted) -> None:
+    for alpha, colour, _ in _chosen(fitted):
+        radii = fitted.law.sampler.sample(SHARES, alpha)
+        left = np.asarray(exact.cdf(radii, alpha, setting=fitted.law.setting)) - SHARES
+        ax.plot(SHARES, left, color=colour, label=f"α = {alpha:.3f}")
+    ax.set(xlabel="ξ [-]", ylabel="exact cdf(r(ξ)) − ξ [-]", xlim=(0.0, 1.0))
+    _legend(ax)
+
+
+def _of_profile(ax: Axes, fitted: Fitted) -> None:
+    edges = fitted.arrays["r_edges"]
+    for alpha, colour, row in _chosen(fitted):
+        energy, error = fitted.arrays["energy"][row], np.nan_to_num(fitted.arrays["energy_error"][row])
+        model = np.diff(energy_within(fitted.law, edges, alpha))
+        last = np.searchsorted(np.cumsum(energy), WITHIN * np.sum(energy))
+        known = (energy > 0) & (np.arange(energy.size) <= last)
+        index = np.flatnonzero(known)
+        index = index[np.unique(np.geomspace(1, index.size, MOST_RINGS).astype(int) - 1)]
+        middle = np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1:]) * edges[1:])[index]
+        left, spread = model[index] / energy[index] - 1.0, error[index] / energy[index]
+        ax.errorbar(middle, left, spread, color=colour, linewidth=1.0, elinewidth=0.7, label=f"α = {alpha:.3f}")
+    ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a ring: law / data − 1 [-]")
+    _legend(ax)
+
+
+def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
+    """What the fit compared, within each edge [-]."""
+    with jax.enable_x64(True):
+        return np.asarray(law.unscaled_energy(jnp.asarray(edges), jnp.asarray(alpha)))
+
+
+def _chosen(fitted: Fitted) -> list[tuple[float, tuple[float, ...], int]]:
+    """(alpha, colour, row) of the albedos shown."""
+    rows = np.unique(np.linspace(0, fitted.arrays["alpha"].size - 1, ALBEDOS).round().astype(int))
+    colours = matplotlib.colormaps[COLOURS](np.linspace(0.05, 0.9, rows.size))
+    pairs = zip(rows, colours, strict=True)
+    return [(float(fitted.arrays["alpha"][row]), tuple(map(float, colour)), int(row)) for row, colour in pairs]
+
+
+def _legend(ax: Axes) -> None:
+    ax.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))

@@ -1,0 +1,189 @@
+"""What was measured with the laws, as sections of the page: shader check, cost, failures."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterator, Mapping, Sequence
+from html import escape
+
+from profilefit.report.page.markup import details, element, markup, paragraph
+from profilefit.report.page.measured import Measured, Told, missing
+from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.studies.stability.cells import Verdict
+
+# `python -m benchmarks.render` makes them.
+RENDERS = {
+    "render-laws.png": "A head by the exact profile, four laws and the separable filter, and how far each is off.",
+    "render-error.png": "Error of renders over samples a pixel and over time, against the exact picture.",
+    "render-choices.png": "The same head with the ways to sample.",
+    "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
+}
+GROUPS = {
+    "laws": ("Laws in float32", {"rel": "rel", "ks": "ks", "inversion_error": "sample"}),
+    "maps": ("Maps in float32", {"delta_A": "A", "delta_alpha": "α"}),
+}
+MEANING = (
+    "model: the record's error against exact half space or photons, worst albedo; float32: what rounding adds; bad: "
+    "NaN, Inf, negative or not monotone, in and out of where the law holds"
+)
+COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
+
+
+def shader(found: Measured) -> Iterator[str]:
+    """The parts of the section."""
+    told = found.told("check")
+    yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
+    for name, title in RENDERS.items():
+        path = found.folder / name
+        if path.exists():
+            yield _picture(path.read_bytes(), title)
+
+
+def _check(told: Told) -> Iterator[str]:
+    counts = " and ".join(f"{len(told[key])} {key}" for key in GROUPS)
+    verdict = "all pass" if told["passed"] else "bounds are broken"
+    yield paragraph(f"{counts} on {told['device']}: {verdict}.", "bold")
+    for key, (title, measures) in GROUPS.items():
+        if told[key]:
+            columns = _columns(told[key], measures)
+            yield markup(column_table(title, columns, MEANING, left=("light", "result"), fold=("law",)))
+    if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in told[key] for line in one["broken"]]:
+        yield element("ul", "".join(element("li", escape(line)) for line in broken))
+    if told["costs"]:
+        yield markup(column_table(COSTS, _costs(told["costs"]), left=("text",)))
+
+
+def _columns(group: Sequence[Told], measures: Mapping[str, str]) -> dict[str, list[str]]:
+    columns = {
+        "law": [_label(one) for one in group],
+        "result": ["FAIL" if one["broken"] else "pass" for one in group],
+        "light": [one["setting"]["illumination"] for one in group],
+        "n": [f"{one['setting']['n']:g}" for one in group],
+    }
+    for name, short in measures.items():
+        columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
+        columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
+    for place in ("inside", "outside"):
+        columns[f"bad\n{place}"] = [_count(one[place]) for one in group]
+    return columns
+
+
+def _label(one: Told) -> str:
+    return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
+
+
+def _count(bad: Told) -> str:
+    return str(sum(value for value in bad.values() if isinstance(value, int)))
+
+
+def _costs(costs: Told) -> dict[str, list[str]]:
+    works = list(next(iter(costs.values()))["ns"])
+    columns = {"text": list(costs)}
+    for work in works:
+        columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
+    return columns
+
+
+def _picture(png: bytes, title: str) -> str:
+    data = base64.b64encode(png).decode()
+    image = f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
+    caption = element("figcaption", escape(title))
+    return element("figure", element("div", image, class_="wide", tabindex="0") + caption)
+
+
+CHARTS = {
+    "truth": "Truths: error over time for a profile at five albedos.",
+    "laws": "Laws: error of R_d over the time of one evaluation.",
+    "samplers": "Samplers: error at an edge of light over time.",
+    "fits": "Fits: error of constants over time.",
+}
+
+
+def speed(found: Measured) -> Iterator[str]:
+    """The parts of the section."""
+    told = found.told("tradeoff")
+    if told is None:
+        yield missing("tradeoff")
+        return
+    for name, title in CHARTS.items():
+        if name in told:
+            yield found.origin({"made": told["made"], **told[name]})  # parts may have been measured on different days
+            yield found.drawing(f"tradeoff-{name}", title)
+            yield details(f"{escape(title)} The numbers", _numbers(told[name]))
+
+
+def _numbers(part: Told) -> str:
+    tables = []
+    for panel in part["panels"].values():
+        points = panel["points"]
+        columns = {
+            "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
+            "cost": [_with_spread(one["cost"]) for one in points],
+            "error": [_with_spread(one["error"]) for one in points],
+            "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
+            "stands": [one["standing"] for one in points],
+        }
+        caption = _plain(f"cost: {panel['cost']}; error: {panel['error']}")
+        tables.append(markup(column_table(_plain(panel["title"]), columns, caption, left=("", "stands"))))
+    return "\n".join([*tables, *(paragraph(note, "dim") for note in part["notes"])])
+
+
+def _plain(text: str) -> str:
+    """Without the marks that make a subscript in a figure."""
+    return text.replace("$", "")
+
+
+def _with_spread(measured: Told) -> str:
+    value, low, high = (measured[key] for key in ("value", "low", "high"))
+    alone = significant(value, 3)
+    return alone if low == high else f"{alone} ({significant(low)} … {significant(high)})"
+
+
+HOLDS = {
+    True: "No law, map or solver of this project has a red cell inside its stated range.",
+    False: "A law, map or solver of this project has a red cell inside its stated range.",
+}
+UNKNOWN = "no truth there: NaN, sign and order only"
+NOT_JUDGED = Verdict.NOT_JUDGED.words
+ATLAS = "stability-"
+FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
+
+
+def failures(found: Measured) -> Iterator[str]:
+    """The parts of the section."""
+    told = found.told("stability")
+    if told is None:
+        yield missing("stability")
+        return
+    yield found.origin(told)
+    yield paragraph(HOLDS[bool(told["passed"])], "bold")
+    yield paragraph(_unjudged(told["regions"]), "dim")
+    causes = _causes(told["regions"])
+    yield markup(column_table("Why cells are red, and what helps", causes, left=("cause", "as"), fold=("remedy",)))
+    for path in sorted(found.folder.glob(f"{ATLAS}*.svg")):
+        title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
+        figure = found.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
+        yield details(title, figure, is_open=path.stem == FIRST)
+
+
+def _unjudged(regions: Sequence[Told]) -> str:
+    count = sum(int(one["count"]) for one in regions if one["class"] == NOT_JUDGED)
+    return f"{count} cells, of all laws, are not judged: no truth reaches there."
+
+
+def _causes(regions: Sequence[Told]) -> dict[str, list[str]]:
+    groups: dict[str, list[Told]] = {}
+    for region in regions:
+        groups.setdefault(str(region["cause"]), []).append(region)
+    rows = sorted(groups.values(), key=lambda group: -len(_laws(group)))
+    return {
+        "cause": [group[0]["cause"] for group in rows],
+        "laws": [str(len(_laws(group))) for group in rows],
+        "cells": [str(sum(int(one["count"]) for one in group)) for group in rows],
+        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows],
+        "remedy": [group[0]["remedy"] or UNKNOWN for group in rows],
+    }
+
+
+def _laws(group: Sequence[Told]) -> set[str]:
+    return {one["law"] for one in group}

@@ -1,0 +1,178 @@
+"""The records of a folder as tables and figures need them: content, arrays, the fitted law, posterior, errors."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from functools import cache, cached_property
+from pathlib import Path
+from typing import Any
+
+import jax
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import exact
+from mcml_sim.media.setting import Setting
+from profilefit.errors import RecordError
+from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.schema import ERRORS, SETS
+
+Content = Mapping[str, Any]
+ADDED = ("statistical", "discretisation", "model", "jackknife")  # errors, of which the larger of the last two counts
+TOTAL = "photons, rings, and the larger of model and jackknife"
+
+
+def converged(content: Content) -> bool:
+    """Whether the fit says so: constants of a failed one are no law."""
+    return content["fit"]["result"] == "converged"
+
+
+def largest_error(constant: Content) -> float | None:
+    """The largest of a constant's errors, in its own unit; None if it was held."""
+    return max((constant[key] for key in ERRORS if constant.get(key) is not None), default=None)
+
+
+def total_error(constant: Content) -> float | None:
+    """Photons, ring width, the larger of model and jackknife, together in squares; None if held or without model error.
+
+    Model and jackknife are two views of what the law cannot follow: they do not add.
+    """
+    if constant.get("model_error") is None:
+        return None
+    photons, rings, model, jackknife = (constant.get(f"{name}_error") or 0.0 for name in ADDED)
+    return math.hypot(photons, rings, max(model, jackknife))
+
+
+def z_score(constant: Content) -> float | None:
+    """(published - regenerated) / `total_error`; None where there is no printed value or no error."""
+    error, published = total_error(constant), constant.get("published")
+    return (published - constant["regenerated"]) / error if error and published is not None else None
+
+
+def known_errors(constants: Content) -> dict[str, str]:
+    """Those of `ERRORS` that a record's constants, by name, tell of."""
+    return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
+
+
+def measured_sets(content: Content) -> list[str]:
+    """The sets of constants that a record measures, printed ones first."""
+    return [name for name in SETS if name in content["quality"]]
+
+
+def measures(content: Content, measure: str) -> bool:
+    """Whether a record knows this measure of its regenerated constants."""
+    return measure in (content.get("quality") or {}).get("regenerated", {})
+
+
+Floats = NDArray[np.float64]
+# Draws of the posterior that a band is made of: enough for its 95 % edges to a tenth of the band.
+DRAWS = 200
+LEVEL = 0.95
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """One record with the law that its constants make.
+
+    content, arrays  of the record; law the regenerated one; converged whether its fit says so
+    """
+
+    content: dict[str, Any]
+    arrays: dict[str, Floats]
+    law: Any
+
+    @property
+    def converged(self) -> bool:
+        return converged(self.content)
+
+    def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "discrepancy") -> tuple[Floats, Floats] | None:
+        """The 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
+
+        `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
+        """
+        samples = self.arrays.get(f"samples_{kind}")
+        if samples is None or not self.converged:
+            return None
+        some = samples[np.linspace(0, len(samples) - 1, min(DRAWS, len(samples))).astype(int)].astype(float)
+        curves = evaluate(self.law.with_vector(tuple(self.content["covariance"]["names"]), some.T[:, :, None]))
+        low, high = np.nanquantile(np.asarray(curves), [0.5 - LEVEL / 2, 0.5 + LEVEL / 2], axis=0)
+        return low, high
+
+
+@dataclass(frozen=True)
+class Source:
+    """The records in `folder`, or those of them that are named."""
+
+    folder: Path
+    names: tuple[str, ...] | None = None
+
+    @cached_property
+    def paths(self) -> dict[str, Path]:
+        """Record name -> file."""
+        found = record.available(self.folder)
+        return found if self.names is None else {name: path for name, path in found.items() if name in self.names}
+
+    @cached_property
+    def _read(self) -> dict[str, Fitted]:
+        return {}
+
+    def content(self, name: str) -> dict[str, Any]:
+        """What the .json of a record says."""
+        return self._read[name].content if name in self._read else record.read(self.paths[name])
+
+    def fitted(self, name: str) -> Fitted | None:
+        """A record and its law; None if the folder has none of that name. RecordError if it is damaged."""
+        if name not in self.paths:
+            return None
+        if name not in self._read:
+            content = record.read(self.paths[name])
+            self._read[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
+        return self._read[name]
+
+    def needed(self, name: str) -> Fitted:
+        """A record and its law; RecordError if the folder has none of that name."""
+        found = self.fitted(name)
+        if found is None:
+            raise RecordError(f"{self.folder} has no record {name!r}; `profilefit regenerate` makes it")
+        return found
+
+    def usable(self, name: str) -> Fitted | None:
+        """A record whose fit converged, or None: constants of a failed fit are no law to draw."""
+        found = self.fitted(name)
+        return found if found is not None and found.converged else None
+
+    def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
+        """A profile law with printed constants, normalised as the records here are."""
+        return catalogue.load(law, constants, setting, self.folder)
+
+    def _law(self, name: str, content: dict[str, Any]) -> ProfileLaw | AlbedoLaw:
+        setting, path = catalogue.record_setting(content), str(self.paths[name])
+        load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
+        return load(content["law"], path, setting, self.folder)
+
+
+def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:
+    """a [1/mfp], b [-], c [mfp] of (7) in double precision."""
+    with jax.enable_x64(True):
+        a, b, c = (np.asarray(value, float) for value in law.coefficients(np.asarray(alpha, float)))
+    return a, b, c
+
+
+def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
+    """r R_d [1/mfp] of (7) at radii `r` [mfp], before the correction (18), and zero beyond r_max."""
+    a, b, c = coefficients(law, alpha)
+    return np.maximum((a * r + b) / (r + c), 0.0)
+
+
+@cache
+def _exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int) -> tuple[Floats, Floats]:
+    r = np.geomspace(low, high, count)
+    return r, np.asarray(exact.profile(r, alpha, setting=setting))
+
+
+def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
+    """Radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
+    return _exact_profile(float(alpha), setting, float(low), float(high), count)

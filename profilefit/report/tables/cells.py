@@ -1,0 +1,138 @@
+"""How tables show numbers: digits that errors leave, columns of text, rows of blocks."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping, Sequence
+from itertools import pairwise
+
+from rich.cells import cell_len
+from rich.console import Group, JustifyMethod, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+# A constant whose error exceeds it still shows these digits: it is what the fit ended at.
+LEAST_DIGITS = 3
+SMALLEST, LARGEST = 1e-4, 1e6  # beyond these numbers are written with an exponent
+ABSENT = "–"
+
+
+def to_error(value: float | None, error: float | None) -> str:
+    """`value` to two digits of `error`, but never to fewer than three of its own."""
+    if value is None or not math.isfinite(value):
+        return ABSENT
+    places = LEAST_DIGITS - 1 - _exponent(value)
+    if error is not None and math.isfinite(error) and error > 0:
+        places = max(places, 1 - _exponent(error))
+    if value != 0 and not SMALLEST <= abs(value) < LARGEST:
+        return f"{value:.{max(places + _exponent(value), LEAST_DIGITS - 1)}e}"
+    return f"{value:.{max(places, 0)}f}"
+
+
+def significant(value: float | None, digits: int = 2) -> str:
+    """`value` to so many significant digits, zeros kept."""
+    if value is None or not math.isfinite(value):
+        return ABSENT
+    if value == 0:
+        return "0"
+    if not SMALLEST <= abs(value) < LARGEST:
+        return f"{value:.{digits - 1}e}"
+    return f"{value:.{max(digits - 1 - _exponent(value), 0)}f}"
+
+
+def interval(ends: Sequence[float | None] | None, most: float | None = None) -> str:
+    """Both ends, to two digits of half their distance; one that is None leaves a limit.
+
+    That has three digits, or two of its half distance from `most`, the end of what such a number can be.
+    """
+    if ends is None:
+        return ABSENT
+    low, high = ends
+    if low is not None and high is not None:
+        return f"{to_error(low, (high - low) / 2)} … {to_error(high, (high - low) / 2)}"
+    limit = high if low is None else low
+    room = None if limit is None or most is None else (most - limit) / 2
+    return f"{'<' if low is None else '>'} {to_error(limit, room)}"
+
+
+def on_the_point(texts: Sequence[str]) -> list[str]:
+    """The same texts, blanks added on the right so that in a right-aligned column the decimal points stand together."""
+    tails = [len(text) - _point(text) for text in texts]
+    widest = max(tails, default=0)
+    return [text + " " * (widest - tail) for text, tail in zip(texts, tails, strict=True)]
+
+
+def _point(text: str) -> int:
+    """Where the decimal point stands, or would."""
+    return text.index(".") if "." in text else len(text)
+
+
+def _exponent(value: float) -> int:
+    """The power of ten of the first digit, after rounding to two of them."""
+    return int(f"{value:.1e}".split("e")[1])
+
+
+def column_table(
+    title: str,
+    columns: Mapping[str, Sequence[str]],
+    caption: str = "",
+    left: Sequence[str] = ("",),
+    fold: Sequence[str] = (),
+) -> Group:
+    """Columns of equally many texts under their headers, numbers to the right; title and caption as wide as the screen.
+
+    left  headers of columns that stand to the left; fold those that may wrap, while all others keep to one line
+    """
+    table = Table(box=None, header_style="dim", padding=(0, 2, 0, 0), pad_edge=False)
+    for header, cells in columns.items():
+        side: JustifyMethod = "left" if header in left or header in fold else "right"
+        whole = None if header in fold else _width([header, *cells])  # a number that is cut reads as another one
+        table.add_column(Text(header), justify=side, no_wrap=header not in fold, overflow="fold", min_width=whole)
+    for row in zip(*columns.values(), strict=True):
+        table.add_row(*(Text(cell) for cell in row))
+    parts: list[RenderableType] = [Text(title, style="bold"), table]
+    return Group(*parts, Text(caption, style="dim")) if caption else Group(*parts)
+
+
+def _width(texts: Sequence[str]) -> int:
+    """Columns of the screen that the widest line takes."""
+    return max(cell_len(line) for text in texts for line in (text.splitlines() or [""]))
+
+
+BLOCKS = "▁▂▃▄▅▆▇█"
+GAP = " "  # for what is no positive number
+
+
+def spark(values: Sequence[float | None], ends: tuple[float, float] | None, width: int | None = None) -> str:
+    """A block a value, the lowest at the first of `ends`, the highest at the second, logarithmic between.
+
+    width  the most characters; of more values the largest of each stretch is shown, since an error may not be averaged
+    """
+    if ends is None:
+        return GAP * min(len(values), width or len(values))
+    return "".join(_block(value, *ends) for value in _at_most(values, width or len(values)))
+
+
+def span(rows: Iterable[Sequence[float | None]]) -> tuple[float, float] | None:
+    """The smallest and the largest positive number of all, so that sparks of one table have one scale; None of none."""
+    known = [value for row in rows for value in row if _is_shown(value)]
+    return (min(known), max(known)) if known else None  # type: ignore[type-var, return-value]
+
+
+def _block(value: float | None, low: float, high: float) -> str:
+    if value is None or not _is_shown(value):
+        return GAP
+    share = math.log(value / low) / math.log(high / low) if high > low else 0.0
+    return BLOCKS[round(min(max(share, 0.0), 1.0) * (len(BLOCKS) - 1))]
+
+
+def _is_shown(value: float | None) -> bool:
+    return value is not None and math.isfinite(value) and value > 0
+
+
+def _at_most(values: Sequence[float | None], width: int) -> list[float | None]:
+    """The largest of each of `width` stretches of equally many values; all of them if they are no more."""
+    count = min(width, len(values))
+    ends = [round(i * len(values) / count) for i in range(count + 1)]
+    stretches = [values[a:b] for a, b in pairwise(ends)]
+    return [max((v for v in stretch if _is_shown(v)), default=None) for stretch in stretches]  # type: ignore[type-var]

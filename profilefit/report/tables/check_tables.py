@@ -1,0 +1,226 @@
+"""What checks of shader texts found: a line a law, where errors are largest, what it costs, which bounds are broken."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from rich.console import RenderableType
+from rich.text import Text
+
+from profilefit.recipes.inventory import Named
+from profilefit.recipes.record import plain
+from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.report.tables.markdown import markdown_table
+from profilefit.shader.check import half
+from profilefit.shader.check.chosen import REGENERATED, chosen
+from profilefit.shader.check.cost import WORKS, Cost, law_costs
+from profilefit.shader.check.half import HalfCheck
+from profilefit.shader.check.laws import JUDGED, OWN, LawCheck, check_laws
+from profilefit.shader.check.maps import MapCheck, check_map
+from profilefit.shader.context import opened, renderer
+
+PASS, FAIL = "pass", "FAIL"
+LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
+MAP_COLUMNS = ("A\nmodel", "A\nfloat32", "α\nmodel", "α\nfloat32")
+COUNTS = ("bad\nin", "bad\nout")
+CAPTION = (
+    "model: the record's error against the exact half space or photons, worst albedo (of printed constants that of "
+    "the regenerated); float32: what rounding adds, at worst; sample: share of the energy between both radii; pdf: its "
+    "text against the slope of the sampler's own map; bad: NaN, Inf, negative, not monotone, in and out of where the "
+    "law holds"
+)
+COST_CAPTION = (
+    "ns and, in brackets, times normalized diffusion. profile: R_d; sample: a radius; both: a radius and R_d there; "
+    "estimate: a sample of (22), that is a radius, its density and R_d at another distance; material: both, with "
+    "another α at each. The texts as exported; constants do not change it"
+)
+HALF_CAPTION = (
+    "mean relative error of R_d / largest error of the cdf that float16 alone makes, worst of 24 albedos, l = 1"
+)
+
+
+def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
+    """A line a law and a line a map."""
+    parts: list[RenderableType] = []
+    if laws:
+        columns = {"law": [one.of.label for one in laws]}
+        columns |= _columns(LAW_COLUMNS, [_law_cells(one) for one in laws]) | _verdicts(laws)
+        parts.append(column_table(f"Laws in float32, {device}", columns, CAPTION, left=("result",), fold=("law",)))
+    if maps:
+        columns = {"map": [one.of.label for one in maps]}
+        columns |= _columns(MAP_COLUMNS, [_map_cells(one) for one in maps]) | _verdicts(maps)
+        parts.append(column_table(f"Maps in float32, {device}", columns, left=("result",), fold=("map",)))
+    return parts
+
+
+def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
+    """Of each law the distribution of its errors, and where the largest is."""
+    parts: list[RenderableType] = []
+    for one in laws:
+        spreads = one.spreads.values()
+        columns = {
+            "float32 error": list(one.spreads),
+            "50 %": [significant(spread.half) for spread in spreads],
+            "99 %": [significant(spread.most) for spread in spreads],
+            "largest": [significant(spread.largest) for spread in spreads],
+            "at": [spread.where for spread in spreads],
+        }
+        parts.append(column_table(one.of.label, columns, _against_exact(one), left=("float32 error", "at")))
+    return parts
+
+
+def _against_exact(one: LawCheck) -> str:
+    """The GPU's own errors beside the record's."""
+    pairs = [
+        f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})"
+        for name, value in one.measured.items()
+    ]
+    return f"GPU against the exact half space: {', '.join(pairs)}" if pairs else ""
+
+
+def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
+    """A line a text."""
+    columns = {"text": list(costs)}
+    for work in WORKS:
+        columns[work] = [f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for cost in costs.values()]
+    return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("text",))
+
+
+def half_table(found: Sequence[HalfCheck]) -> RenderableType:
+    """A line a law, a column for each thing that is stored in float16."""
+    columns = {"law": [one.of.label for one in found]}
+    for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
+        if any(name in one.rel for one in found):
+            columns[name] = [
+                f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT
+                for one in found
+            ]
+    return column_table("Half precision", columns, HALF_CAPTION, fold=("law",))
+
+
+def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
+    """The broken bounds, a line each, and the sum of it."""
+    lines = [Text(f"{FAIL} {_called(one)}: {bound}") for one in checks for bound in one.broken]
+    failed = sum(bool(one.broken) for one in checks)
+    count = f"{len(checks)} law{'s' if len(checks) != 1 else ''} or map{'s' if len(checks) != 1 else ''}"
+    return [*lines, Text(f"{count}: {failed} fail" if failed else f"{count}: all pass", style="bold")]
+
+
+def markdown_check(folder: Path) -> str:
+    """The README's tables: all that was regenerated, and what Liang et al. printed. ShaderError without OpenGL."""
+    laws, maps = (
+        [*regenerated, *printed]
+        for regenerated, printed in zip(
+            chosen((), REGENERATED, folder), chosen(("liang",), "published", folder), strict=True
+        )
+    )
+    with opened() as context:
+        of_laws = list(check_laws(context, laws, folder))
+        of_maps = [check_map(context, one, folder) for one in maps]
+        return markdown_checks(of_laws, of_maps, law_costs(context, laws, folder), renderer(context))
+
+
+def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
+    """The README's tables: laws, maps, costs, and the broken bounds."""
+    parts = []
+    if laws:
+        header = ("law", "light", "n", *(_flat(name) for name in (*LAW_COLUMNS, *COUNTS)), "result")
+        rows = [(one.of.label, *_setting(one.of), *_law_cells(one), *_counts(one), _result(one)) for one in laws]
+        parts.append(markdown_table(header, rows))
+    if maps:
+        header = ("law", "light", "n", *(_flat(name) for name in (*MAP_COLUMNS, *COUNTS)), "result")
+        rows = [(one.of.label, *_setting(one.of), *_map_cells(one), *_counts(one), _result(one)) for one in maps]
+        parts.append(markdown_table(header, rows))
+    checks: list[LawCheck | MapCheck] = [*laws, *maps]
+    broken = [f"- `{_called(one)}`: {bound}" for one in checks for bound in one.broken]
+    if broken:
+        parts.append("\n".join(broken))
+    if costs:
+        rows = [
+            (name, *(f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for work in WORKS))
+            for name, cost in costs.items()
+        ]
+        parts.append(markdown_table(("law", *(f"{work}, ns" for work in WORKS)), rows))
+    captions = [CAPTION, *([f"Costs: {COST_CAPTION}"] if costs else [])]
+    return "\n\n".join([*parts, f"On {device}. {'. '.join(captions)}."])
+
+
+def content(
+    laws: Sequence[LawCheck],
+    maps: Sequence[MapCheck],
+    costs: Mapping[str, Cost],
+    halves: Sequence[HalfCheck],
+    device: str,
+) -> dict[str, Any]:
+    """All of it as plain numbers and text, for --json; what is not finite is null."""
+    checks: list[LawCheck | MapCheck] = [*laws, *maps]
+    told = {
+        "device": device,
+        "passed": not any(one.broken for one in checks),
+        "laws": [{**_told(one), "spreads": one.spreads} for one in laws],
+        "maps": [_told(one) for one in maps],
+        "costs": dict(costs),
+        "float16": {one.of.label: {"rel": one.rel, "ks": one.ks} for one in halves},
+    }
+    return dict(plain(told))
+
+
+def _told(one: LawCheck | MapCheck) -> dict[str, Any]:
+    return {
+        "name": one.of.name,
+        "constants": one.of.constants,
+        "setting": one.of.setting,
+        "model": one.model,
+        "rounding": one.rounding,
+        "measured": one.measured,
+        "inside": one.inside,
+        "outside": one.outside,
+        "bounds": one.bounds,
+        "broken": [str(bound) for bound in one.broken],
+    }
+
+
+def _called(one: LawCheck | MapCheck) -> str:
+    """A map apart from the law of its name."""
+    return f"map {one.of.label}" if isinstance(one, MapCheck) and not one.of.records else one.of.label
+
+
+def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, list[str]]:
+    return {header: [row[i] for row in rows] for i, header in enumerate(headers)}
+
+
+def _verdicts(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
+    found = _columns(COUNTS, [_counts(one) for one in checks])
+    return {**found, "result": [_result(one) for one in checks]}
+
+
+def _law_cells(one: LawCheck) -> tuple[str, ...]:
+    """Model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
+    rounding = {name: value for name, value in one.rounding.items() if JUDGED[name] in one.spreads}
+    own = one.spreads.get(OWN)
+    cells = [value for name in ("rel", "ks") for value in (one.model.get(name), rounding.get(name))]
+    return tuple(significant(value) for value in (*cells, rounding.get("inversion_error"), own.most if own else None))
+
+
+def _map_cells(one: MapCheck) -> tuple[str, ...]:
+    return tuple(
+        significant(value) for name in ("delta_A", "delta_alpha") for value in (one.model.get(name), one.rounding[name])
+    )
+
+
+def _counts(one: LawCheck | MapCheck) -> tuple[str, str]:
+    return str(one.inside.total), str(one.outside.total)
+
+
+def _result(one: LawCheck | MapCheck) -> str:
+    return FAIL if one.broken else PASS
+
+
+def _setting(one: Named) -> tuple[str, str]:
+    return one.setting.illumination, f"{one.setting.n:g}"
+
+
+def _flat(header: str) -> str:
+    return header.replace("\n", " ")

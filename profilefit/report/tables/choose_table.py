@@ -1,0 +1,199 @@
+"""The choice for a scene as one table: the least that serves, what is next to it, and why."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from profilefit.report.tables.cells import column_table, on_the_point, significant
+from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
+from profilefit.studies.choose.cost import Ratios
+from profilefit.studies.choose.error import CHANNELS, Error
+from profilefit.studies.choose.filtered import passes
+from profilefit.studies.choose.layers import OneLayer
+from profilefit.studies.choose.options import is_filter
+from profilefit.studies.choose.truth import truth
+
+PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
+CAUSES = {
+    "model": "its shape",
+    "curvature": "the curved surface",
+    "pixel": "large pixels",
+    "noise": "noise",
+}
+LAYERS = {
+    "enough": "one layer is enough",
+    "enough alone": "one layer is enough by itself, but not with this choice: a more accurate way leaves it room",
+    "not enough": "one layer is not enough: fit the stack's own profile (profilefit fit STACK.mco)",
+    "undecided": "undecided: as far from the tolerance as the photons' noise",
+}
+
+
+def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> RenderableType:
+    """All that is said of a choice."""
+    shown = {
+        "best cheaper": choice.cheaper,
+        "chosen" if choice.chosen else "nearest": choice.nearest,
+        "next dearer": choice.dearer,
+    }
+    rows = {name: one for name, one in shown.items() if one is not None}
+    places = _places([one.error.total for one in rows.values()])
+    columns = {
+        "": list(rows),
+        "way": [one.option.label for one in rows.values()],
+        "error %": [_percent(one.error.total, places) for one in rows.values()],
+        **{
+            header: [_percent(getattr(one.error, part), places) for one in rows.values()]
+            for part, header in PARTS.items()
+        },
+        "ms": on_the_point([significant(one.ms) for one in rows.values()]),
+        "serves": [_serves(one, choice) for one in rows.values()],
+    }
+    fold = ("way", "most of the error")
+    parts: list[RenderableType] = [
+        column_table(headline(choice), columns, _caption(choice, ratios), ("", "serves"), fold)
+    ]
+    if layer is not None:
+        parts += [Text(), Text(_layer(layer, choice), style="bold")]
+    return Group(*parts)
+
+
+def headline(choice: Choice) -> str:
+    """The answer in a line."""
+    scene, one = choice.scene, choice.nearest
+    asked = f"{_percent(scene.tolerance)} %"
+    if scene.budget.ms is not None:
+        asked += f" within {scene.budget.ms:g} ms"
+    if choice.chosen:
+        return f"The least that serves: {one.option.label} (asked: {asked})"
+    if choice.meets_tolerance:
+        return f"Nothing serves for {asked}: the cheapest within the tolerance is {one.option.label}"
+    where = " in the budget" if choice.meets_budget and scene.budget.ms is not None else ""
+    return f"Nothing serves for {asked}: the most accurate{where} is {one.option.label}"
+
+
+def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> dict[str, Any]:
+    """The same and all options, as data; filters with the constants that a shader needs."""
+    scene = choice.scene
+    made: dict[str, Any] = {
+        "tolerance": scene.tolerance,
+        "budget_ms": scene.budget.ms,
+        "gpu": scene.budget.gpu,
+        "ratios_of": ratios.device,
+        "chosen": choice.chosen.option.label if choice.chosen else None,
+        "nearest": _data(choice.nearest),
+        "cheaper": _data(choice.cheaper) if choice.cheaper else None,
+        "dearer": _data(choice.dearer) if choice.dearer else None,
+        "options": [_data(one) for one in choice.predicted],
+        "filters": _filters(choice),
+        "export": export_hint(choice),
+    }
+    if layer is not None:
+        made["one_layer"] = {**vars(layer), "verdict": _verdict(layer, choice)}
+    return made
+
+
+def export_hint(choice: Choice) -> str:
+    """How to get the text of what was chosen."""
+    option = choice.nearest.option
+    if option.law is not None:
+        return f"profilefit export {option.name} --lang glsl"
+    if is_filter(option):
+        return "the filter's constants: --json, `filters`; its text: profilefit/shader/glsl/stage/separable.frag"
+    return "nothing to export: radiance is A E / pi"
+
+
+def _data(one: Predicted) -> dict[str, Any]:
+    error, case = one.error, one.error.case
+    return {
+        "option": one.option.label,
+        "ms": one.ms,
+        "error": error.total,
+        "parts": {part: getattr(error, part) for part in PARTS},
+        "worst": {
+            "channel": CHANNELS[error.channel],
+            "pixel": case.pixel,
+            "radius": None if case.is_flat else case.radius,
+        },
+    }
+
+
+def _filters(choice: Choice) -> list[dict[str, Any]]:
+    """Weights [-] and offsets [unit] of the taps of each filter of the choice, in the middle of the scene's ranges."""
+    option, scene = choice.nearest.option, choice.scene
+    if not is_filter(option):
+        return []
+    found = passes(option, middle(scene), truth(scene.setting))
+    return [
+        {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
+        for share, kernel, stretches in found
+    ]
+
+
+def _serves(one: Predicted, choice: Choice) -> str:
+    """Which of the limits it keeps."""
+    precise, paid = one.error.total <= choice.scene.tolerance, affordable(one, choice.scene)
+    if precise and paid:
+        return "yes"
+    return "no: " + " and ".join(what for what, good in (("error", precise), ("ms", paid)) if not good)
+
+
+def _reason(error: Error, unit: str) -> str:
+    """Where the error is worst, and what most of it comes from."""
+    part = max(PARTS, key=lambda name: getattr(error, name))
+    case = error.case
+    shape = "flat" if case.is_flat else f"radius {significant(case.radius)} {unit}"
+    return f"{CHANNELS[error.channel]}, pixel {significant(case.pixel)} {unit}, {shape}; mostly {CAUSES[part]}"
+
+
+def _caption(choice: Choice, ratios: Ratios) -> str:
+    scene = choice.scene
+    budget, setting = scene.budget, scene.setting
+    reasons = {"worst": choice.nearest, "the best cheaper": choice.cheaper}
+    lines = [
+        *(f"{name}: {_reason(one.error, scene.unit)}." for name, one in reasons.items() if one is not None),
+        f"error: root mean square of radiance within {scene.within.mfp:g} mean free paths (at least "
+        f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "
+        "share of white; then its parts, which add in squares.",
+        f"ms: an estimate of a frame on a {budget.gpu} at {100 * budget.coverage:.0f} % coverage: Table 2 of Liang et "
+        f"al. times ratios measured on {ratios.device.partition(' (')[0]}.",
+        f"light: {setting.illumination}, n = {setting.n:g}.",
+    ]
+    if (floor := truth(setting).floor) > 0:
+        lines.append(f"law: with what that for n = {setting.n:g} may be off from photons, {_percent(floor)} % of A.")
+    return "\n".join([*lines, export_hint(choice)])
+
+
+def _verdict(layer: OneLayer, choice: Choice) -> str:
+    """Whether it is within the tolerance, by itself and in what the choice leaves of it, in squares."""
+    alone = layer.verdict(choice.scene.tolerance)
+    left = max(choice.scene.tolerance**2 - choice.nearest.error.total**2, 0.0) if choice.meets_tolerance else 0.0
+    return "enough alone" if alone == "enough" and layer.verdict(math.sqrt(left)) != "enough" else alone
+
+
+def _layer(layer: OneLayer, choice: Choice) -> str:
+    verdict = _verdict(layer, choice)
+    unit = choice.scene.unit
+    together = math.hypot(layer.error, choice.nearest.error.total)
+    told = (
+        f"Layers, of one colour: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
+        f"mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a searchlight) is off by "
+        f"{_percent(layer.error)} ± {_percent(layer.standard_error)} %; with the choice {_percent(together)} %."
+    )
+    index = choice.scene.setting.n
+    if not math.isclose(layer.n, index, rel_tol=0.01):
+        told += f" The choice is for n = {index:g}, as material.index says, and these layers are not."
+    return told
+
+
+def _places(shares: list[float]) -> int:
+    """Decimals of a percentage that show two digits of the least of these."""
+    return max(1 - math.floor(math.log10(max(100.0 * min(shares), 1e-4))), 0)
+
+
+def _percent(share: float, places: int | None = None) -> str:
+    """Without the sign: to so many decimals, or two digits."""
+    return significant(100.0 * share) if places is None else f"{100.0 * share:.{places}f}"

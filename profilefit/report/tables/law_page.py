@@ -1,0 +1,286 @@
+"""A page for each law and map, in Markdown: what it is, every set of its constants with errors, and how to make it.
+
+Made of records, printed sets and docstrings alone, so that a page changes when they do. The documentation builds these.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcml_sim.media.setting import Setting
+from profilefit.laws import published
+from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.gaussians import Gaussians
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.inventory import PRINTED_MAP, Named, albedo_laws, profile_laws, sampled_laws
+from profilefit.report.records import SETS, TOTAL, Content, converged, known_errors, largest_error, z_score
+from profilefit.report.tables.cells import ABSENT, significant, to_error
+from profilefit.report.tables.markdown import markdown_table
+from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, MEANING, ROWS, albedo_number
+from profilefit.shader import emit
+
+RINGS = ("rel", "ks", "l1", "inversion_error")
+MEASURED = {
+    "rel": "mean relative error of R_d",
+    "ks": "largest error of the cdf",
+    "l1": "misplaced share of the energy",
+    "inversion_error": "largest error of the inversion in xi, up to 0.999",
+}
+# What the table of all laws shows of each, and how it is headed there.
+WORST = {"rel": "rel", "ks": "ks", "inversion_error": "xi", "delta_A": "A"}
+MAP = "map-"
+FORMS: dict[Any, emit.Form] = {**emit.FORMS, **emit.MAPS}  # what has a shader text
+INDEX = "index"
+
+
+@dataclass(frozen=True)
+class Page:
+    """One law or map with all its constants.
+
+    name     of the page's file; title its heading
+    members  the law with each set of constants, in the order of the inventory
+    """
+
+    name: str
+    title: str
+    members: tuple[Named, ...]
+
+    @property
+    def law_class(self) -> type:
+        """The class whose docstring says what the law is."""
+        kind = type(self.members[0].law)
+        return Gaussians if issubclass(kind, Gaussians) else kind
+
+    @property
+    def records(self) -> tuple[str, ...]:
+        return tuple(dict.fromkeys(name for one in self.members for name in one.records))
+
+
+def law_pages(folder: Path) -> list[Page]:
+    """Every law and map that loads with the records in `folder`, profile laws first."""
+    profiles = profile_laws(folder, matched=False)
+    taken = {name for one in profiles for name in one.records}
+    inverses = [one for one in sampled_laws(folder) if one.records and not set(one.records) & taken]
+    laws = _grouped(profiles + inverses, lambda one: one.name.split(":")[0])
+    maps = _grouped(albedo_laws(folder, matched=False), lambda one: MAP + one.name)
+    return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
+
+
+def page_text(page: Page, folder: Path, figure: str | None = None) -> str:
+    """One page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
+    parts = [
+        f"# {page.title}",
+        f"```{{eval-rst}}\n.. autoclass:: {_constructor(page)}\n   :no-members:\n```",
+        _shader(page),
+    ]
+    if figure:
+        caption = "Errors by albedo, at albedos that were not fitted; dashed: as printed."
+        parts.append(f"## Quality by albedo\n\n![Errors of {page.title} by albedo]({figure})\n\n*{caption}*")
+    for one in page.members:
+        parts.append(f"## {one.label}\n\n{_loading(one)}")
+        parts += [text for text in (_printed(one, folder), *(_recorded(name, folder) for name in one.records)) if text]
+    return "\n\n".join(parts) + "\n"
+
+
+def index_text(pages: Sequence[Page], folder: Path) -> str:
+    """The table of all laws with the worst errors that their records state, and the list of the pages."""
+    contents = _contents(folder)
+    header = ("law", "constants", "light", "n", "number", *(f"{name} worst" for name in WORST.values()))
+    rows = [_row(page, one, contents) for page in pages for one in page.members]
+    told = (
+        "Every law and map between alpha and A, with every set of constants that comes with this version. The errors "
+        "are those at the worst albedo that was not fitted, as the records state them: `rel` the mean relative error "
+        "of R_d, `ks` the largest error of the cumulated energy, `xi` that of the inversion, `A` that of the "
+        "reflectance. The pages are made of the records when the documentation is built; "
+        "[The laws](../guide/laws.md) measures also those that have no record."
+    )
+    tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.name for page in pages) + "\n```"
+    return "\n\n".join(["# All laws", told, markdown_table(header, rows), tree]) + "\n"
+
+
+def _contents(folder: Path) -> dict[str, Content]:
+    return {name: record.read(path) for name, path in record.available(folder).items()}
+
+
+def _grouped(found: Iterable[Named], key: Any) -> dict[str, list[Named]]:
+    groups: dict[str, list[Named]] = {}
+    for one in found:
+        groups.setdefault(key(one), []).append(one)
+    return groups
+
+
+def _title(name: str) -> str:
+    return f"{name.removeprefix(MAP)}, map between alpha and A" if name.startswith(MAP) else name
+
+
+def _constructor(page: Page) -> str:
+    """The class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
+    kind = page.law_class
+    names = [field.name for field in fields(kind)]
+    return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
+
+
+def _row(page: Page, one: Named, contents: Mapping[str, Content]) -> Sequence[str]:
+    worst = _worst(one, contents)
+    return (
+        f"[{one.name}]({page.name}.md)",
+        one.constants or "none",
+        one.setting.illumination,
+        f"{one.setting.n:g}",
+        str(len(one.law.constant_names())),
+        *(significant(worst.get(key)) for key in WORST),
+    )
+
+
+def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
+    """The largest error of each measure: of its own records, or of a record that measured the printed set as well."""
+    if one.records:
+        own = [contents[name]["quality"]["regenerated"] for name in one.records]
+    else:
+        own = [values for _, values in _measured_sets(one, contents)]
+    return {key: float(np.max(values[key])) for values in own for key in WORST if values.get(key) is not None}
+
+
+def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
+    """Records of the same law and light that measured this printed set as well: the record, and what it measured."""
+    pipelines = ("albedo",) if isinstance(one.law, AlbedoLaw) else ("profile", "as-published", "inverse")
+    which = one.constants if one.constants in SETS else SETS[0]  # records call the printed set of their light so
+    for content in contents.values():
+        is_own = content["law"] == one.name and content["pipeline"] in pipelines
+        if is_own and catalogue.record_setting(dict(content)) == one.setting and which in content["quality"]:
+            yield content, content["quality"][which]
+
+
+def _loading(one: Named) -> str:
+    """How Python and the shell get this very law."""
+    call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
+    lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
+    lines += ["", "```python", f"profilefit.{call}({', '.join(_arguments(one))})", "```"]
+    command = _export(one)
+    return "\n".join([*lines, "", "```", command, "```"] if command else lines)
+
+
+def _arguments(one: Named) -> list[str]:
+    """Of `load` or `albedo_law`: the constants' name, a record's path, or the setting of regenerated ones."""
+    name = f'"{one.name}"'
+    key = f"albedo {one.name}" if isinstance(one.law, AlbedoLaw) else one.name
+    if not one.records:
+        return [name, f'constants="{one.constants}"'] if one.constants else [name]
+    if one.records != tuple(catalogue.record_name(base, one.setting) for base in catalogue.REGENERATED.get(key, ())):
+        return [name, f'constants="fits/{one.records[0]}.json"']
+    return [name] if one.setting == Setting() else [name, f"setting={_setting(one.setting)}"]
+
+
+def _setting(setting: Setting) -> str:
+    parts = [f'"{setting.illumination}"'] if setting.illumination != Setting().illumination else []
+    parts += [f"n={setting.n:g}"] if setting.n != 1.0 else []
+    parts += [f"g={setting.g:g}"] if setting.g != 0.0 else []
+    return f"Setting({', '.join(parts)})"
+
+
+def _export(one: Named) -> str:
+    """The command that writes this law's shader text; none where it has none."""
+    if not isinstance(one.law, tuple(FORMS)):
+        return ""
+    if one.records:
+        return f"profilefit export {one.records[0]} --lang glsl"
+    name = f'"albedo {one.name}"' if isinstance(one.law, AlbedoLaw) and one.name == "liang" else one.name
+    return f"profilefit export {name}{f' --constants {one.constants}' if one.constants else ''} --lang glsl"
+
+
+def _shader(page: Page) -> str:
+    if not isinstance(page.members[0].law, tuple(FORMS)):
+        return "In a shader: no text, since its share within r is a quadrature."
+    prefixes = dict.fromkeys(f"`{emit.prefix(one.law)}_…`" for one in page.members)
+    form = next(form for kind, form in FORMS.items() if isinstance(page.members[0].law, kind))
+    return f"In a shader: `profilefit/shader/glsl/{form.file}.glsl`, its names begin with {', '.join(prefixes)}."
+
+
+def _printed(one: Named, folder: Path) -> str:
+    """A printed set: its source, its constants and the errors that a record found for it."""
+    law = one.name + (PRINTED_MAP if isinstance(one.law, AlbedoLaw) else "")
+    found = next((s for s in published.SETS if not one.records and (s.law, s.name) == (law, one.constants)), None)
+    if found is None:
+        return "" if one.records else "It has no constants: everything follows from alpha and the surface."
+    table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in found.constants.items()])
+    contents = _contents(folder)
+    measured = next(_measured_sets(one, contents), None)
+    told = [f"Source: {found.source}.", table]
+    return "\n\n".join(told if measured is None else [*told, _quality(measured[0], measured[1])])
+
+
+def _recorded(name: str, folder: Path) -> str:
+    """A record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
+    path = folder / f"{name}.json"
+    content = record.read(path, whole=True)
+    facts = [
+        f"**Record `{name}`**: {content['title']}. Equations: `{content['equations']}`",
+        _fitted(content),
+        _constants(content),
+        _quality(content, content["quality"]["regenerated"]),
+        _digests(content, path),
+        f"```\nprofilefit regenerate {name}\n```",
+    ]
+    return "\n\n".join(fact for fact in facts if fact)
+
+
+def _fitted(content: Content) -> str:
+    albedos, truth = content["protocol"]["albedos"], content["truth"]
+    light = "the exact half space" if truth["kind"] == "exact" else f"{truth['photons']:,} photons"
+    objective = content["protocol"]["weighting"]["objective"]
+    span = f"alpha from {albedos['low']:g} to {albedos['high']:g}, {albedos['count']} even in `{albedos['spacing']}`"
+    told = f"Fitted to {light}: {span}; objective `{objective}`; the fit {content['fit']['result']}."
+    return f"{told} {content.get('note', '')}".strip()
+
+
+def _constants(content: Content) -> str:
+    if not converged(content):
+        return f"No constants: {content['fit']['result']}."
+    told = known_errors(content["constants"])
+    has_printed = any(value.get("published") is not None for value in content["constants"].values())
+    header = ["constant", "regenerated", *(f"± {word}" for word in told.values())]
+    rows = [[name, *_with_errors(value, list(told))] for name, value in content["constants"].items()]
+    if has_printed:
+        header[1:1], header[len(header) :] = ["published"], ["z"]
+        for row in rows:
+            one = content["constants"][row[0]]
+            row[1:1], row[len(row) :] = [_plain(one.get("published"), "g")], [_plain(z_score(one), "+.1f")]
+    note = f"z: (published - regenerated) over {TOTAL}, together." if has_printed else ""
+    return f"{markdown_table(header, rows)}\n\n{note}".rstrip()
+
+
+def _with_errors(value: Content, kinds: Sequence[str]) -> list[str]:
+    """A constant, to the digits of its largest error, and its errors."""
+    errors = [significant(value.get(key)) for key in kinds]
+    held = ["held", *[ABSENT] * (len(kinds) - 1)]
+    return [to_error(value["regenerated"], largest_error(value)), *(errors if value.get("free", True) else held)]
+
+
+def _plain(value: float | None, form: str) -> str:
+    return ABSENT if value is None else format(value, form)
+
+
+def _quality(content: Content, values: Content) -> str:
+    if "delta_A" in values:
+        numbers = [(MEANING[key].replace("|", "\\|"), albedo_number(key, values[key])) for key in ALBEDO_MEASURES]
+        return markdown_table(("measure", "value"), numbers)
+    alpha = content["quality"]["alpha"]
+    shown = np.unique(np.linspace(0, len(alpha) - 1, ROWS).round().astype(int))
+    measures = [key for key in RINGS if values.get(key) is not None]
+    rows: list[Sequence[str]] = [(f"{alpha[i]:.3f}", *(significant(values[key][i]) for key in measures)) for i in shown]
+    rows.append(("worst", *(significant(float(np.max(values[key]))) for key in measures)))
+    meaning = "; ".join(f"`{key}`: {MEASURED[key]}" for key in measures)
+    return f"{markdown_table(('alpha', *measures), rows)}\n\n{meaning}."
+
+
+def _digests(content: Content, path: Path) -> str:
+    data = content.get("data_digest")
+    lines = [f"sha256 of the data   {data}"] if data else []
+    lines.append(f"sha256 of the record {hashlib.sha256(path.read_bytes()).hexdigest()}")
+    return "```\n" + "\n".join(lines) + "\n```"

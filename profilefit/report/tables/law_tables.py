@@ -1,0 +1,262 @@
+"""Every law on one axis: how far each is from the exact half space, by albedo; maps and samplers likewise."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain, groupby
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import RenderableType
+from rich.text import Text
+
+from mcml_sim.media.setting import Setting
+from profilefit.fitting.quality import AlbedoQuality, Quality
+from profilefit.fitting.sampling import SamplerQuality
+from profilefit.recipes.inventory import Named, Records, albedo_laws, profile_laws, sampled_laws
+from profilefit.report.tables.all_laws import (
+    ALBEDOS,
+    Floats,
+    MeasuredSampler,
+    Track,
+    for_each,
+    measured_map,
+    measured_profile,
+    measured_samplers,
+    untracked,
+)
+from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
+from profilefit.report.tables.check_tables import markdown_check
+from profilefit.report.tables.markdown import markdown_table
+from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, albedo_number, worst
+
+INFINITE = "∞"
+NEGLIGIBLE = 5e-6  # a draw from 2^24 steps and the quadrature know no better
+# Header and measure; the two "by law" are of a shader that takes the law's density for the sampler's.
+COLUMNS = {
+    "inversion": "inversion_error",
+    "atom": "atom",
+    "even\nown": "bias",
+    "even\nlaw": "bias_by_law_pdf",
+    "edge\nown": "edge_bias",
+    "edge\nlaw": "edge_bias_by_law_pdf",
+    "variance": "variance",
+}
+CAPTION = (
+    "inversion: max |cdf(r(ξ)) − ξ|, ξ ≤ 0.999; atom: share of samples at one radius; even, edge: relative error of "
+    "even light and of light beyond a straight edge, with the sampler's own pdf or the law's; variance: of the weight "
+    "of one sample, with its own"
+)
+
+
+def sampler_tables(qualities: Mapping[str, SamplerQuality]) -> list[RenderableType]:
+    """A table a sampler, by albedo, the worst last; what the columns are stands under the last."""
+    names = list(qualities)
+    return [_table(name, qualities[name], CAPTION if name == names[-1] else "") for name in names]
+
+
+def _table(name: str, quality: SamplerQuality, caption: str) -> RenderableType:
+    columns = {"α": [*(f"{alpha:.3f}" for alpha in quality.alpha), "worst"]}
+    for header, measure in COLUMNS.items():
+        values: NDArray[np.float64] = getattr(quality, measure)
+        worst = values[np.argmax(np.abs(values))]
+        columns[header] = on_the_point([sampler_number(float(value)) for value in [*values, worst]])
+    return column_table(f"Sampler: {name}", columns, caption, left=("α",))
+
+
+def sampler_number(value: float) -> str:
+    """A measure of a sampler as text."""
+    if abs(value) < NEGLIGIBLE:
+        return "0"
+    if math.isinf(value):
+        return INFINITE if value > 0 else f"-{INFINITE}"
+    return significant(value)
+
+
+PERCENT, BILLIONTHS = 100.0, 1e9
+SHOWN, SPARK = 3, 12  # albedos in columns, and characters of a sparkline over all of them
+# Measure: what it is, and in what unit its columns fit a line.
+MEASURES: Mapping[str, tuple[str, float]] = {
+    "rel": ("mean |law / exact - 1| of R_d [%]", PERCENT),
+    "ks": ("max |cdf - exact cdf| [%]", PERCENT),
+    "l1": ("share of misplaced energy [%]", PERCENT),
+    "mse": ("mean square error of r R_d [1e-9 / mfp²]", BILLIONTHS),
+    "r2": ("of r R_d", 1.0),
+}
+MAP_HEADERS = ("δA", "δα", "√(1-α)", "rises", "α(1)", "fold")
+NOTHING = "None of these records holds a law that can be measured against the exact half space."
+
+
+@dataclass(frozen=True)
+class Measured:
+    """What was measured of the laws of a folder, in the order in which it is shown."""
+
+    profiles: list[tuple[Named, Quality]]
+    maps: list[tuple[Named, AlbedoQuality]]
+    samplers: list[MeasuredSampler]
+
+
+def measured(
+    folder: Path,
+    records: Records = None,
+    alpha: Floats = ALBEDOS,
+    sampled_alpha: Sequence[float] | None = None,
+    track: Track = untracked,
+) -> Measured:
+    """Measure profiles by setting, then maps, then samplers.
+
+    records  restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
+    track    is shown the progress
+    """
+    profiles, maps, sampled = (find(folder, records) for find in (profile_laws, albedo_laws, sampled_laws))
+    profiles, sampled = (sorted(laws, key=lambda one: _order(one.setting)) for laws in (profiles, sampled))
+    qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
+    of_maps = for_each(measured_map, maps, track, "maps")
+    samplers = for_each(lambda one: measured_samplers(one, sampled_alpha), sampled, track, "samplers")
+    return Measured(
+        profiles=list(zip(profiles, qualities, strict=True)),
+        maps=list(zip(maps, of_maps, strict=True)),
+        samplers=list(chain.from_iterable(samplers)),
+    )
+
+
+def every_law(found: Measured, in_detail: bool = False) -> Iterator[RenderableType]:
+    """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
+    for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
+        by_label = {one.label: quality for one, quality in laws}
+        for measure in MEASURES:
+            yield _profile_table(measure, setting, by_label)
+    if found.maps:
+        yield _map_table(found.maps)
+    for setting, of_setting in groupby(found.samplers, key=lambda one: one.of.setting):
+        samplers = list(of_setting)
+        yield _sampler_table(setting, samplers)
+        if in_detail:
+            yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
+    if not (found.profiles or found.maps or found.samplers):
+        yield Text(NOTHING)
+
+
+def content(found: Measured) -> dict[str, Any]:
+    """The same for JSON: every measure at every albedo."""
+    return {
+        "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],
+        "maps": [{**_whose(one), "quality": quality} for one, quality in found.maps],
+        "samplers": [
+            {**_whose(one.of), "sampler": one.name, "exact_error": one.exact_error, "quality": one.quality}
+            for one in found.samplers
+        ],
+    }
+
+
+def _whose(one: Named) -> dict[str, Any]:
+    return {"law": one.name, "constants": one.constants, "records": list(one.records), "setting": one.setting}
+
+
+def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
+    """Tables of a README that are measured, not read from records, by the names of their marks.
+
+    "check" needs OpenGL, and raises ShaderError where there is none.
+    """
+
+    def laws() -> str:
+        found = profile_laws(folder)
+        return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
+
+    def samplers() -> str:
+        return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder)))))
+
+    return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder)}
+
+
+def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
+    """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
+    header = ("law", "constants", "light", "number", *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")))
+    rows = [
+        (
+            one.name,
+            one.constants or "none",
+            one.setting.illumination,
+            str(len(one.law.constant_names())),
+            *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
+        )
+        for one, quality in sorted(measured, key=lambda pair: _order(pair[0].setting))
+    ]
+    return markdown_table(header, rows)
+
+
+def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
+    """A line a sampler, each measure at its worst albedo."""
+    header = ("law", "constants", "light", "sampler", *_sampler_headers())
+    rows = [
+        (s.of.name, s.of.constants or "none", s.of.setting.illumination, s.name, *_sampler_cells(s))
+        for s in sorted(measured, key=lambda s: _order(s.of.setting))
+    ]
+    return markdown_table(header, rows)
+
+
+def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
+    alpha = next(iter(measured.values())).alpha
+    rows = np.unique(np.linspace(0, alpha.size - 1, SHOWN).round().astype(int))
+    values = [getattr(quality, measure) for quality in measured.values()]
+    wrong = [np.abs(1.0 - row) if measure == "r2" else row for row in values]  # r2 is good where it is near to 1
+    columns: dict[str, list[str]] = {"law": list(measured)}
+    columns["over α"] = [spark(list(row), span(map(list, wrong)), SPARK) for row in wrong]
+    for i in rows:
+        columns[f"{alpha[i]:.3f}"] = [_number(measure, float(row[i])) for row in values]
+    columns["mean"] = [_number(measure, float(np.mean(row))) for row in values]
+    columns["worst"] = [_number(measure, worst(measure, row)) for row in values]
+    title = f"{measure}: {MEASURES[measure][0]}, by α; {setting}"
+    caption = f"mean and worst over {alpha.size} albedos; over α: from the least to the worst here, logarithmic"
+    return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
+
+
+def _map_table(measured: Sequence[tuple[Named, AlbedoQuality]]) -> RenderableType:
+    maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
+    columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
+    for header, measure in zip(MAP_HEADERS, ALBEDO_MEASURES, strict=True):
+        columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
+    columns["α(0)"] = [albedo_number("at_one", one.law.alpha(0.0)) for one in maps]
+    caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
+    return column_table("Maps between A and α", columns, caption, left=("light",), fold=("map",))
+
+
+def _sampler_table(setting: Setting, samplers: Sequence[MeasuredSampler]) -> RenderableType:
+    columns: dict[str, list[str]] = {"law: sampler": [_sampler_label(one) for one in samplers]}
+    cells = [_sampler_cells(one) for one in samplers]
+    for i, header in enumerate(_sampler_headers("\n")):
+        columns[header] = [row[i] for row in cells]
+    caption = f"Each at its worst albedo. {CAPTION}; exact: inversion against the exact cdf"
+    return column_table(f"Samplers, {setting}", columns, caption, fold=("law: sampler",))
+
+
+def _sampler_headers(space: str = " ") -> list[str]:
+    return ["exact", *(header.replace("\n", space) for header in COLUMNS)]
+
+
+def _sampler_cells(one: MeasuredSampler) -> list[str]:
+    measures = [one.exact_error, *(getattr(one.quality, measure) for measure in COLUMNS.values())]
+    return [sampler_number(float(values[np.argmax(np.abs(values))])) for values in measures]
+
+
+def _sampler_label(one: MeasuredSampler) -> str:
+    return f"{one.of.label}: {one.name}"
+
+
+def _number(measure: str, value: float) -> str:
+    """A value in the measure's unit, in few characters."""
+    value *= MEASURES[measure][1]
+    if measure == "r2":
+        return f"{value:.3f}" if value > -1.0 else f"{value:.1f}"
+    if value < 0.1:
+        return f"{value:.3f}" if measure != "mse" else f"{value:.2f}"
+    return f"{value:.0f}" if value >= 100.0 else significant(value)
+
+
+def _order(setting: Setting) -> tuple[bool, float, float]:
+    """Searchlight first."""
+    return setting.illumination != Setting().illumination, setting.n, setting.g

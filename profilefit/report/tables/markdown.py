@@ -1,0 +1,232 @@
+"""The tables of README and documentation, as GitHub markdown: constants with errors, and how good each set is."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from math import inf
+from typing import Any
+
+import numpy as np
+
+from profilefit.recipes.paper.reproduction import LENGTH, PUBLISHED
+from profilefit.report.records import ERRORS, Content, converged, known_errors, largest_error, measured_sets, measures
+from profilefit.report.tables.cells import ABSENT, significant, to_error
+from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, MEANING, albedo_number, worst
+
+PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
+# Which equation of the paper a constant of its profile law belongs to.
+EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
+
+# Headers of columns that stand to the left.
+NAMES = frozenset({"record", "equation", "constant", "constants", "nearest reading", "constants found", "printed"})
+NAMES |= {"verdict", "law", "light", "sampler", "measure"}
+MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
+# What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
+SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
+
+
+def markdown_constants(records: Mapping[str, Content]) -> str:
+    """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
+    told = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
+    known = {key: word for key, word in ERRORS.items() if key in told}
+    header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
+    rows: list[Sequence[str]] = []
+    failures = []
+    for name, content in _fits(records).items():
+        if not converged(content):
+            failures.append(f"{_text(name)} has no constants to show: {_text(content['fit']['result'])}.")
+            continue
+        for constant, values in content["constants"].items():
+            errors = [significant(values.get(key)) for key in known]
+            if not values.get("free", True):
+                errors = ["held", *[ABSENT] * (len(known) - 1)]
+            published = values.get("published")
+            rows.append(
+                (
+                    name,
+                    EQUATION.get(constant, ABSENT) if content["law"] == "liang" else ABSENT,
+                    constant,
+                    ABSENT if published is None else f"{published:g}",
+                    to_error(values["regenerated"], largest_error(values)),
+                    *errors,
+                )
+            )
+    note = (
+        "Digits end where the largest error does; constants trade against each other, so compute with the record's own."
+    )
+    return "\n\n".join([markdown_table(header, rows), *failures, note])
+
+
+def markdown_hazard(records: Mapping[str, Content]) -> str:
+    """The constants of the hazard law in every setting, a record a column, and its worst errors there."""
+    fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
+    fitted = {name: c for name, c in fits.items() if converged(c)}
+    if not fitted:
+        return ""
+    names = next(iter(fitted.values()))["constants"]
+    fitted = {name: c for name, c in fitted.items() if c["constants"].keys() == names.keys()}
+    rows = [
+        (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
+        for columns in [list(fitted.values())]
+        for name in names
+    ]
+    for measure in ("rel", "ks"):
+        worst_of = (worst(measure, c["quality"]["regenerated"][measure]) for c in fitted.values())
+        rows.append((f"{measure}, worst", *map(significant, worst_of)))
+    return markdown_table(("constant", *fitted), rows)
+
+
+def markdown_quality(records: Mapping[str, Content]) -> str:
+    """Measures of every set of constants, mean and worst over alpha; those of A -> alpha maps; inversion errors."""
+    parts = [
+        _profile_quality(records),
+        _inversion_quality(records),
+        _albedo_quality(records),
+    ]
+    return "\n\n".join(part for part in parts if part)
+
+
+def markdown_readings(records: Mapping[str, Content]) -> str:
+    """Of each equation the reading nearest to print: what it chose, what came out, and the verdict."""
+    header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
+    readings = [r for content in records.values() for r in content.get("readings") or ()]
+    best: dict[str, Content] = {}
+    for reading in sorted(readings, key=lambda r: inf if r["curve_distance"] is None else r["curve_distance"]):
+        best.setdefault(reading["equation"], reading)
+    rows = [
+        (
+            equation,
+            best[equation]["choices"],
+            ", ".join(f"{name} {value:.4g}" for name, value in best[equation]["constants"].items()),
+            ", ".join(f"{value:g}" for value in best[equation]["published"].values()),
+            _percent(best[equation]["constant_distance"]),
+            _percent(best[equation]["curve_distance"]),
+            best[equation]["verdict"],
+        )
+        for equation in dict.fromkeys(reading["equation"] for reading in readings)
+    ]
+    return markdown_table(header, rows) if rows else ""
+
+
+def sections(records: Mapping[str, Content]) -> dict[str, str]:
+    """The tables that are made of records, by the names of their marks in README and documentation."""
+    paper = {name: content for name, content in records.items() if _is_of_the_paper(content)}
+    found = {
+        "short": _short_quality(records),
+        "quality": _profile_quality(paper),
+        "constants": markdown_constants(paper),
+        "hazard": markdown_hazard(records),
+        "readings": markdown_readings(records),
+        "inversion": _inversion_quality(records),
+        "maps": _albedo_quality(records),
+    }
+    return {name: text for name, text in found.items() if text}
+
+
+def fill(text: str, tables: Mapping[str, str]) -> str:
+    """Put each table between its marks, <!-- name --> and <!-- /name -->; marks without a table stay as they are."""
+    for name, table in tables.items():
+        begin, end = f"<!-- {name} -->", f"<!-- /{name} -->"
+        if begin in text and end in text:
+            head, rest = text.split(begin, 1)
+            text = f"{head}{begin}\n{table}\n{end}{rest.split(end, 1)[1]}"
+    return text
+
+
+def _profile_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(f"{key} {which}" for key in PROFILE_MEASURES for which in ("mean", "worst")))
+    rows = [
+        (owner, which, *(text for key in PROFILE_MEASURES for text in _mean_and_worst(key, values.get(key))))
+        for owner, which, values in _measured(records, "rel")
+    ]
+    return markdown_table(header, rows) if rows else ""
+
+
+def _short_quality(records: Mapping[str, Content]) -> str:
+    """A few laws under a searchlight by `rel` and `ks`, the worst first."""
+    searchlight = {name: c for name, c in records.items() if _is_searchlight(c)}
+    found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    rows = [
+        (owner, which, *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])))
+        for owner, which, values in sorted(found, key=lambda item: -worst("rel", item[2]["rel"]))
+    ]
+    header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
+    return markdown_table(header, rows) if rows else ""
+
+
+def _inversion_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", "inversion error mean", "inversion error worst")
+    rows = [
+        (owner, which, *_mean_and_worst("inversion_error", values["inversion_error"]))
+        for owner, which, values in _measured(records, "inversion_error")
+    ]
+    return markdown_table(header, rows) if rows else ""
+
+
+def _albedo_quality(records: Mapping[str, Content]) -> str:
+    header = ("record", "constants", *(MEANING[measure].replace("|", "\\|") for measure in ALBEDO_MEASURES))
+    rows = [
+        (owner, which, *(albedo_number(measure, values[measure]) for measure in ALBEDO_MEASURES))
+        for owner, which, values in _measured(records, "delta_A")
+    ]
+    return markdown_table(header, rows) if rows else ""
+
+
+def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
+    """(record or law, set, measures) of each set once: printed constants are the same in every record of their law."""
+    found: list[tuple[str, str, Content]] = []
+    for name, content in _fits(records).items():
+        for which in measured_sets(content):
+            regenerated = which == "regenerated"
+            owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
+            values = content["quality"][which]
+            failed = regenerated and not converged(content)
+            if measure in values and not failed and (owner, which) not in [item[:2] for item in found]:
+                found.append((owner, which, values))
+    return found
+
+
+def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
+    if values is None:  # photons do not say it
+        return ABSENT, ABSENT
+    return _number(measure, float(np.mean(values))), _number(measure, worst(measure, values))
+
+
+def _number(measure: str, value: float) -> str:
+    return f"{value:.4f}" if measure == "r2" else significant(value)
+
+
+def _is_of_the_paper(content: Content) -> bool:
+    """Its own laws, and those it is compared with, under its own light."""
+    return _is_searchlight(content) and content["law"] in ("liang", "burley", "rational")
+
+
+def _is_searchlight(content: Content) -> bool:
+    setting = content.get("setting") or {}
+    return (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
+
+
+def _fits(records: Mapping[str, Content]) -> dict[str, Content]:
+    return {name: content for name, content in records.items() if "constants" in content}
+
+
+def _percent(share: float | None) -> str:
+    return ABSENT if share is None else f"{share:.1%}"
+
+
+def _text(cell: str) -> str:
+    """Text for Markdown: no element, and no column of a table."""
+    return MARKUP.sub(r"\\\g<0>", cell)
+
+
+def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A GitHub table, names to the left and numbers to the right, every line filled to the same width.
+
+    What is in its cells begins no element and no further column.
+    """
+    header, rows = [_text(cell) for cell in header], [[_text(cell) for cell in row] for row in rows]
+    widths = [max(len(row[i]) for row in (header, *rows)) for i in range(len(header))]
+    rule = [":" + "-" * (w - 1) if h in NAMES else "-" * (w - 1) + ":" for h, w in zip(header, widths, strict=True)]
+    lines = [header, rule, *rows]
+    return "\n".join("| " + " | ".join(c.ljust(w) for c, w in zip(line, widths, strict=True)) + " |" for line in lines)

@@ -1,0 +1,228 @@
+"""What the atlas says in words: causes with their remedies, what holds of ours, fits, and every region as CSV."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+from rich.text import Text
+
+from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.studies.stability.atlas import Part
+from profilefit.studies.stability.cells import Cells, Verdict, cell_count
+from profilefit.studies.stability.fits import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
+from profilefit.studies.stability.regions import Region
+
+COLUMNS = (
+    "law", "quantity", "precision", "cells", "class", "count", "inside_its_range", "worst_cell", "value", "reference",
+    "error", "bound", "cause", "words", "remedy",
+)  # fmt: skip
+FIT_COLUMNS = ("law", "case", "value", "converged", "best", "spread", "constant", "results")
+SHORT = {
+    Verdict.NOT_JUDGED: "not judged",
+    Verdict.INACCURATE: "inacc.",
+    Verdict.NOT_MONOTONE: "not mon.",
+    Verdict.NEGATIVE: "neg.",
+    Verdict.NOT_FINITE: "NaN/Inf",
+    Verdict.RAISES: "raises",
+}
+# One character a class, as in the figure.
+SIGNS = {
+    Verdict.NOT_JUDGED: "?",
+    Verdict.INACCURATE: "≈",
+    Verdict.NOT_MONOTONE: "↕",
+    Verdict.NEGATIVE: "−",
+    Verdict.NOT_FINITE: "×",
+    Verdict.RAISES: "!",
+}
+LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
+BARE = "no truth there: NaN, sign, order only"
+LONGEST_NAME, LONGEST_REMEDY = 18, 40  # characters: a line of 100 holds both
+# What a line a law says of its fits: header, case, how its value begins, and whether shares or spreads.
+SUMMARY = (
+    ("from × 2", STARTS, "× e^(0.69", True),
+    ("from × 8", STARTS, "× e^(2.1", True),
+    ("dark", ALBEDO, "α 1e-4", True),
+    ("white", ALBEDO, "α 0.999", True),
+    ("rings × 8", BINS, "dr 1.6", False),
+    ("1e6 photons", NOISE, "1e+06", False),
+    ("trimmed", TRIMMING, "ε 0.0005", False),
+)
+
+
+def cause_table(parts: Sequence[Part]) -> RenderableType:
+    """A line a cause: whom it hits, in which classes, and what helps, shortened."""
+    groups: dict[str, list[Region]] = {}
+    for region in _regions(parts):
+        groups.setdefault(region.cause.key, []).append(region)
+    rows = sorted(groups.values(), key=lambda group: (not group[0].verdict.is_red, -len({o.subject for o in group})))
+    columns: dict[str, list[str]] = {
+        "cause": [group[0].cause.key for group in rows],
+        "of": [_among([one.subject for one in group]) for group in rows],
+        "cells": [str(sum(one.count for one in group)) for group in rows],
+        "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for group in rows],
+        "remedy": [_clipped(group[0].cause.remedy.split(";")[0] or BARE, LONGEST_REMEDY) for group in rows],
+    }
+    total = cell_count([one for part in parts for one in part.cells])
+    caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
+    return column_table("Why cells are red, and what helps", columns, caption, ("cause", "of", "as", "remedy"))
+
+
+def region_table(part: Part, most: int = 20) -> RenderableType:
+    """The regions of one subject, those inside its range first."""
+    regions = sorted(part.regions, key=lambda one: (one.inside == 0, -one.count))[:most]
+    columns = {
+        "quantity": [f"{one.quantity}, {one.arithmetic}" for one in regions],
+        "class": [SHORT[one.verdict] for one in regions],
+        "cells": [str(one.count) for one in regions],
+        "inside": [str(one.inside) for one in regions],
+        "where": [one.where for one in regions],
+        "worst": [significant(one.error) for one in regions],
+        "bound": [significant(one.bound) for one in regions],
+        "cause": [one.cause.key for one in regions],
+    }
+    caption = "" if len(part.regions) <= most else f"the largest {most} of {len(part.regions)} regions; --out has all"
+    return column_table(part.name, columns, caption, ("class",), ("quantity", "where", "cause"))
+
+
+def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
+    """A line a law: how many fits converge from where, and how far its constants move with the data."""
+    columns: dict[str, list[str]] = {"fit": [], **{header: [] for header, *_ in SUMMARY}}
+    for subject in dict.fromkeys(one.subject for one in fits):
+        columns["fit"].append(subject)
+        for header, case, begins, is_share in SUMMARY:
+            found = [o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins)]
+            columns[header].append(_told(found[0], is_share) if found else ABSENT)
+    refused = sum(one.case == NONSENSE and one.converged == 0 for one in fits)
+    nonsense = sum(one.case == NONSENSE for one in fits)
+    caption = (
+        "How many converge from so far off, and on dark or white albedos alone; then how far that constant\n"
+        "moves, over its size, that moves most: on wider rings, under noise, trimmed at 0.0005, not 0.05.\n"
+        f"Nonsense (NaN, no light, one albedo): {refused} of {nonsense} refused by name."
+    )
+    return column_table("Fits", columns, caption, ("fit",))
+
+
+def _told(one: FitCase, is_share: bool) -> str:
+    return f"{100.0 * one.converged:.0f} %" if is_share else significant(one.spread) if one.worst else ABSENT
+
+
+def fit_table(fits: Sequence[FitCase]) -> RenderableType:
+    """A line a case: how many converge, and how far their constants spread."""
+    shown = [one for one in fits if one.case != NONSENSE]
+    columns = {
+        "fit": [one.subject for one in shown],
+        "case": [f"{one.case}, {one.value}" for one in shown],
+        "converged": [f"{100.0 * one.converged:.0f} %" for one in shown],
+        "at the best": [
+            f"{100.0 * one.best:.0f} %" if one.case not in (BINS, NOISE, TRIMMING) else ABSENT for one in shown
+        ],
+        "spread": [f"{significant(one.spread)} {one.worst}" if one.worst else ABSENT for one in shown],
+        "else": [", ".join(f"{count} {told}" for told, count in one.results if told != "converged") for one in shown],
+    }
+    nonsense = sorted({told for one in fits if one.case == NONSENSE for told, _ in one.results})
+    caption = (
+        "spread: of the constant that moves most, over its size. Nonsense (NaN, no light, one albedo): "
+        + "; ".join(nonsense)
+    )
+    return column_table("Fits", columns, caption, ("fit",), ("case", "else"))
+
+
+def verdict_lines(parts: Sequence[Part]) -> list[Text]:
+    """Each broken promise of our own laws and solvers, and how many hold; each region without a cause."""
+    lines = []
+    for part in parts:
+        for region in part.regions:
+            if region.is_failure or (region.is_unexplained and region.verdict.is_red):
+                head = "FAIL" if region.is_failure else "unexplained"
+                lines.append(
+                    Text(
+                        f"{head} {region.subject}: {region.quantity}, {region.arithmetic}, {region.verdict.words} at "
+                        f"{region.place}: {region.value:.4g}, right {region.reference:.4g}; {region.cause.words}"
+                    )
+                )
+        lines += [
+            Text(f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}") for one in part.fits if one.is_failure
+        ]
+    ours = [part for part in parts if part.fits or any(one.own for one in part.cells)]
+    broken = sum(part.failures > 0 for part in ours)
+    told = (
+        "none has a red cell inside its range" if not broken else f"{broken} of them with red cells inside their range"
+    )
+    aside, inside = _unjudged(parts)
+    share = Text(f"of ours {aside} of {inside} cells inside their ranges are not judged: no truth there")
+    return [*lines, Text(f"ours: {len(ours)} laws, maps and functions, {told}"), *([share] if aside else [])]
+
+
+def _unjudged(parts: Sequence[Part]) -> tuple[int, int]:
+    """Of our own, cells that are not judged, and all, inside their ranges."""
+    own = [one for part in parts for one in part.cells if one.own]
+    aside = sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own)
+    return aside, sum(int(np.sum(one.inside)) for one in own)
+
+
+def regions_csv(parts: Iterable[Part]) -> str:
+    """Every region that is red or not judged, a line each."""
+    rows = [
+        (
+            one.subject, one.quantity, one.arithmetic, one.where, one.verdict.words, one.count, one.inside, one.place,
+            one.value, one.reference, one.error, one.bound, one.cause.key, one.cause.words, one.cause.remedy,
+        )
+        for one in _regions(parts)
+    ]  # fmt: skip
+    return _csv(COLUMNS, rows)
+
+
+def fits_csv(fits: Iterable[FitCase]) -> str:
+    """Every case of fits, a line each."""
+    rows = [
+        (
+            one.subject, one.case, one.value, one.converged, one.best, one.spread, one.worst,
+            "; ".join(f"{count} {told}" for told, count in one.results),
+        )
+        for one in fits
+    ]  # fmt: skip
+    return _csv(FIT_COLUMNS, rows)
+
+
+def content(parts: Sequence[Part]) -> dict[str, Any]:
+    """All of it for JSON."""
+    return {
+        "passed": not any(part.failures for part in parts),
+        "subjects": {part.name: _counts(part.cells) for part in parts if part.cells},
+        "regions": [dict(zip(COLUMNS, row, strict=True)) for row in csv.reader(io.StringIO(regions_csv(parts)))][1:],
+        "fits": [vars(one) for part in parts for one in part.fits],
+    }
+
+
+def _counts(cells: Sequence[Cells]) -> Mapping[str, int]:
+    total = {one.words: 0 for one in Verdict}
+    for each in cells:
+        for code, count in zip(*np.unique(each.codes, return_counts=True), strict=True):
+            total[Verdict(int(code)).words] += int(count)
+    return total
+
+
+def _regions(parts: Iterable[Part]) -> list[Region]:
+    return [region for part in parts for region in part.regions]
+
+
+def _among(subjects: Sequence[str]) -> str:
+    distinct = list(dict.fromkeys(subjects))
+    return f"{len(distinct)} of them" if len(distinct) > 1 else _clipped(distinct[0], LONGEST_NAME)
+
+
+def _clipped(text: str, most: int) -> str:
+    return text if len(text) <= most else text[: most - 1].rstrip() + "…"
+
+
+def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(header)
+    writer.writerows(rows)
+    return text.getvalue()

@@ -1,0 +1,101 @@
+"""All records on one screen: a line each, what was fitted to what, and its worst error before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from rich.console import Group, RenderableType
+from rich.text import Text
+
+from profilefit.report.records import SETS, Content, converged, measures
+from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark
+from profilefit.report.tables.evidence_tables import evidence_line
+from profilefit.report.tables.quality_tables import values_of, worst_measures
+
+SPARK = 12  # characters of a sparkline
+FAILED = "FAILED"
+Records = Mapping[str, Content]
+CAPTION = (
+    "Worst over α: as printed → corrected, where there is such a set → regenerated. "
+    "`profilefit report NAME` has constants, errors and quality by α."
+)
+
+
+def summary(records: Records) -> RenderableType:
+    """Profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+    tables = (_laws, _inverses, _maps, _readings)
+    kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
+    told = [make(found) for make, found in kinds.items() if found]
+    failures = [
+        Text(f"{name}: {content['fit']['result']}", style="red")
+        for name, content in records.items()
+        if "fit" in content and not converged(content)
+    ]
+    return Group(*_spaced(told), *failures, Text(CAPTION, style="dim"))
+
+
+def truth(content: Content) -> str:
+    """What a record was fitted to: the exact solution, or so many photons."""
+    source = content.get("truth") or {}
+    if source.get("photons") is None:
+        return str(source.get("kind", ABSENT))
+    return f"{source['photons']:.3g}".replace("e+0", "e") + " photons"
+
+
+def _laws(records: Records) -> RenderableType:
+    title = "Profile laws: mean |law / exact − 1| of R_d (rel) and max |cdf − exact cdf| (ks)"
+    return _errors(title, records, "rel", {"ks": "ks"})
+
+
+def _inverses(records: Records) -> RenderableType:
+    return _errors("Inverse cdfs: max |cdf(r(ξ)) − ξ|", records, "inversion_error", {})
+
+
+def _errors(title: str, records: Records, measure: str, more: Mapping[str, str]) -> RenderableType:
+    """A line a record: the worst of a measure, set by set, and how it goes over α."""
+    rows = {name: values_of(content["quality"]["regenerated"], measure) or [] for name, content in records.items()}
+    ends = span(rows.values())
+    header = measure.replace("inversion_error", "error")
+    columns = _first(records)
+    columns[header] = [_course(content, measure) for content in records.values()]
+    columns |= {key: [_course(content, key, last=True) for content in records.values()] for key in more}
+    columns[f"{header} over α"] = [spark(row, ends, SPARK) for row in rows.values()]
+    return column_table(title, columns, left=("record", "truth", f"{header} over α"))
+
+
+def _maps(records: Records) -> RenderableType:
+    columns = _first(records)
+    columns["max error of A"] = [_course(content, "delta_A") for content in records.values()]
+    columns["of √(1 − α)"] = [_course(content, "largest_s") for content in records.values()]
+    return column_table("Maps between A and α", columns, left=("record", "truth"))
+
+
+def _readings(records: Records) -> RenderableType:
+    columns = {"record": list(records), "found": [evidence_line(one).replace("\n", ", ") for one in records.values()]}
+    return column_table("Readings of what a paper leaves unsaid", columns, left=("record", "found"))
+
+
+def _first(records: Records) -> dict[str, list[str]]:
+    return {"record": list(records), "truth": [truth(content) for content in records.values()]}
+
+
+def _course(content: Content, measure: str, last: bool = False) -> str:
+    """The worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
+    found = worst_measures(content).get(measure, {})
+    shown = [significant(found[name]) for name in SETS if name in found]
+    if not converged(content):
+        shown.append(FAILED)
+    return shown[-1] if last else " → ".join(shown)
+
+
+def _spaced(tables: list[RenderableType]) -> list[RenderableType]:
+    return [part for table in tables for part in (table, Text())]
+
+
+def _kind(content: Content) -> Callable[[Records], RenderableType]:
+    """The table that a record stands in."""
+    if content["pipeline"] == "evidence":
+        return _readings
+    if measures(content, "delta_A"):
+        return _maps
+    return _laws if measures(content, "rel") else _inverses

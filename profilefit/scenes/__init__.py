@@ -1,0 +1,1 @@
+"""Calibrated closed forms on a stage, each beside its truth."""

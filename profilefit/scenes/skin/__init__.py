@@ -1,0 +1,1 @@
+"""Liang et al.'s head."""

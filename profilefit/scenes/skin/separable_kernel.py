@@ -1,0 +1,181 @@
+"""The kernel of Jimenez et al.'s separable filter, as wide as a material: what each tap weighs in each channel.
+
+Source: J. Jimenez et al., Separable subsurface scattering, Computer Graphics Forum 34, 2015, and the authors' own code
+(iryoku/separable-sss, SeparableSSS.cpp, calculateKernel; SeparableSSS.h, SSSSBlurPS). A slice through the skin profile
+is blurred with along rows, then along columns.
+
+Human skin as sums of Gaussians, the two sets that games still blur with [mm]: E. d'Eon and D. Luebke, Advanced
+techniques for realistic real-time skin rendering, GPU Gems 3, ch. 14, 2007, figure 14-13; J. Jimenez et al., Separable
+subsurface scattering, Computer Graphics Forum 34, 2015, with the authors' own code (iryoku/separable-sss,
+SeparableSSS.cpp), which rounds pi to 3.14.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
+from scipy.special import erf
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
+from profilefit.scenes.skin.material import DIFFUSE, Rgb
+from profilefit.shader.emit import literal
+
+Floats = NDArray[np.float64]
+CHANNELS = ("red", "green", "blue")
+
+
+@dataclass(frozen=True)
+class SkinGaussians:
+    """R(r) = sum_i w_i G(r / f; v_i), G(r; v) = e^{-r^2 / 2 v} / (2 pi v), in each channel.
+
+    variances  v_i [mm^2]; weights  w_i of red, green, blue [-]; stretches  f of red, green, blue [-]
+    """
+
+    variances: tuple[float, ...]
+    weights: tuple[tuple[float, float, float], ...]
+    stretches: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+    def profile(self, r: ArrayLike) -> Floats:
+        """R(r) [1/mm^2] of red, green, blue along a last axis, at radii [mm] of any shape."""
+        scaled = np.asarray(r, float)[..., None] / np.array(self.stretches)
+        variance = np.array(self.variances)[:, None]
+        gaussians = np.exp(-(scaled[..., None, :] ** 2) / (2.0 * variance)) / (2.0 * np.pi * variance)
+        return np.sum(np.array(self.weights) * gaussians, axis=-2)
+
+    @property
+    def energy(self) -> Floats:
+        """Integral of 2 pi r R over all r, of red, green, blue [-]."""
+        return np.sum(self.weights, axis=0) * np.square(self.stretches)
+
+
+# White light in, white light out: each channel's weights sum to one, and an albedo texture multiplies.
+D_EON = SkinGaussians(
+    variances=(0.0064, 0.0484, 0.187, 0.567, 1.99, 7.41),
+    weights=(
+        (0.233, 0.455, 0.649),
+        (0.100, 0.336, 0.344),
+        (0.118, 0.198, 0.0),
+        (0.113, 0.007, 0.007),
+        (0.358, 0.004, 0.0),
+        (0.078, 0.0, 0.0),
+    ),
+)
+FALLOFF = (1.0, 0.37, 0.3)
+"""The default of the authors' code for red, green, blue."""
+
+
+def separable(falloff: tuple[float, float, float] = FALLOFF) -> SkinGaussians:
+    """Jimenez et al.: the red Gaussians but the narrowest, in all channels, r / (0.001 + falloff).
+
+    The narrowest they take for light that comes straight back. Nothing is normalised here (0.767 of red is left): their
+    filter divides by the sum of its own samples.
+    """
+    red, _, _ = (np.array(D_EON.weights[1:]).T).tolist()
+    stretches = (0.001 + falloff[0], 0.001 + falloff[1], 0.001 + falloff[2])
+    return SkinGaussians(D_EON.variances[1:], tuple((w, w, w) for w in red), stretches)
+
+
+EXPONENT = 2.0  # of the taps' spacing: closer in the middle
+# Reach in units of the skin profile, r / stretch: the authors' for many taps and for few.
+REACH, SHORT_REACH, MANY = 3.0, 2.0, 20
+# What the five Gaussians of the kernel hold of the red skin profile; the sixth and narrowest is light that comes
+# straight back.
+STRENGTH = float(np.sum(D_EON.weights, axis=0)[0] - D_EON.weights[0][0])
+PUBLISHED_STRENGTH = (0.48, 0.41, 0.28)
+"""The default of the authors' code for red, green, blue: an artist's choice, too weak for a width to be matched."""
+DARKEST = 1e-4  # an albedo below has no light to blur; its width is that of this one
+RADII = 4000
+
+
+@dataclass(frozen=True)
+class Separable:
+    """As wide as a profile: strength, the share of the light that is blurred, of red, green, blue [-]; its setting."""
+
+    strength: Rgb = (STRENGTH, STRENGTH, STRENGTH)
+    setting: Setting = DIFFUSE
+
+    def __post_init__(self) -> None:
+        if len(self.strength) != 3 or not all(0 < share <= 1 for share in self.strength):
+            raise InputError(f"strength must be three shares in (0, 1], got {self.strength!r}")
+
+    def stretches(self, alpha: Floats, mfp: Floats) -> Floats:
+        """(3,) lengths [mm] of the kernel's unit: a step edge rises to 3/4 where it does under the exact profile."""
+        wanted = [exact_quartile(max(a, DARKEST), self.setting) for a in np.asarray(alpha).tolist()]
+        own = [kernel_quartile(share) for share in self.strength]
+        return np.asarray(mfp, float) * np.array(wanted) / np.array(own)
+
+    def taps(self, number: int, stretches: Floats) -> NDArray[np.float32]:
+        """(taps, 4): weights of red, green and blue, each of sum 1, and offset [mm]; an odd number of taps."""
+        count = number | 1
+        if count == 1:
+            return np.array([[1.0, 1.0, 1.0, 0.0]], np.float32)
+        reach = REACH if count > MANY else SHORT_REACH
+        even = np.linspace(-1.0, 1.0, count)
+        offset = reach * np.sign(even) * np.abs(even) ** EXPONENT
+        widest = float(np.max(stretches))
+        falloff = tuple(float(s / widest) - 0.001 for s in stretches)  # `separable` adds it
+        area = 0.5 * (np.diff(offset, prepend=offset[0]) + np.diff(offset, append=offset[-1]))
+        weight = area[:, None] * separable((falloff[0], falloff[1], falloff[2])).profile(np.abs(offset))
+        weight *= np.array(self.strength) / weight.sum(axis=0)
+        weight[count // 2] += 1.0 - np.array(self.strength)
+        return np.column_stack([weight, offset * widest]).astype(np.float32)
+
+
+@cache
+def albedo_of(reflectance: float, setting: Setting) -> float:
+    """alpha of the exact half space of reflectance A [-]."""
+    share = min(max(reflectance, 0.0), 1.0)
+    return float(brentq(lambda alpha: float(exact.reflectance(alpha, setting)) - share, 0.0, 1.0))
+
+
+@cache
+def exact_quartile(alpha: float, setting: Setting) -> float:
+    """Distance [mfp] from a step edge at which the exact profile lets 3/4 of the light through.
+
+    A radius r drawn by the profile, in a random direction, crosses an edge at distance q with the chance
+    arccos(q / r) / pi; the mean over even shares of the energy is 1/4 there.
+    """
+    radius = np.asarray(exact.quantile((np.arange(RADII) + 0.5) / RADII, alpha, setting=setting))
+
+    def crossed(distance: float) -> float:
+        return float(np.mean(np.arccos(np.minimum(distance / radius, 1.0)))) / np.pi - 0.25
+
+    return float(brentq(crossed, 0.0, radius[-1]))
+
+
+def kernel_quartile(strength: float) -> float:
+    """The same of the kernel, in its own unit: its line spread is its slice, and 1 - strength of it stays in place."""
+    if not strength > 0.5:
+        raise InputError(
+            f"strength must be > 0.5: a kernel that blurs less is as wide as no material, got {strength!r}"
+        )
+    gaussians = separable((0.999, 0.999, 0.999))
+    sigma = np.sqrt(gaussians.variances)
+    share = np.array([w[0] for w in gaussians.weights]) / sigma
+    share /= share.sum()
+
+    def within(distance: float) -> float:
+        return 1.0 - strength + strength * float(np.sum(share * erf(distance / (np.sqrt(2.0) * sigma)))) - 0.5
+
+    return float(brentq(within, 0.0, 10.0))
+
+
+def transmitted_text(name: str) -> str:
+    """The shader text of the light left beyond x, in units of the stretch: 1 - cdf of the red skin profile."""
+    gaussians = separable()
+    weights = np.array([w[0] for w in gaussians.weights])
+    terms = " + ".join(
+        f"{literal(float(w))} * exp(-x * x * {literal(0.5 / v)})"
+        for w, v in zip(weights / weights.sum(), gaussians.variances, strict=True)
+    )
+    return (
+        f"struct {name}_Shape {{ float unused; }};\n"
+        f"float {name}_alpha(float reflectance) {{ return reflectance; }}\n"
+        f"{name}_Shape {name}_shape(float alpha) {{ {name}_Shape s; s.unused = alpha; return s; }}\n"
+        f"float {name}_cumulated(float x, {name}_Shape s) {{ return 1.0 - ({terms}); }}\n"
+    )

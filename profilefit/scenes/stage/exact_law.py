@@ -1,0 +1,78 @@
+"""The exact half space as a law that a shader can run: textures for given albedos behind the functions of a law.
+
+For tests and references: what any closed form would give if it had no error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError
+from profilefit.scenes.skin.material import DIFFUSE
+from profilefit.shader.emit import literal, stage_text
+
+Singles = NDArray[np.float32]
+NAME = "exact"
+MOST_DEPTH = 24 * np.log(2.0)  # t = -ln(1 - xi) at the largest xi of a law's text, 1 - 2^-24
+DRAWN, KNOWN = 2048, 4096  # columns of the tables
+NEAR = 0.05  # x = NEAR sinh u [mfp]: u is even in x near the source and in ln x far away
+NEAREST, FARTHEST = 1e-6, 1000.0  # x [mfp] of the first and the last column
+LEAST_DENSITY = 1e-37  # [1/mfp]: its logarithm stays a number
+MOST_ALBEDOS = 16
+
+
+@dataclass(frozen=True)
+class ExactLaw:
+    """Exact profiles of some albedos: density, cdf and the radius that a share of the energy leaves within.
+
+    alpha  those that shaders may ask for; one asked for that is none of them gets the nearest
+    """
+
+    alpha: tuple[float, ...]
+    setting: Setting = DIFFUSE
+
+    def __post_init__(self) -> None:
+        if not 1 <= len(self.alpha) <= MOST_ALBEDOS or not all(0 < a <= 1 for a in self.alpha):
+            raise InputError(f"alpha must be 1 ... {MOST_ALBEDOS} albedos in (0, 1], got {self.alpha!r}")
+
+    def text(self, name: str) -> str:
+        """The law's text with the prefix `name`; it needs the textures of `textures(name)`."""
+        reflectance = np.atleast_1d(exact.reflectance(self.alpha, self.setting))
+        values = {
+            "ROWS": str(len(self.alpha)),
+            "ALPHAS": ", ".join(literal(a) for a in self.alpha),
+            "REFLECTANCES": ", ".join(literal(float(a)) for a in reflectance),
+            "MOST_DEPTH": literal(MOST_DEPTH),
+            "LARGEST_U": literal(float(np.arcsinh(FARTHEST / NEAR))),
+            "NEAR": literal(NEAR),
+        }
+        text = stage_text("exact_law.glsl").replace("LAW_", f"{name}_")
+        for key, value in values.items():
+            text = text.replace(f"@{key}@", value)
+        return text
+
+    def textures(self, name: str) -> dict[str, Singles]:
+        """Float textures (rows, columns, channels) by the names of their samplers."""
+        tables = [_table(alpha, self.setting) for alpha in self.alpha]
+        return {
+            f"{name}_drawn": np.stack([drawn for drawn, _ in tables]),
+            f"{name}_known": np.stack([known for _, known in tables]),
+        }
+
+
+@cache
+def _table(alpha: float, setting: Setting) -> tuple[Singles, Singles]:
+    """ln(x/t) over even t (DRAWN, 1), and ln density and -ln(1 - cdf) over even u (KNOWN, 2)."""
+    t = np.linspace(0.0, MOST_DEPTH, DRAWN)
+    t[0] = 1e-4 * t[1]
+    radius = np.minimum(exact.quantile(-np.expm1(-t), alpha, setting=setting), FARTHEST)
+    x = np.maximum(NEAR * np.sinh(np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOWN)), NEAREST)
+    ring = 2.0 * np.pi * x * exact.profile(x, alpha, setting=setting) / exact.reflectance(alpha, setting)
+    left = np.maximum(1.0 - exact.cdf(x, alpha, setting=setting), np.exp(-MOST_DEPTH - 10.0))
+    known = np.stack([np.log(np.maximum(ring, LEAST_DENSITY)), -np.log(left)], axis=-1)
+    return np.log(radius / t)[:, None].astype(np.float32), known.astype(np.float32)

@@ -1,0 +1,272 @@
+"""The render of Liang et al., section 5: shadow and thickness, G-buffer, scattering, combination.
+
+    with Stage(open_context(), (512, 512)) as stage:
+        stage.draw(head_scene())
+        image = stage.render(profilefit.load("hazard", setting=Setting("diffuse")), mfp, Sampling(64))
+
+Lengths are millimetres of one world scale. Irradiance is diffuse light, so a law of the diffuse setting is meant; one
+of the searchlight setting may be passed as well, to see the difference.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Hashable
+from typing import Any, Self
+
+import moderngl
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.media.checks import checked_whole
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw
+from profilefit.scenes.skin.scene import Scene
+from profilefit.scenes.skin.separable_kernel import Separable, albedo_of
+from profilefit.scenes.stage.buffers import Buffers, Singles, Targets, pixels
+from profilefit.scenes.stage.combining import Combining
+from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.geometry import SHADOW_SIDE, Geometry
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.scattering import Filtering, Gathering, View, text_of
+
+Floats = NDArray[np.float64]
+DEFAULT = Sampling()
+Law = ProfileLaw | ExactLaw | Separable
+MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
+BY_REFLECTANCE = -1.0  # alpha that tells a shader to take it from A
+# Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
+# Mesa's llvmpipe does, and the clock on the wall is right.
+TRUSTED = 0.5
+LONGEST_QUERY = 4.0  # seconds: the query counts nanoseconds in 32 bits
+PASSES = ("scatter", "frame")
+
+
+class Stage:
+    """The four passes over targets of one size, in one context. Release it, or use it in a `with`."""
+
+    def __init__(self, context: moderngl.Context, size: tuple[int, int], shadow_side: int = SHADOW_SIDE):
+        """size  width, height [pixels];  shadow_side  of the shadow map [texels]"""
+        self.context = context
+        side = checked_whole("shadow_side", shadow_side, 1, MOST_PIXELS)
+        self.size = (
+            checked_whole("width", size[0], 1, MOST_PIXELS),
+            checked_whole("height", size[1], 1, MOST_PIXELS),
+        )
+        self.compile_milliseconds: dict[str, float] = {}
+        self._targets = Targets(context, self.size)
+        self._geometry = Geometry(context, side)
+        self._passes: dict[Hashable, Gathering | Filtering | Combining] = {}
+        self._released = False
+        self._view: View | None = None
+        self._scene: Scene | None = None
+        self._mean_reflectance: Floats | None = None
+
+    def draw(self, scene: Scene) -> None:
+        """Passes 1 and 2: the G-buffer of a scene."""
+        self._alive()
+        self._geometry.draw(scene, self._targets.surface)
+        camera = scene.camera
+        self._seen(View(self.size, camera.pixel(self.size[1]), camera.is_perspective), scene)
+
+    def upload(self, buffers: Buffers) -> None:
+        """A G-buffer of numpy arrays in place of a scene; there is no light then, so `render` has no highlights."""
+        self._alive()
+        if buffers.size != self.size:
+            raise InputError(f"buffers must be {self.size} pixels, as the stage is, got {buffers.size}")
+        self._targets.upload(buffers)
+        self._seen(View(self.size, buffers.pixel, buffers.is_perspective), None)
+
+    def buffers(self) -> Buffers:
+        """The G-buffer as numpy arrays."""
+        view = self._ready()
+        return self._targets.read(view.pixel, view.is_perspective)
+
+    def scatter(
+        self,
+        law: Law | str,
+        mfp: ArrayLike,
+        sampling: Sampling = DEFAULT,
+        fixed_alpha: ArrayLike | None = None,
+        rows: tuple[int, int] | None = None,
+    ) -> Singles:
+        """(h, w, 3) radiant exitance, A times the blurred irradiance, in its unit; radiance is that over pi. Pass 3.
+
+        law  with a shader text, an `ExactLaw`, a `Separable` or "separable"
+        mfp  of red, green and blue, or one for all [mm]
+        fixed_alpha  single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
+        rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
+        """
+        first, last = rows or (0, self.size[1])
+        target = self._targets.into[self._targets.exitance]
+        target.scissor = (0, first, self.size[0], last - first)
+        try:
+            self._scatter(law, mfp, sampling, fixed_alpha)
+        finally:
+            target.scissor = (0, 0, *self.size)
+        return pixels(self._targets.exitance)[first:last, :, :3]
+
+    def render(
+        self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None
+    ) -> Singles:
+        """(h, w, 3) linear radiance to the camera [light's unit / sr]; arguments as for `scatter`. Passes 3 and 4."""
+        self._scatter(law, mfp, sampling, fixed_alpha)
+        self._combine(law, mfp, fixed_alpha)
+        return pixels(self._targets.radiance)[..., :3]
+
+    def time(
+        self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, repeats: int = 5, passes: str = "scatter"
+    ) -> list[float]:
+        """Milliseconds of each repeat, by the driver's clock where it is to be trusted; all is compiled before.
+
+        passes  "scatter", pass 3 alone, or "frame", all four of the scene last drawn
+        """
+        if passes not in PASSES:
+            raise InputError(f"passes must be one of {', '.join(PASSES)}, got {passes!r}")
+        if passes == "frame" and self._scene is None:
+            raise InputError("passes must be scatter where no scene was drawn, got 'frame'")
+        self._frame(law, mfp, sampling, passes)
+        return [self._timed(lambda: self._frame(law, mfp, sampling, passes)) for _ in range(repeats)]
+
+    def release(self) -> None:
+        """Frees all that the stage has on the GPU; the context is its owner's."""
+        for one in (*self._passes.values(), self._geometry, self._targets):
+            one.release()
+        self._passes.clear()
+        self._released = True
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.release()
+
+    def _seen(self, view: View, scene: Scene | None) -> None:
+        self._view, self._scene, self._mean_reflectance = view, scene, None
+
+    def _alive(self) -> None:
+        if self._released:
+            raise InputError("stage must not be used after it was released: make another one")
+
+    def _ready(self) -> View:
+        self._alive()
+        if self._view is None:
+            raise InputError("stage must have a scene or buffers: draw or upload comes first")
+        return self._view
+
+    def _scatter(self, law: Law | str, mfp: ArrayLike, sampling: Sampling, fixed_alpha: ArrayLike | None) -> None:
+        view, law, length, alpha = self._ready(), _law(law), _lengths(mfp), _albedos(fixed_alpha)
+        if isinstance(law, Separable):
+            filtering = self._compiled(law, "separable", lambda: Filtering(self.context, law))
+            filtering.run(self._targets, view, sampling, self._stretches(law, length, alpha))
+        else:
+            key = (sampling.kind, sampling.channels, sampling.area)
+            gathering = self._compiled(law, key, lambda: Gathering(self.context, law, sampling))
+            gathering.run(self._targets, view, sampling, length, alpha)
+
+    def _combine(self, law: Law | str, mfp: ArrayLike, fixed_alpha: ArrayLike | None) -> None:
+        view, law, length, alpha = self._ready(), _law(law), _lengths(mfp), _albedos(fixed_alpha)
+        if isinstance(law, Separable):
+            length = self._stretches(law, length, alpha)
+        combining = self._compiled(law, "combine", lambda: Combining(self.context, law))
+        combining.run(self._targets, view, self._scene, length, alpha)
+
+    def _frame(self, law: Law | str, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
+        if passes == "frame" and self._scene is not None:
+            self._geometry.draw(self._scene, self._targets.surface)
+        self._scatter(law, mfp, sampling, None)
+        if passes == "frame":
+            self._combine(law, mfp, None)
+
+    def _timed(self, work: Callable[[], None]) -> float:
+        query = self.context.query(time=True)
+        self.context.finish()
+        start = time.perf_counter()
+        with query:
+            work()
+        self.context.finish()
+        wall = time.perf_counter() - start
+        by_driver = query.elapsed / 1e9
+        return 1e3 * (by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall)
+
+    def _stretches(self, law: Separable, mfp: Floats, alpha: Floats) -> Floats:
+        """One kernel serves the whole picture: that of its mean A, where none is fixed."""
+        if self._mean_reflectance is None:
+            self._mean_reflectance = _mean_reflectance(self.buffers())
+        by_reflectance = np.array([albedo_of(a, law.setting) for a in self._mean_reflectance.tolist()])
+        return law.stretches(np.where(alpha < 0, by_reflectance, alpha), mfp)
+
+    def _compiled(self, law: Law, what: Hashable, make: Callable[[], Any]) -> Any:
+        """A pass of a law, made once; how long that took is in `compile_milliseconds`."""
+        key = (text_of(law) if isinstance(law, ProfileLaw) else law, what)
+        if key not in self._passes:
+            self._passes[key] = made = make()
+            self.compile_milliseconds[made.name] = made.milliseconds
+        return self._passes[key]
+
+
+def _law(law: object) -> Law:
+    if isinstance(law, str) and law == "separable":
+        return Separable()
+    if not isinstance(law, ProfileLaw | ExactLaw | Separable):
+        raise InputError(f'law must be a profile law, an ExactLaw, a Separable or "separable", got {law!r}')
+    return law
+
+
+def _lengths(mfp: ArrayLike) -> Floats:
+    lengths = _three("mfp", mfp)
+    if not np.all((lengths > 0) & (lengths < np.inf)):
+        raise InputError(f"mfp must be lengths > 0 [mm], got {mfp!r}")
+    return lengths
+
+
+def _albedos(alpha: ArrayLike | None) -> Floats:
+    if alpha is None:
+        return np.full(3, BY_REFLECTANCE)
+    albedos = _three("fixed_alpha", alpha)
+    if not np.all((albedos >= 0) & (albedos <= 1)):
+        raise InputError(f"fixed_alpha must be albedos in [0, 1], got {alpha!r}")
+    return albedos
+
+
+def _three(name: str, value: ArrayLike) -> Floats:
+    try:
+        return np.broadcast_to(np.asarray(value, float), 3).copy()
+    except (TypeError, ValueError):
+        raise InputError(f"{name} must be one number or three, got {value!r}") from None
+
+
+def _mean_reflectance(buffers: Buffers) -> Floats:
+    """(3,) mean A where light scatters inside; 0 where that is nowhere."""
+    inside = buffers.mask > 0.5
+    return buffers.reflectance[inside].mean(axis=0, dtype=float) if inside.any() else np.zeros(3)
+
+
+ROWS = 270  # of the picture that is searched with
+STEPS = 12  # of the bisection: the height to 1 in 4000
+SPAN = 0.05, 8.0  # heights tried, in those of the scene's camera
+TOLERANCE = 0.01
+
+
+def covering(context: moderngl.Context, scene: Scene, share: float, size: tuple[int, int] = (1920, 1080)) -> Scene:
+    """The scene zoomed so that translucent pixels are this share of the screen, to 1 %; size only as a shape."""
+    if not 0 < share < 1:
+        raise InputError(f"share must be in (0, 1), got {share!r}")
+    columns = round(ROWS * size[0] / size[1])
+    near, far = (factor * scene.camera.height for factor in SPAN)
+    with Stage(context, (columns, ROWS), shadow_side=16) as stage:
+        for _ in range(STEPS):
+            middle = np.sqrt(near * far)
+            is_covered = covered(stage, scene.zoomed(middle)) > share
+            near, far = (middle, far) if is_covered else (near, middle)
+        found = scene.zoomed(float(np.sqrt(near * far)))
+        reached = covered(stage, found)
+    if abs(reached - share) > TOLERANCE:
+        raise InputError(f"share must be one that the scene can cover by zooming, got {share!r}: {reached:.3f} is near")
+    return found
+
+
+def covered(stage: Stage, scene: Scene) -> float:
+    """Share of the stage's pixels that are translucent [-]."""
+    stage.draw(scene)
+    return float(np.mean(stage.buffers().mask > 0.5))

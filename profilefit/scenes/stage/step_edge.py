@@ -1,0 +1,254 @@
+"""The flat step edge: an endless plane, lit for x > 0 and dark elsewhere. What a profile makes of it is an integral.
+
+A point at the distance d from the edge gathers from the lit side, where it lies on the dark one itself,
+
+    L(-d) / A = (1/pi) int_d^inf arccos(d/r) p(r) dr = (1/pi) int_0^inf S(d cosh u) / cosh u du,    S = 1 - cdf,
+
+with p = 2 pi r R_d / A: of the circle of radius r the share arccos(d/r) / pi is lit. The second form is the first by
+parts with r = d cosh u: no density enters, no end is singular, and u is even in the logarithm of r where d is small, so
+that one rule serves every d. On the lit side L(d) = A - L(-d); at the edge A/2.
+
+The estimator of a screen-space gather on that edge, in float64, the slow, plain twin of a GPU's:
+
+    L = sum_i w_i E_i / sum_i w_i,   w_i = R_d(r_i) / p2(r_i),   p2 = p / (2 pi r)                 (Liang et al., 22)
+
+with radii r_i = r(xi_i) of density p, uniform angles, and E = 1 for x > 0, 0 elsewhere. Where all weights are 0 there
+is nothing to gather, and L is the point's own E. A clip draws one radius with a finite chance, an atom, from which no
+light leaves: it weighs nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline
+
+from mcml_sim import Setting, exact
+from profilefit.errors import InputError, SettingError
+from profilefit.fitting.sampling import ExactTarget, LawTarget, Target
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.scenes.stage import pattern
+
+Floats = NDArray[np.float64]
+NODES, PANEL = 12, 1.0  # Gauss nodes of a panel, and the greatest width in u of one
+FARTHEST = 1e7  # radius [mfp] beyond which less than 1e-7 of white light leaves, and none of any other
+HALVINGS = 80
+ALL = 1.0 - 1e-15  # share of the light that is all of it, to rounding
+
+
+def step_response(
+    x: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0, setting: Setting | None = None, law: ProfileLaw | None = None
+) -> float | Floats:
+    """L(x) / A: the share of its light that a point gathers from beyond the edge at 0, where x > 0 is lit [-].
+
+    x        place [length], any real number; mfp in the same unit; x, alpha, mfp broadcast
+    alpha    single-scattering albedo in [0, 1]
+    setting  of the exact half space, or that of the law; by default the law's, or a searchlight on a matched surface
+    law      its cdf instead of the exact one: what no number of samples takes away
+
+    Error below 1e-8 of A for the exact half space and for every law of this project. Raises InputError, and
+    SettingError where the setting is not the law's or has no exact solution.
+    """
+    places, albedos, length = np.broadcast_arrays(*(np.asarray(value, float) for value in (x, alpha, mfp)))
+    _require("x", places, np.isfinite(places), "a finite place")
+    _require("alpha", albedos, (albedos >= 0) & (albedos <= 1), "a single-scattering albedo in [0, 1]")
+    _require("mfp", length, (length > 0) & np.isfinite(length), "a mean free path > 0")
+    target = target_of(setting, law)
+    scaled = np.abs(places) / length
+    dark = np.empty(places.shape)
+    for value in np.unique(albedos):
+        here = albedos == value
+        dark[here] = _beyond(target, scaled[here], float(value))
+    share = np.where(places > 0, 1.0 - dark, dark)
+    return float(share) if share.ndim == 0 else share
+
+
+def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
+    """The light of a law, or of the exact half space; SettingError where there is none."""
+    if law is not None:
+        if setting is not None and setting != law.setting:
+            raise SettingError(f"the law belongs to {law.setting}, got a request for {setting}")
+        return LawTarget(law)
+    where = setting or Setting()
+    if not where.is_matched_isotropic:
+        raise SettingError(f"the exact half space has n = 1 and g = 0, got {where}: give a law of that setting")
+    return ExactTarget(where)
+
+
+def _require(name: str, values: Floats, good: NDArray[np.bool_], what: str) -> None:
+    if not np.all(good):
+        raise InputError(f"{name} must be {what}, got {values[~good].flat[0]:g}")
+
+
+def _beyond(target: Target, distance: Floats, alpha: float) -> Floats:
+    """The share from beyond a straight edge at each distance >= 0 [mfp], (n,)."""
+    found = np.full(distance.shape, 0.5)
+    last = _last_radius(target, alpha)
+    some = (distance > 0) & (distance < last)
+    found[distance >= last] = 0.0
+    if some.any():
+        d = distance[some]
+        u, du = _rule(np.arccosh(last / d))
+        left = 1.0 - target.cdf((d[:, None] * np.cosh(u)).ravel(), alpha).reshape(u.shape)
+        found[some] = np.sum(du * left / np.cosh(u), axis=1) / np.pi
+    return found
+
+
+def _rule(last: Floats) -> tuple[Floats, Floats]:
+    """Nodes and weights from 0 to each last u, (n,) -> (n, nodes): as many equal panels as the longest needs."""
+    nodes, weights = np.polynomial.legendre.leggauss(NODES)
+    panels = int(np.ceil(np.max(last) / PANEL))
+    width = last[:, None, None] / panels
+    u = (np.arange(panels)[:, None] + 0.5 * (nodes + 1.0)) * width
+    return u.reshape(last.size, -1), np.broadcast_to(0.5 * width * weights, u.shape).reshape(last.size, -1)
+
+
+def _last_radius(target: Target, alpha: float) -> float:
+    """The radius beyond which, to rounding, no light leaves [mfp]: a law that ends has a kink there."""
+    low, high = 0.0, FARTHEST
+    if target.cdf(np.array([high]), alpha)[0] < ALL:
+        return high
+    for _ in range(HALVINGS):
+        middle = 0.5 * (low + high)
+        if target.cdf(np.array([middle]), alpha)[0] < ALL:
+            low = middle
+        else:
+            high = middle
+    return high
+
+
+LAST_XI = 1.0 - 2.0**-24  # the last number below 1 that single-precision generators draw
+UNIFORM_SHARE = 0.995  # of the light within the largest of uniform radii, as the stage has it
+KNOTS = 1500  # of the exact quantile: within 1e-9 of itself, relative
+NEAREST_XI = 1e-9
+
+
+@dataclass(frozen=True)
+class Gather:
+    """How radii are drawn and what they weigh, for one albedo; lengths in mfp.
+
+    sample  xi in [0, 1) -> x = r/l;  weight  x -> w of (22), up to a factor that cancels [-]
+    """
+
+    sample: Callable[[Floats], Floats]
+    weight: Callable[[Floats], Floats]
+
+
+@dataclass(frozen=True)
+class EdgeEstimate:
+    """What the estimator gives at each place x (m,), as a share of A.
+
+    mean, standard_error of it, variance of one estimate, rmse of one estimate against `truth`, the exact response
+    law_bias  of the law's own integral against the truth; `mean` - truth tends to it with the number of samples
+    """
+
+    x: Floats
+    truth: Floats
+    mean: Floats
+    standard_error: Floats
+    variance: Floats
+    rmse: Floats
+    law_bias: Floats
+
+    @property
+    def bias(self) -> Floats:
+        """Of the estimator (m,): that of the law, and that of the ratio of two sums, of order 1/n."""
+        return self.mean - self.truth
+
+
+def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> Gather:
+    """Radii by the law's sampler, or by another, each with its own density."""
+    drawn, target = sampler or law.sampler, LawTarget(law)
+
+    def weight(x: Floats) -> Floats:
+        own = np.asarray(drawn.pdf(x, alpha))
+        return np.where(own > 0, target.density(x, alpha) / np.where(own > 0, own, 1.0), 0.0)
+
+    return Gather(lambda xi: np.asarray(drawn.sample(np.minimum(xi, LAST_XI), alpha)), weight)
+
+
+def by_quantile(alpha: float, setting: Setting | None = None) -> Gather:
+    """The exact profile with radii by its exact quantile: every weight is 1."""
+    curve = _quantile_curve(alpha, setting or Setting())
+    return Gather(lambda xi: np.exp(curve(np.log(_depth(xi)))), np.ones_like)
+
+
+def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | None = None) -> Gather:
+    """Radii uniform up to that of 99.5 % of the light, for a law or the exact profile."""
+    target = target_of(setting, law)
+    low, high = 0.0, 1e6
+    while high - low > 1e-9 * high:
+        middle = 0.5 * (low + high)
+        low, high = (middle, high) if target.cdf(np.array([middle]), alpha)[0] < UNIFORM_SHARE else (low, middle)
+    return Gather(lambda xi: xi * high, lambda x: target.density(x, alpha))
+
+
+def random_points(samples: int, trials: int, seed: int) -> Floats:
+    """Independent (xi, angle / 2 pi), (trials, samples, 2)."""
+    return np.random.default_rng(seed).random((trials, samples, 2))
+
+
+def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | None = None) -> Floats:
+    """One set of points on [0, 1)^2 with a random shift for each trial (Cranley and Patterson).
+
+    points  (samples, 2), shifted over the whole torus; by default the stage's lattice, shifted within one of its cells,
+            which gives the same sets. -> (trials, samples, 2)
+    """
+    shift = np.random.default_rng(seed).random((trials, 1, 2))
+    if points is None:
+        return (pattern.points(samples) + shift @ pattern.best(samples).cell) % 1.0
+    chosen = np.asarray(points, float)
+    if chosen.shape != (samples, 2):
+        raise InputError(f"points must be {samples} pairs (xi, angle / 2 pi), got an array of shape {chosen.shape}")
+    return (chosen + shift) % 1.0
+
+
+def edge_estimate(
+    gather: Gather, points: Floats, x: ArrayLike, alpha: float, setting: Setting, law: ProfileLaw | None = None
+) -> EdgeEstimate:
+    """The estimator at places x (m,) [mfp] with each trial's points (trials, samples, 2), the same at every place.
+
+    setting  of the exact response that it is judged by;  law  whose own response `law_bias` compares
+    """
+    places = np.atleast_1d(np.asarray(x, float))
+    if points.ndim != 3 or points.shape[2] != 2 or points.shape[0] < 2:
+        raise InputError(f"points must be (trials >= 2, samples, 2), got an array of shape {points.shape}")
+    truth = np.atleast_1d(step_response(places, alpha, setting=setting))
+    r = gather.sample(points[..., 0].ravel())
+    weight = gather.weight(r).reshape(points.shape[:2])
+    across = r.reshape(weight.shape) * np.cos(2.0 * np.pi * points[..., 1])
+    found = np.stack([_ratio(weight, place + across > 0, float(place > 0)) for place in places])
+    own = truth if law is None else np.atleast_1d(step_response(places, alpha, law=law))
+    variance = found.var(axis=1, ddof=1)
+    return EdgeEstimate(
+        places,
+        truth,
+        found.mean(axis=1),
+        np.sqrt(variance / points.shape[0]),
+        variance,
+        np.sqrt(np.mean((found - truth[:, None]) ** 2, axis=1)),
+        own - truth,
+    )
+
+
+def _ratio(weight: Floats, lit: NDArray[np.bool_], own: float) -> Floats:
+    """(22) for each trial (trials,)."""
+    total = weight.sum(axis=1)
+    some = total > 0
+    return np.where(some, np.sum(weight * lit, axis=1) / np.where(some, total, 1.0), own)
+
+
+def _depth(xi: Floats) -> Floats:
+    """-ln(1 - xi), where radii are smooth at both ends."""
+    return -np.log1p(-np.clip(xi, NEAREST_XI, LAST_XI))
+
+
+@lru_cache(maxsize=16)
+def _quantile_curve(alpha: float, setting: Setting) -> CubicSpline:
+    """ln x over ln(-ln(1 - xi))."""
+    depth = np.geomspace(_depth(np.zeros(1))[0], _depth(np.ones(1))[0], KNOTS)
+    return CubicSpline(np.log(depth), np.log(exact.quantile(-np.expm1(-depth), alpha, setting=setting)))

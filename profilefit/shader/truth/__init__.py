@@ -1,1 +1,0 @@
-"""What the render should show: float64 integrals that share the G-buffer with it, and no sum."""

@@ -1,0 +1,164 @@
+"""The least that serves: every option's cost and its error at worst, and which of them the scene asks for."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from mcml_sim import Setting
+from profilefit.laws.base import ProfileLaw
+from profilefit.recipes import catalogue
+from profilefit.studies.choose.case import Case
+from profilefit.studies.choose.cost import Ratios, milliseconds
+from profilefit.studies.choose.error import Error, error
+from profilefit.studies.choose.options import Option, filters, sampled
+from profilefit.studies.choose.scene import Range, Scene
+from profilefit.studies.choose.truth import truth
+
+LAWS = ("burley", "hazard", "quantile")
+STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
+SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is
+AS_GOOD = 1.1  # ratio of errors: predicted noise is known to 4 %, and less well where a few samples weigh much
+Track = Callable[[list[Option]], Iterable[Option]]
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """An option's frame [ms], an estimate, and its error in the scene's worst case."""
+
+    option: Option
+    ms: float
+    error: Error
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Options, and which of them serve.
+
+    predicted  cheapest first, as far as the choice asks for
+    chosen     the cheapest within tolerance and budget, or None
+    nearest    what is shown: the chosen one, else the cheapest within the tolerance, else the most accurate within the
+               budget
+    cheaper    of those that cost less, the most accurate;  dearer  the cheapest that is more accurate; None if there is
+               none
+    """
+
+    scene: Scene
+    predicted: tuple[Predicted, ...]
+    chosen: Predicted | None
+    nearest: Predicted
+    cheaper: Predicted | None
+    dearer: Predicted | None
+
+    @property
+    def meets_tolerance(self) -> bool:
+        return self.nearest.error.total <= self.scene.tolerance
+
+    @property
+    def meets_budget(self) -> bool:
+        return affordable(self.nearest, self.scene)
+
+
+def affordable(one: Predicted, scene: Scene) -> bool:
+    """Whether its frame is within the budget."""
+    return scene.budget.ms is None or one.ms <= scene.budget.ms
+
+
+def laws(setting: Setting) -> dict[str, ProfileLaw]:
+    """Sampled laws by the names of their records: those of the setting, else those of a matched surface."""
+    found = {}
+    for name in LAWS:
+        known = catalogue.regenerated_settings(catalogue.REGENERATED[name][0])
+        own = setting if setting in known else Setting(setting.illumination)
+        found[catalogue.record_name(catalogue.REGENERATED[name][0], own)] = catalogue.load(name, setting=own)
+    return found
+
+
+def options(setting: Setting) -> list[Option]:
+    """All that is chosen from."""
+    of_laws = [option for name, law in laws(setting).items() for option in sampled(law, name)]
+    return [*filters(), *of_laws]
+
+
+def cases(scene: Scene) -> Iterator[Case]:
+    """The ends of all ranges: dark and light skin, far and near, flat and as curved as it gets.
+
+    From the shortest mean free path in the largest pixel to the longest in the smallest in steps of STRIDE at most.
+    """
+    kernel = middle(scene).reflectance
+    (near, far), path = scene.pixel, max(high / low for low, high in scene.mfp)
+    steps = math.ceil(math.log(path * far / near) / math.log(STRIDE)) if path * far / near > 1.001 else 0
+    for way in np.linspace(0.0, 1.0, steps + 1).tolist():
+        mfp = _three(tuple(_between(one, way) for one in scene.mfp))
+        pixel = _between((far, near), way)
+        columns, rows = scene.resolution
+        window = (0.5 * columns * pixel, 0.5 * rows * pixel)
+        for reflectance in sorted({_three(tuple(one[end] for one in scene.reflectance)) for end in (0, 1)}):
+            yield Case(reflectance, mfp, pixel, math.inf, kernel, window)
+            if SEEN * pixel <= scene.radius < math.inf:
+                yield Case(reflectance, mfp, pixel, scene.radius, kernel, window)
+
+
+def middle(scene: Scene) -> Case:
+    """The middle of all ranges, on a plane: what one filter for the whole picture is made for."""
+    reflectance = _three(tuple(0.5 * (low + high) for low, high in scene.reflectance))
+    return Case(reflectance, _three(tuple(_between(one, 0.5) for one in scene.mfp)), _between(scene.pixel, 0.5))
+
+
+def worst(option: Option, scene: Scene) -> Error:
+    """The option's error in the scene's worst case."""
+    light = truth(scene.setting)
+    return max((error(option, case, light, scene.within) for case in cases(scene)), key=lambda one: one.total)
+
+
+def choose(scene: Scene, ratios: Ratios, track: Track = iter) -> Choice:
+    """Predict all options, and choose."""
+    budget = scene.budget
+    priced = {
+        option: milliseconds(option, ratios, budget.gpu, budget.coverage, math.prod(scene.resolution))
+        for option in options(scene.setting)
+    }
+    found: list[Predicted] = []
+    for option in track(sorted(priced, key=lambda option: priced[option])):
+        found.append(Predicted(option, priced[option], worst(option, scene)))
+        if _is_settled(found, scene.tolerance):  # what is dearer still need not be known
+            break
+    return chosen(scene, found)
+
+
+def _is_settled(found: list[Predicted], tolerance: float) -> bool:
+    """Whether one serves, and a dearer one that is more accurate is known."""
+    serving = next((one for one in found if one.error.total <= tolerance), None)
+    return serving is not None and found[-1].error.total < serving.error.total
+
+
+def chosen(scene: Scene, predicted: Iterable[Predicted]) -> Choice:
+    """The choice among options, cheapest first."""
+    every = tuple(predicted)
+    good = [one for one in every if one.error.total <= scene.tolerance]
+    paid = [one for one in every if affordable(one, scene)]
+    both = [one for one in good if affordable(one, scene)]
+    nearest = (both or good)[0] if good else _most_accurate(paid or list(every))
+    place = every.index(nearest)
+    cheaper = min(every[:place], key=lambda one: one.error.total, default=None)
+    dearer = next((one for one in every[place + 1 :] if one.error.total < nearest.error.total), None)
+    return Choice(scene, every, both[0] if both else None, nearest, cheaper, dearer)
+
+
+def _most_accurate(some: list[Predicted]) -> Predicted:
+    """The cheapest that is as good as any, to what a prediction can tell."""
+    least = min(one.error.total for one in some)
+    return next(one for one in some if one.error.total <= AS_GOOD * least)
+
+
+def _three(values: tuple[float, ...]) -> tuple[float, float, float]:
+    red, green, blue = values
+    return red, green, blue
+
+
+def _between(ends: Range, way: float) -> float:
+    """Geometric."""
+    return float(ends[0] ** (1.0 - way) * ends[1] ** way)

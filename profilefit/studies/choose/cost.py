@@ -1,0 +1,121 @@
+"""What a frame costs, in milliseconds: an estimate from a published frame, measured ratios and stated speeds of GPUs.
+
+    ms = published(coverage) x pixels / 1080p x ratio(option) x 1.862 / TFLOPS
+
+published  a frame with the separable filter on a GTX 1050 (Liang et al., Table 2): 3.5, 5.9, 8.6 ms where the face
+           covers 25, 50 and 75 % of 1920 x 1080, here the straight line through them
+ratio      a frame by the option over one by the separable filter with 17 taps, as this project's renderer measured it
+TFLOPS     what the maker states of the GPU, float32
+
+Real frames differ: memory, not arithmetic, may be what a GPU waits for, and software's ratios need not be hardware's.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from functools import cache
+from importlib import resources
+
+import moderngl
+import numpy as np
+
+from profilefit.errors import InputError
+from profilefit.laws.base import ProfileLaw
+from profilefit.scenes.skin.scene import Scene, head_scene
+from profilefit.scenes.skin.separable_kernel import Separable
+from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.stage import Stage, covering
+from profilefit.shader.context import renderer
+from profilefit.shader.emit import prefix
+from profilefit.studies.choose.options import Option
+
+COVERED, PUBLISHED = (0.25, 0.50, 0.75), (3.5, 5.9, 8.6)  # share of the screen [-], ms a frame
+PUBLISHED_PIXELS = 1920 * 1080
+# float32 TFLOPS as their makers state them: shaders x 2 x boost clock.
+TFLOPS = {
+    "switch": 0.393,
+    "steam-deck": 1.6,
+    "gtx-1050": 1.862,
+    "gtx-1660": 5.03,
+    "ps5": 10.3,
+    "rtx-3060": 12.7,
+    "rtx-4070": 29.1,
+    "rtx-4090": 82.6,
+}
+YARDSTICK = "gtx-1050"
+SHIPPED = "ratios.json"
+YARDSTICK_TAPS = 17
+TAPS = (9, 33)
+SAMPLES = (16, 64)
+SHARE, SIZE = 0.5, (640, 360)  # of the screen that is covered while it is measured [-], and its size [pixels]
+TURNS = 5
+
+
+@dataclass(frozen=True)
+class Ratios:
+    """Frames over one by the separable filter with 17 taps: `base` + `fixed` + `each` x taps or samples.
+
+    device  that was measured;  base  of a frame without scattering;  fixed, each  of its scatter pass, by the filter
+    ("separable") or law
+    """
+
+    device: str
+    base: float
+    fixed: Mapping[str, float]
+    each: Mapping[str, float]
+
+    def of(self, option: Option) -> float:
+        """The frame of an option over the yardstick's [-]."""
+        if option.kind == "nothing":
+            return self.base
+        key = "separable" if option.law is None else prefix(option.law)
+        if key not in self.each:
+            raise InputError(f"option must be one whose cost was measured ({', '.join(self.each)}), got {key!r}")
+        return self.base + option.count * (self.fixed[key] + self.each[key] * option.number)
+
+
+def milliseconds(
+    option: Option, ratios: Ratios, gpu: str = YARDSTICK, coverage: float = 0.5, pixels: int = PUBLISHED_PIXELS
+) -> float:
+    """A frame [ms]: an estimate."""
+    if gpu not in TFLOPS:
+        raise InputError(f"gpu must be one of {', '.join(TFLOPS)}, got {gpu!r}")
+    slope, base = np.polyfit(COVERED, PUBLISHED, 1)
+    whole = float(base + slope * coverage) * pixels / PUBLISHED_PIXELS
+    return whole * ratios.of(option) * TFLOPS[YARDSTICK] / TFLOPS[gpu]
+
+
+@cache
+def shipped() -> Ratios:
+    """As they were measured for this release."""
+    content = json.loads((resources.files("profilefit.studies.choose") / SHIPPED).read_text(encoding="utf-8"))
+    return Ratios(**content)
+
+
+def as_json(ratios: Ratios) -> str:
+    """What `shipped` reads."""
+    return json.dumps(asdict(ratios), indent=1) + "\n"
+
+
+def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tuple[int, int] = SIZE) -> Ratios:
+    """On this machine's renderer, a head over half of the screen: seconds to a minute; the least of some turns."""
+    scene = covering(context, head_scene(), SHARE, size)
+    with Stage(context, size) as stage:
+        stage.draw(scene)
+        frame = _least(stage, scene, Separable(), Sampling(YARDSTICK_TAPS), "frame")
+        works: list[tuple[str, ProfileLaw | Separable, tuple[int, int]]] = [("separable", Separable(), TAPS)]
+        works += [(prefix(law), law, SAMPLES) for law in laws.values()]
+        lines = {}
+        for key, law, numbers in works:
+            times = [_least(stage, scene, law, Sampling(number), "scatter") / frame for number in numbers]
+            each = max((times[1] - times[0]) / (numbers[1] - numbers[0]), 0.0)
+            lines[key] = (max(times[0] - each * numbers[0], 0.0), each)
+    fixed, each_one = ({key: line[i] for key, line in lines.items()} for i in (0, 1))
+    scatter = fixed["separable"] + YARDSTICK_TAPS * each_one["separable"]
+    return Ratios(renderer(context), max(1.0 - scatter, 0.0), fixed, each_one)
+
+
+def _least(stage: Stage, scene: Scene, law: ProfileLaw | Separable, sampling: Sampling, passes: str) -> float:
+    return min(stage.time(law, scene.material.mfp, sampling, repeats=TURNS, passes=passes))

@@ -1,0 +1,94 @@
+"""How wrong a way to scatter light will be at a step edge, and through what."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.laws.base import ProfileLaw
+from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.filtered import filtered
+from profilefit.studies.choose.gather import estimates
+from profilefit.studies.choose.options import Option, is_filter
+from profilefit.studies.choose.response import averaged, beyond, response
+from profilefit.studies.choose.truth import Truth
+
+Floats = NDArray[np.float64]
+CHANNELS = ("red", "green", "blue")
+
+
+@dataclass(frozen=True)
+class Error:
+    """Root mean square error of radiance over the places within reach of the edge, as a share of white [-].
+
+    White is what a surface with A = 1 shows that is lit all over. Of the worst channel: total, and what it is made of
+    in squares: `model`, the law or kernel on a plane; `curvature`, what that changes around the cylinder; `pixel`, the
+    place in the middle for the mean over a pixel; `noise` of the samples.
+    """
+
+    total: float
+    model: float
+    curvature: float
+    pixel: float
+    noise: float
+    channel: int
+    case: Case
+
+
+def error(option: Option, case: Case, light: Truth, within: Within) -> Error:
+    """Of the worst channel."""
+    return max((_of_channel(option, case, light, within, c) for c in range(3)), key=lambda one: one.total)
+
+
+def _of_channel(option: Option, case: Case, light: Truth, within: Within, channel: int) -> Error:
+    reflectance, mfp, plane = case.reflectance[channel], case.mfp[channel], case.flat()
+    x = case.places(channel, within)
+    share = light.beyond(reflectance)
+    truth = averaged(share, x, case.pixel, mfp, case.radius, case.window[0])
+    here = response(share, x, mfp, case.radius, case.window[0])
+    found = _found(option, case, light, channel, x)
+    noise = found.var(axis=1, ddof=1) if found.shape[1] > 1 else np.zeros(len(x))
+    bias = found.mean(axis=1) - truth
+    flat = _mean(option, plane, light, channel, x) - response(share, x, mfp, plane.radius, plane.window[0])
+    curved = _mean(option, case, light, channel, x) - here
+    # A truth that is a law itself may be wrong by its floor, and in a direction that nobody knows.
+    floor = light.floor**2
+
+    def rms(squares: Floats) -> float:
+        return reflectance * float(np.sqrt(np.mean(squares)))
+
+    return Error(
+        total=rms(bias**2 + noise * (1.0 - 1.0 / found.shape[1]) + floor),
+        model=rms(flat**2 + floor),
+        curvature=rms((curved - flat) ** 2),
+        pixel=rms((here - truth) ** 2),
+        noise=rms(noise),
+        channel=channel,
+        case=case,
+    )
+
+
+def _found(option: Option, case: Case, light: Truth, channel: int, x: Floats) -> Floats:
+    """L / A at places (m,), (m, trials)."""
+    if option.law is None:
+        return _mean(option, case, light, channel, x)[:, None]
+    law = option.law
+    red, green, blue = (_alpha(law, a) for a in case.reflectance)
+    return estimates(law, (red, green, blue), option.number, case, channel, x)
+
+
+def _mean(option: Option, case: Case, light: Truth, channel: int, x: Floats) -> Floats:
+    """The same without noise (m,)."""
+    if option.law is not None:
+        share = beyond(_alpha(option.law, case.reflectance[channel]), option.law.setting, option.law)
+        return response(share, x, case.mfp[channel], case.radius, case.window[0])
+    return filtered(option, case, light, channel, x) if is_filter(option) else np.ones(x.shape)
+
+
+@cache
+def _alpha(law: ProfileLaw, reflectance: float) -> float:
+    """The albedo that a law's own map gives to a reflectance A [-], as its shader has it."""
+    return float(law.albedo.alpha(reflectance))  # type: ignore[attr-defined]

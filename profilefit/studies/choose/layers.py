@@ -1,0 +1,144 @@
+"""Is one layer enough? A stack of layers against the half space that is nearest to it, in photons, at a step edge.
+
+Both are traced: the stack as it is, and a half space of the upper layer's index that scatters alike in all directions,
+at every albedo from one run. Its albedo is the one that gives the stack's reflectance back; its mean free path is the
+one whose light near an edge is nearest to the stack's. Light is a searchlight's, as photons are started.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
+from profilefit.errors import InputError
+from profilefit.studies.choose.case import Within
+
+Floats = NDArray[np.float64]
+RINGS = 200
+NEAREST, FARTHEST = 1e-3, 200.0  # the rings' first and last edge [mfp]
+FEWEST, MOST = 2**18, 2**22  # photons
+PRECISE = 10.0  # photons as its square over that of the tolerance: the light's error is then a twentieth of it
+PLACES = 40  # of the edge
+SPAN = 1.5  # of ln l that is searched on either side of the first guess
+REPLICATES, SEED = 200, 1
+SURE = 2.0  # standard errors
+FLATTEST = 1.0 - 1e-6  # largest albedo
+
+
+@dataclass(frozen=True)
+class OneLayer:
+    """The half space nearest to a stack.
+
+    reflectance  A of both [-];  alpha, mfp  of the half space [-], [unit];  n  of its surface [-]
+    error        root mean square, near a step edge, of what it is wrong by, as a share of white, less what the photons'
+                 noise adds;  standard_error  of that;  photons  of each run
+    """
+
+    reflectance: float
+    alpha: float
+    mfp: float
+    n: float
+    error: float
+    standard_error: float
+    photons: int
+
+    def verdict(self, tolerance: float) -> str:
+        """Whether it is within the tolerance: "enough", "not enough", or "undecided" by so many photons."""
+        if self.error + SURE * self.standard_error <= tolerance:
+            return "enough"
+        return "not enough" if self.error - SURE * self.standard_error > tolerance else "undecided"
+
+
+@dataclass(frozen=True)
+class Rings:
+    """Shares of the light that leaves (rings,) in each ring of the radii, with their standard errors [-]."""
+
+    radius: Floats
+    share: Floats
+    error: Floats
+
+    def beyond(self, d: Floats, share: Floats | None = None) -> Floats:
+        """F(d), the share from beyond an edge at each distance (m,)."""
+        across = np.arccos(np.minimum(d[:, None] / self.radius, 1.0)) / np.pi
+        return (self.share if share is None else share) @ across.T
+
+
+def one_layer(
+    stack: Medium, tolerance: float, within: Within, photons: int | None = None, progress: bool | None = None
+) -> OneLayer:
+    """Trace both, and compare; InputError where nothing comes back. Seconds to a minute.
+
+    tolerance  share of white, which says how many photons it takes, unless `photons` does
+    progress   show a bar on stderr; by default only if that is a terminal
+    """
+    number = int(np.clip((PRECISE / tolerance) ** 2, FEWEST, MOST)) if photons is None else photons
+    reduced = [layer.mu_a + layer.mu_s * (1.0 - layer.g) for layer in stack.layers]
+    lengths = [1.0 / mu for mu in reduced if mu > 0]
+    if not lengths:
+        raise InputError(f"layers must scatter or absorb somewhere, got {len(reduced)} that are clear")
+    edges = np.append(0.0, np.geomspace(NEAREST * min(lengths), FARTHEST * max(lengths), RINGS))
+    tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress)
+    reflectance = float(tally.diffuse_reflectance.value)
+    n = stack.layers[0].n / stack.n_above
+    scaled = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
+    white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=Setting(n=n), progress=progress)
+    alpha = _alpha(white, reflectance)
+    of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
+    of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
+    mfp = _length(of_stack, of_one, within)
+    error, standard_error = _difference(of_stack, of_one, mfp, within)
+    return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number)
+
+
+def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> Rings:
+    """With one ring more, at the last edge, for the light beyond it."""
+    middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
+    value = np.append(energy.value, overflow.value)
+    spread = np.append(energy.standard_error, overflow.standard_error)
+    return Rings(middle, value / value.sum(), spread / value.sum())
+
+
+def _alpha(white: Orders, reflectance: float) -> float:
+    """The albedo that reflects as much."""
+    most = float(white.reflectance(FLATTEST).value)
+    if not 0 < reflectance < most:
+        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
+    return float(brentq(lambda alpha: float(white.reflectance(alpha).value) - reflectance, 0.0, FLATTEST))
+
+
+def _places(mfp: float, within: Within) -> Floats:
+    return within.mfp * mfp * (np.arange(PLACES) + 0.5) / PLACES
+
+
+def _length(stack: Rings, one: Rings, within: Within) -> float:
+    """The mean free path that makes the difference least."""
+
+    def quartile(rings: Rings) -> float:
+        return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
+
+    first = quartile(stack) - quartile(one)
+
+    def missed(u: float) -> float:
+        d = _places(np.exp(u), within)
+        return float(np.mean((stack.beyond(d) - one.beyond(d / np.exp(u))) ** 2))
+
+    return float(np.exp(minimize_scalar(missed, bounds=(first - SPAN, first + SPAN), method="bounded").x))
+
+
+def _difference(stack: Rings, one: Rings, mfp: float, within: Within) -> tuple[float, float]:
+    """Root mean square difference, and its standard error, over replicates of both by their rings' own errors."""
+    random, d = np.random.default_rng(SEED), _places(mfp, within)
+    apart = stack.beyond(d) - one.beyond(d / mfp)
+
+    def drawn(rings: Rings, at: Floats) -> Floats:
+        noise = rings.error * random.standard_normal((REPLICATES, rings.error.size))
+        return rings.beyond(at, noise - noise.sum(axis=1, keepdims=True) * rings.share)
+
+    noise = drawn(stack, d) - drawn(one, d / mfp)
+    squares = np.mean((apart + noise) ** 2, axis=1)
+    true = max(float(np.mean(apart**2) - np.mean(noise**2)), 0.0)
+    return float(np.sqrt(true)), float(np.std(np.sqrt(squares)))

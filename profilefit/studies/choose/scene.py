@@ -1,0 +1,240 @@
+"""What a scene asks of its translucent material: SCENE.toml, read and checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from mcml_sim import Layer, Medium, Setting
+from mcml_sim.errors import InputError as MediumError
+from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.errors import InputError
+from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.studies.choose.case import Within
+from profilefit.studies.choose.cost import TFLOPS, YARDSTICK
+from profilefit.studies.choose.truth import truth
+
+Range = tuple[float, float]
+Table = dict[str, Any]
+TABLES = {
+    "": ("unit", "view", "material", "tolerance", "budget", "layers"),
+    "view": ("pixel", "radius", "world", "resolution", "coverage"),
+    "material": ("light", "index", "name", *CHANNELS),
+    "channel": ("reflectance", "mfp"),
+    "tolerance": ("error", "mfp", "pixels"),
+    "budget": ("ms", "gpu"),
+    "layers": ("n", "mu_a", "mu_s", "g", "thickness"),
+}
+LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
+LONGEST_TEXT = 60  # characters
+LENGTHS = (1e-9, 1e9)  # in the unit of the mean free paths
+MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
+
+
+@dataclass(frozen=True)
+class Budget:
+    """ms of a frame, None if there is no limit; gpu a class of `cost.TFLOPS`; coverage, share of the screen [-]."""
+
+    ms: float | None = None
+    gpu: str = YARDSTICK
+    coverage: float = 0.5
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Ranges of what is to be drawn.
+
+    unit         of all lengths, for show
+    setting      the light of the reflectances, and the surface
+    reflectance  A of red, green, blue, least and most [-];  mfp  of the same [unit]
+    pixel        its side on the surface, near and far [unit];  radius  the smallest of curvature [unit], or infinite
+    resolution   columns and rows of the screen [pixels]
+    tolerance    root mean square error of radiance, as a share of white, `within` reach of a step edge of light
+    layers       a stack that one layer is to stand for, or none
+    """
+
+    unit: str
+    setting: Setting
+    reflectance: tuple[Range, Range, Range]
+    mfp: tuple[Range, Range, Range]
+    pixel: Range
+    radius: float
+    tolerance: float
+    within: Within
+    budget: Budget
+    resolution: tuple[int, int] = (1920, 1080)
+    layers: Medium | None = None
+
+
+def read(path: Path) -> Scene:
+    """A scene from its file; InputError that names file, table and key, what was got and what is accepted."""
+    return _Reader(str(path)).scene(read_toml(path))
+
+
+def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
+    red, green, blue = ranges
+    return red, green, blue
+
+
+class _Reader:
+    """The tables of one file, whose name every message begins with."""
+
+    def __init__(self, file: str) -> None:
+        self.file = file
+
+    def scene(self, content: Table) -> Scene:
+        self.known("", content)
+        view, material = (self.table(content, name) for name in ("view", "material"))
+        tolerance, budget = self.table(content, "tolerance"), self.table(content, "budget", {})
+        setting = self.setting(material)
+        reflectance, mfp = self.channels(material, setting)
+        world = self.number("view", "world", view, 1.0)
+        pixel = self.range("view", "pixel", view)
+        radius = world * self.number("view", "radius", view, math.inf)
+        longest = max(most for _, most in mfp)
+        pixel = (world * pixel[0], world * pixel[1])
+        curved = math.isfinite(view.get("radius", math.inf))
+        self.lengths("view", "pixel", pixel)
+        self.lengths("view", "radius", (radius,) if curved else ())
+        for channel, ends in zip(CHANNELS, mfp, strict=True):
+            self.lengths(f"material.{channel}", "mfp", ends)
+        if radius < LEAST_RADIUS * longest:
+            least = f"at least {LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest / world:.3g}"
+            raise self.bad("view", "radius", least, view["radius"])
+        return Scene(
+            unit=self.text("", "unit", content, "mm"),
+            setting=setting,
+            reflectance=_three(reflectance),
+            mfp=_three(mfp),
+            pixel=pixel,
+            radius=radius,
+            tolerance=self.number("tolerance", "error", tolerance, most=1.0),
+            within=self.within(tolerance),
+            budget=self.budget(budget, view),
+            resolution=self.resolution(view),
+            layers=self.layers(content.get("layers")),
+        )
+
+    def within(self, tolerance: Table) -> Within:
+        pixels = tolerance.get("pixels", 2)
+        if type(pixels) is not int:
+            raise self.bad("tolerance", "pixels", "a whole number in 1 ... 100", pixels)
+        mfp = self.number("tolerance", "mfp", tolerance, 4.0)
+        return self.made("tolerance", lambda: Within(mfp, pixels))
+
+    def setting(self, material: Table) -> Setting:
+        light = self.text("material", "light", material, "diffuse", ILLUMINATIONS)
+        index = self.number("material", "index", material, 1.0)
+        return self.made("material", lambda: truth(Setting(light, index)).setting)
+
+    def channels(self, material: Table, setting: Setting) -> tuple[tuple[Range, ...], tuple[Range, ...]]:
+        """Ranges of A and of the mean free path, three each."""
+        if "name" in material:
+            if given := [name for name in CHANNELS if name in material]:
+                raise self.bad("material", "name", f"left out where {', '.join(given)} are given", material["name"])
+            known = BY_NAME[self.text("material", "name", material, accepted=tuple(BY_NAME))]
+            light = truth(setting)
+            colours = [light.reflectance(alpha) for alpha in known.alpha]
+            return tuple((a, a) for a in colours), tuple((length, length) for length in known.mfp)
+        found: list[tuple[Range, Range]] = []
+        for channel in CHANNELS:
+            where = f"material.{channel}"
+            one = self.table(material, channel, within="material")
+            self.known(where, one, TABLES["channel"])
+            found.append((self.range(where, "reflectance", one, most=1.0), self.range(where, "mfp", one)))
+        return tuple(a for a, _ in found), tuple(length for _, length in found)
+
+    def resolution(self, view: Table) -> tuple[int, int]:
+        resolution = view.get("resolution", [1920, 1080])
+        whole = isinstance(resolution, list) and len(resolution) == 2 and all(type(side) is int for side in resolution)
+        if not (whole and all(1 <= side <= 16384 for side in resolution)):
+            raise self.bad("view", "resolution", "two whole numbers of pixels in 1 ... 16384", resolution)
+        return resolution[0], resolution[1]
+
+    def budget(self, budget: Table, view: Table) -> Budget:
+        return Budget(
+            self.number("budget", "ms", budget) if "ms" in budget else None,
+            self.text("budget", "gpu", budget, YARDSTICK, tuple(TFLOPS)),
+            self.number("view", "coverage", view, 0.5, most=1.0),
+        )
+
+    def layers(self, stack: Any) -> Medium | None:
+        if stack is None:
+            return None
+        if not isinstance(stack, list) or not all(isinstance(layer, dict) for layer in stack):
+            raise InputError(f"{self.file}: layers must be tables [[layers]], got {shown(stack)}")
+        made = []
+        for number, layer in enumerate(stack, start=1):
+            self.known(f"layers {number}", layer, TABLES["layers"])
+            missing = [key for key in ("n", "mu_a", "mu_s", "g") if key not in layer]
+            if missing:
+                raise self.bad(f"layers {number}", missing[0], "a number", None)
+            made.append(self.made(f"layers {number}", lambda layer=layer: Layer(**layer)))
+        return self.made("layers", lambda: Medium(tuple(made)))
+
+    def table(self, content: Table, name: str, default: Table | None = None, within: str = "") -> Table:
+        value = content.get(name, default)
+        where = f"{within}.{name}" if within else name
+        if value is None:
+            raise InputError(f"{self.file}: table [{where}] is missing")
+        if not isinstance(value, dict):
+            raise InputError(f"{self.file}: {where} must be a table [{where}], got {shown(value)}")
+        if name in TABLES:
+            self.known(where, value)
+        return value
+
+    def known(self, where: str, table: Table, accepted: tuple[str, ...] | None = None) -> None:
+        keys = accepted or TABLES[where]
+        for key in table:
+            if key not in keys:
+                place = f"[{where}] " if where else ""
+                raise InputError(f"{self.file}: {place}keys must be of {', '.join(keys)}, got {shown(key)}")
+
+    def number(self, where: str, key: str, table: Table, default: float | None = None, most: float = math.inf) -> float:
+        value = table.get(key, default)
+        if not is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
+            raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
+        return float(value)
+
+    def range(self, where: str, key: str, table: Table, most: float = math.inf) -> Range:
+        """A number, or the least and the most."""
+        value = table.get(key)
+        ends: list[Any] = value if isinstance(value, list) else [value, value]
+        numbers = len(ends) == 2 and all(is_number(end) for end in ends)
+        if not (numbers and 0 < ends[0] <= ends[1] <= most and ends[1] < MOST_ASIDE * ends[0]):
+            accepted = "a number > 0 or two of them, the smaller first" + (f", <= {most:g}" if most < math.inf else "")
+            raise self.bad(where, key, accepted, value)
+        return float(ends[0]), float(ends[1])
+
+    def lengths(self, where: str, key: str, found: tuple[float, ...]) -> None:
+        """InputError unless ratios and squares of these lengths can be computed with."""
+        for one in found:
+            if not LENGTHS[0] <= one <= LENGTHS[1]:
+                words = f"between {LENGTHS[0]:g} and {LENGTHS[1]:g} in the unit of the mean free paths"
+                raise self.bad(where, key, words, one)
+
+    def text(
+        self, where: str, key: str, table: Table, default: str | None = None, accepted: tuple[str, ...] = ()
+    ) -> str:
+        value = table.get(key, default)
+        text = value if isinstance(value, str) else "\n"
+        if not text.isprintable() or len(text) > LONGEST_TEXT or (accepted and text not in accepted):
+            words = f"one of {', '.join(accepted)}" if accepted else f"a text of {LONGEST_TEXT} characters at most"
+            raise self.bad(where, key, words, value)
+        return text
+
+    def made(self, where: str, make: Any) -> Any:
+        """What `make` makes; where it refuses, the message says in which file and table."""
+        try:
+            return make()
+        except MediumError as error:
+            raise InputError(f"{self.file}: [{where}] {error}") from None
+
+    def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:
+        got = "nothing" if value is None else shown(value)
+        place = f"[{where}] " if where else ""
+        return InputError(f"{self.file}: {place}{key} must be {accepted}, got {got}")

@@ -1,0 +1,164 @@
+"""The atlas: every law, map and function there is, over all its arguments, and the fits; what is red, where and why."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
+from profilefit.recipes import catalogue, inventory
+from profilefit.recipes.inventory import Named
+from profilefit.shader.check import validity
+from profilefit.shader.check.validity import EVERYWHERE
+from profilefit.studies.stability import fits, gradients, halfspace, laws, maps, misuse, model
+from profilefit.studies.stability.cells import Cells
+from profilefit.studies.stability.fits import FitCase
+from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
+from profilefit.studies.stability.regions import Region, regions_of
+
+EXACT, CONVERT, SOLVER = "exact", "convert", "solver"
+FUNCTIONS = (EXACT, CONVERT, SOLVER)
+SETTINGS = (Setting(), Setting("diffuse"))
+WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
+# Whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
+DERIVED: dict[str, tuple[str, ...]] = {
+    "hazard": (PROFILE, CDF, SAMPLE),
+    "quantile": QUANTITIES,
+    "liang-whole": (PROFILE, SAMPLE, PDF),
+    "burley-whole": (PROFILE, SAMPLE),
+    "gaussians-2": (PROFILE, SAMPLE),
+    "dipole": (PROFILE, SAMPLE),
+}
+DERIVED_IF_NAMED = {"hazard": (PDF,)}  # ten seconds
+DERIVED_MAPS = ("albedo-rational", "albedo-liang", "van_de_hulst, published", "chiang, published")
+# Law, objective and lanes of the fits.
+FITTED = (("rational", "reflectance", 16), ("burley", "relative", 16), ("hazard", "relative", 6))
+LONGEST = (SOLVER, "hazard", "beam_diffusion", "quantile")  # begun first, so that no core waits at the end
+# A look in seconds: what the paper prints, and what is ours; of profile laws their texts, which need no compiling.
+QUICK_ARITHMETICS = (TEXT32, TEXT16)
+QUICK = ("liang, published", "hazard", "albedo-rational", "map liang, published")
+
+
+@dataclass(frozen=True)
+class Part:
+    """What was found of one subject: its cells, their red regions, and fits."""
+
+    name: str
+    cells: tuple[Cells, ...]
+    regions: tuple[Region, ...]
+    fits: tuple[FitCase, ...] = ()
+
+    @property
+    def failures(self) -> int:
+        """How often one of our own breaks its word."""
+        return sum(one.is_failure for one in self.regions) + sum(one.is_failure for one in self.fits)
+
+
+Job = tuple[str, Callable[[], Part]]
+
+
+def jobs(names: Iterable[str], folder: Path, quick: bool) -> list[Job]:
+    """What there is to do, a job a subject: all of it, or what is named; InputError for a name that there is not."""
+    asked = list(names)
+    profiles, albedos = _known(folder)
+    found: list[Job] = []
+    for one in profiles:
+        if _is_asked(one, one.label, asked, quick):
+            also = DERIVED_IF_NAMED.get(one.label, ()) if asked else ()
+            found.append((one.label, _of_law(one, folder, quick, also)))
+    for one in albedos:
+        if _is_asked(one, _map_label(one), asked, quick):
+            found.append((_map_label(one), _of_map(one, folder, quick)))
+    for name, job in _functions(folder, quick).items():
+        if name in asked or not (asked or quick):
+            found.append((name, job))
+    _require_known(asked, [name for name, _ in found], profiles, albedos)
+    return found
+
+
+def run(todo: list[Job]) -> Iterator[Part]:
+    """The parts, in order, several at a time, what takes longest first."""
+    with ThreadPoolExecutor(WORKERS) as pool:
+        started = {name: pool.submit(job) for name, job in sorted(todo, key=lambda one: one[0] not in LONGEST)}
+        try:
+            for name, _ in todo:
+                yield started[name].result()
+        finally:
+            pool.shutdown(wait=False, cancel_futures=True)
+
+
+def _known(folder: Path) -> tuple[list[Named], list[Named]]:
+    whole = inventory.profile_laws(folder, matched=False)
+    held = {name for one in whole for name in one.records}
+    inverses = [one for one in inventory.sampled_laws(folder) if one.records and not set(one.records) & held]
+    return [*whole, *inverses], inventory.albedo_laws(folder, matched=False)
+
+
+def _map_label(one: Named) -> str:
+    return one.label if one.records else f"map {one.label}"
+
+
+def _is_asked(one: Named, label: str, asked: list[str], quick: bool) -> bool:
+    if asked:
+        return bool({label, one.name, catalogue.SHORT.get(one.name, one.name), *one.records} & set(asked))
+    return not quick or label in QUICK
+
+
+def _require_known(asked: list[str], found: list[str], profiles: list[Named], albedos: list[Named]) -> None:
+    known = {*found, *FUNCTIONS, *(n for one in (*profiles, *albedos) for n in (one.name, *one.records))}
+    unknown = [name for name in asked if name not in known]
+    if unknown or not found:
+        names = sorted({one.name for one in (*profiles, *albedos)})
+        got = repr(unknown[0]) if unknown else "none"
+        raise InputError(f"name must be a law, map or record ({', '.join(names)}) or {', '.join(FUNCTIONS)}, got {got}")
+
+
+def _of_law(one: Named, folder: Path, quick: bool, also: tuple[str, ...]) -> Callable[[], Part]:
+    def job() -> Part:
+        limits = laws.limits_of(one, folder)
+        arithmetics = QUICK_ARITHMETICS if quick else laws.COMPUTED
+        cells = [*laws.cells_of(one, limits, arithmetics), *model.cells_of(one, limits), *misuse.of_law(one)]
+        if one.label in DERIVED and not quick:
+            cells += gradients.of_law(one, (*DERIVED[one.label], *also), limits.valid.alpha or EVERYWHERE)
+        return _part(one.label, cells)
+
+    return job
+
+
+def _of_map(one: Named, folder: Path, quick: bool) -> Callable[[], Part]:
+    def job() -> Part:
+        cells = [*maps.cells_of(one, folder), *misuse.of_map(one)]
+        if one.label in DERIVED_MAPS and not quick:
+            cells += gradients.of_map(one, validity.of_map(one, folder))
+        return _part(_map_label(one), cells)
+
+    return job
+
+
+def _functions(folder: Path, quick: bool) -> dict[str, Callable[[], Part]]:
+    def of_exact() -> Part:
+        settings = SETTINGS[:1] if quick else SETTINGS
+        cells = [each for s in settings for each in halfspace.cells_of(s, catalogue.normalisation(s, folder))]
+        return _part(EXACT, [*cells, *misuse.of_exact()])
+
+    def of_solver() -> Part:
+        told: list[FitCase] = []
+        for name, objective, lanes in FITTED[:2] if quick else FITTED:
+            of_map = name in catalogue.ALBEDO_LAWS
+            law = (catalogue.albedo_law if of_map else catalogue.load)(name, folder=folder)
+            told += fits.fits_of(law, objective, name, lanes)
+        start = catalogue.load("liang", "corrected", folder=folder)
+        return Part(SOLVER, (), (), (*told, *fits.trimmed_fits(start)))  # type: ignore[arg-type]
+
+    return {
+        EXACT: of_exact,
+        CONVERT: lambda: _part(CONVERT, [*maps.conversion_cells(), *misuse.of_convert()]),
+        SOLVER: of_solver,
+    }
+
+
+def _part(name: str, cells: list[Cells]) -> Part:
+    return Part(name, tuple(cells), tuple(region for each in cells for region in regions_of(each)))

@@ -1,0 +1,210 @@
+"""Maps between alpha and A, both ways, in all arithmetics, against the exact half space; and lengths, to and fro."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import exact
+from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
+from profilefit.errors import InputError
+from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.rational import Rational
+from profilefit.recipes.inventory import Named
+from profilefit.shader.check import bounds, validity
+from profilefit.shader.check.bounds import ROUNDING_SHARE
+from profilefit.shader.check.validity import Range
+from profilefit.studies.stability import layout
+from profilefit.studies.stability.arithmetic import EXTENDED, Text
+from profilefit.studies.stability.cells import Cells, Codes, Mask, Verdict, absolute, judged, steps_down
+from profilefit.studies.stability.layout import (
+    ALPHA_OF,
+    DTYPES,
+    FLOAT32,
+    FLOAT64,
+    HALF_BOUND,
+    HELD,
+    MODEL,
+    REFLECTANCE_OF,
+    STORED16,
+    TEXT16,
+    TEXT32,
+    Axis,
+)
+
+Floats = NDArray[np.float64]
+FACTOR = 1.5  # of what a record states
+# Against the exact half space: of A, and of sqrt(1 - alpha), in which every law of alpha is smooth.
+MODEL_BOUND = 0.02
+ROOT_STORED = "A(√(1−α))"
+# What a map measures, what its argument is called, and the name of its text's function.
+WAYS = {ALPHA_OF: ("delta_alpha", "alpha"), REFLECTANCE_OF: ("delta_A", "map_reflectance")}
+
+
+def cells_of(one: Named, folder: Path) -> Iterator[Cells]:
+    """Both directions in every arithmetic, then what keeping alpha or its root in half costs."""
+    model, spans = bounds.of_map(one, folder), validity.of_map(one, folder)
+    for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
+        limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
+        for arithmetic in (FLOAT64, FLOAT32, TEXT32, TEXT16):
+            yield _computed(one, name, arithmetic, limit, span)
+    yield from _kept_in_half(one, spans[1])
+    if one.setting.is_matched_isotropic:
+        yield from _against_exact(one, *spans, model)
+
+
+def _computed(one: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
+    dtype = DTYPES[arithmetic]
+    axis = layout.reflectance(dtype) if name == ALPHA_OF else layout.alpha(dtype)
+    value, reference = _value(one.law, name, arithmetic, axis), _right(one.law, name, axis)
+    limit = max(limit, HALF_BOUND) if dtype is np.float16 else limit
+    beside = _value(one.law, name, TEXT32, axis) if arithmetic == TEXT16 else None
+    return _cells(one, name, arithmetic, axis, value, reference, limit, span, beside=beside)
+
+
+def _cells(
+    one: Named, name: str, arithmetic: str, axis: Axis, value: Floats, reference: Floats, limit: float, span: Range,
+    stated: float = np.nan, beside: Floats | None = None,
+) -> Cells:  # fmt: skip
+    """`beside`: what the same text makes of the same arguments in float32."""
+    dtype = DTYPES[arithmetic]
+    inside = span.holds(axis.values)
+    error, codes = _classed(value, reference, limit, inside, dtype)
+    twin = None if beside is None else _classed(beside, reference, limit, inside, np.float32)[1]
+    return Cells(
+        subject=one.label if one.records else f"map {one.label}",
+        own=isinstance(one.law, Rational),
+        quantity=name,
+        arithmetic=arithmetic,
+        axes=(axis,),
+        value=value,
+        reference=reference,
+        error=error,
+        bound=limit,
+        inside=inside & (arithmetic in HELD),
+        codes=codes,
+        law=one.law,
+        dtype=dtype,
+        twin=twin,
+        stated=stated,
+        unjudged="no record tells the error of this direction",
+    )
+
+
+def _classed(value: Floats, reference: Floats, limit: float, inside: Mask, dtype: type) -> tuple[Floats, Codes]:
+    error, wrong_way = absolute(value, reference), steps_down(value, 0, dtype, 1.0)
+    return error, judged(value, reference, error, limit, inside, dtype, wrong_way=wrong_way)
+
+
+def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: Axis) -> Floats:
+    given: Any = axis.values
+    if arithmetic in (TEXT32, TEXT16):
+        return np.asarray(Text(law, DTYPES[arithmetic]).call(WAYS[name][1], given), float)
+    if arithmetic == FLOAT32:
+        law = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law)
+        given = jnp.asarray(given, jnp.float32)
+    with np.errstate(all="ignore"):
+        return np.asarray(law.alpha(given) if name == ALPHA_OF else law.reflectance(given), float)
+
+
+def _right(law: AlbedoLaw, name: str, axis: Axis) -> Floats:
+    return np.asarray(Text(law, EXTENDED).call(WAYS[name][1], axis.values), float)
+
+
+def _kept_in_half(one: Named, span: Range) -> Iterator[Cells]:
+    """A where alpha, or its root, is kept in half and the map is computed in single precision."""
+    axis = layout.alpha(np.float32)
+    text, right = Text(one.law, np.float32), _right(one.law, REFLECTANCE_OF, axis)
+    half = axis.values.astype(np.float16).astype(np.float32)
+    root = np.sqrt(1.0 - axis.values).astype(np.float16).astype(np.float32)
+    for name, alpha in ((REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
+        value = np.asarray(text.call(WAYS[REFLECTANCE_OF][1], alpha), float)
+        yield _cells(one, name, STORED16, axis, value, right, HALF_BOUND, span)
+
+
+def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
+    """In A and in sqrt(1 - alpha), at albedos even in the latter."""
+    root = np.linspace(1.0, 0.0, 41)
+    alpha = Axis("α", "-", 1.0 - root**2)
+    reflectance = Axis("A", "-", np.asarray(exact.reflectance(alpha.values, setting=one.setting)))
+    with np.errstate(all="ignore"):
+        back = np.asarray(one.law.alpha(reflectance.values))
+        there = np.asarray(one.law.reflectance(alpha.values))
+    in_a, in_alpha = (model.get(measure) or np.nan for measure, _ in reversed(WAYS.values()))
+    bound = min(MODEL_BOUND, FACTOR * in_a) if isinstance(one.law, Rational) else MODEL_BOUND  # ours as their records
+    yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha, in_a)
+    one_more = _cells(one, ALPHA_OF, MODEL, reflectance, back, alpha.values, np.inf, of_reflectance, in_alpha)
+    error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
+    codes = judged(
+        back,
+        alpha.values,
+        error,
+        MODEL_BOUND,
+        one_more.inside,
+        np.float64,
+        wrong_way=steps_down(back, 0, np.float64, 1.0),
+    )
+    yield replace(one_more, error=error, bound=MODEL_BOUND, codes=codes)
+
+
+# There and back: a few roundings; a colour to what `alpha_of` promises of A.
+RETURN_BOUND, COLOUR_BOUND = 1e-12, 1e-8
+
+
+def conversion_cells() -> Iterator[Cells]:
+    """Lengths in order of `convert.LENGTHS`, then colours under both lights."""
+    for length in LENGTHS:
+        yield _length(length.name)
+    for light in ("searchlight", "diffuse"):
+        yield _colour(light)
+
+
+def _length(name: str) -> Cells:
+    """l = 1 there and back: infinite lengths, where nothing is absorbed, are refused on the way back, by name."""
+    axis = layout.alpha(np.float64)
+    with np.errstate(all="ignore"):
+        value = np.asarray(Optical(axis.values, np.array(1.0)).length(name))
+        back = np.array([_returned(name, one, a) for one, a in zip(value, axis.values, strict=True)])
+    infinite = np.isinf(value) & (axis.values == 1.0)
+    error = np.where(infinite, 0.0, np.abs(back - 1.0))
+    reference = np.where(infinite, np.inf, value)
+    inside = np.ones(value.shape, bool)
+    codes = judged(value, reference, error, RETURN_BOUND, inside, np.float64)
+    codes[(value == 0) | np.isnan(back)] = Verdict.NOT_FINITE
+    return Cells("convert", False, name, FLOAT64, (axis,), value, reference, error, RETURN_BOUND, inside, codes)
+
+
+def _returned(name: str, value: float, alpha: float) -> float:
+    try:
+        return float(Optical.from_length(name, value, alpha).mfp)
+    except InputError:
+        return 1.0 if np.isinf(value) else np.nan
+
+
+def _albedo(reflectance: float, light: str) -> float:
+    """alpha [-], or NaN where something is raised: every A in [0, 1] has one."""
+    try:
+        return float(alpha_of(reflectance, light))
+    except Exception:  # whatever comes is what is looked for
+        return np.nan
+
+
+def _colour(light: str) -> Cells:
+    axis = layout.reflectance(np.float64)
+    value = np.array([_albedo(one, light) for one in axis.values])
+    raised = np.isnan(value)
+    error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - axis.values)
+    inside = np.ones(value.shape, bool)
+    wrong_way = steps_down(value, 0, np.float64, 1.0)
+    codes = judged(value, value, error, COLOUR_BOUND, inside, np.float64, wrong_way=wrong_way)
+    codes[raised] = Verdict.RAISES
+    return Cells(
+        "convert", False, f"{ALPHA_OF}, {light}", FLOAT64, (axis,), value, value, error, COLOUR_BOUND, inside, codes
+    )

@@ -1,0 +1,129 @@
+"""What is right: a law's text in extended precision, at the very arguments that a narrower format was given.
+
+Of beam diffusion, which has no text, the law itself with more nodes in float64: its quadratures and float32 are judged.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.beam_diffusion import BeamDiffusion
+from profilefit.laws.better_dipole import BetterDipole
+from profilefit.laws.dipole import Dipole
+from profilefit.laws.gaussians import Gaussians
+from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
+from profilefit.shader.check import grid
+from profilefit.studies.stability.arithmetic import EXTENDED, Text, has_text
+from profilefit.studies.stability.cells import DIMMEST, Mask
+from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, Grid
+
+Floats = NDArray[np.float64]
+HALVINGS = 70  # of a bracket of 90 in ln t
+NOWHERE = np.finfo(EXTENDED).tiny ** EXTENDED(0.4)  # r/l that stands for 0 in a quotient
+
+
+class Right:
+    """What is right on a grid; NaN where it is not known, for want of a text.
+
+    albedo   alphas (m, 1, 1) in place of the grid's, where these are kept in some other form
+    nearest  r/l at which R_d is taken where r/l is less, as shader texts do; 0 if it is not
+    """
+
+    def __init__(self, law: ProfileLaw, at: Grid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
+        self.at, self._nearest = at, nearest
+        self._finite_source = isinstance(law, (Gaussians, Dipole, BetterDipole))
+        self._finer = law.finer if isinstance(law, BeamDiffusion) else None
+        self.known = has_text(law)
+        if not self.known:
+            return
+        self._text = Text(law, EXTENDED)
+        if isinstance(law, Quantile):  # its few steps do not settle for albedos that only float64 has
+            self._text.replace("depth", self._depth)
+        r, xi, alpha, mfp = (each.astype(EXTENDED) for each in at.arguments)
+        self._x, self._mfp, self._xi = r / mfp, mfp, xi
+        self._shape = self._text.call("shape", alpha if albedo is None else albedo.astype(EXTENDED))
+
+    def of(self, name: str) -> Floats:
+        """The quantity, in its own unit, as a float64: infinite where it is beyond that."""
+        if self._finer is not None:
+            return _of_finer(self._finer, name, self.at)
+        if not self.known:
+            return np.full((1, 1, 1), np.nan)
+        with np.errstate(all="ignore"):
+            if name == PROFILE:
+                return np.asarray(self._known_at(self._scaled_profile()) / self._mfp**2, float)
+            if name == CDF:
+                return np.asarray(self._text.call("cumulated", self._x, self._shape), float)
+            if name == SAMPLE:
+                return np.asarray(self._radius() * self._mfp, float)
+            density = self._text.call("radius_density", self._x, self._shape)
+            return np.asarray(self._known_at(density) / self._mfp, float)
+
+    def dim(self, name: str, reference: Floats) -> Mask:
+        """Where a number in units of the mean free path has left the format before the unit of length enters."""
+        if not self.known or name not in (PROFILE, PDF):
+            return np.zeros((1, 1, 1), bool)
+        least = DIMMEST[self.at.dtype]
+        with np.errstate(all="ignore"):
+            scaled = reference * self.at.mfp.values ** (2 if name == PROFILE else 1)
+        # A is a factor, and may be too small itself; a denormal r/l is 0 where denormals are.
+        tiny = float(np.finfo(self.at.dtype).tiny)
+        if name == PDF:  # next to the source laws take it at the root of the least number
+            return (np.abs(scaled) < least) & (reference != 0) | (self._x < 4.0 * tiny**0.5)
+        lost = (self.at.arguments[2] < least) | ((self._x > 0) & (self._x < 4.0 * tiny))
+        return ((np.abs(scaled) < least) | lost) & (reference != 0)
+
+    def misplaced(self, value: Floats) -> Floats:
+        """Share of the energy between a drawn radius and the right one [-]."""
+        if self._finer is not None:
+            xi, alpha, mfp = self.at.arguments[1:]
+            reached = self._finer.cdf(np.where(value >= 0, value, np.inf), alpha, mfp)
+            return np.abs(np.asarray(reached) - xi)
+        if not self.known:
+            return np.full(value.shape, np.nan)
+        with np.errstate(all="ignore"):
+            x = np.where(value >= 0, value, np.inf).astype(EXTENDED) / self._mfp
+            here, there = (self._text.call("cumulated", each, self._shape) for each in (x, self._radius()))
+            return np.asarray(np.abs(here - there), float)
+
+    def _known_at(self, value: NDArray) -> NDArray:
+        """NaN beyond the radius at which texts stop, where no light is left."""
+        return np.where((self._x > FARTHEST) & (value != 0), np.nan, value)
+
+    def _scaled_profile(self) -> NDArray:
+        x = np.maximum(self._x, EXTENDED(self._nearest))
+        near = np.maximum(x, NOWHERE)
+        density = self._text.call("density", near, self._shape)
+        found = self._text.call("reflectance", self._shape) * density / (2.0 * EXTENDED(np.pi) * near)
+        return found if self._finite_source else np.where((x > 0) | (found == 0), found, np.inf)
+
+    def _depth(self, radius: NDArray, shape: Any) -> NDArray:
+        """t at x of the quantile law: a bracket halved, in ln t."""
+        x = np.clip(radius, EXTENDED(NEAREST), EXTENDED(FARTHEST))
+        low, high = np.full_like(x, -65.0), np.full_like(x, 25.0) + 0.0 * shape.kappa
+        low = low + 0.0 * high
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            below = self._text.call("local", np.exp(middle), shape).radius < x
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.exp(0.5 * (low + high))
+
+    def _radius(self) -> NDArray:
+        return np.asarray(self._text.call("radius", self._xi, self._shape))
+
+
+def _of_finer(law: BeamDiffusion, name: str, at: Grid) -> Floats:
+    """Radii, which halvings find, are judged by the share within them."""
+    r, _, alpha, mfp = at.arguments
+    if name == SAMPLE:
+        shares = at.xi.values[None, :, None]
+        return np.where(shares == 1.0, np.inf, np.where(shares == 0.0, 0.0, np.nan))
+    calls = {PROFILE: law.profile, CDF: law.cdf, PDF: law.sampler.pdf}
+    return np.asarray(calls[name](r, alpha, mfp))
+
+
+LEAST_X = grid.LEAST_X

@@ -1,0 +1,280 @@
+"""The profile laws that are timed against each other, each in its fastest form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import equinox as eqx
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import exact
+from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError, RecordError
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.burley import (
+    XIE,
+    Burley,
+    BurleyApproximateSampler,
+    BurleyDiffuseMfp,
+    BurleySampler,
+    NormalizedDiffusion,
+)
+from profilefit.laws.hazard import Hazard
+from profilefit.laws.liang import Liang
+from profilefit.laws.quantile import Quantile, radius
+from profilefit.laws.rational import Rational
+from profilefit.recipes import catalogue
+from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
+
+Setup = Callable[[Array], Any]
+Wanted = tuple[str, str, str]
+"""Label, law, constants."""
+YARDSTICK = "normalized diffusion"
+
+
+class Fast(NormalizedDiffusion):
+    """Normalized diffusion as a shader has it: one exponential, its cube, and no guard at x = 0."""
+
+    def scaled_profile(self, x: Array, alpha: Array) -> Array:
+        rate = self.falloff_rate(alpha)
+        e = jnp.exp(x * (rate * (-1.0 / 3.0)))
+        return self.albedo.reflectance(alpha) * rate / (8.0 * jnp.pi) * (e + e * e * e) / x
+
+    @property
+    def sampler(self) -> BurleySampler:
+        return FastBurleySampler(self)
+
+
+class FastBurley(Fast, Burley):
+    """In units of the mean free path."""
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Rational = eqx.field(static=True)
+
+
+class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
+    """In units of the diffuse mean free path."""
+
+    setting: Setting = eqx.field(static=True)
+    albedo: Rational = eqx.field(static=True)
+
+
+class FastBurleySampler(BurleySampler):
+    """Golubev's inverse with its cube root as e^{ln(G) / 3}: on XLA's CPU jnp.cbrt takes ten times as long."""
+
+    law: Fast
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        u = 1.0 - xi
+        root = jnp.exp(jnp.log(1.0 + 4.0 * u * (2.0 * u + jnp.sqrt(1.0 + 4.0 * u * u))) * (1.0 / 3.0))
+        return 3.0 / self.law.falloff_rate(alpha) * jnp.log((1.0 + 1.0 / root + root) / (4.0 * u))
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        return self.law.scaled_profile(x, alpha) * (2.0 * jnp.pi) * x / self.law.albedo.reflectance(alpha)
+
+
+class FastApproximateSampler(BurleyApproximateSampler):
+    """Xie's inverse with ln(1 - xi): on XLA's CPU jnp.log1p takes five times as long."""
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return ((2.0 - self.c) * xi - 2.0) * jnp.log(1.0 - xi) / self.law.falloff_rate(alpha)
+
+
+@dataclass(frozen=True)
+class Contender:
+    """A law with one of its samplers.
+
+    constants   fitted, of the profile and besides of the sampler alone; those of A(alpha) not counted
+    setup       what depends on alpha only, where the law tells it
+    judged      the sampler in the law's own form, guarded where the fast one is not: errors are of this
+    another     whether it is another sampler of the law of the contender before
+    """
+
+    name: str
+    law: ProfileLaw
+    sampler: Sampler
+    constants: tuple[int, int]
+    setup: Setup | None
+    judged: Sampler
+    another: bool = False
+
+    def profile(self, x: Array, alpha: Array) -> Array:
+        return self.law.scaled_profile(x, alpha)
+
+    def sample(self, xi: Array, alpha: Array) -> Array:
+        return self.sampler.scaled_sample(xi, alpha)
+
+    def both(self, xi: Array, alpha: Array) -> tuple[Array, Array]:
+        """A radius, and the profile there."""
+        x = self.sample(xi, alpha)
+        return x, self.profile(x, alpha)
+
+    @property
+    def parts(self) -> dict[str, Callable[[Array, Array], Any]]:
+        """What can be timed, by name: the profile of a law once, whatever its samplers."""
+        drawn: dict[str, Callable[[Array, Array], Any]] = {"sample": self.sample, "both": self.both}
+        return drawn if self.another else {"profile": self.profile, **drawn}
+
+
+class QuantileContender(Contender):
+    """A fitted inverse knows its density where it has drawn; from a radius alone a loop must find it."""
+
+    law: Quantile
+
+    def both(self, xi: Array, alpha: Array) -> tuple[Array, Array]:
+        left = jnp.maximum(1.0 - xi, jnp.finfo(xi.dtype).tiny)
+        x, slope = radius(-jnp.log(left), self.law.curve(alpha))
+        return x, self.law.albedo.reflectance(alpha) * left / (2.0 * jnp.pi * x * slope)
+
+
+# What cannot be had is left out.
+WANTED: tuple[Wanted, ...] = (
+    (YARDSTICK, "burley", "published"),
+    ("normalized diffusion, refitted", "burley", "regenerated"),
+    ("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
+    ("Liang, printed", "liang", "published"),
+    ("Liang, corrected", "liang", "corrected"),
+    ("Liang, refitted", "liang", "regenerated"),
+    ("dipole", "dipole", "published"),
+    ("better dipole", "better_dipole", "published"),
+    ("beam diffusion", "beam_diffusion", "published"),
+    ("2 Gaussians", "gaussians:2", "regenerated"),
+    ("4 Gaussians", "gaussians:4", "regenerated"),
+    ("6 Gaussians", "gaussians:6", "regenerated"),
+    ("quantile", "quantile", "regenerated"),
+    ("hazard", "hazard", "regenerated"),
+)
+
+
+def contenders(folder: Path | None = None, wanted: Sequence[Wanted] | None = None) -> tuple[list[Contender], list[str]]:
+    """All that load, or those `wanted`, with the regenerated constants in `folder`; and a line for each that does not.
+
+    Raises InputError where the yardstick itself is missing.
+    """
+    found: list[Contender] = []
+    left_out = []
+    for label, name, constants in wanted or WANTED:
+        try:
+            law = catalogue.load(name, constants, folder=folder)
+        except (InputError, RecordError) as error:
+            left_out.append(f"{label}: {error}")
+        else:
+            found += made(label, law)
+    if not any(one.name == YARDSTICK for one in found):
+        raise InputError(f"laws must have {YARDSTICK} among them, which all times are over, got {left_out or wanted}")
+    return found, left_out
+
+
+def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
+    """A law with each sampler that costs another time."""
+    if isinstance(law, Burley):
+        fast = FastBurley(law.setting, law.albedo, **law.constants())
+        yield _contender(label, fast, fast.sampler, partial(_burley_setup, fast), law.sampler)
+        if label == YARDSTICK:
+            sampler = FastApproximateSampler(fast, XIE)
+            setup = partial(_burley_setup, fast)
+            yield _contender(f"{label}, Xie's sampler", fast, sampler, setup, law.samplers["xie"], another=True)
+    elif isinstance(law, BurleyDiffuseMfp):
+        own = FastBurleyDiffuseMfp(law.setting, law.albedo, **law.constants())
+        yield _contender(label, own, own.sampler, partial(_burley_setup, own), law.sampler)
+    elif isinstance(law, Hazard):
+        yield _contender(label, law, law.sampler, law.shape)
+        yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.shape, another=True)
+    elif isinstance(law, Liang):
+        yield _contender(label, law, law.sampler, partial(_liang_setup, law))
+    elif isinstance(law, Quantile):
+        yield QuantileContender(label, law, law.sampler, _constants(law), law.curve, law.sampler)
+    else:
+        yield _contender(label, law, law.sampler, None)
+
+
+def _contender(
+    label: str,
+    law: ProfileLaw,
+    sampler: Sampler,
+    setup: Setup | None,
+    judged: Sampler | None = None,
+    another: bool = False,
+) -> Contender:
+    return Contender(label, law, sampler, _constants(law), setup, judged or sampler, another)
+
+
+def _constants(law: ProfileLaw) -> tuple[int, int]:
+    of_profile = len(law.seen_by("energy"))
+    return of_profile, len(law.constant_names()) - of_profile
+
+
+def _burley_setup(law: Fast, alpha: Array) -> tuple[Array, Array]:
+    return law.albedo.reflectance(alpha), law.falloff_rate(alpha)
+
+
+def _liang_setup(law: Liang, alpha: Array) -> tuple[Array, ...]:
+    """Coefficients of the profile and its scale, and those of the sampler   (11)-(15), (18), (20)."""
+    k1 = law.g1 * alpha ** (law.g2 * alpha**law.g3 + law.g4)
+    k2 = law.h1 * alpha ** (law.h2 * alpha + law.h3)
+    return *law.coefficients(alpha), law.albedo.reflectance(alpha) / law.unscaled_energy(jnp.inf, alpha), k1, k2
+
+
+Floats = NDArray[np.float64]
+NAME = "exact, tabulated"
+SEARCHLIGHT = Setting()
+
+
+@dataclass(frozen=True)
+class Tabulated:
+    """The exact half space under a searchlight, cubics between knots of ln r: as a law answers, one albedo a call."""
+
+    setting: Setting = SEARCHLIGHT
+
+    def curves(self, alpha: float) -> Curves:
+        """The cubics of one albedo."""
+        return exact_table(self.setting.illumination).curves([float(exact.reflectance(alpha, self.setting))])
+
+    def profile(self, r: ArrayLike, alpha: float) -> Floats:
+        """R_d [1/mfp^2] at radii (n,) [mfp], looked up in float32: its rounding is nearly all of the error."""
+        return np.asarray(looked_up(self.curves(alpha), jnp.asarray(r, jnp.float32)), float)
+
+    def cdf(self, r: ArrayLike, alpha: float) -> Floats:
+        """Share of the energy within radii (n,) [mfp] [-]."""
+        return self.curves(alpha).share(np.asarray(r, float)[None])[0]
+
+
+def looked_up(curves: Curves, x: Array) -> Array:
+    """R_d [1/mfp^2] at x [mfp]: a logarithm for the place, four numbers of the table, an exponential."""
+    rows = jnp.asarray(curves.profile[0], x.dtype)
+    near = jnp.clip(x, NEAREST, FARTHEST)
+    place = (jnp.log(near) - float(np.log(NEAREST))) * (1.0 / STEP)
+    k = jnp.minimum(place.astype(int), len(rows) - 1)
+    t, c = place - k, rows[k]
+    cubic = c[..., 0] + t * (c[..., 1] + t * (c[..., 2] + t * c[..., 3]))
+    return float(curves.reflectance[0]) * jnp.exp(cubic - float(curves.kappa[0]) * near)
+
+
+@dataclass(frozen=True)
+class TableContender(Contender):
+    """The table of one material, whatever the albedo. No sampler."""
+
+    curves: Curves | None = None
+
+    def profile(self, x: Array, alpha: Array) -> Array:
+        if self.curves is None:
+            raise ValueError("a table contender needs curves")
+        del alpha
+        return looked_up(self.curves, x)
+
+    @property
+    def parts(self) -> dict[str, Any]:
+        return {"profile": self.profile}
+
+
+def table_contender(material: float) -> TableContender:
+    """The table as a contender; its error is that at every albedo, its time that of one material."""
+    law: Any = Tabulated()
+    return TableContender(NAME, law, law, (0, 0), None, law, curves=law.curves(material))

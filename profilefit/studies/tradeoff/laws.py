@@ -1,0 +1,185 @@
+"""Profile laws: nanoseconds of an evaluation, on one core in float32, against the error of R_d.
+
+All that depends on the albedo only is computed beforehand, as for a shader's constants. Every law is in its fastest
+form and takes its turn; its time is that over normalized diffusion's in the same turn, in units of that one's median,
+so that what disturbs a turn disturbs no comparison. Errors are `rel` against the exact half space, at albedos to which
+nothing was fitted: the mean over them, and the worst.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from profilefit.fitting.quality import profile_quality
+from profilefit.studies.tradeoff import stopwatch
+from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders, table_contender
+from profilefit.studies.tradeoff.counting import Counts, count
+from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
+
+# Of one call. A law that computes more functions a point than these takes fewer points, or is not timed at all.
+MANY, TOO_MANY = 30, 5000
+MATERIAL = 0.8  # the albedo of the timed material
+RADII = 0.01, 10.0  # of the timed profiles [mfp]
+NANO = 1e9
+PARTS = ("profile", "sample", "both")
+TITLES = {"profile": "R$_d$ at a given radius", "both": "a radius drawn, and R$_d$ there"}
+QUICKLY = (YARDSTICK, "Liang, corrected", "hazard")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Points of one call, and of one call of a costly law; albedos of a setup; turns; albedos of the errors."""
+
+    points: int = 1_000_000
+    costly: int = 20_000
+    albedos: int = 100_000
+    turns: int = 21
+    judged: int = 60
+
+
+FULL, QUICK = Sizes(), Sizes(100_000, 1000, 10_000, 5, 4)
+
+
+@dataclass(frozen=True)
+class Row:
+    """All that is known of one contender.
+
+    counts  by part: profile, sample and both, one after the other;  times [ns] of a point, by part and turn
+    ratios  by part, times over those of normalized diffusion
+    setup   [ns] for each material;  rel, ks  (albedos,)
+    """
+
+    contender: Contender
+    counts: dict[str, Counts]
+    times: dict[str, Measured]
+    ratios: dict[str, Ratio]
+    setup: float | None
+    rel: np.ndarray
+    ks: np.ndarray
+
+
+def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> Part:
+    """Time and judge every law; quickly, only some of them."""
+    quick = sizes.judged <= QUICK.judged
+    found, left_out = contenders(folder, [one for one in WANTED if not quick or one[0] in QUICKLY])
+    if not quick:
+        found.append(table_contender(MATERIAL))
+    rows = measured(found, sizes, track)
+    panels = tuple(Panel(part, title, *_axes(part), _points(rows, part)) for part, title in TITLES.items())
+    notes = [f"left out: {line}" for line in left_out]
+    return Part("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
+
+
+def judged_albedos(number: int) -> np.ndarray:
+    """Even in sqrt(1 - alpha) over [0.05, 0.995]."""
+    return 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), number) ** 2
+
+
+def counts(contender: Contender) -> dict[str, Counts]:
+    """Functions of each part that there is."""
+    functions = {**contender.parts, **({"profile": contender.profile} if contender.another else {})}
+    return {part: count(functions[part]) for part in PARTS if part in functions}
+
+
+def works(contender: Contender, counted: dict[str, Counts], sizes: Sizes) -> dict[str, stopwatch.Work]:
+    """What to time of a contender, by part."""
+    found = {}
+    for part, function in contender.parts.items():
+        each = counted[part].transcendental
+        if each <= TOO_MANY:
+            found[part] = timed(function, part == "profile", sizes.points if each <= MANY else sizes.costly)
+    return found
+
+
+def timed(function: Callable[[Array, Array], object], radii: bool, points: int) -> stopwatch.Work:
+    """Calls on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
+    shares = np.random.default_rng(1).random(points)
+    near, far = RADII
+    given = jnp.asarray(near * (far / near) ** shares if radii else shares, jnp.float32)
+    compiled = jax.jit(lambda values: function(values, jnp.float32(MATERIAL)))
+
+    def work(_: int) -> int:
+        jax.block_until_ready(compiled(given))
+        return points
+
+    return work
+
+
+def measured(found: Sequence[Contender], sizes: Sizes, track: Track = stopwatch.silent) -> list[Row]:
+    """Count, time and judge every contender; the yardstick must be one of them."""
+    counted = {contender.name: counts(contender) for contender in found}
+    jobs: dict[tuple[str, str], stopwatch.Work] = {}
+    for contender in found:
+        jobs |= {
+            (part, contender.name): work for part, work in works(contender, counted[contender.name], sizes).items()
+        }
+        if (work := _setup_work(contender, sizes.albedos)) is not None:
+            jobs["setup", contender.name] = work
+    rates = stopwatch.take_turns({" of ".join(key): work for key, work in jobs.items()}, sizes.turns, track, "laws")
+    rows: Iterable[int] = track(range(len(found)), "errors of laws")
+    return [_row(found[i], counted[found[i].name], rates, sizes) for i in rows]
+
+
+def nanoseconds(rates: Rates, name: str, yardstick: str) -> Measured:
+    """Time of a point: that over the yardstick's in each turn, in units of its median [ns]."""
+    return Measured.of(NANO * float(np.median(rates.seconds(yardstick))) * rates.times(name, yardstick))
+
+
+def _setup_work(contender: Contender, albedos: int) -> stopwatch.Work | None:
+    if contender.setup is None:
+        return None
+    alphas = jnp.linspace(0.05, 0.995, albedos, dtype=jnp.float32)
+    compiled = jax.jit(contender.setup)
+
+    def work(_: int) -> int:
+        jax.block_until_ready(compiled(alphas))
+        return albedos
+
+    return work
+
+
+def _row(contender: Contender, counted: dict[str, Counts], rates: Rates, sizes: Sizes) -> Row:
+    names = {part: f"{part} of {contender.name}" for part in PARTS}
+    there = {part: name for part, name in names.items() if name in rates.by_name}
+    times = {part: nanoseconds(rates, name, f"{part} of {YARDSTICK}") for part, name in there.items()}
+    ratios = {part: rates.ratio(f"{part} of {YARDSTICK}", name) for part, name in there.items()}
+    setup = f"setup of {contender.name}"
+    of_material = NANO / rates.best(setup) if setup in rates.by_name else None
+    quality = profile_quality(contender.law, judged_albedos(sizes.judged))
+    return Row(contender, counted, times, ratios, of_material, quality.rel, quality.ks)
+
+
+def _points(rows: Sequence[Row], part: str) -> tuple[Point, ...]:
+    return tuple(
+        Point(
+            part,
+            row.contender.name,
+            "",
+            row.times[part],
+            Measured.exactly(row.rel.mean()),
+            Measured.exactly(row.rel.max()),
+            {
+                "times_yardstick": row.ratios[part].median,
+                "constants": sum(row.contender.constants),
+                "functions": row.counts[part].transcendental,
+                "setup_nanoseconds": "" if row.setup is None else row.setup,
+                "ks": float(row.ks.mean()),
+                "worst_ks": float(row.ks.max()),
+            },
+        )
+        for row in rows
+        if part in row.times
+    )
+
+
+def _axes(part: str) -> tuple[str, str]:
+    what = "evaluation" if part == "profile" else "sample"
+    return f"time of one {what}, one core, float32 [ns]", "relative error of R$_d$ [-]"

@@ -1,0 +1,211 @@
+"""Samplers: nanoseconds of a radius with its weight, against the noise and the bias of what is gathered with them.
+
+The estimator is (22) of Liang et al., sum of w E over sum of w with w = R_d / p2, on a flat step edge. Noise: its
+mean square error with 16 random points, over that with radii from the exact quantile and the same random numbers; mean
+over places by the edge, then geometric mean and worst over the albedos; its spread is that of blocks of trials. The
+ratio of the variances alone stands beside it in the data: a law that is too narrow has less of that. Bias: where
+it tends to with the number of points, less the exact step response, as a share of A; by quadrature, without random
+numbers, root mean square and worst over edges and albedos.
+
+Every sampler is weighed by its own density. One that does not invert its law's cdf comes a second time, weighed by the
+law's density instead, as shaders do. Times are those of a radius and R_d there, and of the sampler's own density where
+it is not the law's: that of Liang et al. must be searched for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
+from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.hazard import Hazard
+from profilefit.scenes.stage.step_edge import (
+    UNIFORM_SHARE,
+    Gather,
+    by_law,
+    by_quantile,
+    edge_estimate,
+    random_points,
+)
+from profilefit.studies.tradeoff import laws, stopwatch
+from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders
+from profilefit.studies.tradeoff.counting import count
+from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.stopwatch import Track
+
+Floats = NDArray[np.float64]
+SAMPLES = 16  # of one estimate
+BLOCKS = 5  # of trials: how far the variance itself is known
+PLACES = (-3.0, -1.0, -0.3, -0.1)  # on the dark side of the edge [mfp]
+APART = 1e-3  # a bias that tells a sampler's density from its law's
+ROUNDING = 1e-6  # share of A: what xi beyond 1 - 2^-24, never drawn, and the quadrature leave unknown
+QUICKLY = (YARDSTICK, "quantile")
+# Other constants of a law whose sampler is here already, or a sum of Gaussians between two others.
+LIKE_OTHERS = (
+    "normalized diffusion, refitted",
+    "normalized diffusion, by its own mfp",
+    "Liang, printed",
+    "4 Gaussians",
+)
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Albedos, distances of the edges [mfp], trials of a block; points of one timed call, of a costly law; turns."""
+
+    alphas: tuple[float, ...] = (0.3, 0.8, 0.97)
+    edges: tuple[float, ...] = (0.3, 1.0, 3.0)
+    trials: int = 400
+    points: int = 1_000_000
+    costly: int = 20_000
+    turns: int = 15
+
+
+FULL, QUICK = Sizes(), Sizes((0.8,), (1.0,), 40, 100_000, 1000, 5)
+
+
+class UniformSampler(Sampler):
+    """Radii uniform up to that within which 99.5 % of the light leaves: what is drawn where no inverse is at hand."""
+
+    law: ProfileLaw
+
+    def farthest(self, alpha: Array) -> Array:
+        """x of that share [mfp]."""
+        return self.law.sampler.scaled_sample(jnp.full_like(alpha, UNIFORM_SHARE), alpha)
+
+    def scaled_sample(self, xi: Array, alpha: Array) -> Array:
+        return xi * self.farthest(alpha)
+
+    def scaled_pdf(self, x: Array, alpha: Array) -> Array:
+        last = self.farthest(alpha)
+        return jnp.where(x < last, 1.0 / last, 0.0)
+
+
+@dataclass(frozen=True)
+class Found:
+    """Of one way to weigh: ratios of square error and of variance (2, albedos, blocks), biases (albedos, edges) [A].
+
+    searched  whether the weight takes a density that is not the law's
+    """
+
+    name: str
+    owner: Contender
+    noise: Floats
+    bias: Floats
+    searched: bool = False
+
+    def weighed(self, xi: Array, alpha: Array) -> tuple[Array, ...]:
+        """A radius, and what its weight is made of: what is timed."""
+        x, value = self.owner.both(xi, alpha)
+        return (x, value, self.owner.sampler.scaled_pdf(x, alpha)) if self.searched else (x, value)
+
+
+def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> Part:
+    """Time every sampler, and judge it both ways."""
+    quick = sizes.trials <= QUICK.trials
+    wanted = [one for one in WANTED if (one[0] in QUICKLY if quick else one[0] not in LIKE_OTHERS)]
+    found, left_out = contenders(folder, wanted)
+    found += [_uniform(one) for one in found if isinstance(one.law, Hazard) and not one.another]
+    counted = {one.name: laws.counts(one)["both"].transcendental for one in found}
+    timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
+    dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in found if one not in timed]
+    judged = [way for i in track(range(len(timed)), "noise and bias") for way in _ways(timed[i], sizes)]
+    works = {one.name: laws.timed(one.weighed, False, _calls(one, sizes)) for one in judged}
+    rates = stopwatch.take_turns(works, sizes.turns, track, "samplers")
+    points = [point for one in judged for point in _points(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
+    panels = tuple(
+        Panel(
+            name,
+            title,
+            "time of a radius and its weight, one core, float32 [ns]",
+            error,
+            tuple(p for p in points if p.panel == name),
+        )
+        for name, title, error in (
+            ("noise", f"{SAMPLES} samples by a step edge", "mean square error over the exact quantile's [-]"),
+            ("bias", "bias that no number of samples takes away", "error of light beyond an edge, share of A [-]"),
+        )
+    )
+    notes = tuple([*(f"left out: {line}" for line in left_out), *dear])
+    return Part("samplers", "Samplers: time of a radius against noise and bias", panels, notes)
+
+
+def _uniform(hazard: Contender) -> Contender:
+    law = hazard.law
+    if not isinstance(law, Hazard):
+        raise TypeError(f"hazard must be the contender of that law, got {hazard.name!r}")
+    sampler = UniformSampler(law)
+    return Contender("uniform radii, hazard", law, sampler, hazard.constants, law.shape, sampler, another=True)
+
+
+def _calls(way: Found, sizes: Sizes) -> int:
+    """Points of one timed call."""
+    return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
+
+
+def _ways(one: Contender, sizes: Sizes) -> list[Found]:
+    """A sampler weighed by its own density; and by its law's, where that is another."""
+    sampler = one.judged
+    biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
+    apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
+    own = Found(one.name, one, _noise(by_law, sampler, sizes), biases[..., 0], apart)
+    if not apart or isinstance(sampler, UniformSampler):
+        return [own]
+    return [own, Found(f"{one.name}, law's density", one, _noise(_unweighted, sampler, sizes), biases[..., 1])]
+
+
+def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
+    """Light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
+
+    With weights by the sampler's own density, and by its law's.
+    """
+    quality = sampler_quality(sampler, alpha, edge=edge)
+    of_law = edge_light(LawTarget(sampler.law), alpha, edge)
+    truth = edge_light(ExactTarget(sampler.law.setting), alpha, edge)
+    own = of_law * (1.0 + quality.edge_bias[0]) / (1.0 + quality.bias[0])
+    by_law_density = of_law * (1.0 + quality.edge_bias_by_law_pdf[0]) / (1.0 + quality.bias_by_law_pdf[0])
+    return float(own - truth), float(by_law_density - truth)
+
+
+def _unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> Gather:
+    """Weights by the law's own density are all 1."""
+    drawn = by_law(law, alpha, sampler)
+    return Gather(drawn.sample, np.ones_like)
+
+
+def _noise(gathered, sampler: Sampler, sizes: Sizes) -> Floats:
+    """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
+    rows = []
+    for alpha in sizes.alphas:
+        ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)
+        rows.append([_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
+    return np.moveaxis(np.array(rows), 2, 0)
+
+
+def _ratios(way: Gather, over: Gather, alpha: float, law: ProfileLaw, block: int, trials: int) -> tuple[float, float]:
+    points = random_points(SAMPLES, trials, seed=block + 1)
+    mine, best = (edge_estimate(g, points, PLACES, alpha, law.setting) for g in (way, over))
+    square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
+    return float(square), float(mine.variance.mean() / best.variance.mean())
+
+
+def _points(one: Found, cost: Measured) -> Sequence[Point]:
+    square, variance = one.noise
+    worst = square[np.argmax(np.median(square, axis=1))]
+    middle = np.exp(np.log(square).mean(axis=0))
+    facts = {"samples": SAMPLES, "variance": float(np.exp(np.log(variance).mean()))}
+    rms, largest = (
+        Measured(float(value), max(float(value) - ROUNDING, 0.1 * ROUNDING), float(value) + ROUNDING)
+        for value in (np.sqrt(np.mean(one.bias**2)), np.max(np.abs(one.bias)))
+    )
+    return (
+        Point("noise", one.name, "", cost, Measured.of(middle), Measured.of(worst), facts),
+        Point("bias", one.name, "", cost, rms, largest, facts),
+    )

@@ -1,0 +1,142 @@
+"""Intervals hold the true constants as often as they say, and those that should not don't."""
+
+import numpy as np
+import pytest
+from scipy.stats import binom, norm
+
+from benchmarks.refits import LEVELS, binomial_band, counted, coverage, refits
+from mcml_sim import InputError
+from profilefit.fitting.chains import posterior
+from profilefit.fitting.estimate import fit
+from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES
+
+REPLICATES = 2000
+
+
+def with_beyond(energy):
+    """Energies (..., n) with a column for the light beyond the last ring: Toy has none there."""
+    return np.concatenate([energy, np.zeros((*energy.shape[:-1], 1))], axis=-1)
+
+
+def expected_energy(tallies):
+    chance = tallies.chance.reshape(tallies.edges.size - 1, -1)
+    return with_beyond((chance @ tallies.weights.T).T)
+
+
+def refitted(tallies, law, free=None):
+    """Refits of a law to 2000 runs of normal noise, and the covariance that made it."""
+    profiles = tallies.profiles(tallies.draw(0, 1)[0])
+    one = fit(profiles, law, "energy", free, jackknife=False)
+    noise = with_beyond(profiles.covariance.draws(REPLICATES, seed=21))
+    return one, profiles.covariance, refits(one, expected_energy(tallies), noise)
+
+
+@pytest.fixture(scope="module")
+def known(tallies, toy):
+    """The true law."""
+    return refitted(tallies, toy)
+
+
+@pytest.mark.slow
+def test_intervals_of_the_true_law_cover(known):
+    one, covariance, again = known
+    assert again.failed == 0
+    np.testing.assert_allclose(again.truth, [1.0, 0.5, 0.5], rtol=1e-6)
+    found = coverage(one.free, again.found - again.truth, again.sandwich_errors(covariance))
+    assert found.share.shape == (2, 3)
+    assert found.honest
+    # Its own gain is that of the one fit that `estimate` made, near enough.
+    np.testing.assert_allclose(
+        again.sandwich_errors(covariance).mean(axis=0), one.statistical.diagonal() ** 0.5, rtol=0.05
+    )
+
+
+@pytest.mark.slow
+def test_noise_taken_for_independent_does_not_cover(known):
+    """Negative control: albedos share their photons."""
+    one, covariance, again = known
+    found = coverage(one.free, again.found - again.truth, again.independent_errors(covariance))
+    assert not np.any(found.inside)
+    assert np.all(found.share[0] < 0.5)
+
+
+@pytest.mark.slow
+def test_errors_a_tenth_off_do_not_cover(known):
+    """Negative control: what the band can see."""
+    one, covariance, again = known
+    off, error = again.found - again.truth, again.sandwich_errors(covariance)
+    assert not coverage(one.free, off, 0.9 * error).honest
+    assert not coverage(one.free, off, 1.12 * error).honest
+
+
+@pytest.mark.slow
+def test_whole_photons_are_covered_too(tallies, toy):
+    """Multinomial counts in place of normal noise, each with the covariance of its own counts."""
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), toy, "energy", jackknife=False)
+    counts, truth = tallies.draw(22, REPLICATES), expected_energy(tallies)
+    again = refits(one, truth, with_beyond(tallies.energy(counts)) - truth)
+    covariances = [tallies.profiles(one).covariance for one in counts]
+    errors = [np.sqrt(np.diag(c.sandwich(g))) for c, g in zip(covariances, again.gain, strict=True)]
+    assert coverage(one.free, again.found - again.truth, np.array(errors)).honest
+
+
+@pytest.mark.slow
+def test_a_law_that_is_not_the_truth_covers_its_pseudo_true_constants(tallies, burley):
+    """By the sandwich; not with the residuals taken for noise, nor with the photons' noise taken for independent."""
+    one, covariance, again = refitted(tallies, burley, ("s0", "s1", "s2"))
+    off = again.found - again.truth
+    assert coverage(one.free, off, again.sandwich_errors(covariance)).honest
+    misfit = coverage(one.free, off, np.sqrt(np.diag(one.discrepancy)))
+    assert not np.any(misfit.inside)
+    assert np.all(misfit.share > 0.99)
+    assert not coverage(one.free, off, again.independent_errors(covariance)).honest
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(1200)
+def test_posteriors_cover_too(tallies, toy):
+    """200 runs of photons, each with a fit and a chain of its own; not if intervals are a third too narrow.
+
+    Of rings that hold enough photons, in expectation: Toy trusts one of a single photon, and to drop it only where it
+    happens to be empty picks runs by their noise (intervals of 95 % then held in 78 %).
+    """
+    truth, within, narrow = np.array([1.0, 0.5, 0.5]), [], []
+    used = tallies.photons * expected_energy(tallies)[:, :-1] >= FEWEST_EFFECTIVE_SAMPLES
+    for seed, counts in enumerate(tallies.draw(23, 200)):
+        one = fit(tallies.profiles(counts), toy, "energy", used=used, jackknife=False)
+        chain = posterior(one, "statistical", seed)
+        assert chain.result == "converged"
+        ends = np.stack([chain.interval(level) for level in LEVELS])
+        middle = ends.mean(axis=2, keepdims=True)
+        for held, (low, high) in (
+            (within, np.moveaxis(ends, 2, 0)),
+            (narrow, np.moveaxis(middle + (ends - middle) / 1.5, 2, 0)),
+        ):
+            held.append((low <= truth) & (truth <= high))
+    assert counted(one.free, np.stack(within, axis=1)).honest
+    assert not counted(one.free, np.stack(narrow, axis=1)).honest
+
+
+def test_the_band_is_binomial():
+    """Ends of Clopper and Pearson turned round: all but 1 % of honest tables of six shares lie within."""
+    low, high = binomial_band(0.68, 2000, 6)
+    inside = binom.cdf(round(high * 2000), 2000, 0.68) - binom.cdf(round(low * 2000) - 1, 2000, 0.68)
+    assert 0.99 <= inside**6 < 0.994
+    width = norm.isf((1 - 0.99 ** (1 / 6)) / 2) * np.sqrt(0.68 * 0.32 / 2000)
+    assert high - 0.68 == pytest.approx(width, rel=0.05)
+    assert binomial_band(0.5, 4, 1) == (0.0, 1.0)
+
+
+def test_shares_are_counted():
+    off = np.array([[0.5, -3.0], [1.5, 0.0], [-0.9, 1.0], [2.5, 0.1]])
+    found = coverage(("a", "b"), off, np.array([1.0, 1.0]))
+    # Within .994 of zero: 0.5 and -0.9 of a; 0, 0.1 of b. Within 1.96: one more of each.
+    np.testing.assert_array_equal(found.share, [[0.5, 0.5], [0.75, 0.75]])
+    assert found.replicates == 4
+    assert counted(("a",), np.ones((2, 2000, 1), bool)).honest is False
+
+
+def test_a_truth_that_cannot_be_fitted_is_named(tallies, toy):
+    one = fit(tallies.profiles(tallies.draw(0, 1)[0]), toy, "energy", jackknife=False)
+    with pytest.raises(InputError, match=r"energy must let Toy converge without noise, got one where it does not"):
+        refits(one, np.full((5, 15), np.nan), np.zeros((1, 5, 15)))

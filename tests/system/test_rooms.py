@@ -1,0 +1,141 @@
+"""Rooms: imports point one way, down the lists below, and never from the simulator to the fits."""
+
+import ast
+import graphlib
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+# A room, or a file in the root, imports only from those before it.
+ROOMS = {
+    "mcml_sim": ("errors", "files", "media", "exact", "tracing", "results", "runs", "cli", "__init__", "__main__"),
+    "profilefit": (
+        "errors laws materials convert fitting recipes measured shader scenes studies report __init__ cli __main__"
+    ).split(),
+}
+
+# Packages that a function may import where it needs them, because not every installation has them.
+OPTIONAL = frozenset({"dask", "distributed", "numba", "arviz_base"})
+
+Imports = dict[str, set[str]]
+
+
+def modules(root: Path, package: str) -> dict[str, Path]:
+    """Dotted name -> file; a folder goes by its own name."""
+    paths = sorted((root / package).rglob("*.py"))
+    return {".".join(path.relative_to(root).with_suffix("").parts).removesuffix(".__init__"): path for path in paths}
+
+
+def imported_names(tree: ast.AST, module: str, is_package: bool) -> Iterator[str]:
+    """Absolute dotted names; `from a import b` gives a.b, whether b is a module or not."""
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            parts = module.split(".")
+            here = parts[: len(parts) + is_package - node.level] if node.level else []
+            base = ".".join([*here, *([node.module] if node.module else [])])
+            yield from (f"{base}.{alias.name}" for alias in node.names)
+
+
+def import_graph(root: Path, package: str) -> Imports:
+    """Module -> the modules of the same package that it names, each the deepest that exists."""
+    files = modules(root, package)
+
+    def deepest(name: str) -> str | None:
+        while name and name not in files:
+            name = name.rpartition(".")[0]
+        return name or None
+
+    graph: Imports = {}
+    for module, path in files.items():
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        targets = {deepest(name) for name in imported_names(tree, module, path.name == "__init__.py")}
+        graph[module] = {target for target in targets if target} - {module}
+    return graph
+
+
+def cycle(graph: Imports) -> list[str]:
+    """The modules of one import cycle, or none."""
+    try:
+        graphlib.TopologicalSorter(graph).prepare()
+    except graphlib.CycleError as error:
+        return error.args[1]
+    return []
+
+
+def part(package: str, module: str) -> str:
+    """The room, or the file in the root, that a module belongs to."""
+    return module.removeprefix(package).lstrip(".").split(".")[0] or "__init__"
+
+
+def upward(graph: Imports, package: str, order: Sequence[str]) -> list[str]:
+    """The imports inside a package that point against its order."""
+    inside = {module for module in graph if module == package or module.startswith(f"{package}.")}
+    edges = [(module, target) for module in sorted(inside) for target in sorted(graph[module] & inside)]
+    ends = [(order.index(part(package, module)), order.index(part(package, target))) for module, target in edges]
+    return [f"{edge[0]} imports {edge[1]}" for edge, end in zip(edges, ends, strict=True) if end[1] > end[0]]
+
+
+def inner_imports(path: Path) -> list[str]:
+    """Imports inside functions of anything that is not optional, as file:line."""
+    functions = (ast.FunctionDef, ast.AsyncFunctionDef)
+    outer = [node for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))) if isinstance(node, functions)]
+    nodes = {node for function in outer for node in ast.walk(function) if isinstance(node, ast.Import | ast.ImportFrom)}
+    return [
+        f"{path}:{node.lineno}"
+        for node in sorted(nodes, key=lambda node: node.lineno)
+        if not {name.split(".")[0] for name in imported_names(node, "", False)} <= OPTIONAL
+    ]
+
+
+def test_simulator_knows_nothing_of_the_fits():
+    for module, path in modules(ROOT, "mcml_sim").items():
+        names = imported_names(ast.parse(path.read_text(encoding="utf-8")), module, path.name == "__init__.py")
+        assert not [name for name in names if name.split(".")[0] == "profilefit"], path
+
+
+@pytest.mark.parametrize("package", ["mcml_sim", "profilefit"])
+def test_no_import_cycle(package):
+    assert cycle(import_graph(ROOT, package)) == []
+
+
+@pytest.mark.parametrize("package", ["mcml_sim", "profilefit"])
+def test_no_import_inside_a_function(package):
+    assert [place for path in modules(ROOT, package).values() for place in inner_imports(path)] == []
+
+
+@pytest.mark.parametrize("package", ROOMS)
+def test_imports_go_down_the_rooms(package):
+    graph = import_graph(ROOT, package)
+    assert {part(package, module) for module in graph} == set(ROOMS[package])
+    assert upward(graph, package, ROOMS[package]) == []
+
+
+def test_checks_see_what_they_look_for(tmp_path):
+    """Negative control: one small package that breaks every rule."""
+    package = tmp_path / "bad"
+    (package / "sub").mkdir(parents=True)
+    (package / "__init__.py").write_text("from .first import f\n")
+    (package / "first.py").write_text("from bad import second\n")
+    (package / "second.py").write_text("from .first import f\n")
+    (package / "sub" / "__init__.py").write_text("from ..second import g\n")
+    (package / "sub" / "leaf.py").write_text("def f():\n    import json\n")
+
+    graph = import_graph(tmp_path, "bad")
+    assert graph == {
+        "bad": {"bad.first"},
+        "bad.first": {"bad.second"},
+        "bad.second": {"bad.first"},
+        "bad.sub": {"bad.second"},
+        "bad.sub.leaf": set(),
+    }
+    assert set(cycle(graph)) == {"bad.first", "bad.second"}
+    assert upward(graph, "bad", ("first", "sub", "second", "__init__")) == [
+        "bad.first imports bad.second",
+        "bad.sub imports bad.second",
+    ]
+    assert inner_imports(package / "sub" / "leaf.py") == [f"{package / 'sub' / 'leaf.py'}:2"]
