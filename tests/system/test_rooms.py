@@ -11,10 +11,11 @@ ROOT = Path(__file__).resolve().parents[2]
 
 # A room, or a file in the root, imports only from those before it.
 ROOMS = {
-    "mcml_sim": ("errors", "files", "media", "exact", "tracing", "results", "runs", "cli", "__init__", "__main__"),
-    "profilefit": (
-        "errors laws materials convert fitting recipes measured shader scenes studies report __init__ cli __main__"
-    ).split(),
+    "mcml_sim": ["errors", "files", "media", "exact", "tracing", "results", "runs", "cli", "__init__", "__main__"],
+    "profilefit": [
+        *("errors", "laws", "materials", "convert", "fitting", "recipes", "measured", "shader", "scenes", "studies"),
+        *("report", "__init__", "commands", "cli", "__main__"),
+    ],
 }
 
 # Packages that a function may import where it needs them, because not every installation has them.
