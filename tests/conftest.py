@@ -1,4 +1,4 @@
-"""Set before the first test module is imported: figures are drawn to files, never to a screen."""
+"""Set before the first test module is imported: figures go to files, and what one process compiled serves the others."""
 
 import gc
 import os
@@ -8,6 +8,10 @@ from pathlib import Path
 import pytest
 
 os.environ["MPLBACKEND"] = "Agg"
+# XLA takes two thirds of all time: workers, the commands that they start, and the next run share what it made.
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "xla"))
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
+os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 MOST_MAPS = 20_000  # of 65530 that Linux gives a process; a file of tests takes a few thousand
 
 

@@ -336,7 +336,7 @@ AS_PROCESSES: dict[str, tuple[str, tuple[str, ...], int]] = {
     "mci": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 5),
 }
 PROCESSES = 200
-BESIDE = 4  # at a time
+BESIDE = 2
 ARRAYS_WORDS = ("Traceback", "encountered in", "divide by zero", "RuntimeWarning", "site-packages")
 
 

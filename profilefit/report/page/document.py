@@ -2,19 +2,12 @@
 
 from __future__ import annotations
 
-import base64
-import io
-import re
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import partial
-from html import escape, unescape
+from html import escape
 from importlib.resources import files
 from pathlib import Path
 from string import Template
-
-from fontTools import subset
-from fontTools.ttLib import TTFont
-from matplotlib import font_manager
 
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import require_writable, write_whole
@@ -26,27 +19,6 @@ from profilefit.report.page.measured import Measured
 from profilefit.report.page.provenance import provenance
 from profilefit.report.page.sections import failures, shader, speed
 from profilefit.report.records import Source
-
-FAMILY = "DejaVu Sans"
-NAMES = [0, 1, 2, 13, 14]  # of the font's own table: copyright, name, style, licence
-
-
-def font_face(svgs: Iterable[str]) -> str:
-    """A CSS rule with those letters of DejaVu Sans that the texts of these figures use, as WOFF."""
-    texts = (text for svg in svgs for text in re.findall(r">([^<>]+)</(?:text|tspan)>", svg))
-    letters = "".join(sorted(set("".join(unescape(text) for text in texts))))
-    font = TTFont(font_manager.findfont(FAMILY))
-    options = subset.Options(layout_features=[], hinting=False, name_IDs=NAMES)
-    options.drop_tables += ["FFTM"]  # when its editor saved it
-    cutter = subset.Subsetter(options)
-    cutter.populate(text=letters)
-    cutter.subset(font)
-    font.flavor = "woff"
-    file = io.BytesIO()
-    font.save(file)
-    data = base64.b64encode(file.getvalue()).decode()
-    return f"@font-face{{font-family:'{FAMILY}';src:url(data:font/woff;base64,{data}) format('woff')}}"
-
 
 Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
@@ -82,7 +54,6 @@ PAGE = Template("""<!DOCTYPE html>
 <title>$title</title>
 <link rel="icon" href="data:,">
 <style>
-$font
 $style
 </style>
 </head>
@@ -115,7 +86,6 @@ def write_page(
     names     of records; all if None
     tracked   wraps the keys of the parts as these are made: in a bar, say
     RecordError, InputError on files that are damaged; OutputError where `path` cannot be written.
-    Thirty records take two minutes.
     """
     require_writable(path)
     source = Source(folder, tuple(names) if names else None)
@@ -152,7 +122,6 @@ def _document(made: Mapping[str, str], count: int) -> str:
         lead=escape(LEAD),
         conventions=escape(CONVENTIONS),
         count=f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}",
-        font=font_face(inside.values()),
         style=_asset("page.css"),
         script=_asset("page.js"),
         links=links,

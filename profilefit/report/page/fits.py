@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import tempfile
 from collections.abc import Callable, Iterator
 from html import escape
@@ -28,7 +29,6 @@ CAPTIONS = {
     "constants": "Printed constants against regenerated ones. z: their distance over the error.",
     "quality": "Error over the single-scattering albedo, at albedos that were not fitted.",
     "residuals": "What the fit leaves.",
-    "corner": "Posterior draws, 39 and 86 % of them inside the lines. Lines across: regenerated; dashed: printed.",
 }
 
 
@@ -75,8 +75,11 @@ def record_part(source: Source, name: str, figures: bool = True) -> str:
     """Everything of one record, folded; without `figures` only what its .json says."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
-    plans_of = record_plans(source, name) if figures else ()
-    drawings = "\n".join(drawn(plan, source) for plan in plans_of if not plan.missing)
-    command_again = command("\n".join(again({name: content})))
+    plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
+    corner = f"corner-{name}"  # a third of a page's bytes and half of its time, for a figure that few look at
+    drawings = "\n".join(drawn(plan, source) for plan in plans_of if plan.name != corner)
+    draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
+    asked = [draw] if any(plan.name == corner for plan in plans_of) else []
+    command_again = command("\n".join([*again({name: content}), *asked]))
     title = element("b", escape(name)) + " " + element("span", escape(content["title"]), class_="dim")
     return details(title, element("div", tables + drawings + command_again, class_="record"), f"record-{name}")

@@ -210,7 +210,7 @@ def test_a_white_medium_has_an_upper_limit_of_absorption():
     assert answer.value("l") == pytest.approx(MFP, rel=0.05)
 
 
-@pytest.mark.timeout(600)
+@pytest.mark.timeout(1800)
 @pytest.mark.parametrize("alpha", [0.9998, 0.9995])
 def test_limits_at_the_white_end_cover(alpha):
     """As little absorption as 2 % noise tells from none in few and in most of the replicates.

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
-from profilefit.report.page.document import font_face
 from profilefit.report.page.vector import VARIABLES, checked, inline
 
 NOBODY_SEES = r'<path [^>]*style="fill: none"[^>]*>'
@@ -96,12 +95,6 @@ def test_a_screen_reader_hears_the_title(page):
 def test_a_figure_without_a_frame_is_refused():
     with pytest.raises(ValueError, match="figure 'x' has no viewBox"):
         inline("<svg><g/></svg>", "x", "t")
-
-
-def test_the_font_has_the_letters_that_are_used_and_no_others(page):
-    rule = font_face([page])
-    assert rule.startswith("@font-face{font-family:'DejaVu Sans';src:url(data:font/woff;base64,")
-    assert len(rule) < len(font_face([page, "<text>ABCDEFGHIJKLMNOPQRSTUVWXYZ</text>"])) < 40_000
 
 
 @pytest.mark.parametrize(
