@@ -1,4 +1,4 @@
-"""Set before the first test module is imported: figures go to files, and what one process compiled serves the others."""
+"""Set before the first test module is imported: figures go to files, and what one process compiles serves all."""
 
 import gc
 import os
