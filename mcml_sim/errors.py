@@ -2,6 +2,7 @@
 
 # What errors tell to do about them; a command line has other words for it.
 ELSEWHERE = "use another folder"
+NAMED = "a folder to write into"
 RESUMES = "the same run with its store resumes"
 
 

@@ -3,7 +3,7 @@
 import equinox as eqx
 import jax.numpy as jnp
 
-from mcml_sim.media.setting import Setting
+from mcml_sim import Setting
 from profilefit.laws.base import Sampler
 from profilefit.laws.escape import EscapeLaw
 from profilefit.laws.rational import Rational

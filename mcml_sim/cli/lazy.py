@@ -1,4 +1,4 @@
-"""What is imported only when it is asked for: names of a package (PEP 562), a command, and what a subcommand does.
+"""What is imported only when it is asked for: names of a package (PEP 562), a command, and what a subcommand needs.
 
 JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
 """
@@ -6,7 +6,6 @@ JAX and SciPy take seconds to import, which a command that only shows its help, 
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import signal
 from importlib import import_module
@@ -32,24 +31,9 @@ def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
     return of_package
 
 
-def carried_out(module: str) -> Callable[[Callable[..., None]], Callable[..., None]]:
-    """The subcommand below, which has options and a help but no body, done by the function of its name in `module`."""
-
-    def of(asked: Callable[..., None]) -> Callable[..., None]:
-        @functools.wraps(asked)
-        def run(**given: Any) -> None:
-            with _nothing_to_finish(module):
-                done = getattr(import_module(module), asked.__name__)
-            done(**given)
-
-        return run
-
-    return of
-
-
 def command(module: str) -> None:
     """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last."""
-    with _nothing_to_finish(module):
+    with interruptible(module):
         main = import_module(module).main
     try:
         main()
@@ -61,8 +45,11 @@ def command(module: str) -> None:
 
 
 @contextlib.contextmanager
-def _nothing_to_finish(module: str) -> Iterator[None]:
-    """Have Ctrl-C end the process at once: an exception that falls into imports may be dropped, or told as another."""
+def interruptible(module: str) -> Iterator[None]:
+    """For the imports of a command in `module`: Ctrl-C ends the process at once, in one line and with its status.
+
+    An exception that falls into imports may be dropped, or told as another.
+    """
     before = signal.getsignal(signal.SIGINT)
     if before in (signal.SIG_IGN, None) or not _on_interrupt(lambda *_: _quit(module)):
         yield

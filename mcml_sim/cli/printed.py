@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.results.tally import Precision
 from mcml_sim.results.tally_file import Results
+from mcml_sim.runs.input_runs import Done, Job, Plan
 
 # What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.
 TOTALS = {
@@ -84,3 +86,42 @@ def answer(estimate: Estimate, goal: Precision, photons: int) -> str:
         f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
         "photons in all would reach it, and these are kept: ask for more --photons"
     )
+
+
+def lines(job: Job, done: Done, plan: Plan) -> Iterator[str]:
+    """Lines that tell of a run that is done."""
+    kept = done.results
+    yield f"{kept.photons} photons, seed {plan.seed}, {pace(done, plan.scheduler is not None)}"
+    yield from totals(kept)
+    if plan.goal is not None:
+        yield answer(kept.estimates[plan.goal.quantity], plan.goal, kept.photons)
+    if job.is_part_of_more:
+        yield f"{job.store} is kept, since it holds more photons than these: more --photons use them"
+
+
+def pace(done: Done, on_workers: bool) -> str:
+    """How fast a run went."""
+    if done.seconds is None:
+        return "finished before"
+    if done.resumed:  # the batches that were there cost nothing: a rate would be too good
+        return f"{times(done.seconds, done.compiling)}, resumed"
+    there = ", compiling on the workers included" if on_workers else ""
+    return speed(done.results.photons, done.seconds, done.compiling) + there
+
+
+def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
+    """A run that is done, for JSON: files, and each share of the light with its standard error."""
+    shares = {name: kept.estimates[name] for name in (*TOTALS, "energy")}
+    summary = {
+        "mco": job.mco,
+        "npz": job.npz,
+        "photons": kept.photons,
+        "seed": kept.seed,
+        "version": kept.version,
+        "cut": kept.cut,
+        "estimates": {name: {"value": one.value, "standard_error": one.standard_error} for name, one in shares.items()},
+    }
+    if goal is not None:
+        reached = goal.is_reached(kept.estimates[goal.quantity])
+        summary["precision"] = {"quantity": goal.quantity, "goal": goal.relative_error, "reached": reached}
+    return summary

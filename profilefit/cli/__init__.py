@@ -1,4 +1,4 @@
-"""profilefit on the command line: one file a subcommand, which says how it is asked for."""
+"""profilefit on the command line: one file a subcommand, with its options and with what it does."""
 
 from __future__ import annotations
 
@@ -7,14 +7,15 @@ import sys
 import typer
 
 from mcml_sim.cli.help import FirstScreen, add
+from mcml_sim.cli.lazy import interruptible
 from mcml_sim.cli.program import Program
-from mcml_sim.files.version import __version__
 from profilefit.cli.check import check
 from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert
 from profilefit.cli.examples import examples
 from profilefit.cli.export import export
 from profilefit.cli.fit import fit
+from profilefit.cli.options import in_options
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
 from profilefit.cli.stability import stability
@@ -46,6 +47,9 @@ for panel, commands in PANELS.items():
 
 def _show_version(wanted: bool) -> None:
     if wanted:
+        with interruptible(__name__):
+            from mcml_sim.files.version import __version__
+
         typer.echo(f"profilefit {__version__}")
         raise typer.Exit
 
@@ -63,7 +67,7 @@ def _stopped() -> str:
     return "stopped"
 
 
-PROGRAM = Program("profilefit", app, (InputError, OutputError, ShaderError, StoreError), _stopped)
+PROGRAM = Program("profilefit", app, (InputError, OutputError, ShaderError, StoreError), _stopped, remedied=in_options)
 
 
 def main() -> None:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 import enum
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
+from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
+
+if TYPE_CHECKING:
+    from profilefit.shader.check.chosen import Checked
+
+BROKEN = 1  # exit status
 
 
 class Precision(enum.StrEnum):
@@ -20,19 +26,19 @@ class Precision(enum.StrEnum):
     HALF = "float16"
 
 
-@carried_out("profilefit.commands.check")
 def check(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of laws, maps or records; all that were regenerated if none is.", autocompletion=words.subjects
+            help="Names of laws, maps or records; all that were regenerated if none is.",
+            autocompletion=options.subjects,
         ),
     ] = None,
     constants: Annotated[
         str | None,
         typer.Option(
             help="regenerated (the default, where there are any) or a printed set (published, diffuse).",
-            autocompletion=words.constants,
+            autocompletion=options.constants,
         ),
     ] = None,
     precision: Annotated[
@@ -53,3 +59,51 @@ def check(
       profilefit check hazard albedo-rational
       profilefit check liang --constants published
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, typed
+        from mcml_sim.files.plain import as_json as json_text
+        from mcml_sim.files.whole_file import write_whole
+        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.report.tables.check_tables import content
+        from profilefit.shader.check.chosen import checked, chosen, scope
+
+    folder = records_folder(fits, quiet)
+    those = chosen(names or [], constants, folder)
+    if out is not None:
+        require_apart(out, folder)
+    found = checked(those, folder, precision is Precision.HALF, quiet)
+    if out is not None or as_json:
+        whole = content(found.laws, found.maps, found.costs, found.halves, found.device)
+        told = {"made": made(typed(), folder), "of": scope(names, constants), **whole}
+    if out is not None:
+        write_whole(out / "check.json", json_text(told))
+        notes(quiet).print(f"wrote {out / 'check.json'}", markup=False)
+    if as_json:
+        print_json(told)
+    else:
+        _show(found, bool(names), precision is Precision.HALF)
+    if found.is_broken:
+        raise typer.Exit(BROKEN)
+
+
+def _show(found: Checked, named: bool, in_half: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import screen, show
+        from profilefit.report.tables.check_tables import (
+            check_tables,
+            cost_table,
+            half_table,
+            place_tables,
+            verdict_lines,
+        )
+
+    console = screen()
+    parts = check_tables(found.laws, found.maps, found.device)
+    parts += place_tables(found.laws) if named else []
+    parts += [cost_table(found.costs, found.device)] if found.costs else []
+    parts += [half_table(found.halves)] if found.halves else []
+    show(parts, console)
+    if in_half and found.lacking:
+        console.print(found.lacking, markup=False)
+    for line in verdict_lines(found.checks):
+        console.print(line)

@@ -3,15 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
+from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.options import AsJson, Quiet
 
+if TYPE_CHECKING:
+    from profilefit.studies.choose.cost import Ratios
+    from profilefit.studies.choose.scene import Scene
 
-@carried_out("profilefit.commands.choose")
+UNSERVED = 1  # exit status
+
+
 def choose(
     scene: Annotated[
         Path,
@@ -35,3 +40,35 @@ def choose(
     Example, on a file of profilefit examples:
       profilefit choose examples/skin.toml
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.runs.progress import tracked
+        from profilefit.report.tables.choose_table import choose_table, content
+        from profilefit.studies.choose import cost
+        from profilefit.studies.choose.choice import choose as chosen
+        from profilefit.studies.choose.layers import one_layer
+        from profilefit.studies.choose.scene import read
+
+    asked = read(scene)
+    ratios = _measured(asked, quiet) if measure else cost.shipped()
+    choice = chosen(asked, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
+    layer = None
+    if asked.layers is not None:
+        layer = one_layer(asked.layers, asked.tolerance, asked.within, progress=False if quiet else None)
+    if as_json:
+        print_json(content(choice, ratios, layer))
+    else:
+        screen().print(choose_table(choice, ratios, layer))
+    if choice.chosen is None:
+        raise typer.Exit(UNSERVED)
+
+
+def _measured(asked: Scene, quiet: bool) -> Ratios:
+    with interruptible(__name__):
+        from mcml_sim.runs.progress import working
+        from profilefit.shader import opened
+        from profilefit.studies.choose import cost
+        from profilefit.studies.choose.choice import laws
+
+    with working("measuring costs", quiet), opened() as context:
+        return cost.measured(context, laws(asked.setting))

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
-from typing import Annotated
+import re
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli.options import AsJson
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli.options import LIGHTS, AsJson
+from profilefit.errors import InputError
 
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from profilefit.convert import Optical
+
+    Floats = NDArray[np.float64]
+
+UNITS = ("um", "µm", "μm", "mm", "cm", "m", "in")
+NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D*)")
+COLOURS = "--alpha, --reflectance with --illumination, or --mu-a with --mu-s"
 LENGTH = "Length"  # the panel of --help
 
 
-@carried_out("profilefit.commands.convert")
 def convert(
     alpha: Annotated[str | None, typer.Option(help="Single-scattering albedo mu_s' / (mu_s' + mu_a).")] = None,
     reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
@@ -62,3 +74,101 @@ def convert(
       profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm
       profilefit convert --alpha 0.95 --dmfp 3mm --json
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen
+        from profilefit.report.tables.convert_table import content, convert_table
+
+    lengths = {
+        "mfp": mfp,
+        "dmfp": dmfp,
+        "dmfp_classical": dmfp_classical,
+        "decay_length": decay_length,
+        # The falloff depends on the light whose A it is paired with.
+        f"falloff_{illumination or LIGHTS[0]}": falloff,
+        "falloff_dmfp": falloff_dmfp,
+        "cycles_radius": cycles_radius,
+        "cycles_skin_radius": cycles_skin_radius,
+        "hdrp_distance": hdrp_distance,
+        "hdrp_radius": hdrp_radius,
+        "unreal_mfp": unreal_mfp,
+        "unreal_dmfp": unreal_dmfp,
+    }
+    if illumination is not None and illumination not in LIGHTS:
+        raise InputError(f"--illumination must be one of {', '.join(LIGHTS)}, got {illumination!r}")
+    given = {name: text for name, text in lengths.items() if text is not None}
+    colours = {"--alpha": alpha, "--reflectance": reflectance, "--mu-a": mu_a, "--mu-s": mu_s}
+    chosen = [name for name, text in colours.items() if text is not None]
+    if chosen not in (["--alpha"], ["--reflectance"], ["--mu-a", "--mu-s"]):
+        raise InputError(f"colour must be one of {COLOURS}, got {' and '.join(chosen) or 'none'}")
+    if mu_a is not None and mu_s is not None:
+        medium, unit = _of_coefficients(mu_a, mu_s, given)
+    else:
+        medium, unit = _of_length(_albedo(alpha, reflectance, illumination), given)
+    if as_json:
+        print_json(content(medium, unit))
+    else:
+        screen().print(convert_table(medium, unit))
+
+
+def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None) -> Floats:
+    if alpha is not None:
+        return _numbers("--alpha", alpha)[0]
+    if illumination is None:
+        raise InputError(f"--illumination must be one of {', '.join(LIGHTS)} with --reflectance, got none")
+    with interruptible(__name__):
+        from profilefit.convert import alpha_of
+
+    return alpha_of(_numbers("--reflectance", reflectance or "")[0], illumination)
+
+
+def _of_length(alpha: Floats, given: dict[str, str]) -> tuple[Optical, str]:
+    with interruptible(__name__):
+        from profilefit.convert import Optical
+
+    if len(given) != 1:
+        raise InputError(f"length must be one, such as --mfp 1.2mm, got {_options(given)}")
+    ((name, text),) = given.items()
+    value, unit = _numbers(_option(name), text, UNITS)
+    return Optical.from_length(name, value, alpha), unit
+
+
+def _of_coefficients(mu_a: str, mu_s: str, given: dict[str, str]) -> tuple[Optical, str]:
+    with interruptible(__name__):
+        from profilefit.convert import Optical
+
+    if given:
+        raise InputError(f"length must be left out, as --mu-a and --mu-s have one, got {_options(given)}")
+    per_length = tuple(f"/{unit}" for unit in UNITS)
+    absorption, unit = _numbers("--mu-a", mu_a, per_length)
+    scattering, other = _numbers("--mu-s", mu_s, per_length)
+    if unit != other:
+        raise InputError(f"--mu-a and --mu-s must have one unit, got {unit or 'none'} and {other or 'none'}")
+    return Optical.from_coefficients(absorption, scattering), unit.removeprefix("/")
+
+
+def _option(name: str) -> str:
+    """The option that gives this length."""
+    parametrised = name in ("falloff_searchlight", "falloff_diffuse")
+    return "--falloff" if parametrised else f"--{name.replace('_', '-')}"
+
+
+def _options(given: dict[str, str]) -> str:
+    return " and ".join(_option(name) for name in given) or "none"
+
+
+def _numbers(option: str, text: str, units: tuple[str, ...] = ()) -> tuple[Floats, str]:
+    """Numbers between commas, and the one unit of them all; units are `units`, or none."""
+    with interruptible(__name__):
+        import numpy as np
+
+    numbers, found = [], set()
+    for word in text.split(","):
+        match = NUMBER.fullmatch(word.strip())
+        if match is None or match[2] not in ("", *units):
+            accepted = f"numbers, with a unit of {', '.join(units)} or none" if units else "numbers"
+            raise InputError(f"{option} must be {accepted}, between commas, got {text!r}")
+        numbers.append(float(match[1]))
+        found.add(match[2])
+    if len(found - {""}) > 1:
+        raise InputError(f"{option} must have one unit, got {', '.join(sorted(found))}")
+    return np.array(numbers), max(found)

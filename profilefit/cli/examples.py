@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
+from mcml_sim.cli.lazy import interruptible
+from profilefit.errors import OutputError
+from profilefit.recipes.folder import shipped
 
 
-@carried_out("profilefit.commands.examples")
 def examples(
     out: Annotated[Path, typer.Option(help="Folder to copy them into; what is there is never replaced.")] = Path(
         "examples"
@@ -25,3 +27,18 @@ def examples(
       profilefit examples --out .
       profilefit examples --out trial
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import screen
+        from mcml_sim.files.whole_file import require_writable, write_together
+
+    files = sorted(path for path in shipped("examples").iterdir() if path.is_file())
+    if taken := [path.name for path in files if os.path.lexists(out / path.name)]:
+        raise OutputError(
+            f"cannot write into {out}: {', '.join(taken)} would be replaced; use --out with another folder"
+        )
+    for path in files:
+        require_writable(out / path.name)
+    write_together({out / path.name: path.read_bytes() for path in files})
+    console = screen()
+    for path in files:
+        console.print(str(out / path.name), markup=False)

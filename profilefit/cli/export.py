@@ -2,34 +2,35 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
+from profilefit.cli.folders import records_folder
 from profilefit.cli.options import Fits
 
 
-@carried_out("profilefit.commands.export")
 def export(
     what: Annotated[
         str,
         typer.Argument(
             metavar="NAME",
             help="A record (hazard-diffuse), a law (burley) or a map (chiang).",
-            autocompletion=words.subjects,
+            autocompletion=options.subjects,
         ),
     ],
     lang: Annotated[
-        str, typer.Option(help=f"One of {', '.join(words.LANGUAGES)}.", autocompletion=words.languages)
+        str, typer.Option(help=f"One of {', '.join(options.LANGUAGES)}.", autocompletion=options.languages)
     ] = "glsl",
     constants: Annotated[
         str | None,
         typer.Option(
             help="Of a law: regenerated, a printed set (published, corrected), or a record's path.",
-            autocompletion=words.constants,
+            autocompletion=options.constants,
         ),
     ] = None,
     name: Annotated[
@@ -48,3 +49,14 @@ def export(
     Example:
       profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
     """
+    with interruptible(__name__):
+        from mcml_sim.files.whole_file import write_whole
+        from profilefit.recipes.inventory import find
+        from profilefit.shader import export as exported
+
+    folder = records_folder(fits)
+    text = exported(find(what, folder, constants), folder, lang, name)
+    if out is None:
+        sys.stdout.write(text)
+    else:
+        write_whole(out, text)

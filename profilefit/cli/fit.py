@@ -2,26 +2,40 @@
 
 from __future__ import annotations
 
+import math
+import re
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from mcml_sim.cli.program import one_line
+from profilefit.cli import options
+from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.errors import InputError, SettingError
+
+if TYPE_CHECKING:
+    from mcml_sim import Setting
+    from profilefit.measured import Answer, Known, Measured
+
+FAILED = 1  # exit status
+FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
+WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
+FREE = "free"
 
 
-@carried_out("profilefit.commands.fit")
 def fit(
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
-    law: Annotated[str, typer.Option(help=f"One of {', '.join(words.LAWS)}.", autocompletion=words.laws)] = "hazard",
+    law: Annotated[
+        str, typer.Option(help=f"One of {', '.join(options.LAWS)}.", autocompletion=options.laws)
+    ] = "hazard",
     constants: Annotated[
         str,
         typer.Option(
             help="regenerated, a printed set (published, corrected) or a record's path (.json).",
-            autocompletion=words.constants,
+            autocompletion=options.constants,
         ),
     ] = "regenerated",
     fix: Annotated[
@@ -36,7 +50,7 @@ def fit(
     total: Annotated[
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
     ] = None,
-    light: Annotated[str, typer.Option(help=f"{' or '.join(ILLUMINATIONS)}.")] = ILLUMINATIONS[0],
+    light: Annotated[str, typer.Option(help=f"{' or '.join(options.LIGHTS)}.")] = options.LIGHTS[0],
     n: Annotated[
         float | None, typer.Option(help="Refractive index of the medium.", show_default="the file's, else 1")
     ] = None,
@@ -59,3 +73,142 @@ def fit(
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json
+        from mcml_sim.files.whole_file import require_folder
+        from mcml_sim.runs.progress import working
+        from profilefit.measured import fit as fitted
+        from profilefit.measured import read
+        from profilefit.measured.result import content
+
+    if seed < 0:
+        raise InputError(f"--seed must be a whole number >= 0, got {seed}")
+    folder = records_folder(fits, quiet)
+    measured = read(data, unit, scale == FREE)
+    measured = measured.within(_radius("--r-min", r_min, measured.unit), _radius("--r-max", r_max, measured.unit))
+    setting = _setting(measured, light, n)
+    held = _held(fix or [], measured.unit)
+    known = None if total is None else _total(total)
+    factor = _scale(scale)
+    if out is not None:
+        require_folder(out)
+    try:
+        with working("fitting", quiet):
+            answer = fitted(measured, law, constants, setting, held, known, factor, seed, folder=folder)
+    except SettingError as error:
+        raise SettingError(f"{error}; --n and --light choose one of these") from None
+    body = options.in_options(content(answer, law, constants))
+    if out is not None:
+        _write(answer, body, out, quiet)
+    if as_json:
+        print_json(body)
+    else:
+        points = f"{measured.value.size} {'rings' if measured.rings else 'points'}"
+        _show(answer, f"{one_line(data.name)}: {points}, law {law}, {answer.found.question.law.setting}")
+    if answer.telling is None:
+        raise typer.Exit(FAILED)
+
+
+def _write(answer: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes
+        from mcml_sim.files.plain import as_json
+        from mcml_sim.files.whole_file import write_whole
+        from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
+
+    write_whole(out / "fit.json", as_json(body))
+    figures = [*residual_figure(answer, out), *posterior_figure(answer, out)]
+    notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
+
+
+def _show(answer: Answer, title: str) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import screen, show
+        from profilefit.report.tables.fit_tables import fit_lines, fit_tables
+
+    console = screen()
+    show(list(fit_tables(answer, title)), console)
+    for line in fit_lines(answer):
+        console.print(options.in_options(line.plain), markup=False, emoji=False)
+
+
+def _radius(option: str, text: str | None, unit: str) -> float | None:
+    with interruptible(__name__):
+        from profilefit.measured.lengths import length
+
+    return None if text is None else length(option, text, unit)
+
+
+def _setting(measured: Measured, light: str, n: float | None) -> Setting:
+    """The light and the surface: of a simulation its own, where no option says otherwise."""
+    with interruptible(__name__):
+        from mcml_sim import Setting
+
+    if light not in options.LIGHTS:
+        raise InputError(f"--light must be one of {', '.join(options.LIGHTS)}, got {light!r}")
+    if measured.medium is not None and light != options.LIGHTS[0]:
+        raise InputError(
+            f"--light must be {options.LIGHTS[0]} for {measured.source}, which was simulated so, got {light!r}"
+        )
+    return Setting(light, measured.n or 1.0 if n is None else n)
+
+
+def _held(fix: list[str], unit: str) -> dict[str, float]:
+    """What `--fix` holds: alpha or A, and l."""
+    with interruptible(__name__):
+        from profilefit.measured.lengths import length
+
+    held: dict[str, float] = {}
+    for text in fix:
+        match = FIXED.fullmatch(text.strip())
+        if match is None:
+            raise InputError(f"--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got {text!r}")
+        name, value, option = match[1], match[2], f"--fix {match[1]}"
+        if name in held or {"alpha", "A"} <= {name, *held}:
+            raise InputError(f"--fix must hold each of l and alpha (or A) once, got {' and '.join(fix)}")
+        held[name] = length(option, value, unit) if name == "l" else _number(option, value)
+    return held
+
+
+def _scale(text: str) -> float | Known | None:
+    """What `--scale` says: nothing of a free one, a number, or one with its error."""
+    if text == FREE:
+        return None
+    known = _known("--scale", text)
+    return known if known.error else known.value
+
+
+def _total(text: str) -> Known:
+    known = _known("--total", text)
+    if known.error == 0 or known.value >= 1:
+        raise InputError(f"--total must be a reflectance in (0, 1) with its error, such as 0.52+-0.01, got {text!r}")
+    return known
+
+
+def _known(option: str, text: str) -> Known:
+    """A number > 0, with or without an error."""
+    with interruptible(__name__):
+        from profilefit.measured import Known
+        from profilefit.measured.data import LARGEST, SMALLEST
+
+    match = WITH_ERROR.fullmatch(text.strip())
+    value = _number(option, match["value"] if match else text)
+    error = _number(option, match["error"]) if match else 0.0
+    if not value > 0 or error < 0 or (match is not None and error == 0):
+        accepted = (
+            f"a number > 0, {'free, ' if option == '--scale' else ''}or a number with its error such as 1.0+-0.02"
+        )
+        raise InputError(f"{option} must be {accepted}, got {text!r}")
+    if not SMALLEST <= value <= LARGEST:
+        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {text!r}")
+    return Known(value, error)
+
+
+def _number(option: str, text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not math.isfinite(number):
+        raise InputError(f"{option} must be a number, got {text!r}")
+    return number

@@ -1,14 +1,117 @@
-"""Options that several subcommands have."""
+"""Options that several subcommands have, and the words that a shell completes: names of laws, maps, records, recipes.
+
+Words are written out where their owner takes seconds to import; a test holds them against it.
+"""
 
 from __future__ import annotations
 
+import re
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
+
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli.folders import known_folder
+from profilefit.recipes.folder import fits_folder
 
 Fits = Annotated[
     Path | None, typer.Option(help="Folder of the records: ./fits if it has any, which is said, else the ones shipped.")
 ]
 AsJson = Annotated[bool, typer.Option("--json", help="Print all of it as JSON instead.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes: the result only.")]
+
+LAWS = (
+    "liang",
+    "burley",
+    "burley_diffuse_mfp",
+    "dipole",
+    "better_dipole",
+    "beam_diffusion",
+    "gaussians",
+    "hazard",
+    "quantile",
+)
+MAPS = ("rational", "van_de_hulst", "chiang")  # and liang, which is a profile law's name, too
+LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
+LIGHTS = ("searchlight", "diffuse")
+PARTS = ("truth", "laws", "samplers", "fits")
+FUNCTIONS = ("exact", "convert", "solver")
+# What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
+OPTIONS = {
+    "constants": "--constants",
+    "held": "--fix",
+    "out": "--out",
+    "part": "PART",
+    "r_max": "--r-max",
+    "r_min": "--r-min",
+    "scaled": "--scale free",
+    "unit": "--unit",
+}
+ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
+
+
+def in_options(told: Any) -> Any:
+    """What the library says, a text or content with texts in it, with options in place of arguments."""
+    if isinstance(told, str):
+        return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), told)
+    if isinstance(told, Mapping):
+        return {name: in_options(value) for name, value in told.items()}
+    return [in_options(value) for value in told] if isinstance(told, list | tuple) else told
+
+
+def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """Names of the records in the folder that the command has been given so far."""
+    return _starting(incomplete, _known_records(ctx))
+
+
+def recipes(incomplete: str) -> Iterator[str]:
+    """Names of the recipes that came with this installation."""
+    return _starting(incomplete, sorted(path.stem for path in fits_folder().glob("*.toml")))
+
+
+def subjects(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """Names of laws, maps and records."""
+    return _starting(incomplete, dict.fromkeys((*LAWS, *MAPS, *_known_records(ctx))))
+
+
+def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
+    """What `stability` takes: those, and functions."""
+    yield from subjects(ctx, incomplete)
+    yield from _starting(incomplete, FUNCTIONS)
+
+
+def laws(incomplete: str) -> Iterator[str]:
+    """Names of profile laws."""
+    return _starting(incomplete, LAWS)
+
+
+def languages(incomplete: str) -> Iterator[str]:
+    """Languages of `export`."""
+    return _starting(incomplete, LANGUAGES)
+
+
+def parts(incomplete: str) -> Iterator[str]:
+    """Parts of `tradeoff`."""
+    return _starting(incomplete, PARTS)
+
+
+def constants(incomplete: str) -> Iterator[str]:
+    """Sets of constants, of whatever law."""
+    with interruptible(__name__):
+        from profilefit.laws.published import SETS
+
+    return _starting(incomplete, dict.fromkeys(("regenerated", *(one.name for one in SETS))))
+
+
+def _known_records(ctx: typer.Context) -> list[str]:
+    with interruptible(__name__):
+        from profilefit.recipes.record import available
+
+    asked = ctx.params.get("fits")
+    return list(available(known_folder(Path(asked) if asked else None)))
+
+
+def _starting(incomplete: str, known: Iterable[str]) -> Iterator[str]:
+    return (word for word in known if word.startswith(incomplete))

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from enum import StrEnum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
 from profilefit.cli.options import Quiet
-from profilefit.recipes.folder import LOCAL
+from profilefit.errors import InputError
+from profilefit.recipes.folder import LOCAL, fits_folder
 
+PHOTON_STORE = ".photons"
+MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
 PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
 
 
@@ -23,12 +27,11 @@ class Preset(StrEnum):
     FULL = "full"
 
 
-@carried_out("profilefit.commands.regenerate")
 def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of recipes, or .toml files; all of them if none is named.", autocompletion=words.recipes
+            help="Names of recipes, or .toml files; all of them if none is named.", autocompletion=options.recipes
         ),
     ] = None,
     preset: Annotated[Preset, typer.Option(help=PRESETS)] = Preset.QUICK,
@@ -53,3 +56,33 @@ def regenerate(
       profilefit regenerate hazard --out mine
       profilefit regenerate albedo-liang --photons 100000 --out mine
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json
+        from mcml_sim.files.whole_file import require_folder
+        from mcml_sim.runs.progress import is_watched
+        from profilefit.recipes.recipe import chosen
+        from profilefit.recipes.regenerate import regenerate as regenerate_records
+        from profilefit.recipes.run import Run
+        from profilefit.report.tables.summary_tables import outcome
+
+    if not 0 <= seed <= MAX_SEED:
+        raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")
+    if photons is not None and photons < 1:
+        raise InputError(f"photons must be a whole number >= 1, got {photons}")
+    said = notes(quiet)
+    those = chosen(recipes or (), fits_folder())
+    require_folder(out)
+    begin = time.perf_counter()
+    run = Run(
+        preset=str(preset),
+        seed=seed,
+        out=out,
+        store=out / PHOTON_STORE / f"seed-{seed}",
+        photons=photons,
+        say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
+        progress=is_watched() and not quiet,
+    )
+    written = regenerate_records(those, run)
+    run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
+    if as_json:
+        print_json({path.stem: outcome(path) for path in written})

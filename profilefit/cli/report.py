@@ -2,21 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
+from profilefit.cli.folders import evidence_folder, records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.errors import InputError, ShaderError
+
+if TYPE_CHECKING:
+    from profilefit.report.tables.law_tables import Measured
+
+MEGABYTE = 1e6
+MOST_MARKDOWN = 2**24  # bytes of a page whose tables are filled in
 
 
-@carried_out("profilefit.commands.report")
 def report(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Names of records; a summary of all if none is named.", autocompletion=words.records),
+        typer.Argument(help="Names of records; a summary of all if none is named.", autocompletion=options.records),
     ] = None,
     quality: Annotated[
         bool, typer.Option("--quality", help="Measure every law against the exact half space instead (a minute).")
@@ -53,3 +61,107 @@ def report(
       profilefit report liang-whole --figures figures
       profilefit report --html report.html
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen, show
+        from profilefit.recipes import record
+        from profilefit.report import every_law
+        from profilefit.report.tables import law_tables
+
+    _require_one({"--markdown": markdown, "--html": html, "--json": as_json, "--quality": quality and not as_json})
+    folder = records_folder(fits, quiet)
+    contents = record.chosen(folder, names)
+    if markdown is not None:
+        _fill(markdown, contents, folder, quiet)
+    elif html is not None:
+        _page(html, folder, evidence_folder(folder, evidence), names, quiet)
+    elif as_json:
+        told: dict[str, Any] = {"records": contents}
+        if quality:
+            told["quality"] = law_tables.content(_measured(folder, names, quiet))
+        print_json(told)
+    elif quality:
+        show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())
+    else:
+        _show(contents, bool(names))
+    if figures_to is not None:
+        _draw(folder, figures_to, names, quiet)
+
+
+def _require_one(asked: dict[str, object]) -> None:
+    given = [option for option, value in asked.items() if value]
+    if len(given) > 1:
+        raise InputError(f"report takes one of {', '.join(asked)}, or --json with --quality, got {' and '.join(given)}")
+
+
+def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import put, screen
+        from profilefit.report import record_tables, summary
+
+    parts = [part for one in contents.values() for part in record_tables(one)] if named else [summary(contents)]
+    console = screen()
+    for part in parts:
+        put(part, console)
+
+
+def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Measured:
+    with interruptible(__name__):
+        from mcml_sim.runs.progress import tracked
+        from profilefit.report.tables import law_tables
+
+    def track(found: Iterator[Any], title: str, total: int) -> Iterator[Any]:
+        return tracked(found, f"measuring {title}", "laws", total, quiet)
+
+    return law_tables.measured(folder, names or None, track=track)
+
+
+def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes
+        from mcml_sim.files.whole_file import require_folder
+        from mcml_sim.runs.progress import tracked
+        from profilefit.report import draw_all
+
+    require_folder(out)
+    drawn, skipped = draw_all(folder, out, names, lambda plans: tracked(plans, "drawing", "figures", quiet=quiet))
+    said = notes(quiet)
+    said.print(f"drew {len(drawn)} figures into {out}", markup=False)
+    for line in skipped:
+        said.print(f"left out: {line}", markup=False)
+
+
+def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes
+        from mcml_sim.runs.progress import tracked
+        from profilefit.report.page.document import write_page
+
+    write_page(path, folder, evidence, names, lambda parts: tracked(parts, "writing", "parts", quiet=quiet))
+    notes(quiet).print(f"wrote {path}, {path.stat().st_size / MEGABYTE:.1f} MB", markup=False)
+
+
+def _fill(path: Path, contents: dict[str, dict[str, Any]], folder: Path, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes
+        from mcml_sim.files.whole_file import read_whole, write_whole
+        from mcml_sim.runs.progress import working
+        from profilefit.report import fill, markdown_sections, sections
+
+    if path.exists() and not path.is_file():  # to read a pipe would wait for ever
+        raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
+    content = read_whole(path, MOST_MARKDOWN)
+    try:
+        if len(content) > MOST_MARKDOWN:
+            raise ValueError(f"more than {MOST_MARKDOWN} bytes")
+        text = content.decode("utf-8")
+    except ValueError as error:
+        raise InputError(f"{path}: cannot be read ({error})") from None
+    measured = {}
+    for name, make in markdown_sections(folder).items():
+        if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
+            try:
+                with working(f"measuring the table {name}", quiet):
+                    measured[name] = make()
+            except ShaderError as error:
+                notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
+    write_whole(path, fill(text, sections(contents) | measured))

@@ -2,23 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
+from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 
+if TYPE_CHECKING:
+    from profilefit.studies.stability.atlas import Part
 
-@carried_out("profilefit.commands.stability")
+BROKEN = 1  # exit status
+
+
 def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
             help="Laws, maps, records, or exact, convert, solver; all there is if none is named.",
-            autocompletion=words.tested,
+            autocompletion=options.tested,
         ),
     ] = None,
     out: Annotated[
@@ -42,3 +48,64 @@ def stability(
       profilefit stability --quick --out atlas
       profilefit stability liang
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, typed
+        from mcml_sim.files.plain import as_json as json_text
+        from mcml_sim.files.whole_file import write_whole
+        from mcml_sim.runs.progress import tracked
+        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.report.tables.stability_tables import content
+        from profilefit.studies.stability.atlas import jobs, run
+
+    folder = records_folder(fits, quiet)
+    todo = jobs(names or [], folder, quick)
+    if out is not None:
+        require_apart(out, folder)
+    parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
+    if out is not None or as_json:
+        told = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}
+    if out is not None:
+        _write(parts, out)
+        write_whole(out / "stability.json", json_text(told))
+        notes(quiet).print(f"{out}: stability*.png, .svg; stability.csv, .json", markup=False)
+    if as_json:
+        print_json(told)
+    else:
+        _show(parts, bool(names))
+    if any(part.failures for part in parts):
+        raise typer.Exit(BROKEN)
+
+
+def _show(parts: Sequence[Part], named: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import screen, show
+        from profilefit.report.tables.stability_tables import (
+            cause_table,
+            fit_summary,
+            fit_table,
+            region_table,
+            verdict_lines,
+        )
+
+    told = [region_table(part) for part in parts if part.regions] if named else []
+    found = [one for part in parts for one in part.fits]
+    if any(part.regions for part in parts):
+        told.append(cause_table(parts))
+    if found:
+        told.append(fit_table(found) if named else fit_summary(found))
+    console = screen()
+    show(told, console)
+    for line in verdict_lines(parts):
+        console.print(line)
+
+
+def _write(parts: Sequence[Part], out: Path) -> None:
+    with interruptible(__name__):
+        from mcml_sim.files.whole_file import write_whole
+        from profilefit.report.figures.stability_figure import stability_figures
+        from profilefit.report.tables.stability_tables import fits_csv, regions_csv
+
+    stability_figures([one for part in parts for one in part.cells], out)
+    write_whole(out / "stability.csv", regions_csv(parts))
+    if found := [one for part in parts for one in part.fits]:
+        write_whole(out / "stability-fits.csv", fits_csv(found))

@@ -2,24 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from mcml_sim.cli.lazy import carried_out
-from profilefit.cli import words
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli import options
+from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 
+if TYPE_CHECKING:
+    from profilefit.studies.tradeoff.points import Part
+
 OUT = Path("tradeoff")
+WIDTH = 120  # columns that the tables take
 
 
-@carried_out("profilefit.commands.tradeoff")
 def tradeoff(
     parts: Annotated[
         list[str] | None,
         typer.Argument(
-            metavar="PART", help=f"{', '.join(words.PARTS)}; all of them if none is named.", autocompletion=words.parts
+            metavar="PART",
+            help=f"{', '.join(options.PARTS)}; all of them if none is named.",
+            autocompletion=options.parts,
         ),
     ] = None,
     out: Annotated[
@@ -41,3 +48,46 @@ def tradeoff(
     Example:
       profilefit tradeoff laws --quick --out charts
     """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, screen, show, typed
+        from mcml_sim.runs.progress import tracked
+        from profilefit.recipes.evidence import made, require_apart
+        from profilefit.report.tables.tradeoff_tables import as_numbers, tradeoff_tables
+        from profilefit.studies.tradeoff import stopwatch
+        from profilefit.studies.tradeoff.parts import chosen, is_alike, keep, measured, read
+
+    names = chosen(parts or [])
+    folder = records_folder(fits, quiet)
+    require_apart(out, folder)
+    file, said = out / "tradeoff.json", notes(quiet)
+    origin = {"made": made(typed(), folder)}
+    if file.exists() and not is_alike(read(file), origin):
+        said.print(f"{file} is of other records, another version or machine: written afresh", markup=False)
+
+    def track(turns: range, title: str) -> Iterable[int]:
+        return tracked(turns, title, "turns", quiet=quiet)
+
+    with stopwatch.on_processor(), stopwatch.on_one_core() as pinned:
+        told: dict[str, Any] = {**origin, "machine": (known := stopwatch.facts(pinned))}
+        for name in names:
+            found = measured(name, quick, folder, track)
+            files = _written(found, known, out)
+            told[name] = {**as_numbers(found), **origin, "machine": known}
+            keep(file, told)
+            if not as_json:
+                show(list(tradeoff_tables(found)), screen(WIDTH))
+            said.print(f"wrote {', '.join(map(str, (*files, file)))}", markup=False)
+    if as_json:
+        print_json(told)
+
+
+def _written(found: Part, known: dict[str, str], out: Path) -> list[Path]:
+    with interruptible(__name__):
+        from mcml_sim.files.whole_file import write_whole
+        from profilefit.report.figures.tradeoff_figure import tradeoff_figure
+        from profilefit.report.tables.tradeoff_tables import as_csv
+        from profilefit.studies.tradeoff import stopwatch
+
+    data = out / f"tradeoff-{found.name}.csv"
+    write_whole(data, as_csv(found, known))
+    return [*tradeoff_figure(found, stopwatch.caption(known), out), data]

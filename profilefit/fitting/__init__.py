@@ -1,1 +1,22 @@
-"""Data and a law become constants with errors."""
+"""Data and a law: constants with their errors, and how good they are. `profilefit` has the functions."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+if TYPE_CHECKING:
+    from profilefit.fitting.estimate import Structure
+    from profilefit.fitting.profiles import Covariance
+    from profilefit.fitting.quality import AlbedoQuality, Quality
+    from profilefit.fitting.solver import Solution
+else:
+    __getattr__ = attributes(
+        __name__,
+        {
+            "Structure": "estimate",
+            "Covariance": "profiles",
+            **dict.fromkeys(("AlbedoQuality", "Quality"), "quality"),
+            "Solution": "solver",
+        },
+    )
+
+__all__ = ["AlbedoQuality", "Covariance", "Quality", "Solution", "Structure"]

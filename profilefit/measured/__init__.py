@@ -1,1 +1,17 @@
-"""One's own data: a measured or simulated profile, the medium it tells of, and how far it tells it."""
+"""One's own data: a measured or simulated profile, the medium that it tells of, and what it cannot tell."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+if TYPE_CHECKING:
+    from profilefit.measured.data import Measured
+    from profilefit.measured.problem import Known
+    from profilefit.measured.reading import read
+    from profilefit.measured.result import Answer
+    from profilefit.measured.workflow import fit
+else:
+    __getattr__ = attributes(
+        __name__, {"Measured": "data", "Known": "problem", "read": "reading", "Answer": "result", "fit": "workflow"}
+    )
+
+__all__ = ["Answer", "Known", "Measured", "fit", "read"]

@@ -64,21 +64,26 @@ class Measured:
         """Median of |sigma / value| [-]."""
         return float(np.median(np.abs(self.sigma) / np.maximum(np.abs(self.value), np.finfo(float).tiny)))
 
-    def within(self, least: float | None, most: float | None) -> Measured:
+    @property
+    def n(self) -> float | None:
+        """Refractive index of a simulated medium over that above it [-]; None of what was measured."""
+        return None if self.medium is None else self.medium.layers[0].n / self.medium.n_above
+
+    def within(self, r_min: float | None, r_max: float | None) -> Measured:
         """Only what lies wholly between two radii [unit]; InputError if nothing does."""
         keep = np.ones(self.value.size, bool)
-        if least is not None:
-            keep &= self.inner >= least
-        if most is not None:
-            keep &= self.outer <= most
+        if r_min is not None:
+            keep &= self.inner >= r_min
+        if r_max is not None:
+            keep &= self.outer <= r_max
         if np.all(keep):
             return self
         if not np.any(keep):
             low, high = self.inner[0], self.outer[-1]
             raise InputError(
-                f"{self.source}: no row is left between --r-min and --r-max: r goes from {low:g} to {high:g}"
+                f"{self.source}: no row is left between `r_min` and `r_max`: r goes from {low:g} to {high:g}"
             )
-        note = f"{np.sum(~keep)} of {keep.size} rows left out, by --r-min and --r-max"
+        note = f"{np.sum(~keep)} of {keep.size} rows left out, by `r_min` and `r_max`"
         return self.chosen(keep, note)
 
     def chosen(self, keep: NDArray[np.bool_], note: str = "") -> Measured:
@@ -107,7 +112,7 @@ def require_workable(data: Measured) -> None:
     if data.value.size > MOST_ROWS:
         raise InputError(
             f"{data.source}: expected at most {MOST_ROWS} rows, got {data.value.size}: average neighbours over rings "
-            "(r_in, r_out), or choose a range by --r-min and --r-max"
+            "(r_in, r_out), or choose a range by `r_min` and `r_max`"
         )
     lit = np.where(data.value == 0, 1.0, data.value)  # no light is a value like any other
     for name, column in (("r", data.r), ("value", lit), ("sigma", data.sigma)):

@@ -40,7 +40,7 @@ def length(name: str, text: str, unit: str) -> float:
     if not match[2] or match[2] == unit:
         return float(match[1])
     if not unit:
-        raise InputError(f"{name} must be without a unit where the data has none (--unit gives it one), got {text!r}")
+        raise InputError(f"{name} must be without a unit where the data has none (`unit` gives it one), got {text!r}")
     return float(match[1]) * factor(match[2], unit)
 
 

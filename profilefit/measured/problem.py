@@ -53,16 +53,16 @@ class Question:
 
 
 def held_albedo(law: ProfileLaw, name: str, value: float) -> float:
-    """The albedo that `--fix alpha=...` or `--fix A=...` holds; InputError where the law has none such."""
+    """The albedo that holding `alpha` or `A` at `value` means; InputError where the law has none such."""
     if name == "alpha":
         if not LEAST <= value <= MOST:
-            raise InputError(f"--fix alpha must be a single-scattering albedo in (0, 1), got {value:g}")
+            raise InputError(f"held alpha must be a single-scattering albedo in (0, 1), got {value:g}")
         return value
     with np.errstate(all="ignore"):
         low, high = (float(np.asarray(total(law, np.float64(end)))) for end in (LEAST, MOST))
     if not low <= value <= high:
         raise InputError(
-            f"--fix A must be a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface, got {value:g}"
+            f"held A must be a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface, got {value:g}"
         )
     return float(
         brentq(lambda alpha: float(np.asarray(total(law, np.float64(alpha)))) - value, LEAST, MOST, xtol=1e-14)

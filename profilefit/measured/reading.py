@@ -146,6 +146,6 @@ def read(path: Path, unit: str | None = None, scaled: bool = False) -> Measured:
         return read_table(path, unit, scaled)
     if unit not in (None, UNIT):
         raise InputError(
-            f"--unit must be {UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}, got {unit!r}"
+            f"unit must be {UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}, got {unit!r}"
         )
     return SIMULATED[path.suffix.lower()](path)

@@ -34,10 +34,10 @@ STARTS = 4  # the best of them, no two neighbours, that are followed to their mi
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
 EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has run there
 WHITE, BLACK = -9.0, 6.0  # u beyond which alpha is 1 or 0 for all that data can say
-AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with --fix alpha=..."
+AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with `held` alpha=..."
 NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
-RAN_AWAY = "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with --fix"
-AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use --fix alpha=..."
+RAN_AWAY = "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with `held`"
+AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use `held` alpha=..."
 
 
 @dataclass(frozen=True)

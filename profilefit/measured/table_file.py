@@ -292,8 +292,8 @@ def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
             )
     if len({UNITS.get(one) for one in found | ({unit} if unit else set())}) > 1:
         told = ", ".join(sorted(found | ({unit} if unit else set())))
-        raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in --unit, got {told}")
-    return found.pop() if found else checked_unit("--unit", unit) if unit else ""
+        raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in `unit`, got {told}")
+    return found.pop() if found else checked_unit("unit", unit) if unit else ""
 
 
 def _require_one_measure(path: Path, header: _Header) -> None:
@@ -320,7 +320,7 @@ def _value_factor(path: Path, header: _Header, length: str) -> float:
     unit = area_unit(text)
     if unit is None:
         raise InputError(
-            f"{path}:{header.line}: column {name}: expected light per area such as [1/mm^2], or --scale free for any "
+            f"{path}:{header.line}: column {name}: expected light per area such as [1/mm^2], or `scaled` for any "
             f"other measure, got [{text}]"
         )
     if not length:

@@ -1,8 +1,10 @@
-"""The whole way from a file to an answer in one call: what `profilefit fit` does in a shell, for Python."""
+"""The whole way from a file to an answer in one call."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from mcml_sim.media.setting import Setting
@@ -19,7 +21,7 @@ from profilefit.recipes import catalogue
 HOLDABLE = ("alpha", "A", "l")
 
 
-def asked(
+def fit(
     data: Measured | Path | str,
     law: str = "hazard",
     constants: str = "regenerated",
@@ -45,15 +47,18 @@ def asked(
     InputError, SettingError or RecordError on what cannot be fitted; a fit that fails is an Answer that says so.
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
-    records, where = folder or catalogue.fits_folder(), setting or _own_setting(measured)
+    records, where = folder or catalogue.fits_folder(), setting or Setting(n=measured.n or 1.0)
+    measured = _noted(measured, where)
     chosen = catalogue.load(law, constants, where, records)
     question = Question(chosen, _held(chosen, held or {}, scale), total, scale if isinstance(scale, Known) else None)
-    return answered(fitted(measured, question, origin(law, constants, where, records)), seed, walk)
+    return answered(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 
 
-def _own_setting(measured: Measured) -> Setting:
-    medium = measured.medium
-    return Setting() if medium is None else Setting(n=medium.layers[0].n / medium.n_above)
+def _noted(measured: Measured, setting: Setting) -> Measured:
+    """The data, with a note where a simulation's surface is not the one that is fitted."""
+    if measured.n is None or math.isclose(measured.n, setting.n):
+        return measured
+    return replace(measured, notes=(*measured.notes, f"the file's n is {measured.n:g}, fitted as n = {setting.n:g}"))
 
 
 def _held(law: ProfileLaw, held: Mapping[str, float], scale: float | Known | None) -> dict[str, float]:

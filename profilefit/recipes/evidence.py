@@ -54,7 +54,7 @@ def require_apart(out: Path, records: Path) -> None:
     """InputError where a measurement's .json in `out` would be taken for a record; OutputError where none can be."""
     taken = {records.resolve(), LOCAL.resolve()}
     if out.resolve() in taken:
-        raise InputError(f"--out must be another folder than that of the records, got {out}")
+        raise InputError(f"out must be another folder than that of the records, got {out}")
     require_folder(out)
 
 

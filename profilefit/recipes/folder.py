@@ -1,13 +1,9 @@
-"""Where records lie: in the folder one works in, if it has any, else in what came with this installation."""
+"""Where recipes and records lie: in what came with this installation, and where one writes one's own."""
 
 from __future__ import annotations
 
-import warnings
 from importlib import resources
 from pathlib import Path
-
-from profilefit.errors import InputError, OtherRecords
-from profilefit.recipes import record
 
 LOCAL = Path("fits")
 EVIDENCE = Path("evidence")  # what was measured with records: shader check, failures, times
@@ -23,36 +19,3 @@ def shipped(name: str) -> Path:
     package = Path(str(resources.files("profilefit"))).resolve()
     inside = package / name
     return inside if inside.is_dir() else package.parent / name
-
-
-def records_folder(asked: Path | None = None, quiet: bool = False) -> Path:
-    """The folder that was asked for, or ./fits if it has records, or the one shipped.
-
-    One that is not the shipped one is told of by an OtherRecords warning, since constants of a strange folder look like
-    ours; of one that was asked for, not if `quiet`. InputError if it is no folder.
-    """
-    if asked is not None and not asked.is_dir():
-        raise InputError(f"--fits must be a folder of records, got {str(asked)!r}, which is none")
-    folder = known_folder(asked)
-    if folder.resolve() != fits_folder().resolve() and not (quiet and asked):
-        where = "" if asked else " in the folder that you are in; --fits chooses others"
-        warnings.warn(f"records of {str(folder)!r}{where}", OtherRecords, stacklevel=2)
-    return folder
-
-
-def known_folder(asked: Path | None = None) -> Path:
-    """The same without a word, there or not."""
-    return asked or (LOCAL if record.available(LOCAL) else fits_folder())
-
-
-def evidence_folder(records: Path, asked: Path | None = None) -> Path:
-    """The folder that was asked for, or ./evidence if it is there, or the one beside the records.
-
-    One that nobody named is told of by an OtherRecords warning. InputError if it was asked for and is no folder.
-    """
-    if asked is not None and not asked.is_dir():
-        raise InputError(f"--evidence must be a folder, got {str(asked)!r}, which is none")
-    if asked is None and EVIDENCE.is_dir():
-        where = f"measurements of {str(EVIDENCE)!r} in the folder that you are in; --evidence chooses others"
-        warnings.warn(where, OtherRecords, stacklevel=2)
-    return asked or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)

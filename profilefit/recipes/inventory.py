@@ -146,7 +146,7 @@ def _default(key: str, printed_as: str, has_constants: bool) -> str:
         return printed[0]
     accepted = ", ".join([*printed, "the path of a record (.json)"])
     several = "one of " if printed else ""
-    raise InputError(f"--constants must be {several}{accepted}: {key} was not regenerated, got none")
+    raise InputError(f"constants must be {several}{accepted}: {key} was not regenerated, got none")
 
 
 def _whole_laws(folder: Path, records: Records, matched: bool) -> list[Named]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -236,6 +236,18 @@ def find(name: str, folder: Path) -> Recipe:
     if name not in known:
         raise RecipeError(f"recipe must be one of {', '.join(known) or '(none)'} or a .toml file, got {name!r}")
     return read(known[name])
+
+
+def chosen(names: Sequence[str], folder: Path) -> tuple[Recipe, ...]:
+    """The recipes of these names or paths; all of `folder` if none is named. RecipeError if two write one record."""
+    found = tuple(find(name, folder) for name in names or available(folder))
+    first: dict[str, Path] = {}
+    for one in found:
+        if one.name in first:
+            paths = f"{first[one.name]} and {one.path}"
+            raise RecipeError(f"recipes must have different names, as their records do, got {paths}")
+        first[one.name] = one.path
+    return found
 
 
 def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[str] = frozenset()) -> Any:

@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,7 @@ FORMAT = 1
 DIGITS = 12
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
 LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
+NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
 
 
 def write(folder: Path, name: str, content: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> Path:
@@ -84,6 +86,25 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
 def available(folder: Path) -> dict[str, Path]:
     """The records of a folder by name, in order."""
     return {path.stem: path for path in sorted(folder.glob("*.json"))}
+
+
+def chosen(folder: Path, names: Sequence[str] | None = None) -> dict[str, dict[str, Any]]:
+    """The records of these names, or all of a folder, as `read` gives them; RecordError names the nearest there are."""
+    known = available(folder)
+    if not known:
+        raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
+    for name in names or ():
+        if name not in known:
+            raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known))}")
+    return {name: read(known[name], whole=True) for name in (names or known)}
+
+
+def _nearest(name: str, known: list[str]) -> str:
+    """What may have been meant: names that begin so, or differ by a few letters."""
+    begun = sorted((one for one in known if one.startswith(name.lower())), key=len)
+    near = begun or get_close_matches(name.lower(), known, n=NEAREST, cutoff=ALIKE)
+    hint = f"did you mean {', '.join(near[:NEAREST])}? " if near else ""
+    return f"{hint}`profilefit report` lists them"
 
 
 def digest(*arrays: np.ndarray) -> str:

@@ -1,1 +1,12 @@
-"""Questions asked of every law and scene: which to choose, where each fails, what each costs."""
+"""Questions asked of every law and scene: the least that serves, where things fail, speed against accuracy."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+if TYPE_CHECKING:
+    from profilefit.studies.choose.case import Within
+    from profilefit.studies.choose.layers import one_layer
+else:
+    __getattr__ = attributes(__name__, {"Within": "choose.case", "one_layer": "choose.layers"})
+
+__all__ = ["Within", "one_layer"]

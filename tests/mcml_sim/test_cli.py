@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mcml_sim.cli import app, printed
-from mcml_sim.cli import run as doing
+from mcml_sim.cli.run import FIRST_LOOKS, QUANTITIES
 from mcml_sim.errors import ClusterError
 from mcml_sim.files.version import __version__
 from mcml_sim.media.grid import Grid
@@ -18,6 +18,7 @@ from mcml_sim.media.medium import half_space
 from mcml_sim.results.mci import read_mci
 from mcml_sim.results.tally import Precision, quantities
 from mcml_sim.results.tally_file import read_results
+from mcml_sim.runs import input_runs
 from mcml_sim.runs.batches import FIRST_LOOK
 from mcml_sim.runs.simulation import batch_photons, simulate
 from mcml_sim.runs.store import RESUMES
@@ -258,7 +259,7 @@ def test_two_at_once_with_other_seeds_are_told_to_part(command, mci, monkeypatch
         Path("one.photons/run.json").unlink()  # as if it had not been there when this one looked
         return simulate(medium, grid, photons, **options)
 
-    monkeypatch.setattr(doing, "simulate", second)
+    monkeypatch.setattr(input_runs, "simulate", second)
     status, _, err = command("run", mci)
     assert status == 2
     assert err == (
@@ -511,7 +512,7 @@ def test_a_scheduler_is_passed_on(command, mci, monkeypatch):
         given.append(scheduler)
         return simulate(*what, **options)
 
-    monkeypatch.setattr(doing, "simulate", here)
+    monkeypatch.setattr(input_runs, "simulate", here)
     assert command("run", mci, "--scheduler", "tcp://10.0.0.1:8786")[0] == 0
     assert given == ["tcp://10.0.0.1:8786"] * 2
 
@@ -520,7 +521,7 @@ def test_the_remedy_is_the_command_lines_when_a_scheduler_leaves(command, mci, m
     def gone(*_, **__):
         raise ClusterError(f"the scheduler at here has gone; {RESUMES}")
 
-    monkeypatch.setattr(doing, "simulate", gone)
+    monkeypatch.setattr(input_runs, "simulate", gone)
     status, _, err = command("run", mci)
     assert (status, err) == (2, "mcml-sim: the scheduler at here has gone; the same command resumes\n")
 
@@ -553,10 +554,9 @@ def test_quiet_is_quiet(command, mci):
 
 
 def test_what_the_help_says_is_what_is_done():
-    assert quantities(Grid(1, 1, 1, 1, na=1)) == app.QUANTITIES
-    assert doing.QUANTITY == app.QUANTITY
+    assert quantities(Grid(1, 1, 1, 1, na=1)) == QUANTITIES
     first = [f"{FIRST_LOOK * batch_photons(half_space(0.5, n=n)) / 1e6:.2g} million" for n in (1.4, 1.0)]
-    assert list(app.FIRST_LOOKS) == first
+    assert list(FIRST_LOOKS) == first
 
 
 def test_version_and_help(command):

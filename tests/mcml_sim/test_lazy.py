@@ -10,15 +10,30 @@ import pytest
 
 import mcml_sim
 import profilefit
-from mcml_sim.cli.lazy import attributes, carried_out
+import profilefit.fitting
+import profilefit.measured
+import profilefit.report
+import profilefit.shader
+import profilefit.studies
+from mcml_sim.cli.lazy import attributes
+
+FACES = (
+    mcml_sim,
+    profilefit,
+    profilefit.fitting,
+    profilefit.measured,
+    profilefit.report,
+    profilefit.shader,
+    profilefit.studies,
+)
 
 
-@pytest.mark.parametrize("package", [mcml_sim, profilefit])
+@pytest.mark.parametrize("package", FACES, ids=lambda package: package.__name__)
 def test_every_name_is_there_and_is_the_one_that_is_typed(package):
     """What type checkers are told is what `__getattr__` gives."""
     (branch,) = [one for one in ast.parse(Path(package.__file__).read_text()).body if isinstance(one, ast.If)]
     homes = {alias.name: one.module for one in branch.body for alias in one.names}
-    assert set(homes) <= set(package.__all__) <= set(dir(package))
+    assert set(homes) <= set(package.__all__)
     for name in package.__all__:
         assert getattr(package, name) is not None
     for name, home in homes.items():
@@ -26,21 +41,23 @@ def test_every_name_is_there_and_is_the_one_that_is_typed(package):
         assert getattr(package, name) is getattr(there, name)
 
 
+@pytest.mark.parametrize("package", [mcml_sim, profilefit])
+def test_an_interactive_shell_completes_names_that_nobody_has_asked_for(package):
+    assert set(package.__all__) <= set(dir(package))
+
+
+@pytest.mark.parametrize("package", FACES, ids=lambda package: package.__name__)
+def test_no_module_has_the_name_of_what_is_exported_beside_it(package):
+    """It would stand in the place of the function as soon as anybody imports it."""
+    beside = {path.stem for path in Path(package.__file__).parent.iterdir()}
+    assert beside & set(package.__all__) <= {"exact"}, "which is itself a module"
+
+
 def test_an_unknown_name_is_an_attribute_error():
     with pytest.raises(AttributeError, match=r"module 'profilefit' has no attribute 'nothing'"):
         profilefit.nothing  # noqa: B018
     with pytest.raises(AttributeError, match=r"module 'a' has no attribute 'b'"):
         attributes("a", {})("b")
-
-
-def test_a_subcommand_is_done_by_the_function_of_its_name():
-    def sqrt(x: float) -> None:
-        """Of x."""
-
-    done = carried_out("math")(sqrt)
-    assert (done.__name__, done.__doc__) == ("sqrt", "Of x.")
-    with pytest.raises(TypeError, match="keyword"):
-        done(x=4.0)  # math.sqrt itself is asked, which takes no keywords
 
 
 INTERRUPTED = """
@@ -66,7 +83,10 @@ runpy.run_module(package, run_name="__main__")
     [
         ("typer", "profilefit", ("--help",)),
         ("typer", "mcml_sim", ("--help",)),
+        ("numpy", "profilefit", ("convert", "--alpha", ".5", "--mfp", "1")),
         ("profilefit.convert", "profilefit", ("convert", "--alpha", ".5", "--mfp", "1")),
+        ("profilefit.shader.emit", "profilefit", ("export", "hazard")),
+        ("mcml_sim.tracing", "mcml_sim", ("run", "none.mci")),
     ],
 )
 def test_ctrl_c_among_the_imports_of_a_command_is_one_line(imported, package, words, tmp_path):

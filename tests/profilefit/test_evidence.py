@@ -70,7 +70,7 @@ def test_the_boundary_between_records_counts(tmp_path):
 def test_measurements_do_not_lie_among_records(records, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for out in (records, tmp_path / "records" / ".." / "records", Path("fits")):
-        with pytest.raises(InputError, match="--out must be another folder than that of the records, got"):
+        with pytest.raises(InputError, match="out must be another folder than that of the records, got"):
             require_apart(out, records)
     (tmp_path / "file").write_text("")
     with pytest.raises(OutputError, match=r"cannot write into .*file"):

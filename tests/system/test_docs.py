@@ -19,7 +19,7 @@ import profilefit
 from mcml_sim.cli.app import app as mcml_sim_cli
 from profilefit import cli
 from profilefit.recipes import inventory
-from profilefit.shader.export import export
+from profilefit.shader.law_file import export
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, FITS = ROOT / "docs", ROOT / "fits"

@@ -29,14 +29,14 @@ import pytest
 from mcml_sim.errors import InputError, OutputError, StoreError
 from mcml_sim.results.mci import read_mci
 from mcml_sim.results.tally_file import read_results
-from profilefit.commands.report import report
+from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading
 from profilefit.recipes import recipe, record
 from profilefit.recipes.inventory import find
 from profilefit.report.page.document import write_page
 from profilefit.shader import emit
-from profilefit.shader.export import LANGUAGES, export
+from profilefit.shader.law_file import LANGUAGES, export
 from profilefit.studies.choose import scene
 from tests.system import mutations, processes
 

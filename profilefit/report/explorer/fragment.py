@@ -25,7 +25,7 @@ from profilefit.materials import MATERIALS
 from profilefit.recipes.inventory import Named, profile_laws
 from profilefit.report.explorer.still import still
 from profilefit.scenes.stage.exact_table import LEAST_ALPHA, log_profile
-from profilefit.shader.export import export
+from profilefit.shader.law_file import export
 
 PREFIX = "law"  # of the names in each text: one law runs at a time
 FIRST = ("hazard-diffuse", "hazard")  # what is shown at the start, if it is there

@@ -14,12 +14,11 @@ from profilefit.recipes.record import plain
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.shader.check import half
-from profilefit.shader.check.chosen import REGENERATED, chosen
-from profilefit.shader.check.cost import WORKS, Cost, law_costs
+from profilefit.shader.check.chosen import REGENERATED, checked, chosen
+from profilefit.shader.check.cost import WORKS, Cost
 from profilefit.shader.check.half import HalfCheck
-from profilefit.shader.check.laws import JUDGED, OWN, LawCheck, check_laws
-from profilefit.shader.check.maps import MapCheck, check_map
-from profilefit.shader.context import opened, renderer
+from profilefit.shader.check.laws import JUDGED, OWN, LawCheck
+from profilefit.shader.check.maps import MapCheck
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
@@ -110,16 +109,9 @@ def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
 
 def markdown_check(folder: Path) -> str:
     """The README's tables: all that was regenerated, and what Liang et al. printed. ShaderError without OpenGL."""
-    laws, maps = (
-        [*regenerated, *printed]
-        for regenerated, printed in zip(
-            chosen((), REGENERATED, folder), chosen(("liang",), "published", folder), strict=True
-        )
-    )
-    with opened() as context:
-        of_laws = list(check_laws(context, laws, folder))
-        of_maps = [check_map(context, one, folder) for one in maps]
-        return markdown_checks(of_laws, of_maps, law_costs(context, laws, folder), renderer(context))
+    regenerated, printed = chosen((), REGENERATED, folder), chosen(("liang",), "published", folder)
+    found = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
+    return markdown_checks(found.laws, found.maps, found.costs, found.device)
 
 
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:

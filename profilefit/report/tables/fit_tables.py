@@ -137,7 +137,7 @@ def _lines(answer: Answer) -> Iterator[str]:
         yield "the error of the law is not known for this surface: nothing exact or recorded to hold it against"
     elif beyond := int(found.beyond.sum()):
         rows = f"{beyond} row{'s lie' if beyond > 1 else ' lies'}"
-        yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; --r-max leaves such rows out"
+        yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
     if answer.walk is not None and answer.walk.result != "converged":
         yield f"posterior: {answer.walk.result}"
 

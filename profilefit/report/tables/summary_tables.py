@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
 
+from profilefit.recipes import record
+from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
 from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark
 from profilefit.report.tables.evidence_tables import evidence_line
@@ -32,6 +36,17 @@ def summary(records: Records) -> RenderableType:
         if "fit" in content and not converged(content)
     ]
     return Group(*_spaced(told), *failures, Text(CAPTION, style="dim"))
+
+
+def outcome(path: Path) -> dict[str, Any]:
+    """What came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
+    content = record.read(path)
+    told: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
+    if "fit" not in content:
+        return {**told, "readings": len(content.get("readings", []))}
+    kept = ("published", "regenerated", *ERRORS)
+    constants = {name: {key: one.get(key) for key in kept} for name, one in content["constants"].items()}
+    return {**told, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 
 
 def truth(content: Content) -> str:

@@ -1,15 +1,25 @@
-"""Which laws and maps a check is of: by name, by record, by constants, or all that were regenerated."""
+"""Which laws and maps a check is of (by name, record or constants, or all that were regenerated), and what it finds."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
+import moderngl
+
+from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
 from profilefit.shader import emit
+from profilefit.shader.check.cost import Cost, law_costs
+from profilefit.shader.check.evaluate import half_extension, no_half
+from profilefit.shader.check.half import HalfCheck, check_half
+from profilefit.shader.check.laws import LawCheck, check_laws
+from profilefit.shader.check.maps import MapCheck, check_map
+from profilefit.shader.context import opened, renderer
 
 REGENERATED = "regenerated"
 Chosen = tuple[list[Named], list[Named]]
@@ -42,6 +52,11 @@ def chosen(names: Sequence[str], constants: str | None, folder: Path) -> Chosen:
     return found
 
 
+def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str:
+    """What a check of these is of: names or "all", so that a part does not pass for the whole."""
+    return list(names or ()) or ("all" if constants in (None, REGENERATED) else f"all {constants}")
+
+
 def regenerated(folder: Path) -> Chosen:
     """All laws and maps made of records, in every setting."""
     whole = [one for one in inventory.profile_laws(folder, matched=False) if one.records]
@@ -69,3 +84,49 @@ def _loaded(name: str, constants: str | None, folder: Path) -> Chosen:
     """A law or map that is in no list: one without constants, one that was not regenerated, or a mistake."""
     one = inventory.find(name, folder, constants)
     return ([], [one]) if isinstance(one.law, AlbedoLaw) else ([one], [])
+
+
+@dataclass(frozen=True)
+class Checked:
+    """All that was measured on one device; `lacking` says why nothing was in half precision."""
+
+    laws: list[LawCheck]
+    maps: list[MapCheck]
+    costs: dict[str, Cost]
+    halves: list[HalfCheck]
+    device: str
+    lacking: str
+
+    @property
+    def checks(self) -> list[LawCheck | MapCheck]:
+        """Laws and maps."""
+        return [*self.laws, *self.maps]
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether any bound is."""
+        return any(one.broken for one in self.checks)
+
+
+def checked(those: Chosen, folder: Path, in_half: bool = False, quiet: bool = True) -> Checked:
+    """Check laws and maps, and time their texts; `in_half` in half precision as well. ShaderError without OpenGL."""
+    laws, maps = those
+    with opened() as context:
+        found = list(tracked(_checks(context, those, folder), "checking", "laws", len(laws) + len(maps), quiet))
+        with working("timing the texts", quiet):
+            costs = law_costs(context, laws, folder)
+        halves = (check_half(context, one) for one in laws if in_half)
+        return Checked(
+            laws=[one for one in found if isinstance(one, LawCheck)],
+            maps=[one for one in found if isinstance(one, MapCheck)],
+            costs=costs,
+            halves=list(tracked(halves, "halving", "laws", len(laws), quiet)),
+            device=renderer(context),
+            lacking="" if half_extension(context) else no_half(context),
+        )
+
+
+def _checks(context: moderngl.Context, those: Chosen, folder: Path) -> Iterator[LawCheck | MapCheck]:
+    yield from check_laws(context, those[0], folder)
+    for one in those[1]:
+        yield check_map(context, one, folder)

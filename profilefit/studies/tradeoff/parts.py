@@ -1,15 +1,21 @@
-"""The parts of the measurement by name, in the order in which they run."""
+"""The parts of the measurement by name, in the order in which they run, and the file that keeps them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import Any
 
+from mcml_sim.files.plain import as_json
+from mcml_sim.files.text_file import read_json
+from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
 from profilefit.studies.tradeoff import fits, laws, samplers, truth
 from profilefit.studies.tradeoff.points import Part
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
+Told = dict[str, Any]
+SAME = ("version", "sha256", "machine")  # of `made`: what parts beside each other have in common
 Measure = Callable[[bool, Path | None, Track], Part]
 """Whether quickly, where the records lie, who is shown the progress -> part."""
 
@@ -38,10 +44,39 @@ PARTS: dict[str, Measure] = {"truth": _truth, "laws": _laws, "samplers": _sample
 def chosen(names: list[str]) -> list[str]:
     """The parts named, each once and in their own order; all of them if none is. InputError on an unknown one."""
     if unknown := [name for name in names if name not in PARTS]:
-        raise InputError(f"PART must be one of {', '.join(PARTS)}, got {unknown[0]!r}")
+        raise InputError(f"part must be one of {', '.join(PARTS)}, got {unknown[0]!r}")
     return [name for name in PARTS if not names or name in names]
 
 
 def measured(name: str, quick: bool = False, folder: Path | None = None, track: Track = silent) -> Part:
     """Run one part."""
     return PARTS[name](quick, folder, track)
+
+
+def keep(file: Path, told: Mapping[str, Any]) -> None:
+    """Write what was measured, and the other parts that the file has, if they are comparable.
+
+    told  "made" and "machine" of this run, and by its name each part measured so far, which has both, too
+    """
+    before = read(file)
+    kept: Told = {}
+    if is_alike(before, told):
+        own = {key: before[key] for key in ("made", "machine") if key in before}
+        kept = {name: {**own, **before[name]} for name in PARTS if isinstance(before.get(name), dict)}
+    parts = {**kept, **told}
+    heads = {name: value for name, value in told.items() if name not in PARTS}
+    write_whole(file, as_json({**heads, **{name: parts[name] for name in PARTS if name in parts}}))
+
+
+def read(file: Path) -> Told:
+    """What a tradeoff.json says, which is nothing if it is damaged or not there: it is only added to, or replaced."""
+    try:
+        content = read_json(file)
+    except InputError:
+        return {}
+    return content if isinstance(content, dict) and isinstance(content.get("made"), dict) else {}
+
+
+def is_alike(before: Mapping[str, Any], told: Mapping[str, Any]) -> bool:
+    """Whether both are of the same records, version and machine: else their times and errors do not compare."""
+    return bool(before) and all(before["made"].get(key) == told["made"].get(key) for key in SAME)

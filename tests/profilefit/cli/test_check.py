@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from profilefit.commands.check import asked
 from profilefit.errors import ShaderError
 from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import stale
+from profilefit.shader.check.chosen import scope
 from profilefit.shader.context import open_context
 
 FITS = catalogue.fits_folder()
@@ -76,7 +76,7 @@ def test_json_has_all_of_it_and_is_what_a_folder_keeps(command, opengl):
     ],
 )
 def test_a_part_is_not_told_as_the_whole(names, constants, told):
-    assert asked(names, constants) == told
+    assert scope(names, constants) == told
 
 
 def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
@@ -113,8 +113,8 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     [
         (("nothing",), "name must be a law, map or record, got 'nothing'; laws: liang, "),
         (("hazzard",), "did you mean hazard"),
-        (("hazard", "--constants", "nothing"), "constants must be one of regenerated"),
-        (("--constants", "nothing"), "constants must be regenerated or a printed set, got 'nothing'"),
+        (("hazard", "--constants", "nothing"), "--constants must be one of regenerated"),
+        (("--constants", "nothing"), "--constants must be regenerated or a printed set, got 'nothing'"),
         (("reproduction",), "record 'reproduction' holds no law"),
         (("hazard", "--precision", "float8"), "float8"),
     ],

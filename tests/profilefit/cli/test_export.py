@@ -5,7 +5,7 @@ from pathlib import Path
 
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find
-from profilefit.shader.export import export
+from profilefit.shader.law_file import export
 
 FITS = catalogue.fits_folder()
 
@@ -78,7 +78,7 @@ def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path):
         (("hazard", "--name", "gl_skin"), "profilefit: name must be letters, digits and single underscores"),
         (("hazard", "--name", "skin", "--lang", "json"), "profilefit: name must be left out where lang is json"),
         (("hazard", "--lang", "wgsl"), "profilefit: lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
-        (("hazard", "--constants", "old"), "profilefit: constants must be one of regenerated, "),
+        (("hazard", "--constants", "old"), "profilefit: --constants must be one of regenerated, "),
         (("hazard", "--out", "no/such/folder.glsl"), "profilefit: cannot write no/such/folder.glsl: No such file"),
         (("hazard", "--constants", "x.json"), "profilefit: x.json: there is no such record"),
         (

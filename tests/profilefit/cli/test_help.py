@@ -1,9 +1,7 @@
 """The first screen, and examples that work as they are typed in a fresh clone."""
 
-import inspect
 import shlex
 import shutil
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -11,7 +9,6 @@ import typer
 
 import mcml_sim.cli.app
 import profilefit.cli
-from mcml_sim.cli import run as mcml_command
 
 ROOT = Path(__file__).resolve().parents[3]
 PROGRAMS = {"profilefit": profilefit.cli.app, "mcml-sim": mcml_sim.cli.app.app}
@@ -95,17 +92,6 @@ def test_cheap_examples_run_as_typed(command, line):
     status, out, err = command(*shlex.split(line)[1:])
     assert status == 0, err
     assert out or Path("skin.hlsl").stat().st_size
-
-
-@pytest.mark.parametrize(("program", "name"), SUBCOMMANDS)
-def test_what_is_asked_for_is_what_is_done(program, name):
-    """The function that does a subcommand has the parameters of the one that has its options, by name and kind."""
-    asked = SUBCOMMANDS[program, name].callback
-    done = mcml_command.run if program == "mcml-sim" else getattr(import_module(f"profilefit.commands.{name}"), name)
-    wanted = list(inspect.signature(asked).parameters)
-    taken = inspect.signature(done).parameters
-    assert [one for one in wanted if one not in taken] == ([] if name != "convert" else [*wanted[5:-1]])
-    assert {one for one in taken if one not in wanted} == (set() if name != "convert" else {"lengths"})
 
 
 def test_mcml_sim_fits_a_screen_too(capsys, monkeypatch):

@@ -5,9 +5,9 @@ import json
 
 import pytest
 
-from profilefit.commands.tradeoff import is_alike, keep, read
 from profilefit.recipes.evidence import digest
 from profilefit.recipes.folder import fits_folder
+from profilefit.studies.tradeoff.parts import is_alike, keep, read
 
 
 def test_an_unknown_part_is_one_line(command, tmp_path):

@@ -6,26 +6,25 @@ import sys
 
 import pytest
 
-from profilefit.cli import words
-from profilefit.cli.check import Precision
-from profilefit.commands.check import HALF
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.cli import options
 from profilefit.recipes import catalogue, recipe, record
-from profilefit.shader.export import LANGUAGES
+from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.atlas import FUNCTIONS
 from profilefit.studies.tradeoff.parts import PARTS
 
 FITS = catalogue.fits_folder()
-HEAVY = ("jax", "scipy", "matplotlib", "moderngl", "optimistix")  # take seconds together, which no shell has
+HEAVY = ("jax", "numpy", "scipy", "matplotlib", "moderngl", "optimistix")  # take seconds together, which no shell has
 PATIENCE = 1.0  # [s] of processor time, so that a busy machine does not count
 
 
 def test_what_is_written_out_is_what_there_is():
-    assert catalogue.names() == words.LAWS
-    assert {*words.MAPS, "liang"} == set(catalogue.ALBEDO_LAWS)
-    assert LANGUAGES == words.LANGUAGES
-    assert tuple(PARTS) == words.PARTS
-    assert set(FUNCTIONS) == set(words.FUNCTIONS)
-    assert HALF == Precision.HALF
+    assert catalogue.names() == options.LAWS
+    assert {*options.MAPS, "liang"} == set(catalogue.ALBEDO_LAWS)
+    assert LANGUAGES == options.LANGUAGES
+    assert tuple(PARTS) == options.PARTS
+    assert set(FUNCTIONS) == set(options.FUNCTIONS)
+    assert ILLUMINATIONS == options.LIGHTS
 
 
 @pytest.fixture

@@ -8,10 +8,9 @@ import pytest
 import profilefit
 from mcml_sim import Setting, half_space
 from profilefit.errors import InputError, SettingError
+from profilefit.measured import Known, fit, read
 from profilefit.measured.fitting import fitted
-from profilefit.measured.problem import Known, Question
-from profilefit.measured.reading import read
-from profilefit.measured.workflow import asked
+from profilefit.measured.problem import Question
 
 DATA = Path(__file__).parents[3] / "examples"
 PHANTOM = DATA / "phantom.csv"  # alpha .95, l 1.1 mm
@@ -24,13 +23,13 @@ def near():
 
 def test_it_reads_files():
     with pytest.raises(InputError, match=r"none\.csv"):
-        asked(str(DATA / "none.csv"))
+        fit(str(DATA / "none.csv"))
 
 
 def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
     parts = fitted(near, Question(law, {"scale": 1.0}))
-    answer = asked(near, walk=False)
+    answer = fit(near, walk=False)
     assert answer.found.values == parts.values
     assert answer.walk is None
     assert answer.telling.told
@@ -38,11 +37,11 @@ def test_it_is_the_fit_of_its_parts(near):
 
 
 def test_what_is_known_goes_in(near):
-    assert asked(near, held={"l": 1.1}, walk=False).found.values["l"] == pytest.approx(1.1, rel=1e-12)
-    free = asked(near, held={"A": 0.53}, scale=None, walk=False).found
+    assert fit(near, held={"l": 1.1}, walk=False).found.values["l"] == pytest.approx(1.1, rel=1e-12)
+    free = fit(near, held={"A": 0.53}, scale=None, walk=False).found
     assert free.values["A"] == pytest.approx(0.53, rel=1e-6)
     assert free.question.held.keys() == {"alpha"}
-    measured = asked(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).found
+    measured = fit(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).found
     assert measured.question.held == {}
     assert measured.values["alpha"] == pytest.approx(0.95, abs=4 * measured.errors(measured.statistical)["alpha"])
 
@@ -51,9 +50,9 @@ def test_a_simulation_brings_its_own_surface():
     simulated = read(DATA / "half_space.mco")
     oily = replace(simulated, medium=half_space(0.9, n=1.37))
     with pytest.raises(SettingError, match=r"belongs to .*, got a request for searchlight, n = 1.37"):
-        asked(oily)
+        fit(oily)
     with pytest.raises(SettingError, match=r"belongs to .*, got a request for searchlight, n = 1.38"):
-        asked(oily, setting=Setting(n=1.38))
+        fit(oily, setting=Setting(n=1.38))
 
 
 @pytest.mark.parametrize(
@@ -68,4 +67,4 @@ def test_a_simulation_brings_its_own_surface():
 )
 def test_what_cannot_be_asked_is_named(near, given, told):
     with pytest.raises(InputError, match=told):
-        asked(near, **given)
+        fit(near, **given)

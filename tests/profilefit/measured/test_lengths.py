@@ -19,15 +19,15 @@ def test_lengths_come_in_the_unit_of_the_data():
 
 @pytest.mark.parametrize("text", ["", "mm", "-1mm", "0", "1.2.3", "1 ft", "nan", "1mm2"])
 def test_what_is_no_length_is_named(text):
-    with pytest.raises(InputError, match=r"--fix l must be a length > 0 such as 1.2mm \(units: nm, .*\), got"):
-        length("--fix l", text, "mm")
+    with pytest.raises(InputError, match=r"^held l must be a length > 0 such as 1.2mm \(units: nm, .*\), got"):
+        length("held l", text, "mm")
 
 
 def test_a_unit_needs_a_unit():
     with pytest.raises(InputError, match="l must be without a unit where the data has none"):
         length("l", "1mm", "")
-    with pytest.raises(InputError, match=r"--unit must be a unit of length \(nm, .*\), got 'mile'"):
-        checked_unit("--unit", "mile")
+    with pytest.raises(InputError, match=r"^unit must be a unit of length \(nm, .*\), got 'mile'"):
+        checked_unit("unit", "mile")
 
 
 @pytest.mark.parametrize(

@@ -68,7 +68,7 @@ def test_quantities_and_their_slopes():
 def test_a_held_reflectance_is_an_albedo():
     assert held_albedo(LAW, "A", LAW.albedo.reflectance(0.8)) == pytest.approx(0.8, abs=1e-10)
     refracting = catalogue.load("hazard", setting=Setting(n=1.4))
-    with pytest.raises(InputError, match=r"--fix A must be a total reflectance in \[.*, 0.97\d+\] of this light"):
+    with pytest.raises(InputError, match=r"^held A must be a total reflectance in \[.*, 0.97\d+\] of this light"):
         held_albedo(refracting, "A", 0.99)
-    with pytest.raises(InputError, match=r"--fix alpha must be a single-scattering albedo in \(0, 1\), got 1"):
+    with pytest.raises(InputError, match=r"^held alpha must be a single-scattering albedo in \(0, 1\), got 1"):
         held_albedo(LAW, "alpha", 1.0)

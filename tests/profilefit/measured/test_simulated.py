@@ -54,7 +54,7 @@ def test_an_npz_has_its_own_errors_and_keeps_every_ring():
     np.testing.assert_allclose(exact.value[same], bound.value[same], rtol=1e-4)
     assert np.all(exact.sigma[same] < bound.sigma[same]), "a bound is one"
     assert exact.inner.size < 120, "the empty tail belongs to the last ring"
-    with pytest.raises(InputError, match=r"--unit must be cm or left out for .npz, whose lengths are in cm, got 'mm'"):
+    with pytest.raises(InputError, match=r"^unit must be cm or left out for .npz, whose lengths are in cm, got 'mm'"):
         read(DATA / "half_space.npz", unit="mm")
 
 
@@ -104,11 +104,11 @@ def test_rows_can_be_chosen_and_added():
     data = read(DATA / "phantom.csv")
     near = data.within(None, 1.0)
     assert near.r.max() <= 1.0
-    assert near.notes == ("12 of 20 rows left out, by --r-min and --r-max",)
+    assert near.notes == ("12 of 20 rows left out, by `r_min` and `r_max`",)
     assert data.within(0.1, 100.0) is data
     more = near.with_row(0.5, 0.5, 7.0, 0.1)
     np.testing.assert_array_equal(np.diff(more.inner) > 0, True)
     assert more.value[more.inner == 0.5] == 7.0
-    with pytest.raises(InputError, match=r"no row is left between --r-min and --r-max: r goes from 0.2 to 12"):
+    with pytest.raises(InputError, match=r"no row is left between `r_min` and `r_max`: r goes from 0.2 to 12"):
         data.within(20.0, None)
     assert dataclasses.replace(data, unit="m").relative_error == pytest.approx(0.02, rel=0.1)

@@ -229,9 +229,9 @@ def test_faults_are_one_line_with_file_row_and_column(table, tmp_path, text, mes
 
 
 def test_units_that_contradict(table):
-    with pytest.raises(InputError, match=r":1: column r: expected one unit, here and in --unit, got cm, mm"):
+    with pytest.raises(InputError, match=r":1: column r: expected one unit, here and in `unit`, got cm, mm"):
         table(GOOD.replace("r,", "r [mm],"), unit="cm")
-    with pytest.raises(InputError, match=r"--unit must be a unit of length .*, got 'ell'"):
+    with pytest.raises(InputError, match=r"^unit must be a unit of length .*, got 'ell'"):
         table(GOOD, unit="ell")
     mixed = GOOD.replace("value", "value [1/mm^2]").replace("sigma", "sigma [%]")
     with pytest.raises(InputError, match=r":1: column sigma: expected the unit of value, \[1/mm\^2\], or none, got"):

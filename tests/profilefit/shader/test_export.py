@@ -16,7 +16,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find
 from profilefit.shader import emit
 from profilefit.shader.context import full_screen, program
-from profilefit.shader.export import LANGUAGES, TARGETS, commented, export
+from profilefit.shader.law_file import LANGUAGES, TARGETS, commented, export
 
 FITS = catalogue.fits_folder()
 MAIN = """

@@ -7,7 +7,8 @@ import re
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.studies.tradeoff import parts, stopwatch, written
+from profilefit.report.tables import tradeoff_tables
+from profilefit.studies.tradeoff import parts, stopwatch
 from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
 
 POINTS = (
@@ -18,7 +19,7 @@ PART = Part("demo", "A title", (Panel("p", "R$_d$ of p", "time [s]", "error [-]"
 
 
 def test_csv_reads_back_with_its_comments():
-    text = written.as_csv(PART, {"processor": "a chip"})
+    text = tradeoff_tables.as_csv(PART, {"processor": "a chip"})
     comments = [line for line in text.splitlines() if line.startswith("#")]
     assert comments[:2] == ["# demo: A title", "# processor: a chip"]
     assert "# panel p: R_d of p; cost: time [s]; error, worst: error [-]" in comments
@@ -37,12 +38,12 @@ def test_every_column_is_documented():
         *("functions", "setup_nanoseconds", "ks", "worst_ks", "photons", "first_call", "stated", "samples"),
         *("standardised", "light_seconds", "seeds", "converged"),
     ]
-    told = re.findall(r"\w+", written.__doc__)
+    told = re.findall(r"\w+", tradeoff_tables.__doc__)
     assert [column for column in columns if column not in told] == []
 
 
 def test_json_has_the_same():
-    numbers = written.as_numbers(PART)
+    numbers = tradeoff_tables.as_numbers(PART)
     point = numbers["panels"]["p"]["points"][0]
     assert point["cost"] == {"value": 1.0, "low": 0.9, "high": 1.1}
     assert point["standing"] == "front"
@@ -59,5 +60,5 @@ def test_machine_is_named():
 def test_parts_come_in_their_own_order():
     assert parts.chosen([]) == ["truth", "laws", "samplers", "fits"]
     assert parts.chosen(["fits", "truth", "fits"]) == ["truth", "fits"]
-    with pytest.raises(InputError, match="PART must be one of truth, laws, samplers, fits, got 'light'"):
+    with pytest.raises(InputError, match="part must be one of truth, laws, samplers, fits, got 'light'"):
         parts.chosen(["laws", "light"])

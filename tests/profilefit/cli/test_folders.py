@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from profilefit.cli.folders import records_folder
 from profilefit.errors import InputError, OtherRecords
-from profilefit.recipes.folder import fits_folder, records_folder
+from profilefit.recipes.folder import fits_folder
 
 
 def test_what_was_asked_for_comes_first_then_what_is_here_then_what_is_shipped(tmp_path, monkeypatch):

@@ -1,0 +1,200 @@
+"""The runs of an MCML input file: where each keeps its results, what they may replace, and what was done before."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+from mcml_sim.errors import ELSEWHERE, NAMED, InputError, StoreError
+from mcml_sim.files.version import __version__
+from mcml_sim.files.whole_file import read_whole, require_target, require_writable, write_together
+from mcml_sim.media.medium import Medium
+from mcml_sim.results.mci import Run
+from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
+from mcml_sim.results.tally import Precision, quantities
+from mcml_sim.results.tally_file import Results, read_results, results_bytes
+from mcml_sim.runs.compiling import Compiling
+from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
+from mcml_sim.runs.store import batches, discard, strange
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What all runs have in common; arguments as for `simulate`.
+
+    goal  the precision at which a run may stop early
+    """
+
+    seed: int
+    goal: Precision | None
+    workers: int | None
+    scheduler: str | None
+    progress: bool | None
+
+
+@dataclass(frozen=True)
+class Job:
+    """A run, and where its results go, and its batches until then."""
+
+    run: Run
+    photons: int
+    mco: Path
+    npz: Path
+    store: Path
+
+    @property
+    def is_begun(self) -> bool:
+        """True if the store holds batches."""
+        return bool(batches(self.store))
+
+    @property
+    def is_part_of_more(self) -> bool:
+        """True if the store holds batches beyond this run's photons, which are a longer run's."""
+        return self._holds_more(self.run.medium, self.photons)
+
+    def is_in_the_way(self, seed: int) -> bool:
+        """True if the store holds what another run left, finished: no more photons than the results to be replaced.
+
+        StoreError if it holds anything else of another run.
+        """
+        try:
+            require_store(self.store, self.run.medium, self.run.grid, seed)
+        except StoreError:
+            done = _results(self.npz) if self.store.is_dir() else None
+            if done is None or self._holds_more(done.medium, done.photons):
+                raise
+            if not is_store_of(self.store, done.medium, done.grid, done.seed):
+                raise
+            return True
+        return False
+
+    def _holds_more(self, medium: Medium, photons: int) -> bool:
+        return any(batch * batch_photons(medium) >= photons for batch in batches(self.store))
+
+
+@dataclass(frozen=True)
+class Done:
+    """A run that is done: its results, and how that went.
+
+    seconds  it took, of which compiling [s]; None if it was finished before
+    resumed  whether some of its batches were there
+    """
+
+    results: Results
+    seconds: float | None = None
+    compiling: float = 0.0
+    resumed: bool = False
+
+
+def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | None, plan: Plan) -> list[Job]:
+    """The runs of an input file, each with the paths of its results; nothing is written yet.
+
+    photons  instead of the file's;  folder  for the results instead of the current one
+    InputError, OutputError or StoreError where a run could not keep its results: better now than hours later.
+    """
+    found = [Job(one, photons or one.photons, *_outputs(one, folder)) for one in runs]
+    _require_room(file, found, plan)
+    return found
+
+
+def done(job: Job, plan: Plan) -> Done:
+    """Do a run, unless the same was done before, and keep its results."""
+    kept = _finished(job, plan)
+    found = _traced(job, plan) if kept is None else Done(kept)
+    kept = found.results
+    is_enough = plan.goal is None or plan.goal.is_reached(kept.estimates[plan.goal.quantity])
+    if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
+        discard(job.store)
+    return found
+
+
+def _traced(job: Job, plan: Plan) -> Done:
+    if job.is_in_the_way(plan.seed):
+        discard(job.store)
+    resumed, start = job.is_begun, time.perf_counter()
+    with Compiling() as compiling:
+        tally = simulate(
+            job.run.medium,
+            job.run.grid,
+            job.photons,
+            seed=plan.seed,
+            store=job.store,
+            workers=plan.workers,
+            precision=plan.goal,
+            scheduler=plan.scheduler,
+            progress=plan.progress,
+        )
+    seconds = time.perf_counter() - start
+    # The .npz is last: by it the run counts as finished.
+    write_together({job.mco: mco_text(tally, job.mco.name), job.npz: results_bytes(tally)})
+    return Done(read_results(job.npz), seconds, compiling.seconds, resumed)
+
+
+def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
+    """Paths by the name in the input file, in `folder` or, as MCML does, seen from where we are.
+
+    A name that leads out of there is a stranger's say over our files: it takes a folder, which gets its last part.
+    """
+    name = Path(run.output)
+    if name.is_absolute() or ".." in name.parts:
+        if folder is None or name.name in ("", ".."):
+            raise InputError(
+                f"output files must lie in the current folder, or have a name and {NAMED}, got {run.output}"
+            )
+        name = Path(name.name)
+    mco = (folder or Path()) / name
+    bare = mco.with_suffix("") if mco.suffix.lower() == ".mco" else mco
+    return mco, Path(f"{bare}.npz"), Path(f"{bare}.photons")
+
+
+def _require_room(file: Path, jobs: list[Job], plan: Plan) -> None:
+    taken = {file.resolve(): f"the input file {file}"}
+    for job in jobs:
+        if plan.goal is not None and plan.goal.quantity not in (names := quantities(job.run.grid)):
+            raise InputError(f"quantity must be one of {', '.join(names)}, got {plan.goal.quantity!r}")
+        for path in (job.mco, job.npz):
+            require_target(path)
+        for path in (job.mco, job.npz, job.store):
+            place = path.resolve()
+            if place in taken:
+                raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
+            taken[place] = job.run.output
+        _require_ours(job)
+        job.is_in_the_way(plan.seed)
+    for job in jobs:
+        for path in (job.mco, job.npz):
+            require_writable(path)
+
+
+def _require_ours(job: Job) -> None:
+    """InputError where a file or a folder that is to be replaced is no output of a run."""
+    found = None
+    if job.mco.is_file() and job.mco.stat().st_size and not begins_mco(job.mco):
+        found = f"{job.mco} is there already, and no output of MCML"
+    elif job.npz.exists() and not (job.npz.is_file() and (not job.npz.stat().st_size or _results(job.npz))):
+        found = f"{job.npz} is there already, and no results of mcml_sim"
+    elif names := strange(job.store):
+        found = f"{job.store} is there already, and holds {names[0]}, which is no batch of photons"
+    if found is not None:
+        raise InputError(f"{found}: it is not replaced, {ELSEWHERE}")
+
+
+def _finished(job: Job, plan: Plan) -> Results | None:
+    """The run's results, if its files are there and of this very run."""
+    found = _results(job.npz)
+    if found is None or not job.mco.is_file() or made_by(plan.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
+        return None
+    if (found.medium, found.grid, found.seed, found.version) != (job.run.medium, job.run.grid, plan.seed, __version__):
+        return None
+    goal = plan.goal
+    is_enough = goal is not None and found.photons < job.photons and goal.is_reached(found.estimates[goal.quantity])
+    return found if is_enough or found.photons == job.photons else None
+
+
+def _results(path: Path) -> Results | None:
+    """What a run has kept there, if anything."""
+    try:
+        return read_results(path)
+    except InputError:
+        return None

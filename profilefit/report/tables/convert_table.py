@@ -1,0 +1,73 @@
+"""One medium in the conventions of papers and engines, as a table or as numbers."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from rich.console import RenderableType
+
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.convert import LENGTHS, Optical
+from profilefit.report.tables.cells import column_table, on_the_point, significant
+
+Floats = NDArray[np.float64]
+DIGITS = 5
+NONE = "none"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One convention: its name, what the table says of it, and a value a channel."""
+
+    name: str
+    title: str
+    light: str  # whose A it is, or is paired with
+    power: int  # of the unit of length
+    formula: str
+    values: Floats
+
+
+def _rows(medium: Optical) -> list[Row]:
+    colour = [
+        Row(f"reflectance_{light}", "reflectance A", light, 0, "exact, index-matched", medium.reflectance(light))
+        for light in ILLUMINATIONS
+    ]
+    return [
+        Row("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
+        *colour,
+        Row("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
+        Row("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
+        *(Row(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
+    ]
+
+
+def content(medium: Optical, unit: str) -> dict[str, str | Floats | None]:
+    """The same by name, for --json; what a channel has not is not finite."""
+    return {"unit": unit or None} | {row.name: row.values for row in _rows(medium)}
+
+
+def convert_table(medium: Optical, unit: str) -> RenderableType:
+    """A line a convention, a column a channel; unit is that of length, or ""."""
+    rows = _rows(medium)
+    cells = np.array([[_cell(value) for value in row.values] for row in rows])
+    columns = {"": [row.title for row in rows]}
+    for i in range(cells.shape[1]):
+        header = "value" if cells.shape[1] == 1 else f"channel {i + 1}"
+        columns[header] = on_the_point(list(cells[:, i]))
+    units = {0: "", 1: unit or "length", -1: f"1/{unit or 'length'}"}
+    columns |= {
+        "unit": [units[row.power] for row in rows],
+        "A of": [row.light for row in rows],
+        "is": [row.formula for row in rows],
+    }
+    caption = ["Sources: " + "; ".join(dict.fromkeys(one.source for one in LENGTHS if one.source)) + "."]
+    if NONE in cells:
+        caption += [f"{NONE}: light that nothing absorbs (alpha = 1) has no diffuse mean free path."]
+    return column_table("One medium in every convention", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))
+
+
+def _cell(value: float) -> str:
+    return significant(value, DIGITS) if math.isfinite(value) else NONE
