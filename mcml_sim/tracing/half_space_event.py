@@ -16,7 +16,8 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from mcml_sim.media import fresnel, phase
+from mcml_sim.media import fresnel
+from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import rng
 from mcml_sim.tracing.isotropic_event import STOPPED, azimuth_cosine, has_ended, landed, stop, was_stopped
@@ -30,7 +31,7 @@ class HalfSpace(NamedTuple):
     """A Setting as the kernel wants it: arrays, so that no other one makes it compile again."""
 
     n: Array
-    g: Array
+    phase: Phase
     entry: Array
     """Cosines of the light that has entered, to the normal and inside; see `_entry_cosines`, (STEPS + 1,)."""
 
@@ -62,7 +63,8 @@ class Lanes(NamedTuple):
 
 def half_space(setting: Setting) -> HalfSpace:
     """What the kernel needs to know of a setting."""
-    return HalfSpace(jnp.float32(setting.n), jnp.float32(setting.g), jnp.asarray(_entry_cosines(setting)))
+    phase = HenyeyGreenstein(jnp.float32(setting.g))
+    return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(_entry_cosines(setting)))
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> Lanes:
@@ -101,7 +103,7 @@ def _scattered(
 ) -> tuple[Array, Array]:
     """Places and directions after one more scattering and flight, as in `isotropic`."""
     cosine_word, path_word, azimuth_word, surface_word = words
-    outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.g)
+    outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.phase)
     path = rng.exponential(path_word)
     z = place.imag + path * down
     reflectance, _ = fresnel.fresnel(where.n, jnp.float32(1), jnp.abs(down))
@@ -118,13 +120,13 @@ def _scattered(
 
 
 def _deflected(
-    direction: Array, cosine_word: Array, azimuth_word: Array, sign_word: Array, g: Array
+    direction: Array, cosine_word: Array, azimuth_word: Array, sign_word: Array, phase: Phase
 ) -> tuple[Array, Array, Array]:
-    """Components outwards, around and down after a scattering by Henyey and Greenstein's phase function.
+    """Components outwards, around and down after a scattering.
 
     In the frame of Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017: no direction is special.
     """
-    below_one, above_minus_one = phase.deflection(g, rng.symmetric(cosine_word))
+    below_one, above_minus_one = phase.deflection(rng.symmetric(cosine_word))
     sine = jnp.sqrt(below_one * above_minus_one)
     x = azimuth_cosine(azimuth_word)
     half = jnp.sqrt((1 - x) * (1 + x))

@@ -19,8 +19,10 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.phase import Isotropic
 from mcml_sim.tracing import rng
 
+PHASE = Isotropic()
 MAX_ORDER = 8192
 STOPPED = 0.5  # what a photon that was stopped inside is deeper outside than one that left
 UNROLLED = 4  # events in one go: 1 is slower by 13 %, 16 is faster by 7 % and compiles for twice as long
@@ -111,11 +113,12 @@ def scatter(key: Array, lanes: Lanes, place: Array, number: Array) -> Array:
     order = lanes.order + number
     cosine_word, path_word, azimuth_word = rng.draw_three(key, lanes.photon, order.astype(jnp.uint32))
     cosine = rng.symmetric(cosine_word)
+    below_one, above_minus_one = PHASE.deflection(cosine)  # the cosine itself is v
     path = rng.exponential(path_word)
     z = place.imag + path * cosine
     leaves = z < 0
     path = jnp.where(leaves, -place.imag / cosine, path)
-    rho = displaced(place.real, path, (1 - cosine) * (1 + cosine), azimuth_cosine(azimuth_word))
+    rho = displaced(place.real, path, below_one * above_minus_one, azimuth_cosine(azimuth_word))
     out = -number.astype(jnp.float32)
     z = jnp.where(leaves, out, jnp.where(order == lanes.last, out - STOPPED, z))
     return jnp.where(place.imag < 0, place, lax.complex(rho, z))
