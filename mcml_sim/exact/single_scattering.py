@@ -45,7 +45,7 @@ T_STEP, T_LAST = 0.13, 3.9  # of the tanh-sinh rule on (0, 1): 1e-12 for square 
 
 
 def ring_shares(r_edges: ArrayLike, setting: Setting = SEARCHLIGHT) -> Floats:
-    """Share of photons that leave a white half space after exactly one scattering, by ring [-].
+    """Share of photons that leave a conservative half space after exactly one scattering, by ring [-].
 
     r_edges  edges of the rings [mfp], rising from 0, float64 (rings + 1,); `setting` may be any. A mean free path is
              that of light itself, 1 / mu_s, not the reduced one

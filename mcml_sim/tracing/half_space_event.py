@@ -1,4 +1,6 @@
-"""One event of photons in a white half space of any surface, phase function and light: the general `isotropic`.
+"""One event of photons in a conservative half space of any surface, phase function and light.
+
+Its special case `isotropic_event` needs no directions.
 
 All is symmetric around the beam and under mirrors through it, so a photon is its distance `rho` from the beam, its
 depth `z`, and the direction of its flight in the frame (outwards, around, down) at its place; the component around
@@ -40,7 +42,7 @@ class Lanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
-    """As in `isotropic.Lanes`: rho + i z, complex64, where -z counts events once the photon has ended."""
+    """As in `isotropic_event.Lanes`: rho + i z, complex64, where -z counts events once the photon has ended."""
     direction: Array
     """Components outwards + i down of the flight that ended here, complex64."""
     order: Array
@@ -68,7 +70,7 @@ def half_space(setting: Setting) -> HalfSpace:
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> Lanes:
-    """Photons at the place of their first scattering; `stops` as in `isotropic.enter`."""
+    """Photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
     cosine = _entering(rng.uniform(entry_word), where.entry)
@@ -101,7 +103,7 @@ def _scattered(
     left: Array,
     where: HalfSpace,
 ) -> tuple[Array, Array]:
-    """Places and directions after one more scattering and flight, as in `isotropic`."""
+    """Places and directions after one more scattering and flight, as in `isotropic_event.scatter`."""
     cosine_word, path_word, azimuth_word, surface_word = words
     outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.phase)
     path = rng.exponential(path_word)

@@ -32,9 +32,9 @@ EVENTS_PER_TURN = FLIGHTS + 1  # the last one is the step across interfaces
 # A photon of less weight goes on by a chance of CHANCE_IN_256 / 256. Variance times time, measured on the three-layer
 # sample, is 0.79 of that with MCML's 1e-4 and 0.1: for R, T, absorption by layer and by depth, and rings alike.
 THRESHOLD, CHANCE_IN_256 = 0.2, 128
-# Each time the number of events doubles from here on, half the photons end and the others count twice, so that white
-# media end too; at the last count what is left is cut. Variance times time of strongly forward, nearly white media
-# (n 1.37, g 0.9, albedo 0.9999) is a fifth of that with a first toss at 512.
+# Each time the number of events doubles from here on, half the photons end and the others count twice, so that
+# conservative media end too; at the last count what is left is cut. Variance times time of strongly forward, nearly
+# conservative media (n 1.37, g 0.9, albedo 0.9999) is a fifth of that with a first toss at 512.
 FIRST_TOSS, MAX_EVENTS = 2**13, 2**18
 
 FARTHEST = 1e30  # free path in clear glass, in units of length: finite, so that no product of it is NaN
