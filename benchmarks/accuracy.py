@@ -7,7 +7,7 @@ needs the v of its worst ring; the order-resolved run that of the worst ring at 
 v comes from second moments, not from scatter: where a ring is rarely hit, scatter is as rare. The mean of a ring is the
 exact one. In the scalar run a photon that leaves after n scatterings weighs w_n = alpha^n 10^j, having won j rounds of
 roulette, the same for all of them; so its second moment is the sum of P_n(ring) w_n^2 10^-j, where P_n, the probability
-of leaving a white half space through the ring after n scatterings, is exact for n = 1 and comes from a long
+of leaving a conservative half space through the ring after n scatterings, is exact for n = 1 and comes from a long
 order-resolved run beyond. Where scalar runs do hit, `check` compares.
 """
 
@@ -59,7 +59,7 @@ def ring_energy(alphas: Floats) -> Floats:
 
 
 def exit_probabilities(run: Orders) -> Floats:
-    """P_n of a white photon by ring and bin of order, (rings, bins)."""
+    """P_n of a photon where alpha = 1, by ring and bin of order, (rings, bins)."""
     probabilities = run.ring_order_counts * run.weights(1.0) / run.photons
     probabilities[:, 0] = single_scattering.ring_shares(run.grid.r_edges)[:-1]
     return probabilities

@@ -10,7 +10,7 @@ import scalar_half_space
 import scalar_layered
 
 from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, simulate, simulate_orders
-from mcml_sim.tracing import matched_batch, orders_batch, rng
+from mcml_sim.tracing import layered_batch, matched_batch, orders_batch, rng
 from mcml_sim.tracing.order_bins import LAST_ORDERS
 from profilefit.studies.tradeoff.stopwatch import Work
 
@@ -72,10 +72,26 @@ def layered_yardstick(photons: int, tally_rz: bool) -> Work:
     return work
 
 
+def half_space_grid(tally_rz: bool) -> Grid:
+    """The bins of the scalar half space."""
+    return Grid(DR, NR, DZ, NZ) if tally_rz else Grid(DR, NR)
+
+
 def half_space_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) -> Tally:
     """`simulate` on the scalar half space's problem."""
-    grid = Grid(DR, NR, DZ, NZ) if tally_rz else Grid(DR, NR)
-    return simulate(half_space(ALPHA), grid, photons, seed, workers=workers, progress=False)
+    return simulate(half_space(ALPHA), half_space_grid(tally_rz), photons, seed, workers=workers, progress=False)
+
+
+def half_space_by_layers(photons: int, tally_rz: bool) -> Work:
+    """The same problem by the kernel for any layers, which `simulate` does not take for it."""
+
+    def work(seed: int) -> int:
+        for batch, first in enumerate(range(0, photons, layered_batch.BATCH_PHOTONS)):
+            number = min(layered_batch.BATCH_PHOTONS, photons - first)
+            layered_batch.trace_batch(half_space(ALPHA), half_space_grid(tally_rz), seed, batch, number)
+        return photons
+
+    return work
 
 
 def half_space_events(photons: int = 2**18) -> float:
@@ -123,6 +139,8 @@ def works(sizes: Sizes) -> dict[str, Work]:
         "orders": lambda seed: orders(sizes.orders, seed).photons,
         "half space": lambda seed: half_space_tally(sizes.half_space, False, seed).photons,
         "half space, r-z": lambda seed: half_space_tally(sizes.half_space, True, seed).photons,
+        "half space by layers": half_space_by_layers(sizes.half_space // 4, tally_rz=False),
+        "half space by layers, r-z": half_space_by_layers(sizes.half_space // 4, tally_rz=True),
         "layered yardstick": layered_yardstick(sizes.layered_yardstick, tally_rz=False),
         "three layers": lambda seed: layered_tally(sizes.layered, False, seed).photons,
         "layered yardstick, r-z": layered_yardstick(sizes.layered_yardstick, tally_rz=True),

@@ -109,7 +109,15 @@ def speed(report: Report) -> None:
         ("work", "ratio"),
         [(name, str(rates.ratio(name, over, factor))) for name, over, factor in others],
     )
+    report.table(
+        "What the kernel of the matched half space buys, photons/s over the kernel for any layers",
+        ("work", "ratio"),
+        [(name, str(rates.ratio(name, name.replace("space", "space by layers")))) for name in _HALF_SPACES],
+    )
     report.numbers["rates"] = rates.by_name
+
+
+_HALF_SPACES = ("half space", "half space, r-z")
 
 
 def _speed_row(name: str, rates: Rates, events: float | None) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ TYPE_CHECKING = False  # importing typing for it would take longer than all the 
 if TYPE_CHECKING:
     from mcml_sim import exact
     from mcml_sim.files.version import __version__
+    from mcml_sim.media import phase
     from mcml_sim.media.grid import Grid
     from mcml_sim.media.medium import Layer, Medium, half_space
     from mcml_sim.media.setting import Setting
@@ -24,6 +25,7 @@ else:
         __name__,
         {
             "exact": "",
+            "phase": "media.",
             "Grid": "media.grid",
             "read_mci": "results.mci",
             **dict.fromkeys(("read_mco", "write_mco"), "results.mco"),
@@ -59,6 +61,7 @@ __all__ = [
     "__version__",
     "exact",
     "half_space",
+    "phase",
     "read_mci",
     "read_mco",
     "read_results",

@@ -19,14 +19,16 @@ INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 
 
 def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package: `homes` says in which of its modules each name is; "" for a module itself."""
+    """The `__getattr__` of a package: `homes` says in which of its modules each name is.
+
+    A module itself has the room it is in, with a dot: "media." makes `phase` of `media.phase`, "" stays in the root.
+    """
 
     def of_package(name: str) -> Any:
         if name not in homes:
             raise AttributeError(f"module {package!r} has no attribute {name!r}")
-        if not homes[name]:
-            return import_module(f"{package}.{name}")
-        return getattr(import_module(f"{package}.{homes[name]}"), name)
+        home = f"{package}.{homes[name]}"
+        return import_module(home + name) if home.endswith(".") else getattr(import_module(home), name)
 
     return of_package
 

@@ -32,7 +32,7 @@ def totals(kept: Results) -> Iterator[str]:
     for name, title in TOTALS.items():
         yield _line(title, told(kept.estimates[name]))
     if kept.cut > 0:
-        yield _line("still inside, cut", f"{kept.cut:.2g}")
+        yield _line("at scattering limit", f"{kept.cut:.2g}")
     yield _line("all of these", told(kept.estimates["energy"]))
 
 

@@ -19,7 +19,7 @@ from mcml_sim.exact.bessel import bessel_k
 from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS, Transform
 
 MAX_STEPS = 60  # of Newton's method, which takes twelve at most where xi < 1 - 1e-8
-NO_LIGHT = 1e100  # mfp: nothing is left there but in white light, and products are finite
+NO_LIGHT = 1e100  # mfp: nothing is left there but in a conservative medium, and products are finite
 SETTLED = 4e-15  # of the logarithm of a share: its rounding
 
 
@@ -40,7 +40,7 @@ def cdf(transform: Transform, x: jax.Array) -> jax.Array:
 def ring_density(transform: Transform, x: jax.Array) -> jax.Array:
     """2 pi x R_d(x) / alpha [1/mfp] at finite radii x >= 0 of any shape; 1/2 at the source."""
     inside = _solved(transform, x)
-    # Nothing of A is left in the sum, nor of its derivative in alpha, which white light has infinite.
+    # Nothing of A is left in the sum, nor of its derivative in alpha, which is infinite at alpha = 1.
     total = jax.lax.stop_gradient(transform.reflectance)
     rest = transform.value - (_concentrated(inside) * total)[..., None]
     waves = bessel_k(0, -1j * transform.k * inside[..., None])
@@ -80,9 +80,9 @@ def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
 def _energy_beyond(transform: Transform, x: jax.Array) -> jax.Array:
     """Share of the reflected energy that leaves beyond x, or beyond NEAREST_RADIUS if that is farther."""
     inside = _solved(transform, x)
-    # Next to the derivative in alpha of A, infinite in white light, no other counts.
-    white = transform.pole > 0.0
-    held = jax.tree.map(lambda leaf: jnp.where(white, jax.lax.stop_gradient(leaf), leaf), transform)
+    # Next to the derivative in alpha of A, infinite at alpha = 1, no other counts.
+    conservative = transform.pole > 0.0
+    held = jax.tree.map(lambda leaf: jnp.where(conservative, jax.lax.stop_gradient(leaf), leaf), transform)
     here = _concentrated(inside)
     rest = held.value - (here * held.reflectance)[..., None]
     waves = bessel_k(1, -1j * held.k * inside[..., None])
@@ -102,5 +102,5 @@ def _concentrated(x: jax.Array) -> jax.Array:
 
 
 def _solved(transform: Transform, x: jax.Array) -> jax.Array:
-    """The nearest radius that the contour reaches; white light ends in R_d ~ x^-3."""
+    """The nearest radius that the contour reaches; at alpha = 1 light ends in R_d ~ x^-3."""
     return jnp.clip(x, NEAREST_RADIUS, jnp.where(transform.pole > 0.0, FARTHEST_RADIUS, NO_LIGHT))

@@ -29,8 +29,9 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from mcml_sim.media import fresnel, phase
+from mcml_sim.media import fresnel
 from mcml_sim.media.grid import Grid
+from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.media.setting import Setting
 
 Floats = NDArray[np.float64]
@@ -44,7 +45,7 @@ T_STEP, T_LAST = 0.13, 3.9  # of the tanh-sinh rule on (0, 1): 1e-12 for square 
 
 
 def ring_shares(r_edges: ArrayLike, setting: Setting = SEARCHLIGHT) -> Floats:
-    """Share of photons that leave a white half space after exactly one scattering, by ring [-].
+    """Share of photons that leave a conservative half space after exactly one scattering, by ring [-].
 
     r_edges  edges of the rings [mfp], rising from 0, float64 (rings + 1,); `setting` may be any. A mean free path is
              that of light itself, 1 / mu_s, not the reduced one
@@ -81,42 +82,43 @@ def source_strength(setting: Setting = SEARCHLIGHT) -> float:
 @lru_cache(maxsize=64)
 def _density(setting: Setting) -> tuple[Floats, Floats]:
     """Nodes k, and f(k) dk on them."""
-    sine = min(1 / setting.n, 1.0)  # of the critical angle
+    n, phase = setting.n, HenyeyGreenstein(setting.g)
+    sine = min(1 / n, 1.0)  # of the critical angle
     cosine = np.sqrt((1 - sine) * (1 + sine))
     if setting.illumination == "searchlight":
-        critical = np.sqrt((1 + cosine) / (1 - cosine)) if setting.n > 1 else 1.0
-        f = _searchlight(critical, setting)
+        critical = np.sqrt((1 + cosine) / (1 - cosine)) if n > 1 else 1.0
+        f = _searchlight(critical, n, phase)
     else:
-        critical = max(setting.n, 1.0)
-        f = _diffuse_matched(setting.g) if setting.n == 1 else _diffuse(critical, setting)
+        critical = max(n, 1.0)
+        f = _diffuse_matched(phase) if n == 1 else _diffuse(critical, n, phase)
     return critical + BEYOND_CRITICAL, f * K_STEP * BEYOND_CRITICAL
 
 
-def _searchlight(critical: float, setting: Setting) -> Floats:
+def _searchlight(critical: float, n: float, phase: Phase) -> Floats:
     k = critical + BEYOND_CRITICAL
     above = (BEYOND_CRITICAL + (critical - 1)) * (k + 1)  # k^2 - 1
     mu = above / (k * k + 1)
     solid_angle = 2 * np.pi * 4 * k / (k * k + 1) ** 2
-    return solid_angle * _phase(-mu, setting.g) * _passes(mu, setting.n) * above / (2 * k * k)
+    return solid_angle * phase.pdf(-mu) * _passes(mu, n) * above / (2 * k * k)
 
 
-def _diffuse_matched(g: float) -> Floats:
+def _diffuse_matched(phase: Phase) -> Floats:
     """f where T = 1: the integral over psi is pi / 2."""
     k = 1 + BEYOND_CRITICAL[:, None]
     eta, rest, weights = _unit_nodes()
     above, flat = BEYOND_CRITICAL[:, None] * (k + 1), rest * (1 + eta)  # k^2 - 1, 1 - eta^2
     both = above + flat  # k^2 - eta^2
-    integrand = above * flat / both**2 * _phase(1 - 2 * above / both, g)
+    integrand = above * flat / both**2 * phase.pdf(1 - 2 * above / both)
     return 4 * np.pi / k[:, 0] * (integrand @ weights)
 
 
-def _diffuse(critical: float, setting: Setting) -> Floats:
-    return np.array([_diffuse_at(beyond, critical, setting) for beyond in BEYOND_CRITICAL])
+def _diffuse(critical: float, n: float, phase: Phase) -> Floats:
+    return np.array([_diffuse_at(beyond, critical, n, phase) for beyond in BEYOND_CRITICAL])
 
 
-def _diffuse_at(beyond: float, critical: float, setting: Setting) -> float:
+def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float:
     """f at k = critical + beyond, from the quarter with eta > 0 and psi < pi / 2, where mu_1 < mu_2."""
-    n, k = setting.n, critical + beyond
+    k = critical + beyond
     x, rest, weights = _unit_nodes()
     above = (beyond + (critical - 1)) * (k + 1)  # k^2 - 1
     lost = max(1 - 1 / n**2, 0.0)  # squared cosine of the critical angle
@@ -133,18 +135,13 @@ def _diffuse_at(beyond: float, critical: float, setting: Setting) -> float:
     mu_1, mu_2 = height / (k + eta), height / (beyond + (critical - largest) + to_largest)
     integrand = height**2 * _passes(mu_1, n) * _passes(mu_2, n) * range_psi
     spread = (above + flat)[:, 0]  # k^2 - eta^2
-    outer = _phase(1 - 2 * above / spread, setting.g) / spread**2 * largest * weights
+    outer = phase.pdf(1 - 2 * above / spread) / spread**2 * largest * weights
     return float(16 / k / _mean_transmittance(n) * (outer @ integrand @ weights))
 
 
 def _passes(mu: Floats, n: float) -> Floats:
     """Share of light that the surface lets out [-], at a cosine `mu` to the normal inside."""
     return 1 - fresnel.fresnel(n, 1.0, mu)[0]
-
-
-def _phase(cosine: Floats, g: float) -> Floats:
-    """Phase function [1/sr]."""
-    return phase.pdf_henyey_greenstein(g, cosine) / (2 * np.pi)
 
 
 def _unit_nodes() -> tuple[Floats, Floats, Floats]:

@@ -39,11 +39,11 @@ Floats = NDArray[np.float64]
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].
 NEAREST_RADIUS = 1e-6
-# White light, which falls off as a power, is that power beyond, to 1e-9 [mfp].
+# At alpha = 1 light falls off as a power, and is that power beyond, to 1e-9 [mfp].
 FARTHEST_RADIUS = 1e6
 START = 0.9  # of the contour, of the way to the singularity at i kappa
 DIRECTION = complex(np.exp(0.25j * np.pi))
-WHITE_SCALE = 0.1 / FARTHEST_RADIUS  # of rho where there is no kappa to set one
+CONSERVATIVE_SCALE = 0.1 / FARTHEST_RADIUS  # of rho where there is no kappa to set one
 LAST_WAVE = 35.0  # k r where e^{i k r} has decayed to e^-25
 # rho = scale e^{v - e^-v} ends double exponentially at v below 0: at this v it has 1e-16 of its scale left.
 FIRST_V = -3.5
@@ -135,7 +135,7 @@ def _pole(alpha: jax.Array) -> jax.Array:
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
     """k and dk, each (rule.k,)."""
     kappa = jnp.sqrt(squared_decay_rate(jax.lax.stop_gradient(alpha)))
-    scale = jnp.where(kappa > 0.0, (1.0 - START) * kappa, WHITE_SCALE)
+    scale = jnp.where(kappa > 0.0, (1.0 - START) * kappa, CONSERVATIVE_SCALE)
     step = (jnp.log(LAST_WAVE / (NEAREST_RADIUS * scale)) - FIRST_V) / (rule.k - 1)
     v = FIRST_V + step * np.arange(rule.k)
     rho = scale * jnp.exp(v - jnp.exp(-v))

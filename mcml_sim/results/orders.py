@@ -29,7 +29,7 @@ SEARCHLIGHT = Setting()
 
 @dataclass(frozen=True, eq=False)
 class Orders:
-    """Photons of a white half space by ring and number of scatterings; lengths in mean free paths [mfp].
+    """Photons of a conservative half space by ring and number of scatterings; lengths in mean free paths [mfp].
 
     Every method takes the single-scattering albedo `alpha` in [0, 1], a number or an array, InputError otherwise;
     estimates have the shape of alpha, then that of the rings. All albedos come from the same photons, so their

@@ -146,7 +146,7 @@ class Tally:
 
     @property
     def cut(self) -> float:
-        """Light given up inside, after the last event allowed [-]; part of `energy`."""
+        """Light terminated at the scattering limit, still inside [-]; part of `energy`."""
         return float(self.deposits.cut) / self.photons * self._entering
 
     @property

@@ -53,7 +53,7 @@ class Results:
     version: str
     """Of mcml_sim, that made it."""
     cut: float
-    """Light given up inside, after the last event allowed [-]."""
+    """Light terminated at the scattering limit, still inside [-]."""
     estimates: Mapping[str, Estimate]
     """By the names of the tally's properties."""
 

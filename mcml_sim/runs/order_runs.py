@@ -40,7 +40,7 @@ def simulate_orders(
     progress: bool | None = None,
     scheduler: str | None = None,
 ) -> Orders:
-    """Simulate a white half space, resolved by scattering order.
+    """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
     grid      rings, edges in mean free paths [mfp]
     photons   how many to start, 1 to 1e13

@@ -1,4 +1,6 @@
-"""One event of photons in a white half space of any surface, phase function and light: the general `isotropic`.
+"""One event of photons in a conservative half space of any surface, phase function and light.
+
+Its special case `isotropic_event` needs no directions.
 
 All is symmetric around the beam and under mirrors through it, so a photon is its distance `rho` from the beam, its
 depth `z`, and the direction of its flight in the frame (outwards, around, down) at its place; the component around
@@ -16,7 +18,8 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
-from mcml_sim.media import fresnel, phase
+from mcml_sim.media import fresnel
+from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import rng
 from mcml_sim.tracing.isotropic_event import STOPPED, azimuth_cosine, has_ended, landed, stop, was_stopped
@@ -30,7 +33,7 @@ class HalfSpace(NamedTuple):
     """A Setting as the kernel wants it: arrays, so that no other one makes it compile again."""
 
     n: Array
-    g: Array
+    phase: Phase
     entry: Array
     """Cosines of the light that has entered, to the normal and inside; see `_entry_cosines`, (STEPS + 1,)."""
 
@@ -39,7 +42,7 @@ class Lanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
-    """As in `isotropic.Lanes`: rho + i z, complex64, where -z counts events once the photon has ended."""
+    """As in `isotropic_event.Lanes`: rho + i z, complex64, where -z counts events once the photon has ended."""
     direction: Array
     """Components outwards + i down of the flight that ended here, complex64."""
     order: Array
@@ -62,11 +65,12 @@ class Lanes(NamedTuple):
 
 def half_space(setting: Setting) -> HalfSpace:
     """What the kernel needs to know of a setting."""
-    return HalfSpace(jnp.float32(setting.n), jnp.float32(setting.g), jnp.asarray(_entry_cosines(setting)))
+    phase = HenyeyGreenstein(jnp.float32(setting.g))
+    return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(_entry_cosines(setting)))
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> Lanes:
-    """Photons at the place of their first scattering; `stops` as in `isotropic.enter`."""
+    """Photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
     cosine = _entering(rng.uniform(entry_word), where.entry)
@@ -99,9 +103,9 @@ def _scattered(
     left: Array,
     where: HalfSpace,
 ) -> tuple[Array, Array]:
-    """Places and directions after one more scattering and flight, as in `isotropic`."""
+    """Places and directions after one more scattering and flight, as in `isotropic_event.scatter`."""
     cosine_word, path_word, azimuth_word, surface_word = words
-    outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.g)
+    outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.phase)
     path = rng.exponential(path_word)
     z = place.imag + path * down
     reflectance, _ = fresnel.fresnel(where.n, jnp.float32(1), jnp.abs(down))
@@ -118,13 +122,13 @@ def _scattered(
 
 
 def _deflected(
-    direction: Array, cosine_word: Array, azimuth_word: Array, sign_word: Array, g: Array
+    direction: Array, cosine_word: Array, azimuth_word: Array, sign_word: Array, phase: Phase
 ) -> tuple[Array, Array, Array]:
-    """Components outwards, around and down after a scattering by Henyey and Greenstein's phase function.
+    """Components outwards, around and down after a scattering.
 
     In the frame of Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017: no direction is special.
     """
-    below_one, above_minus_one = phase.deflection(g, rng.symmetric(cosine_word))
+    below_one, above_minus_one = phase.deflection(rng.symmetric(cosine_word))
     sine = jnp.sqrt(below_one * above_minus_one)
     x = azimuth_cosine(azimuth_word)
     half = jnp.sqrt((1 - x) * (1 + x))

@@ -1,4 +1,4 @@
-"""One event of photons in a matched, isotropic, white half space, where (rho, z) is all a photon needs.
+"""One event of photons in a matched, isotropic, conservative half space, where (rho, z) is all a photon needs.
 
 The surface does not refract and scattering forgets the direction, so a photon is its distance `rho` from the beam
 and its depth `z`; where around the beam it is never matters. Lengths are in mean free paths [mfp], all float32.
@@ -19,8 +19,10 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.phase import Isotropic
 from mcml_sim.tracing import rng
 
+PHASE = Isotropic()
 MAX_ORDER = 8192
 STOPPED = 0.5  # what a photon that was stopped inside is deeper outside than one that left
 UNROLLED = 4  # events in one go: 1 is slower by 13 %, 16 is faster by 7 % and compiles for twice as long
@@ -28,7 +30,7 @@ UNROLLED = 4  # events in one go: 1 is slower by 13 %, 16 is faster by 7 % and c
 # the reflectance is made; without roulette six sevenths of all events would go to the few photons beyond it.
 FIRST_ROULETTE = 64
 DOUBLINGS = FIRST_ROULETTE * 2 ** np.arange(1 + round(np.log2(MAX_ORDER / FIRST_ROULETTE)), dtype=np.int32)
-"""Stops of the white half space, int32: 64, 128, ... and at last MAX_ORDER, where nobody goes on."""
+"""Stops of the order-resolved run, int32: 64, 128, ... and at last MAX_ORDER, where nobody goes on."""
 
 # sin(pi v) = v P(v^2) on |v| <= 1/2: minimax polynomial of (1 - 2^-22) sin(pi v) by linear programming, error 3.4e-9.
 # The factor keeps |value| <= 1 whatever the rounding; with it and float32 the total error is below 5e-7.
@@ -111,18 +113,19 @@ def scatter(key: Array, lanes: Lanes, place: Array, number: Array) -> Array:
     order = lanes.order + number
     cosine_word, path_word, azimuth_word = rng.draw_three(key, lanes.photon, order.astype(jnp.uint32))
     cosine = rng.symmetric(cosine_word)
+    below_one, above_minus_one = PHASE.deflection(cosine)  # the cosine itself is v
     path = rng.exponential(path_word)
     z = place.imag + path * cosine
     leaves = z < 0
     path = jnp.where(leaves, -place.imag / cosine, path)
-    rho = displaced(place.real, path, (1 - cosine) * (1 + cosine), azimuth_cosine(azimuth_word))
+    rho = displaced(place.real, path, below_one * above_minus_one, azimuth_cosine(azimuth_word))
     out = -number.astype(jnp.float32)
     z = jnp.where(leaves, out, jnp.where(order == lanes.last, out - STOPPED, z))
     return jnp.where(place.imag < 0, place, lax.complex(rho, z))
 
 
 def landed(lanes: L, place: Array, events: int) -> L:
-    """Lanes, these or `white`'s, that `events` scatterings have brought to `place`, or that ended before."""
+    """Lanes, these or `half_space_event`'s, that `events` scatterings have brought to `place`, or that ended before."""
     done = jnp.where(place.imag < 0, (-place.imag).astype(jnp.int32), events)
     return lanes._replace(place=place, order=lanes.order + done)
 

@@ -80,7 +80,7 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 512.
 
     Photons enter with weight 1, below all specular reflection. A first layer of clear glass is behind them then:
-    `optics.specular_reflectance` has counted what it sends back.
+    `fresnel.specular_reflectance` has counted what it sends back.
     """
     first = 1 if medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):

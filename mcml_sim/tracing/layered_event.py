@@ -21,8 +21,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim.media import fresnel, phase
+from mcml_sim.media import fresnel
 from mcml_sim.media.medium import Medium
+from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.tracing import rng
 
 FLIGHTS = 5  # measured on the three-layer sample: from 4 to 7 it is the same within 3 %
@@ -31,9 +32,9 @@ EVENTS_PER_TURN = FLIGHTS + 1  # the last one is the step across interfaces
 # A photon of less weight goes on by a chance of CHANCE_IN_256 / 256. Variance times time, measured on the three-layer
 # sample, is 0.79 of that with MCML's 1e-4 and 0.1: for R, T, absorption by layer and by depth, and rings alike.
 THRESHOLD, CHANCE_IN_256 = 0.2, 128
-# Each time the number of events doubles from here on, half the photons end and the others count twice, so that white
-# media end too; at the last count what is left is cut. Variance times time of strongly forward, nearly white media
-# (n 1.37, g 0.9, albedo 0.9999) is a fifth of that with a first toss at 512.
+# Each time the number of events doubles from here on, half the photons end and the others count twice, so that
+# conservative media end too; at the last count what is left is cut. Variance times time of strongly forward, nearly
+# conservative media (n 1.37, g 0.9, albedo 0.9999) is a fifth of that with a first toss at 512.
 FIRST_TOSS, MAX_EVENTS = 2**13, 2**18
 
 FARTHEST = 1e30  # free path in clear glass, in units of length: finite, so that no product of it is NaN
@@ -64,8 +65,8 @@ class Stack(NamedTuple):
     """[length], FARTHEST in clear glass."""
     absorbs: Array
     """1 - alpha = mu_a / mu_t [-]: a number of its own, since 1 - alpha would lose the digits of weak absorption."""
-    g: Array
-    """Mean cosine of the scattering angle [-]."""
+    phase: Phase
+    """Leaves by layer too."""
     n: Array
     """Refractive indices [-], (layers + 2,): those above and below are first and last."""
 
@@ -113,7 +114,8 @@ def stack(medium: Medium, unit: float) -> Stack:
         "g": [layer.g if layer.mu_s else 0.0 for layer in layers],
         "n": [medium.n_above, *(layer.n for layer in layers), medium.n_below],
     }
-    return Stack(**{name: jnp.asarray(np.asarray(values, np.float32)) for name, values in columns.items()})
+    arrays = {name: jnp.asarray(np.asarray(values, np.float32)) for name, values in columns.items()}
+    return Stack(phase=HenyeyGreenstein(arrays.pop("g")), **arrays)
 
 
 def enter(photon: Array, first: Array, followed: int) -> Lanes:
@@ -158,12 +160,13 @@ class Material(NamedTuple):
     thickness: Array
     mfp: Array
     absorbs: Array
-    g: Array
+    phase: Phase
 
 
 def material(stack: Stack, layer: Array) -> Material:
     """That of each photon."""
-    return Material(*(pick(values, layer) for values in (stack.thickness, stack.mfp, stack.absorbs, stack.g)))
+    everywhere = Material(stack.thickness, stack.mfp, stack.absorbs, stack.phase)
+    return jax.tree.map(lambda values: pick(values, layer), everywhere)
 
 
 def scatter(go: Array, key: Array, lanes: Lanes, event: Array, here: Material) -> tuple[Lanes, Array]:
@@ -172,7 +175,7 @@ def scatter(go: Array, key: Array, lanes: Lanes, event: Array, here: Material) -
     Also returns what is absorbed. `go` as in `staged`.
     """
     paths = staged(go, _paths, key, lanes.down, lanes.weight, lanes.photon, event, here.thickness, here.mfp)
-    turns = staged(go, _turns, key, lanes.photon, event, here.g)
+    turns = staged(go, _turns, key, lanes.photon, event, here.phase)
     aside = staged(go, _aside, turns)
     moves, cosine, uz = paths > 0, 1 - turns.real, lanes.down.imag
     upright = jnp.abs(uz)
@@ -240,10 +243,10 @@ def _paths(key: Array, down: Array, weight: Array, photon: Array, event: Array, 
     return jnp.where((weight > 0) & (z >= 0) & (z <= thickness), path, 0)
 
 
-def _turns(key: Array, photon: Array, event: Array, g: Array) -> Array:
+def _turns(key: Array, photon: Array, event: Array, phase: Phase) -> Array:
     """1 - cosine of the scattering angle, and i times the azimuth / pi."""
     _, cosine_word, azimuth_word = rng.draw_three(key, photon, event)
-    below_one, _ = phase.deflection(g, rng.symmetric(cosine_word))
+    below_one, _ = phase.deflection(rng.symmetric(cosine_word))
     return lax.complex(below_one, rng.symmetric(azimuth_word))
 
 

@@ -17,7 +17,7 @@ Floats = NDArray[np.float64]
 
 LAST_EXACT = 256
 BINS_PER_OCTAVE = 64
-LONG_PATHS = -1.5  # exponent of the order's density in a white half space
+LONG_PATHS = -1.5  # exponent of the order's density in a conservative half space
 
 
 def _last_orders() -> NDArray[np.int64]:

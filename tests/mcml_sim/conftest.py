@@ -14,7 +14,7 @@ EDGES = np.concatenate([[0.0], np.geomspace(0.01, 30.0, 40)])
 
 @pytest.fixture(scope="session")
 def run():
-    """4 batches of the white half space, seed 1."""
+    """4 batches of the order-resolved run, seed 1."""
     return simulate_orders(Grid.from_edges(r=EDGES), 2**22, seed=1)
 
 

@@ -91,9 +91,9 @@ def test_thick_layer_is_the_exact_half_space(alpha):
     assert answer.transmitted.sum() < 1e-15
 
 
-def test_white_layers_lose_no_light():
-    white = Medium((Layer(1.5, 0.0, 20.0, 0.9, 1.0), Layer(1.5, 0.0, 5.0, -0.3, 0.2)))
-    answer = solve(white, angles=6)
+def test_conservative_layers_lose_no_light():
+    conservative = Medium((Layer(1.5, 0.0, 20.0, 0.9, 1.0), Layer(1.5, 0.0, 5.0, -0.3, 0.2)))
+    answer = solve(conservative, angles=6)
     total = answer.specular + answer.reflected.sum() + answer.transmitted.sum() + answer.ballistic
     assert total == pytest.approx(1, abs=1e-11)
 

@@ -49,7 +49,7 @@ def test_decay_rate_at_its_ends():
     assert around[0] == around[1]
 
 
-def test_the_square_is_smooth_up_to_white():
+def test_the_square_is_smooth_up_to_alpha_1():
     """Its slope is -3 there; kappa's is infinite."""
     slope = jax.vmap(jax.grad(squared_decay_rate))(jnp.array([0.0, 0.5, 1 - 1e-6, 1.0]))
     h = 1e-6

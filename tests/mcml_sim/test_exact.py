@@ -152,7 +152,7 @@ def test_cdf_rises_from_0_to_1(setting):
         shares = exact.cdf(r, alpha, setting=setting)
         assert np.all(np.diff(shares) >= 0)
         assert shares[0] < 1e-7
-        # White light creeps out as S = H(1) / (sqrt(3) r), or its diffuse like; else nothing is left.
+        # At alpha = 1 light creeps out as S = H(1) / (sqrt(3) r), or its diffuse like; else nothing is left.
         assert 1 - shares[-1] < (2e-4 if alpha == 1 else 1e-12)
 
 

@@ -102,11 +102,11 @@ def test_slopes_in_mfp_are_those_of_a_scale(table):
 
 def test_slopes_at_the_ends_of_the_albedo(table):
     """Finite where the law is smooth, infinite where it is not: 1 - A ends in a root, and the cdf divides by A."""
-    black, white, r = table["profile"][1][0][0], table["profile"][1][0][4], np.s_[1:-2]
+    black, conservative, r = table["profile"][1][0][0], table["profile"][1][0][4], np.s_[1:-2]
     assert table["reflectance"][1][0, 0] == pytest.approx(exact.reflectance(1e-7) / 1e-7, rel=1e-5)
     np.testing.assert_allclose(black[r], exact.profile(R[r], 1e-9, MFP) / 1e-9, rtol=1e-6)
     below = difference(lambda a: exact.profile(R[3], a, MFP), 1 - 2 * STEP, STEP)
-    assert white[3] == pytest.approx(below, rel=3e-2)  # the next term is of order sqrt(STEP)
+    assert conservative[3] == pytest.approx(below, rel=3e-2)  # the next term is of order sqrt(STEP)
     assert np.isfinite([table[name][1][0][0, :-1] for name in ("cdf", "quantile")]).all()
     assert table["reflectance"][1][4, 0] == np.inf
     assert table["decay_rate"][1][4, 0] == -np.inf

@@ -9,7 +9,7 @@ from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS
 BOTH = pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=["searchlight", "diffuse"])
 # Chandrasekhar, Radiative Transfer (1950), table XI: H(1) at alpha = 1 is 2.9078; the digits beyond are Stibbs and
 # Weir's (Mon. Not. R. Astron. Soc. 119, 1959).
-H_NORMAL_WHITE = 2.907810529
+H_NORMAL_CONSERVATIVE = 2.907810529
 
 
 @BOTH
@@ -49,27 +49,27 @@ def test_quantile_inverts_below_the_nearest_radius_too(setting):
     assert exact.cdf(exact.quantile(xi, 0.5, setting=setting), 0.5, setting=setting) == pytest.approx(xi, rel=1e-9)
 
 
-def test_near_white_the_loss_is_2_91_times_the_root():
+def test_near_conservative_the_loss_is_2_91_times_the_root():
     for exponent in (6, 8, 10):
         s = 10.0 ** (-exponent / 2)
         # The next term of the expansion is O(s) relative, about 4 s.
-        assert (1 - exact.reflectance(1 - s**2)) / s == pytest.approx(H_NORMAL_WHITE, rel=6 * s)
+        assert (1 - exact.reflectance(1 - s**2)) / s == pytest.approx(H_NORMAL_CONSERVATIVE, rel=6 * s)
 
 
-def test_white_light_ends_in_a_power():
+def test_conservative_light_ends_in_a_power():
     """Where nothing is absorbed R^(k) = 1 - H(1) k / sqrt(3) + ..., so 1 - cdf = H(1) / (sqrt(3) r)."""
     for r in (1e3, 1e4, FARTHEST_RADIUS, 100 * FARTHEST_RADIUS):
         end = 2 * np.pi * r**3 * exact.profile(r, 1.0)
-        assert end == pytest.approx(H_NORMAL_WHITE / np.sqrt(3), rel=10 / r)
+        assert end == pytest.approx(H_NORMAL_CONSERVATIVE / np.sqrt(3), rel=10 / r)
     for r in (1e3, 1e4):
-        assert (1 - exact.cdf(r, 1.0)) * r == pytest.approx(H_NORMAL_WHITE / np.sqrt(3), rel=5 / r)
+        assert (1 - exact.cdf(r, 1.0)) * r == pytest.approx(H_NORMAL_CONSERVATIVE / np.sqrt(3), rel=5 / r)
 
 
-def test_almost_white_light_is_almost_white():
+def test_almost_conservative_is_almost_conservative():
     """kappa = 1.7e-7 tells them apart at 1e7 mfp, not at 1e3."""
-    found, white = exact.profile([1e3, 1e8], 1 - 1e-14), exact.profile([1e3, 1e8], 1.0)
-    assert found[0] == pytest.approx(white[0], rel=1e-3)
-    assert found[1] < 1e-5 * white[1]
+    found, limit = exact.profile([1e3, 1e8], 1 - 1e-14), exact.profile([1e3, 1e8], 1.0)
+    assert found[0] == pytest.approx(limit[0], rel=1e-3)
+    assert found[1] < 1e-5 * limit[1]
 
 
 @BOTH

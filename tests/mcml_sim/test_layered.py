@@ -278,7 +278,7 @@ def test_half_space_reflects_as_the_exact_solution(alpha):
     assert np.all(np.abs(rings[:-1] - expected) < 4.5 * np.sqrt(d.reflected_squares[:-1, 0]))
 
 
-def test_white_half_space_ends_and_says_what_it_cut():
+def test_conservative_half_space_ends_and_says_what_it_cut():
     d = one_layer(half_space(1.0, n=1.3, g=0.5))
     reflected, transmitted, absorbed, cut = shares(d)
     assert absorbed == transmitted == 0
@@ -289,7 +289,7 @@ def test_white_half_space_ends_and_says_what_it_cut():
     assert abs(reflected + cut / 2 - d.started) > 2 * error
 
 
-def test_white_slab_sends_everything_back_or_through():
+def test_conservative_slab_sends_everything_back_or_through():
     d = one_layer(Medium((Layer(1.5, 0, 50, 0.7, 0.2),)))
     reflected, transmitted, absorbed, cut = shares(d)
     error = np.sqrt(d.accounted_squares - d.accounted**2 / d.started)

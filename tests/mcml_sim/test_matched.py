@@ -207,7 +207,7 @@ def test_weights_stay_around_the_threshold_once_they_have_fallen_to_it(alpha):
 
 
 def test_fixed_point_sums_hold_the_longest_batch():
-    """All visits of a white batch, in units, stay inside int64."""
+    """All visits of a batch where alpha = 1, in units, stay inside int64."""
     key = jnp.asarray(rng.batch_key(0, 0))
     values = matched_batch.weights(1.0)
     order = np.abs(np.asarray(orders_batch.trace(key, jnp.int32(2**14), jnp.asarray(values.stops)).order)[: 2**14])
@@ -223,7 +223,7 @@ def test_a_lost_photon_is_noticed():
         )
 
 
-def test_the_white_run_reweighted_agrees():
+def test_the_order_resolved_run_reweighted_agrees():
     """The same photons, drawn in another way: alpha^n of the order-resolved kernel."""
     ends = orders_batch.trace(jnp.asarray(rng.batch_key(5, 0)), jnp.int32(PHOTONS), DOUBLINGS)
     order = np.asarray(ends.order)

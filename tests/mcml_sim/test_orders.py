@@ -1,4 +1,4 @@
-"""Every albedo from one white run, against the exact half space and against itself."""
+"""Every albedo from one run, against the exact half space and against itself."""
 
 import numpy as np
 import pytest
@@ -114,7 +114,7 @@ def test_no_albedo_no_light(run):
     assert np.all(run.profile_derivative(0.0).value.sum() > 0)
 
 
-def test_white_half_space_returns_all_but_what_is_cut(run):
+def test_conservative_half_space_returns_all_but_what_is_cut(run):
     found = run.reflectance(1.0)
     assert abs(found.value + run.cut(1.0) - 1) < 4 * found.standard_error + 0.2 * run.cut(1.0)
 

@@ -54,5 +54,5 @@ def test_light_that_was_cut_is_a_line_of_the_sum():
         estimates=dict.fromkeys((*printed.TOTALS, "energy"), part),
     )
     lines = list(printed.totals(kept))
-    assert lines[-2:] == ["still inside, cut      0.12", "all of these           0.200 ± 0.010"]
+    assert lines[-2:] == ["at scattering limit    0.12", "all of these           0.200 ± 0.010"]
     assert len(list(printed.totals(replace(kept, cut=0.0)))) == len(lines) - 1

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from mcml_sim import Grid, InputError, Setting, exact, simulate_orders
+from mcml_sim import Grid, InputError, Setting, exact, phase, simulate_orders
 from mcml_sim.exact import single_scattering
-from mcml_sim.media import fresnel, phase
+from mcml_sim.media import fresnel
 
 LN2 = np.log(2)
 EDGES = np.concatenate([[0.0], np.geomspace(1e-4, 50.0, 40)])
@@ -32,7 +32,7 @@ def photons_that_scatter_once(setting, photons, seed):
         passes = (1 - reflected) / single_scattering.entered(setting)
     down = np.stack([np.sqrt(1 - cosine**2), np.zeros(photons), cosine])
     place = source.exponential(size=photons) * down
-    turn = phase.sample_henyey_greenstein(setting.g, source.random(photons))
+    turn = phase.HenyeyGreenstein(setting.g).sample(source.random(photons))
     azimuth = 2 * np.pi * source.random(photons)
     side = np.stack([down[2], np.zeros(photons), -down[0]])
     across = np.cross(down.T, side.T).T
@@ -130,7 +130,7 @@ def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):
         rate = np.sqrt((1 + mu) / (1 - mu))
         within = np.exp(-ring[0] * rate) - np.exp(-ring[1] * rate)
         passes = 1 - fresnel.fresnel(setting.n, 1.0, mu)[0]
-        return phase.pdf_henyey_greenstein(setting.g, -mu) * mu / (1 + mu) * within * passes
+        return 2 * np.pi * phase.HenyeyGreenstein(setting.g).pdf(-mu) * mu / (1 + mu) * within * passes
 
     critical = np.sqrt(max(1 - setting.n**-2, 0))
     expected, _ = quad(integrand, critical, 1, epsabs=1e-13, epsrel=1e-11, limit=400)

@@ -90,7 +90,7 @@ def test_h_solves_its_equation_and_factors_the_dispersion(alpha, k, nu):
     assert h_function(1e7, alpha, k) == pytest.approx(1.0 / root, rel=1e-6)
 
 
-def test_reflectance_and_the_white_limit():
+def test_reflectance_and_the_conservative_limit():
     """(18), and 2.91."""
     for alpha in (0.5, 0.99):
         root = np.sqrt(1.0 - alpha)

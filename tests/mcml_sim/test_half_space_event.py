@@ -1,4 +1,4 @@
-"""The white half space of any setting against a slow obvious twin, and against what is exact."""
+"""The conservative half space of any setting against a slow obvious twin, and against what is exact."""
 
 import jax
 import jax.numpy as jnp
@@ -132,10 +132,10 @@ def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
     for alpha in (0.4, 0.8, 0.95):
         tally = simulate(half_space(alpha, n=setting.n, g=setting.g), grid, 2**17, seed=9)
         pairs = ((orders.profile(alpha), tally.reflectance_r), (orders.reflectance(alpha), tally.diffuse_reflectance))
-        for white_, own in pairs:
-            error = np.hypot(white_.standard_error, own.standard_error)
-            sampled = np.atleast_1d(own.is_sampled() & white_.is_sampled())
-            z = np.atleast_1d((white_.value - own.value) / error)[sampled]
+        for general, own in pairs:
+            error = np.hypot(general.standard_error, own.standard_error)
+            sampled = np.atleast_1d(own.is_sampled() & general.is_sampled())
+            z = np.atleast_1d((general.value - own.value) / error)[sampled]
             assert z.size
             assert np.abs(z).max() < sidak(8)
 
@@ -154,7 +154,7 @@ def test_diffuse_light_meets_the_exact_answer(sidak):
 
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
-def test_all_light_that_entered_a_white_half_space_comes_back(setting):
+def test_all_light_that_entered_a_conservative_half_space_comes_back(setting):
     run = simulate_orders(Grid.from_edges(r=EDGES), 2**18, seed=2, setting=setting)
     found = run.reflectance(1.0)
     assert abs(found.value + run.cut(1.0) - run.entered) < 4 * found.standard_error + 0.5 * run.cut(1.0)

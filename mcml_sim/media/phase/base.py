@@ -1,0 +1,65 @@
+"""What a phase function answers: the one signature of the shelf."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from dataclasses import fields
+from functools import partial
+from typing import Any, TypeVar
+
+import jax
+
+P = TypeVar("P", bound="Phase")
+
+
+class Phase(ABC):
+    """How far scattering turns the light, by the cosine c of the angle, -1 ... 1; around its course all is alike.
+
+    A frozen dataclass, and a pytree whose leaves are its fields: jax carries it into a kernel, differentiates by it
+    and maps over it. The fields, and every argument, are numbers, numpy arrays or jax arrays, which broadcast, and
+    keep their precision. A kernel asks for `deflection` alone.
+    """
+
+    def __init_subclass__(cls) -> None:
+        """Every phase function is a pytree."""
+        super().__init_subclass__()
+        jax.tree_util.register_pytree_node(cls, _leaves, partial(_from_leaves, cls))
+
+    @abstractmethod
+    def pdf(self, cosine: Any) -> Any:
+        """Density p(c) of the direction [1/sr]: over all directions its integral, 2 pi int p dc, is 1."""
+
+    @abstractmethod
+    def invert(self, cosine: Any) -> Any:
+        """The `xi` in [0, 1] whose sample is `cosine`: the cumulative distribution [-]."""
+
+    @abstractmethod
+    def deflection(self, v: Any) -> tuple[Any, Any]:
+        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, v in [-1, 1], without cancellation at the ends."""
+
+    @abstractmethod
+    def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
+        """Legendre moment [-] of the order l >= 0: 2 pi int p(c) P_l(c) dc. That of order 0 is 1."""
+
+    def sample(self, xi: Any) -> Any:
+        """Cosine [-] below which lies the share `xi` in [0, 1] of all scatterings."""
+        below_one, _ = self.deflection(2 * xi - 1)
+        return 1 - below_one
+
+    @property
+    def mean_cosine(self) -> Any:
+        """Mean of the cosine [-], also called anisotropy g: the moment of order 1."""
+        return self.moment(1)
+
+
+def _leaves(phase: Phase) -> tuple[tuple[Any, ...], None]:
+    return tuple(getattr(phase, field.name) for field in fields(phase)), None  # type: ignore[arg-type]
+
+
+def _from_leaves(cls: type[P], _: None, leaves: Sequence[Any]) -> P:
+    """Without the checks of the constructor: jax puts in place of numbers whatever it needs."""
+    phase = object.__new__(cls)
+    for field, leaf in zip(fields(cls), leaves, strict=True):  # type: ignore[arg-type]
+        object.__setattr__(phase, field.name, leaf)
+    return phase

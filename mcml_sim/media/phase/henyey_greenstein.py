@@ -1,0 +1,64 @@
+"""Henyey and Greenstein's phase function, the one of tissue optics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import jax
+import numpy as np
+
+from mcml_sim.errors import InputError
+from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.fresnel import namespace
+from mcml_sim.media.phase.base import Phase
+
+
+@dataclass(frozen=True)
+class HenyeyGreenstein(Phase):
+    """p(c) = (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2)) [1/sr] (Henyey & Greenstein, Astrophys. J. 93, 70, 1941).
+
+    g  mean cosine of the scattering angle [-], -1 < g < 1; InputError beyond, but not of a jax array, which nobody can
+       look into while jax compiles
+
+    All forms here are free of the usual division by g and of its cancellation: g = 0 is no special case, and 1 - c and
+    1 + c keep their relative precision near c = 1 and -1.
+    """
+
+    g: Any
+
+    def __post_init__(self) -> None:
+        if isinstance(self.g, jax.Array):
+            return
+        if not ((is_number(self.g) or isinstance(self.g, np.ndarray)) and np.all(np.abs(self.g) < 1)):
+            raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
+
+    def pdf(self, cosine: Any) -> Any:
+        """Density of the direction [1/sr]."""
+        xp = namespace(self.g, cosine)
+        square = self._square(cosine)
+        return (1 - self.g * self.g) / (2 * square * xp.sqrt(square)) / (2 * np.pi)
+
+    def invert(self, cosine: Any) -> Any:
+        """The `xi` whose sample is `cosine` [-], the integral of the density from -1 on."""
+        xp, g = namespace(self.g, cosine), self.g
+        distance = xp.sqrt(self._square(cosine))
+        return 0.5 + 0.5 * (2 * cosine - 3 * g + g * g * g) / (distance * (1 - g * g + distance))
+
+    def deflection(self, v: Any) -> tuple[Any, Any]:
+        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2; both >= 0, and g -> -g, v -> -v swaps them."""
+        g = self.g
+        reciprocal = 1 / (1 + g * v)
+        half_square = 0.5 * reciprocal * reciprocal
+        below_one = (1 - g) * (1 - g) * half_square * ((1 - v) * (2 + g * (1 + v)))
+        above_minus_one = (1 + g) * (1 + g) * half_square * ((1 + v) * (2 - g * (1 - v)))
+        return below_one, above_minus_one
+
+    def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
+        """g^l [-]."""
+        return self.g**l
+
+    def _square(self, cosine: Any) -> Any:
+        """1 + g^2 - 2 g c, without cancellation at c = 1."""
+        g = self.g
+        return (1 - g) * (1 - g) + 2 * g * (1 - cosine)
