@@ -38,7 +38,7 @@ def carried_out(module: str) -> Callable[[Callable[..., None]], Callable[..., No
     def of(asked: Callable[..., None]) -> Callable[..., None]:
         @functools.wraps(asked)
         def run(**given: Any) -> None:
-            with _nothing_to_finish(module):
+            with interruptible(module):
                 done = getattr(import_module(module), asked.__name__)
             done(**given)
 
@@ -49,7 +49,7 @@ def carried_out(module: str) -> Callable[[Callable[..., None]], Callable[..., No
 
 def command(module: str) -> None:
     """Run the `main` of a command in `module`: Ctrl-C is one line and its status from the first import to the last."""
-    with _nothing_to_finish(module):
+    with interruptible(module):
         main = import_module(module).main
     try:
         main()
@@ -61,8 +61,11 @@ def command(module: str) -> None:
 
 
 @contextlib.contextmanager
-def _nothing_to_finish(module: str) -> Iterator[None]:
-    """Have Ctrl-C end the process at once: an exception that falls into imports may be dropped, or told as another."""
+def interruptible(module: str) -> Iterator[None]:
+    """For the imports of a command in `module`: Ctrl-C ends the process at once, in one line and with its status.
+
+    An exception that falls into imports may be dropped, or told as another.
+    """
     before = signal.getsignal(signal.SIGINT)
     if before in (signal.SIG_IGN, None) or not _on_interrupt(lambda *_: _quit(module)):
         yield

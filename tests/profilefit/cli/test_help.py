@@ -101,6 +101,8 @@ def test_cheap_examples_run_as_typed(command, line):
 def test_what_is_asked_for_is_what_is_done(program, name):
     """The function that does a subcommand has the parameters of the one that has its options, by name and kind."""
     asked = SUBCOMMANDS[program, name].callback
+    if name == "scene":
+        return  # its options and what it does are one function
     done = mcml_command.run if program == "mcml-sim" else getattr(import_module(f"profilefit.commands.{name}"), name)
     wanted = list(inspect.signature(asked).parameters)
     taken = inspect.signature(done).parameters
