@@ -15,10 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
-from profilefit.scenes.skin.separable_kernel import albedo_of
+from profilefit.scenes.skin.law import albedo_of
+from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.truth import gathered
 from profilefit.scenes.stage.buffers import Buffers, step_edge
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
 from profilefit.studies.choose.case import Case, Within
@@ -111,7 +112,9 @@ class Measured:
         total = np.zeros((ROWS, self.size[0], 3))
         for share, kernel, _ in passes(option, self.case, truth(self.setting)):
             drawn = Sampling(option.number)
-            total += share * self._stage.scatter(kernel, self.case.mfp, drawn, self._kernel_alpha, rows)
+            total += share * self._stage.scatter(
+                SeparableFilter(kernel), self.case.mfp, drawn, self._kernel_alpha, rows
+            )
         return total
 
     @property

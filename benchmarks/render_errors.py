@@ -50,7 +50,7 @@ def measured(
 
     The separable filter draws nothing: all its seeds would be the same picture, so it has one.
     """
-    errors = {key: _errors(judge, one, samples, 1 if one.law == "separable" else seeds) for key, one in works.items()}
+    errors = {key: _errors(judge, one, samples, 1 if one.is_filter else seeds) for key, one in works.items()}
     times = {key: np.empty((len(samples), turns)) for key in works}
     for turn in range(turns):
         for row, number in enumerate(samples):

@@ -8,9 +8,10 @@ import profilefit
 from mcml_sim import Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, SKY, VERMILION
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.skin.passes import SeparableFilter
+from profilefit.scenes.stage.pattern import Sampling
 
-Law = ProfileLaw | str
+Law = ProfileLaw | SeparableFilter
 OPEN = "s"
 
 
@@ -24,6 +25,11 @@ class Contender:
     colour: str = BLACK
     marker: str = "o"
     dashes: str = "-"
+
+    @property
+    def is_filter(self) -> bool:
+        """Whether it draws nothing: its samples are taps, and every seed is the same picture."""
+        return isinstance(self.law, SeparableFilter)
 
     @property
     def size(self) -> float:
@@ -50,7 +56,7 @@ WANTED = (
     ("liang corrected", "Liang, corrected", "liang", "corrected", "searchlight", ORANGE, "X", "--"),
     ("liang", "Liang, printed", "liang", "published", "searchlight", VERMILION, "X", ":"),
 )
-SEPARABLE = Contender("separable", "separable", Sampling(), GREY, "*", "-.")
+SEPARABLE = Contender("separable", SeparableFilter(), Sampling(), GREY, "*", "-.")
 VARIED = ("hazard", "burley")
 VARIANTS = (
     ("uniform", "longest"),

@@ -16,7 +16,7 @@ from benchmarks.render_laws import Contender
 from benchmarks.render_view import Judged, shown
 from benchmarks.table import show
 from profilefit.report.figures.canvas import canvas, styled
-from profilefit.scenes.stage.sampling import MOST_SAMPLES, Sampling
+from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 
 Floats = NDArray[np.float64]
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear sRGB, ITU-R BT.709
@@ -44,7 +44,7 @@ def shots(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) ->
     """A picture of each law with so many samples, and the least of its times, taken in turns."""
     found = []
     for (one, samples), time in zip(wanted, _least(judge, wanted, turns), strict=True):
-        unit = "taps" if one.law == "separable" else "samples"
+        unit = "taps" if one.is_filter else "samples"
         exitance = judge.stage.scatter(one.law, judge.mfp, one.drawn(samples))
         found.append(Shot(one.label, exitance, samples, time, unit))
     return found

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from benchmarks.render_laws import Contender
 from benchmarks.table import show
-from profilefit.scenes.skin.scene import Scene
+from profilefit.scenes.skin.scene import Head
 from profilefit.scenes.stage.stage import PASSES, Stage, covered, covering
 from profilefit.studies.tradeoff.stopwatch import Ratio
 
@@ -39,7 +39,7 @@ class Timed:
 
 def timed(
     context: moderngl.Context,
-    scene: Scene,
+    scene: Head,
     works: Mapping[str, Contender],
     size: tuple[int, int],
     turns: int,
@@ -50,7 +50,7 @@ def timed(
 
 
 def _timed(
-    context: moderngl.Context, scene: Scene, works: Mapping[str, Contender], size: tuple[int, int], turns: int
+    context: moderngl.Context, scene: Head, works: Mapping[str, Contender], size: tuple[int, int], turns: int
 ) -> Timed:
     mfp = scene.material.mfp
     found = {passes: {key: np.empty(turns) for key in works} for passes in PASSES}

@@ -19,10 +19,10 @@ from benchmarks.table import show
 from mcml_sim import exact
 from profilefit.fitting.sampling import LawTarget
 from profilefit.laws.base import ProfileLaw
-from profilefit.scenes.skin.material import DIFFUSE, translucent
+from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.stage.buffers import step_edge
-from profilefit.scenes.stage.exact_law import ExactLaw
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.exact_law import DIFFUSE, ExactLaw
+from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points, step_response
 

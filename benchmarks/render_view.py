@@ -14,42 +14,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.scenes.skin import truth as integral
-from profilefit.scenes.skin.material import Rgb
-from profilefit.scenes.skin.scene import FACE, Scene, head_scene
-from profilefit.scenes.skin.truth import gathered, refined
+from profilefit.scenes.skin.chart import Judge
+from profilefit.scenes.skin.scene import EXPOSURE, FACE, Head, head_scene
+from profilefit.scenes.skin.truth import exitance_of, own_error
 from profilefit.scenes.stage.buffers import Buffers
+from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import seen
+from profilefit.scenes.stage.world import Rgb
 
 Floats = NDArray[np.float64]
-OwnError = tuple[float, float, float]
 # Brow, nose, its shadow, freckles and the band before it: 60 mm of the head, so that of 192 rows one shows 0.29 mm, and
 # the shortest mean free path is 2.2 pixels: below two the stage fades to Lambert, which the truth does not.
 CLOSE = replace(FACE, target=(14.0, 24.0, 50.0), height=60.0)
-EXPOSURE = 1.1  # of every picture; 1 in a thousand of the view's pixels is clipped by it
 REFERENCE = Path(integral.__file__)  # a kept answer is that of another code if this file has changed
-CHECKED = 60  # pixels at which the reference is compared with one of half the pixel
 
 
 @dataclass(frozen=True)
-class Judged:
-    """A stage that has drawn the view, and the exact answer; row 0 at the bottom.
+class Judged(Judge):
+    """The view and its exact answer; truth_error is the answer's own, by `own_error`, None if not measured."""
 
-    truth  (h, w, 3) radiant exitance, light that scattered only;  mask  (h, w), where light scatters
-    truth_error  what half the pixel's side changes in the truth, over its mean [-]: half of the pixels and nine in ten
-                 are below the first two, the third is the root mean square, which outlines set; None if not measured
-    """
-
-    stage: Stage
-    mfp: Rgb
-    truth: Floats
-    mask: NDArray[np.bool_]
-    truth_error: OwnError | None
-
-    def rmse(self, exitance: NDArray[np.floating]) -> float:
-        """Root mean square error over the translucent pixels and channels, over the mean of the truth there [-]."""
-        difference = exitance[self.mask] - self.truth[self.mask]
-        return float(np.sqrt(np.mean(difference**2)) / np.mean(self.truth[self.mask]))
+    truth_error: TruthError | None
 
     def flip(self, exitance: NDArray[np.floating]) -> float:
         """Mean over the translucent pixels of FLIP (Andersson et al. 2020) [0, 1], seen at 67 pixels a degree."""
@@ -79,13 +63,6 @@ def shown(exitance: NDArray[np.floating]) -> Floats:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
 
 
-def reference(buffers: Buffers, mfp: Rgb) -> Floats:
-    """(h, w, 3) exact exitance where light scatters, and Lambert's elsewhere, as in the stage."""
-    light = gathered(*seen(buffers), mfp, "diffuse").light
-    inside = (buffers.mask > 0.5)[..., None]
-    return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
-
-
 def _kept(path: Path | None, buffers: Buffers, mfp: Rgb) -> Floats:
     seen_by = (
         *(np.asarray(getattr(buffers, field.name)).tobytes() for field in fields(buffers)),
@@ -96,19 +73,13 @@ def _kept(path: Path | None, buffers: Buffers, mfp: Rgb) -> Floats:
         with np.load(path) as content:
             if str(content["digest"]) == digest:
                 return content["truth"]
-    truth = reference(buffers, mfp)
+    truth = exitance_of(buffers, mfp)
     if path is not None:
         np.savez_compressed(path, truth=truth, digest=digest)
     return truth
 
 
-def _own_error(context: moderngl.Context, scene: Scene, size: tuple[int, int]) -> OwnError:
+def _own_error(context: moderngl.Context, scene: Head, size: tuple[int, int]) -> TruthError:
     with Stage(context, (2 * size[0], 2 * size[1])) as fine:
         fine.draw(scene)
-        surface, view = seen(fine.buffers())
-    inside = np.argwhere(surface.coarsened(2).mask)
-    chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
-    mean, difference = refined(surface, view, scene.material.mfp, "diffuse", chosen)
-    share = np.abs(difference) / np.mean(mean)
-    half, most = np.quantile(share, (0.5, 0.9)).tolist()
-    return half, most, float(np.sqrt(np.mean(share**2)))
+        return own_error(fine.buffers(), scene.material.mfp)

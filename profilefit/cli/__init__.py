@@ -18,15 +18,16 @@ from profilefit.cli.fit import fit
 from profilefit.cli.options import in_options
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
+from profilefit.cli.scene import scene
 from profilefit.cli.stability import stability
 from profilefit.cli.tradeoff import tradeoff
 from profilefit.errors import InputError, OutputError, ShaderError, StoreError
 
 __all__ = ["app", "main"]
 
-HELP = """\
-Closed-form profiles of subsurface scattering, fitted to simulated or exact
-light: constants with error bars, all of them made again by one command.
+# The first line is empty: typer takes the margin of all others off them.
+HELP = """
+Closed-form profiles of subsurface scattering, fitted to light with error bars.
 
   profilefit regenerate hazard --out mine  simulate, and fit anew: two minutes
   profilefit report --fits mine            what came out, and how good it is
@@ -34,7 +35,7 @@ light: constants with error bars, all of them made again by one command.
   profilefit fit FILE.csv                  alpha and l of what you measured"""
 PANELS = {
     "Make laws": (regenerate, report),
-    "Use laws": (export, choose, convert),
+    "Use laws": (export, choose, convert, scene),
     "Your own data": (fit, examples),
     "What to trust": (check, stability, tradeoff),
 }

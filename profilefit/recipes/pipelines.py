@@ -116,7 +116,8 @@ def _evidence(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 
-PIPELINES: dict[str, Callable[[Recipe, Run, Orders | None], Made]] = {
+Pipeline = Callable[[Recipe, Run, Orders | None], Made]
+PIPELINES: dict[str, Pipeline] = {
     "albedo": _albedo,
     "profile": _profile,
     "inverse": _inverse,

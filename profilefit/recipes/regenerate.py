@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import jax
@@ -10,7 +12,7 @@ import jax
 from mcml_sim import Orders
 from mcml_sim.runs.progress import tracked
 from profilefit.recipes import record, starts
-from profilefit.recipes.pipelines import PIPELINES, needs_photons
+from profilefit.recipes.pipelines import PIPELINES, Pipeline, needs_photons
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.run import Run
 
@@ -19,8 +21,13 @@ from profilefit.recipes.run import Run
 CLEARED = 8  # recipes after which compiled programs go
 
 
-def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
-    """Run recipes and write their records: first the maps that others are normalised with, last what compares them."""
+def regenerate(
+    recipes: tuple[Recipe, ...], run: Run, pipelines: Mapping[str, Pipeline] = MappingProxyType(PIPELINES)
+) -> list[Path]:
+    """Run recipes and write their records: first the maps that others are normalised with, last what compares them.
+
+    pipelines  what runs each recipe, by its key `pipeline`; a caller may have more of them
+    """
     for recipe in recipes:
         starts.require_known(recipe)
     ordered = sorted(recipes, key=lambda r: (r.pipeline != "albedo", r.pipeline == "evidence"))
@@ -30,7 +37,7 @@ def regenerate(recipes: tuple[Recipe, ...], run: Run) -> list[Path]:
     for number, recipe in enumerate(tracked(ordered, "fitting", "recipes", quiet=run.progress is False), start=1):
         run.say(f"{recipe.name}: {recipe.title}")
         light = lights[recipe.setting] if needs_photons(recipe) else None
-        content, arrays = PIPELINES[recipe.pipeline](recipe, run, light)
+        content, arrays = pipelines[recipe.pipeline](recipe, run, light)
         written.append(record.write(run.out, recipe.name, {**_header(recipe, run, light), **content}, arrays))
         if number % CLEARED == 0:
             jax.clear_caches()

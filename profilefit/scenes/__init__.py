@@ -1,1 +1,69 @@
-"""Calibrated closed forms on a stage, each beside its truth."""
+"""Calibrated closed forms on a stage, each beside its truth; what is here is imported when it is asked for.
+
+with profilefit.scenes.Stage(context, (512, 512)) as stage:
+    stage.draw(profilefit.scenes.head_scene())
+"""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
+if TYPE_CHECKING:
+    from profilefit.scenes.skin.law import Separable
+    from profilefit.scenes.skin.material import translucent
+    from profilefit.scenes.skin.passes import SeparableFilter
+    from profilefit.scenes.skin.scene import head_scene
+    from profilefit.scenes.skin.truth import gathered
+    from profilefit.scenes.stage.exact_law import ExactLaw
+    from profilefit.scenes.stage.pattern import Sampling
+    from profilefit.scenes.stage.picture import srgb_codes, to_srgb
+    from profilefit.scenes.stage.stage import Stage, covering
+    from profilefit.scenes.stage.step_edge import step_response
+    from profilefit.scenes.stage.surface import seen
+    from profilefit.scenes.stage.technique import Lambert
+    from profilefit.scenes.stage.world import Camera
+else:
+    __getattr__ = attributes(
+        __name__,
+        {
+            "Separable": "skin.law",
+            "translucent": "skin.material",
+            "SeparableFilter": "skin.passes",
+            "head_scene": "skin.scene",
+            "gathered": "skin.truth",
+            "ExactLaw": "stage.exact_law",
+            "Sampling": "stage.pattern",
+            **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.picture"),
+            **dict.fromkeys(("Stage", "covering"), "stage.stage"),
+            "step_response": "stage.step_edge",
+            "seen": "stage.surface",
+            "Lambert": "stage.technique",
+            "Camera": "stage.world",
+        },
+    )
+
+# By its name in a file's key `scene`: the module that reads such a file and draws it, and an example of one.
+SCENES = {"skin": ("profilefit.scenes.skin.scene", "skin-head.toml")}
+
+__all__ = [
+    "SCENES",
+    "Camera",
+    "ExactLaw",
+    "Lambert",
+    "Sampling",
+    "Separable",
+    "SeparableFilter",
+    "Stage",
+    "covering",
+    "gathered",
+    "head_scene",
+    "seen",
+    "srgb_codes",
+    "step_response",
+    "to_srgb",
+    "translucent",
+]
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that nobody has asked for yet, too."""
+    return [*globals(), *__all__]

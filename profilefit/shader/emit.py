@@ -37,7 +37,6 @@ from profilefit.laws.van_de_hulst import VanDeHulst
 from profilefit.shader.languages import translated
 
 Numbers = dict[str, float]
-TEXTS = "profilefit.shader.glsl"
 PLACEHOLDER = "LAW_"
 # A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before.
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
@@ -163,9 +162,10 @@ def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: 
     return _filled(text, name or prefix(law), constants, 0, lang, remarks)
 
 
-def stage_text(file: str) -> str:
-    """A text of `glsl/stage/`, as it is."""
-    return (resources.files(TEXTS) / "stage" / file).read_text(encoding="utf-8")
+@cache
+def text_beside(module: str, file: str) -> str:
+    """A text that lies in the folder of a module, or below it, as it is: text_beside(__name__, "glsl/x.frag")."""
+    return (resources.files(module.rpartition(".")[0]) / file).read_text(encoding="utf-8")
 
 
 def _form(law: Constants, known: Mapping[Any, Form]) -> Form:
@@ -189,9 +189,8 @@ def _map_constants(law: Any) -> Numbers:
     return {"map_entered": albedo.entered, **{f"map_{key}": value for key, value in albedo.constants().items()}}
 
 
-@cache
 def _read(file: str) -> str:
-    return (resources.files(TEXTS) / f"{file}.glsl").read_text(encoding="utf-8")
+    return text_beside(__name__, f"glsl/{file}.glsl")
 
 
 def _filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import RecipeError
-from profilefit.recipes import catalogue, pipelines, recipe, regenerate
+from profilefit.recipes import catalogue, recipe, regenerate
 from profilefit.recipes.run import Run
 
 FITS = catalogue.fits_folder()
@@ -24,15 +24,13 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     assert not Path(tmp_path / "store").exists()
 
 
-def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path, monkeypatch):
+def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
     made = []
 
     def pipeline(chosen, run, light):
         made.append((chosen.name, light and light.setting))
         return {"constants": {}}, {}
 
-    for name in ("albedo", "profile"):
-        monkeypatch.setitem(pipelines.PIPELINES, name, pipeline)
     said: list[str] = []
     run = Run("quick", 0, tmp_path / "out", None, 1000, said.append, False)
     refracted, diffuse = Setting(n=1.4), Setting("diffuse")
@@ -45,7 +43,7 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path, mon
         exactly,
         replace(exactly, name="checked", setting=diffuse, check="orders"),
     )
-    written = regenerate.regenerate(recipes, run)
+    written = regenerate.regenerate(recipes, run, {"albedo": pipeline, "profile": pipeline})
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
     assert made == [
         ("albedo-rational-n1.4", refracted),

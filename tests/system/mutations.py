@@ -504,6 +504,11 @@ def scene(seed: int) -> bytes:
     return toml_mutant(random.Random(seed), _text("examples/skin.toml"))
 
 
+def head(seed: int) -> bytes:
+    """A .toml of `profilefit scene`."""
+    return toml_mutant(random.Random(seed), _text("examples/skin-head.toml"))
+
+
 def recipe(seed: int) -> bytes:
     """A .toml of `profilefit regenerate`."""
     rng = random.Random(seed)

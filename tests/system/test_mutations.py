@@ -27,6 +27,7 @@ from typing import Any
 import pytest
 
 from mcml_sim.errors import InputError, OutputError, StoreError
+from mcml_sim.files.text_file import read_toml
 from mcml_sim.results.mci import read_mci
 from mcml_sim.results.tally_file import read_results
 from profilefit.cli.report import report
@@ -35,6 +36,7 @@ from profilefit.measured import reading
 from profilefit.recipes import recipe, record
 from profilefit.recipes.inventory import find
 from profilefit.report.page.document import write_page
+from profilefit.scenes.skin import scene as skin
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
 from profilefit.studies.choose import scene
@@ -82,6 +84,7 @@ def read_samples(path: Path) -> object:
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
     "record": (".json", lambda seed: mutations.record(seed)[1], (lambda path: record.read(path, whole=True),)),
     "scene": (".toml", mutations.scene, (scene.read,)),
+    "head": (".toml", mutations.head, (lambda path: skin.read(str(path), read_toml(path)),)),
     "recipe": (".toml", mutations.recipe, (recipe.read,)),
     "table": (".csv", mutations.table, (read_profile,)),
     "results": (".npz", mutations.results, (read_results, read_profile)),

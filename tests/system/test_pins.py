@@ -31,6 +31,7 @@ SUBCOMMANDS = (
     "fit",
     "choose",
     "convert",
+    "scene",
     "export",
     "examples",
     "regenerate",

@@ -16,7 +16,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
-from profilefit.scenes.stage.combining import srgb_codes
+from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 
 Floats = NDArray[np.float64]

@@ -102,7 +102,7 @@ def export_hint(choice: Choice) -> str:
     if option.law is not None:
         return f"profilefit export {option.name} --lang glsl"
     if is_filter(option):
-        return "the filter's constants: --json, `filters`; its text: profilefit/shader/glsl/stage/separable.frag"
+        return "the filter's constants: --json, `filters`; its text: profilefit/scenes/skin/separable.frag"
     return "nothing to export: radiance is A E / pi"
 
 

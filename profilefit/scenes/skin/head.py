@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.stage.mesh import Mesh, parameters, sheet
+from profilefit.scenes.stage.world import Mesh, parameters, sheet
 
 Floats = NDArray[np.float64]
 SKULL = np.array([72.0, 104.0, 88.0])  # semi-axes

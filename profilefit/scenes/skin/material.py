@@ -9,9 +9,8 @@ import numpy as np
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
-
-DIFFUSE = Setting("diffuse")
-Rgb = tuple[float, float, float]
+from profilefit.scenes.stage.exact_law import DIFFUSE
+from profilefit.scenes.stage.world import Rgb
 
 
 @dataclass(frozen=True)

@@ -24,8 +24,10 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from profilefit.errors import InputError
+from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
-from profilefit.scenes.stage.surface import Surface, View
+from profilefit.scenes.stage.picture import TruthError
+from profilefit.scenes.stage.surface import Surface, View, seen
 
 Floats = NDArray[np.float64]
 # Pixels up to this many rows or columns away take 2 x 2 Gauss points, up to that many 4 x 4: at a mean free path of 1
@@ -36,6 +38,9 @@ STEPS = np.max(np.abs(np.indices((2 * NEAR + 1, 2 * NEAR + 1)) - NEAR), axis=0).
 EDGE_RULE = np.polynomial.legendre.leggauss(24)
 NOWHERE = (-(10**6), -(10**6))  # row and column of what is not in the image
 AT_ONCE = 32  # gathering points; a few arrays of so many times the number of visible pixels stand in memory
+
+
+CHECKED = 60  # pixels at which the reference is compared with one of half the pixel
 
 
 @dataclass(frozen=True)
@@ -89,6 +94,27 @@ def refined(
     parts = (factor * chosen[:, None] + inside).reshape(-1, 2)
     mean = gathered(fine, view, mfp, illumination, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
     return mean, gathered(coarse, view.coarsened(factor), mfp, illumination, chosen).light - mean
+
+
+def exitance_of(buffers: Buffers, mfp: ArrayLike) -> Floats:
+    """(h, w, 3) radiant exitance of a picture under diffuse light: the reference; Lambert's where nothing scatters."""
+    light = gathered(*seen(buffers), mfp, "diffuse").light
+    inside = (buffers.mask > INSIDE)[..., None]
+    return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
+
+
+def own_error(fine: Buffers, mfp: ArrayLike) -> TruthError:
+    """What half the pixel's side changes in `exitance_of`, over its mean [-], at some pixels of an even-sized picture.
+
+    fine  the same picture with pixels of half the side
+    """
+    surface, view = seen(fine)
+    inside = np.argwhere(surface.coarsened(2).mask)
+    chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
+    mean, difference = refined(surface, view, mfp, "diffuse", chosen)
+    share = np.abs(difference) / np.mean(mean)
+    half, most = np.quantile(share, (0.5, 0.9)).tolist()
+    return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
 
 
 def own_share(curves: Curves, across: Floats, along: Floats) -> Floats:

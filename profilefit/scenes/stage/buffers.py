@@ -2,17 +2,13 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import moderngl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from profilefit.errors import InputError
-from profilefit.shader.context import check_errors, full_screen, program
 
 Singles = NDArray[np.float32]
 VECTORS = ("irradiance", "reflectance", "position", "normal")
@@ -122,70 +118,37 @@ def step_edge(size: tuple[int, int], pixel: float, reflectance: ArrayLike) -> Bu
     return flat(size, pixel, reflectance, lit)
 
 
-class FullScreen:
-    """A fragment shader with its program; `milliseconds` is how long it took to compile."""
-
-    def __init__(self, context: moderngl.Context, name: str, fragment: str):
-        self.context, self.name = context, name
-        start = time.perf_counter()
-        self.program = program(context, name, fragment)
-        self.milliseconds = 1e3 * (time.perf_counter() - start)
-        self._triangle = full_screen(context, self.program)
-
-    def run(
-        self, target: moderngl.Framebuffer, textures: Mapping[str, moderngl.Texture], values: Mapping[str, Any]
-    ) -> None:
-        """Fills the target; what the shader does not use of the values, by the names of its uniforms, is left out."""
-        bind(self.program, textures)
-        assign(self.program, values)
-        with self.context.scope(target, enable_only=moderngl.NOTHING):
-            self._triangle.render(moderngl.TRIANGLES, vertices=3)
-        check_errors(self.context, self.name)
-
-    def release(self) -> None:
-        self._triangle.release()
-        self.program.release()
-
-
-def bind(shader: moderngl.Program, textures: Mapping[str, moderngl.Texture]) -> None:
-    """Each texture to a unit of its own, and its number to the sampler of that name."""
-    for unit, (name, texture) in enumerate(textures.items()):
-        texture.use(unit)
-        assign(shader, {name: unit})
-
-
-def assign(shader: moderngl.Program, values: Mapping[str, Any]) -> None:
-    """Uniforms by name; matrices are (4, 4) arrays as one writes them, rows first."""
-    for name, value in values.items():
-        uniform = shader.get(name, None)
-        if not isinstance(uniform, moderngl.Uniform):
-            continue  # compiled away
-        if isinstance(value, np.ndarray):
-            uniform.write(np.ascontiguousarray(value.T, np.float32).tobytes())
-        else:
-            uniform.value = value
-
-
 SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
 
 
 class Targets:
-    """Float textures of one size, each four channels, with the framebuffers that fill them."""
+    """Float textures of one size by name, four channels each: those of `SURFACE`, and all that passes ask for."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
         self.context, self.size = context, size
-        self.maps = {name: float_texture(context, size, 4) for name in SURFACE}
+        self._maps = {name: float_texture(context, size, 4) for name in SURFACE}
         self._depth = context.depth_renderbuffer(size)
-        self.surface = context.framebuffer(list(self.maps.values()), self._depth)
-        self.halfway, self.exitance, self.radiance = (float_texture(context, size, 4) for _ in range(3))
-        self.into = {texture: context.framebuffer([texture]) for texture in self._shown()}
+        self.surface = context.framebuffer(list(self._maps.values()), self._depth)
+        self._into: dict[str, moderngl.Framebuffer] = {}
+
+    def map(self, name: str) -> moderngl.Texture:
+        """The texture of that name, made when it is first asked for."""
+        if name not in self._maps:
+            self._maps[name] = float_texture(self.context, self.size, 4)
+        return self._maps[name]
+
+    def into(self, name: str) -> moderngl.Framebuffer:
+        """What fills it."""
+        if name not in self._into:
+            self._into[name] = self.context.framebuffer([self.map(name)])
+        return self._into[name]
 
     def upload(self, buffers: Buffers) -> None:
-        for texture, array in zip(self.maps.values(), buffers.targets(), strict=True):
-            texture.write(np.ascontiguousarray(array).tobytes())
+        for name, array in zip(SURFACE, buffers.targets(), strict=True):
+            self._maps[name].write(np.ascontiguousarray(array).tobytes())
 
     def read(self, pixel: float, is_perspective: bool) -> Buffers:
-        irradiance, reflectance, position, normal = (pixels(self.maps[name]) for name in SURFACE)
+        irradiance, reflectance, position, normal = (pixels(self._maps[name]) for name in SURFACE)
         return Buffers(
             irradiance[..., :3],
             reflectance[..., :3],
@@ -200,14 +163,11 @@ class Targets:
         )
 
     def release(self) -> None:
-        for framebuffer in (self.surface, *self.into.values()):
+        for framebuffer in (self.surface, *self._into.values()):
             framebuffer.release()
-        for texture in (*self.maps.values(), *self._shown()):
+        for texture in self._maps.values():
             texture.release()
         self._depth.release()
-
-    def _shown(self) -> tuple[moderngl.Texture, moderngl.Texture, moderngl.Texture]:
-        return self.halfway, self.exitance, self.radiance
 
 
 def float_texture(

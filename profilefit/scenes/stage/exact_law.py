@@ -13,10 +13,10 @@ from numpy.typing import NDArray
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.scenes.skin.material import DIFFUSE
-from profilefit.shader.emit import literal, stage_text
+from profilefit.shader.emit import literal, text_beside
 
 Singles = NDArray[np.float32]
+DIFFUSE = Setting("diffuse")  # the light that irradiance is
 NAME = "exact"
 MOST_DEPTH = 24 * np.log(2.0)  # t = -ln(1 - xi) at the largest xi of a law's text, 1 - 2^-24
 DRAWN, KNOWN = 2048, 4096  # columns of the tables
@@ -51,18 +51,22 @@ class ExactLaw:
             "LARGEST_U": literal(float(np.arcsinh(FARTHEST / NEAR))),
             "NEAR": literal(NEAR),
         }
-        text = stage_text("exact_law.glsl").replace("LAW_", f"{name}_")
+        text = text_beside(__name__, "glsl/exact_law.glsl").replace("LAW_", f"{name}_")
         for key, value in values.items():
             text = text.replace(f"@{key}@", value)
         return text
 
     def textures(self, name: str) -> dict[str, Singles]:
         """Float textures (rows, columns, channels) by the names of their samplers."""
-        tables = [_table(alpha, self.setting) for alpha in self.alpha]
-        return {
-            f"{name}_drawn": np.stack([drawn for drawn, _ in tables]),
-            f"{name}_known": np.stack([known for _, known in tables]),
-        }
+        drawn, known = _tables(self.alpha, self.setting)
+        return {f"{name}_drawn": drawn, f"{name}_known": known}
+
+
+@cache
+def _tables(alpha: tuple[float, ...], setting: Setting) -> tuple[Singles, Singles]:
+    """A row for each albedo; the same arrays each time, which are sent once."""
+    drawn, known = zip(*(_table(one, setting) for one in alpha), strict=True)
+    return np.stack(drawn), np.stack(known)
 
 
 @cache

@@ -8,11 +8,10 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.skin.scene import Part, Scene
-from profilefit.scenes.stage.buffers import assign, bind
-from profilefit.scenes.stage.camera import looking, orthographic, unit
-from profilefit.shader.context import check_errors, program
-from profilefit.shader.emit import stage_text
+from profilefit.scenes.stage.technique import Program
+from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
+from profilefit.shader.context import check_errors
+from profilefit.shader.emit import text_beside
 
 SHADOW_SIDE = 2048
 NOWHERE = 1e6  # depth along the light where nothing is [mm]
@@ -34,8 +33,10 @@ class Geometry:
 
     def __init__(self, context: moderngl.Context, shadow_side: int = SHADOW_SIDE):
         self.context = context
-        self._shadow = program(context, "shadow", stage_text("shadow.frag"), stage_text("shadow.vert"))
-        self._surface = program(context, "surface", stage_text("surface.frag"), stage_text("surface.vert"))
+        self._shadow, self._surface = (
+            Program(context, name, *(text_beside(__name__, f"glsl/{name}.{stage}") for stage in ("frag", "vert")))
+            for name in ("shadow", "surface")
+        )
         self._map = context.texture((shadow_side, shadow_side), 1, dtype="f4")
         self._map.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._depth = context.depth_renderbuffer((shadow_side, shadow_side))
@@ -47,7 +48,7 @@ class Geometry:
         """Both passes; the target has four float textures and a depth. Parts seen before are not sent again."""
         if scene.parts is not self._parts:
             self._release_parts()
-            self._drawn = [_Drawn(self.context, part, self._shadow, self._surface) for part in scene.parts]
+            self._drawn = [_Drawn(self.context, part, self._shadow.compiled, self._surface) for part in scene.parts]
             self._parts = scene.parts
         sphere = _around(scene)
         light = self._light(scene, sphere)
@@ -72,11 +73,10 @@ class Geometry:
         return {
             "light_clip": clip,
             "toward_light": tuple(toward),
-            "shadow_pixel": 2.0 * half / self._map.width,
         }
 
     def _draw_shadow(self, light: Values) -> None:
-        assign(self._shadow, light)
+        self._shadow.assign({}, light)
         with self.context.scope(self._target, enable_only=moderngl.DEPTH_TEST):
             self._target.clear(NOWHERE, depth=1.0)
             for part in self._drawn:
@@ -87,33 +87,31 @@ class Geometry:
         camera = scene.camera
         depth = -(camera.view() @ np.append(sphere.centre, 1.0))[2]
         near = max(depth - MARGIN * sphere.radius, 0.01 * sphere.radius)
-        assign(self._surface, light)
-        assign(
-            self._surface,
-            {
-                "view": camera.view(),
-                "projection": camera.projection(target.width / target.height, near, depth + MARGIN * sphere.radius),
-                "light": scene.light.irradiance,
-                "ambient": scene.ambient,
-            },
-        )
+        values = {
+            **light,
+            "shadow_pixel": 2.0 * MARGIN * sphere.radius / self._map.width,
+            "view": camera.view(),
+            "projection": camera.projection(target.width / target.height, near, depth + MARGIN * sphere.radius),
+            "light": scene.light.irradiance,
+            "ambient": scene.ambient,
+        }
         with self.context.scope(target, enable_only=moderngl.DEPTH_TEST):
             target.clear(depth=1.0)
             for part in self._drawn:
-                part.draw_surface(self._surface, self._map)
+                part.draw_surface(self._map, values)
         check_errors(self.context, "surface")
 
 
 class _Drawn:
     """A part on the GPU, for as long as it is drawn."""
 
-    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program, surface: moderngl.Program):
-        self.part = part
+    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program, surface: Program):
+        self.part, self._shader = part, surface
         self._vertices = context.buffer(part.mesh.vertices().tobytes())
         self._triangles = context.buffer(part.mesh.triangles.astype("i4").tobytes())
         self.shadow = context.vertex_array(shadow, [(self._vertices, "3f 5x4", "position")], self._triangles)
         names = "position", "normal", "uv"
-        self._surface = context.vertex_array(surface, [(self._vertices, "3f 3f 2f", *names)], self._triangles)
+        self._surface = context.vertex_array(surface.compiled, [(self._vertices, "3f 3f 2f", *names)], self._triangles)
         rows, columns = part.reflectance.shape[:2]
         self._skin = context.texture((columns, rows), 3, part.reflectance.astype("f4").tobytes(), dtype="f4")
         self._skin.repeat_y = False
@@ -121,9 +119,9 @@ class _Drawn:
         self._skin.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._skin.anisotropy = ANISOTROPY
 
-    def draw_surface(self, shader: moderngl.Program, shadow_map: moderngl.Texture) -> None:
-        bind(shader, {"skin": self._skin, "shadow_map": shadow_map})
-        assign(shader, {"translucent": float(self.part.is_translucent), "roughness": self.part.roughness})
+    def draw_surface(self, shadow_map: moderngl.Texture, values: Values) -> None:
+        own = {"translucent": float(self.part.is_translucent), "roughness": self.part.roughness}
+        self._shader.assign({"skin": self._skin, "shadow_map": shadow_map}, {**values, **own})
         self._surface.render(moderngl.TRIANGLES)
 
     def release(self) -> None:

@@ -1,7 +1,7 @@
-"""The render of Liang et al., section 5: shadow and thickness, G-buffer, scattering, combination.
+"""The render of Liang et al., section 5: shadow and thickness, G-buffer, scattering by a technique, combination.
 
     with Stage(open_context(), (512, 512)) as stage:
-        stage.draw(head_scene())
+        stage.draw(scene)
         image = stage.render(profilefit.load("hazard", setting=Setting("diffuse")), mfp, Sampling(64))
 
 Lengths are millimetres of one world scale. Irradiance is diffuse light, so a law of the diffuse setting is meant; one
@@ -11,8 +11,8 @@ of the searchlight setting may be passed as well, to see the difference.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Hashable
-from typing import Any, Self
+from collections.abc import Callable
+from typing import Self, TypeVar
 
 import moderngl
 import numpy as np
@@ -20,19 +20,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.checks import checked_whole
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw
-from profilefit.scenes.skin.scene import Scene
-from profilefit.scenes.skin.separable_kernel import Separable, albedo_of
 from profilefit.scenes.stage.buffers import Buffers, Singles, Targets, pixels
-from profilefit.scenes.stage.combining import Combining
-from profilefit.scenes.stage.exact_law import ExactLaw
+from profilefit.scenes.stage.gather import Law, technique
 from profilefit.scenes.stage.geometry import SHADOW_SIDE, Geometry
-from profilefit.scenes.stage.sampling import Sampling
-from profilefit.scenes.stage.scattering import Filtering, Gathering, View, text_of
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, FullScreen, Pass, Technique, combination
+from profilefit.scenes.stage.world import Scene
 
 Floats = NDArray[np.float64]
 DEFAULT = Sampling()
-Law = ProfileLaw | ExactLaw | Separable
+By = Law | Technique
 MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
 BY_REFLECTANCE = -1.0  # alpha that tells a shader to take it from A
 # Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
@@ -56,9 +53,9 @@ class Stage:
         self.compile_milliseconds: dict[str, float] = {}
         self._targets = Targets(context, self.size)
         self._geometry = Geometry(context, side)
-        self._passes: dict[Hashable, Gathering | Filtering | Combining] = {}
+        self._passes: dict[str, FullScreen] = {}  # by their sources
         self._released = False
-        self._view: View | None = None
+        self._view: tuple[float, bool] | None = None  # side of a pixel [mm], and whether it is in perspective
         self._scene: Scene | None = None
         self._mean_reflectance: Floats | None = None
 
@@ -67,7 +64,7 @@ class Stage:
         self._alive()
         self._geometry.draw(scene, self._targets.surface)
         camera = scene.camera
-        self._seen(View(self.size, camera.pixel(self.size[1]), camera.is_perspective), scene)
+        self._seen(camera.pixel(self.size[1]), camera.is_perspective, scene)
 
     def upload(self, buffers: Buffers) -> None:
         """A G-buffer of numpy arrays in place of a scene; there is no light then, so `render` has no highlights."""
@@ -75,16 +72,15 @@ class Stage:
         if buffers.size != self.size:
             raise InputError(f"buffers must be {self.size} pixels, as the stage is, got {buffers.size}")
         self._targets.upload(buffers)
-        self._seen(View(self.size, buffers.pixel, buffers.is_perspective), None)
+        self._seen(buffers.pixel, buffers.is_perspective, None)
 
     def buffers(self) -> Buffers:
         """The G-buffer as numpy arrays."""
-        view = self._ready()
-        return self._targets.read(view.pixel, view.is_perspective)
+        return self._targets.read(*self._ready())
 
     def scatter(
         self,
-        law: Law | str,
+        law: By,
         mfp: ArrayLike,
         sampling: Sampling = DEFAULT,
         fixed_alpha: ArrayLike | None = None,
@@ -92,30 +88,29 @@ class Stage:
     ) -> Singles:
         """(h, w, 3) radiant exitance, A times the blurred irradiance, in its unit; radiance is that over pi. Pass 3.
 
-        law  with a shader text, an `ExactLaw`, a `Separable` or "separable"
+        law  with a shader text, or an `ExactLaw`, which is sampled; or a technique of another kind
         mfp  of red, green and blue, or one for all [mm]
         fixed_alpha  single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
         rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
         """
         first, last = rows or (0, self.size[1])
-        target = self._targets.into[self._targets.exitance]
+        target = self._targets.into(EXITANCE)
         target.scissor = (0, first, self.size[0], last - first)
         try:
             self._scatter(law, mfp, sampling, fixed_alpha)
         finally:
             target.scissor = (0, 0, *self.size)
-        return pixels(self._targets.exitance)[first:last, :, :3]
+        return pixels(self._targets.map(EXITANCE))[first:last, :, :3]
 
     def render(
-        self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None
+        self, law: By, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None
     ) -> Singles:
         """(h, w, 3) linear radiance to the camera [light's unit / sr]; arguments as for `scatter`. Passes 3 and 4."""
-        self._scatter(law, mfp, sampling, fixed_alpha)
-        self._combine(law, mfp, fixed_alpha)
-        return pixels(self._targets.radiance)[..., :3]
+        self._combine(*self._scatter(law, mfp, sampling, fixed_alpha))
+        return pixels(self._targets.map(RADIANCE))[..., :3]
 
     def time(
-        self, law: Law | str, mfp: ArrayLike, sampling: Sampling = DEFAULT, repeats: int = 5, passes: str = "scatter"
+        self, law: By, mfp: ArrayLike, sampling: Sampling = DEFAULT, repeats: int = 5, passes: str = "scatter"
     ) -> list[float]:
         """Milliseconds of each repeat, by the driver's clock where it is to be trusted; all is compiled before.
 
@@ -130,8 +125,10 @@ class Stage:
 
     def release(self) -> None:
         """Frees all that the stage has on the GPU; the context is its owner's."""
-        for one in (*self._passes.values(), self._geometry, self._targets):
+        for one in self._passes.values():
             one.release()
+        self._geometry.release()
+        self._targets.release()
         self._passes.clear()
         self._released = True
 
@@ -141,42 +138,37 @@ class Stage:
     def __exit__(self, *error: object) -> None:
         self.release()
 
-    def _seen(self, view: View, scene: Scene | None) -> None:
-        self._view, self._scene, self._mean_reflectance = view, scene, None
+    def _seen(self, pixel: float, is_perspective: bool, scene: Scene | None) -> None:
+        self._view, self._scene, self._mean_reflectance = (pixel, is_perspective), scene, None
 
     def _alive(self) -> None:
         if self._released:
             raise InputError("stage must not be used after it was released: make another one")
 
-    def _ready(self) -> View:
+    def _ready(self) -> tuple[float, bool]:
         self._alive()
         if self._view is None:
             raise InputError("stage must have a scene or buffers: draw or upload comes first")
         return self._view
 
-    def _scatter(self, law: Law | str, mfp: ArrayLike, sampling: Sampling, fixed_alpha: ArrayLike | None) -> None:
-        view, law, length, alpha = self._ready(), _law(law), _lengths(mfp), _albedos(fixed_alpha)
-        if isinstance(law, Separable):
-            filtering = self._compiled(law, "separable", lambda: Filtering(self.context, law))
-            filtering.run(self._targets, view, sampling, self._stretches(law, length, alpha))
-        else:
-            key = (sampling.kind, sampling.channels, sampling.area)
-            gathering = self._compiled(law, key, lambda: Gathering(self.context, law, sampling))
-            gathering.run(self._targets, view, sampling, length, alpha)
+    def _scatter(
+        self, law: By, mfp: ArrayLike, sampling: Sampling, fixed_alpha: ArrayLike | None
+    ) -> tuple[Technique, Frame]:
+        by, view = technique(law), self._ready()
+        frame = Frame(self.size, *view, sampling, _lengths(mfp), _albedos(fixed_alpha), self._mean)
+        for one in by.passes(frame):
+            self._run(one)
+        return by, frame
 
-    def _combine(self, law: Law | str, mfp: ArrayLike, fixed_alpha: ArrayLike | None) -> None:
-        view, law, length, alpha = self._ready(), _law(law), _lengths(mfp), _albedos(fixed_alpha)
-        if isinstance(law, Separable):
-            length = self._stretches(law, length, alpha)
-        combining = self._compiled(law, "combine", lambda: Combining(self.context, law))
-        combining.run(self._targets, view, self._scene, length, alpha)
+    def _combine(self, by: Technique, frame: Frame) -> None:
+        self._run(combination(by, frame, self._scene))
 
-    def _frame(self, law: Law | str, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
+    def _frame(self, law: By, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
         if passes == "frame" and self._scene is not None:
             self._geometry.draw(self._scene, self._targets.surface)
-        self._scatter(law, mfp, sampling, None)
+        drawn = self._scatter(law, mfp, sampling, None)
         if passes == "frame":
-            self._combine(law, mfp, None)
+            self._combine(*drawn)
 
     def _timed(self, work: Callable[[], None]) -> float:
         query = self.context.query(time=True)
@@ -189,28 +181,18 @@ class Stage:
         by_driver = query.elapsed / 1e9
         return 1e3 * (by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall)
 
-    def _stretches(self, law: Separable, mfp: Floats, alpha: Floats) -> Floats:
-        """One kernel serves the whole picture: that of its mean A, where none is fixed."""
+    def _mean(self) -> Floats:
+        """Mean A of what was drawn last, asked for once."""
         if self._mean_reflectance is None:
             self._mean_reflectance = _mean_reflectance(self.buffers())
-        by_reflectance = np.array([albedo_of(a, law.setting) for a in self._mean_reflectance.tolist()])
-        return law.stretches(np.where(alpha < 0, by_reflectance, alpha), mfp)
+        return self._mean_reflectance
 
-    def _compiled(self, law: Law, what: Hashable, make: Callable[[], Any]) -> Any:
-        """A pass of a law, made once; how long that took is in `compile_milliseconds`."""
-        key = (text_of(law) if isinstance(law, ProfileLaw) else law, what)
-        if key not in self._passes:
-            self._passes[key] = made = make()
-            self.compile_milliseconds[made.name] = made.milliseconds
-        return self._passes[key]
-
-
-def _law(law: object) -> Law:
-    if isinstance(law, str) and law == "separable":
-        return Separable()
-    if not isinstance(law, ProfileLaw | ExactLaw | Separable):
-        raise InputError(f'law must be a profile law, an ExactLaw, a Separable or "separable", got {law!r}')
-    return law
+    def _run(self, one: Pass) -> None:
+        """Compiled once; how long that took is in `compile_milliseconds`."""
+        if one.source not in self._passes:
+            self._passes[one.source] = made = FullScreen(self.context, one)
+            self.compile_milliseconds[one.name] = made.program.milliseconds
+        self._passes[one.source].run(one, self._targets)
 
 
 def _lengths(mfp: ArrayLike) -> Floats:
@@ -246,9 +228,10 @@ ROWS = 270  # of the picture that is searched with
 STEPS = 12  # of the bisection: the height to 1 in 4000
 SPAN = 0.05, 8.0  # heights tried, in those of the scene's camera
 TOLERANCE = 0.01
+Zoomed = TypeVar("Zoomed", bound=Scene)
 
 
-def covering(context: moderngl.Context, scene: Scene, share: float, size: tuple[int, int] = (1920, 1080)) -> Scene:
+def covering(context: moderngl.Context, scene: Zoomed, share: float, size: tuple[int, int] = (1920, 1080)) -> Zoomed:
     """The scene zoomed so that translucent pixels are this share of the screen, to 1 %; size only as a shape."""
     if not 0 < share < 1:
         raise InputError(f"share must be in (0, 1), got {share!r}")

@@ -1,1 +1,1 @@
-"""The texts of laws, a file each; `stage/` holds those of the render."""
+"""The texts of laws, a file each."""

@@ -23,10 +23,10 @@ import numpy as np
 
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
-from profilefit.scenes.skin.scene import Scene, head_scene
-from profilefit.scenes.skin.separable_kernel import Separable
-from profilefit.scenes.stage.sampling import Sampling
-from profilefit.scenes.stage.stage import Stage, covering
+from profilefit.scenes.skin.passes import SeparableFilter
+from profilefit.scenes.skin.scene import Head, head_scene
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.stage import By, Stage, covering
 from profilefit.shader.context import renderer
 from profilefit.shader.emit import prefix
 from profilefit.studies.choose.options import Option
@@ -104,8 +104,8 @@ def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tu
     scene = covering(context, head_scene(), SHARE, size)
     with Stage(context, size) as stage:
         stage.draw(scene)
-        frame = _least(stage, scene, Separable(), Sampling(YARDSTICK_TAPS), "frame")
-        works: list[tuple[str, ProfileLaw | Separable, tuple[int, int]]] = [("separable", Separable(), TAPS)]
+        frame = _least(stage, scene, SeparableFilter(), Sampling(YARDSTICK_TAPS), "frame")
+        works: list[tuple[str, By, tuple[int, int]]] = [("separable", SeparableFilter(), TAPS)]
         works += [(prefix(law), law, SAMPLES) for law in laws.values()]
         lines = {}
         for key, law, numbers in works:
@@ -117,5 +117,5 @@ def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tu
     return Ratios(renderer(context), max(1.0 - scatter, 0.0), fixed, each_one)
 
 
-def _least(stage: Stage, scene: Scene, law: ProfileLaw | Separable, sampling: Sampling, passes: str) -> float:
+def _least(stage: Stage, scene: Head, law: By, sampling: Sampling, passes: str) -> float:
     return min(stage.time(law, scene.material.mfp, sampling, repeats=TURNS, passes=passes))

@@ -17,9 +17,8 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 from scipy.special import ndtr
 
-from profilefit.scenes.skin.material import Rgb
-from profilefit.scenes.skin.separable_kernel import Separable, kernel_quartile
-from profilefit.scenes.stage.scattering import FOLLOW
+from profilefit.scenes.skin.law import FOLLOW, Separable, kernel_quartile
+from profilefit.scenes.stage.world import Rgb
 from profilefit.studies.choose.case import Case
 from profilefit.studies.choose.options import Option
 from profilefit.studies.choose.response import Beyond

@@ -4,22 +4,22 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from mcml_sim import Layer, Medium, Setting
-from mcml_sim.errors import InputError as MediumError
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.checks import is_number, shown
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import TFLOPS, YARDSTICK
 from profilefit.studies.choose.truth import truth
 
 Range = tuple[float, float]
-Table = dict[str, Any]
 TABLES = {
     "": ("unit", "view", "material", "tolerance", "budget", "layers"),
     "view": ("pixel", "radius", "world", "resolution", "coverage"),
@@ -30,7 +30,6 @@ TABLES = {
     "layers": ("n", "mu_a", "mu_s", "g", "thickness"),
 }
 LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
-LONGEST_TEXT = 60  # characters
 LENGTHS = (1e-9, 1e9)  # in the unit of the mean free paths
 MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
 
@@ -72,7 +71,7 @@ class Scene:
 
 def read(path: Path) -> Scene:
     """A scene from its file; InputError that names file, table and key, what was got and what is accepted."""
-    return _Reader(str(path)).scene(read_toml(path))
+    return _Reader(str(path), TABLES).scene(read_toml(path))
 
 
 def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
@@ -80,11 +79,8 @@ def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
     return red, green, blue
 
 
-class _Reader:
+class _Reader(Tables):
     """The tables of one file, whose name every message begins with."""
-
-    def __init__(self, file: str) -> None:
-        self.file = file
 
     def scene(self, content: Table) -> Scene:
         self.known("", content)
@@ -115,7 +111,7 @@ class _Reader:
             tolerance=self.number("tolerance", "error", tolerance, most=1.0),
             within=self.within(tolerance),
             budget=self.budget(budget, view),
-            resolution=self.resolution(view),
+            resolution=self.sides("view", "resolution", view, (1920, 1080), 16384),
             layers=self.layers(content.get("layers")),
         )
 
@@ -148,13 +144,6 @@ class _Reader:
             found.append((self.range(where, "reflectance", one, most=1.0), self.range(where, "mfp", one)))
         return tuple(a for a, _ in found), tuple(length for _, length in found)
 
-    def resolution(self, view: Table) -> tuple[int, int]:
-        resolution = view.get("resolution", [1920, 1080])
-        whole = isinstance(resolution, list) and len(resolution) == 2 and all(type(side) is int for side in resolution)
-        if not (whole and all(1 <= side <= 16384 for side in resolution)):
-            raise self.bad("view", "resolution", "two whole numbers of pixels in 1 ... 16384", resolution)
-        return resolution[0], resolution[1]
-
     def budget(self, budget: Table, view: Table) -> Budget:
         return Budget(
             self.number("budget", "ms", budget) if "ms" in budget else None,
@@ -173,32 +162,8 @@ class _Reader:
             missing = [key for key in ("n", "mu_a", "mu_s", "g") if key not in layer]
             if missing:
                 raise self.bad(f"layers {number}", missing[0], "a number", None)
-            made.append(self.made(f"layers {number}", lambda layer=layer: Layer(**layer)))
+            made.append(self.made(f"layers {number}", partial(Layer, **layer)))
         return self.made("layers", lambda: Medium(tuple(made)))
-
-    def table(self, content: Table, name: str, default: Table | None = None, within: str = "") -> Table:
-        value = content.get(name, default)
-        where = f"{within}.{name}" if within else name
-        if value is None:
-            raise InputError(f"{self.file}: table [{where}] is missing")
-        if not isinstance(value, dict):
-            raise InputError(f"{self.file}: {where} must be a table [{where}], got {shown(value)}")
-        if name in TABLES:
-            self.known(where, value)
-        return value
-
-    def known(self, where: str, table: Table, accepted: tuple[str, ...] | None = None) -> None:
-        keys = accepted or TABLES[where]
-        for key in table:
-            if key not in keys:
-                place = f"[{where}] " if where else ""
-                raise InputError(f"{self.file}: {place}keys must be of {', '.join(keys)}, got {shown(key)}")
-
-    def number(self, where: str, key: str, table: Table, default: float | None = None, most: float = math.inf) -> float:
-        value = table.get(key, default)
-        if not is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
-            raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
-        return float(value)
 
     def range(self, where: str, key: str, table: Table, most: float = math.inf) -> Range:
         """A number, or the least and the most."""
@@ -216,25 +181,3 @@ class _Reader:
             if not LENGTHS[0] <= one <= LENGTHS[1]:
                 words = f"between {LENGTHS[0]:g} and {LENGTHS[1]:g} in the unit of the mean free paths"
                 raise self.bad(where, key, words, one)
-
-    def text(
-        self, where: str, key: str, table: Table, default: str | None = None, accepted: tuple[str, ...] = ()
-    ) -> str:
-        value = table.get(key, default)
-        text = value if isinstance(value, str) else "\n"
-        if not text.isprintable() or len(text) > LONGEST_TEXT or (accepted and text not in accepted):
-            words = f"one of {', '.join(accepted)}" if accepted else f"a text of {LONGEST_TEXT} characters at most"
-            raise self.bad(where, key, words, value)
-        return text
-
-    def made(self, where: str, make: Any) -> Any:
-        """What `make` makes; where it refuses, the message says in which file and table."""
-        try:
-            return make()
-        except MediumError as error:
-            raise InputError(f"{self.file}: [{where}] {error}") from None
-
-    def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:
-        got = "nothing" if value is None else shown(value)
-        place = f"[{where}] " if where else ""
-        return InputError(f"{self.file}: {place}{key} must be {accepted}, got {got}")

@@ -9,7 +9,7 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.recipes import catalogue, record
-from profilefit.scenes.skin.separable_kernel import DARKEST, albedo_of
+from profilefit.scenes.skin.law import DARKEST, albedo_of
 from profilefit.studies.choose.response import Beyond, beyond
 
 STAND_IN = "hazard"

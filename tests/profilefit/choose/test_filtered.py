@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
-from profilefit.scenes.skin.separable_kernel import Separable
+from profilefit.scenes.skin.law import Separable
 from profilefit.studies.choose.filtered import OneGaussian, filtered, fitted, passes
 from profilefit.studies.choose.options import Option
 from profilefit.studies.choose.response import FARTHEST, NEAR, Beyond, response

@@ -10,7 +10,7 @@ from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
 from profilefit.report.explorer.fragment import first, offered
-from profilefit.scenes.stage.combining import srgb_codes
+from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 
 ROUNDING = 1e-5  # relative, of R_d in float32: `profilefit check` finds at most 2.3e-6; this is another float32

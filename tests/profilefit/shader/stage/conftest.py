@@ -2,7 +2,7 @@
 
 import pytest
 
-from profilefit.scenes.stage import scattering
+from profilefit.scenes.stage import gather
 from profilefit.scenes.stage.stage import Stage
 
 
@@ -18,8 +18,8 @@ def alter(monkeypatch):
     """alter(old, new) changes a line of scatter.frag, for stages that are made afterwards; old is what stands there."""
 
     def change(old, new):
-        before = scattering.stage_text
-        assert before("scatter.frag").count(old) == 1
-        monkeypatch.setattr(scattering, "stage_text", lambda name: before(name).replace(old, new))
+        before = gather.text_beside
+        assert before(gather.__name__, "glsl/scatter.frag").count(old) == 1
+        monkeypatch.setattr(gather, "text_beside", lambda *place: before(*place).replace(old, new))
 
     return change

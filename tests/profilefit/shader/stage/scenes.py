@@ -5,10 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from profilefit.scenes.skin import head, texture
-from profilefit.scenes.skin.material import translucent
-from profilefit.scenes.skin.scene import Light, Part, Scene
-from profilefit.scenes.stage.camera import Camera
-from profilefit.scenes.stage.mesh import parameters, sheet
+from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
 
 RADIUS = 10.0
 
@@ -22,4 +19,4 @@ def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
 def scene(direction, *parts, kind="orthographic"):
     camera = Camera(eye=(0.0, 0.0, 100.0), height=30.0, kind=kind)
     light = Light(direction, (1.0, 1.0, 1.0))
-    return Scene(parts or (ball(),), translucent(), light, (0.1, 0.1, 0.1), camera)
+    return Scene(parts or (ball(),), light, (0.1, 0.1, 0.1), camera)

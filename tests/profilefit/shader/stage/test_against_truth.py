@@ -8,7 +8,7 @@ import pytest
 import profilefit
 from profilefit.scenes.skin.scene import FACE, head_scene
 from profilefit.scenes.skin.truth import gathered
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
 from tests.profilefit.shader.stage import edges

@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import exact
 from profilefit.scenes.stage.exact_law import ExactLaw
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 

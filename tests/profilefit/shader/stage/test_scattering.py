@@ -7,9 +7,10 @@ import pytest
 
 from mcml_sim import exact
 from profilefit.errors import InputError
+from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage.buffers import flat, step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
-from profilefit.scenes.stage.sampling import CHANNELS, KINDS, Sampling
+from profilefit.scenes.stage.pattern import CHANNELS, KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 
@@ -50,7 +51,7 @@ def test_a_pixel_alone_is_lambert(small, burley, samples):
     np.testing.assert_allclose(light[0, 0], 50.0)  # off the mask nothing scatters
 
 
-@pytest.mark.parametrize("law", ["burley", "separable"])
+@pytest.mark.parametrize("law", ["burley", SeparableFilter()], ids=["burley", "separable"])
 @pytest.mark.parametrize(("gap", "bleeds"), [(50.0, False), (0.2, True)])
 def test_light_does_not_cross_a_gap(stage, burley, law, gap, bleeds):
     """A dark plane before or behind a bright one, `gap` mfp away."""

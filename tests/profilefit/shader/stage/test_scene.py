@@ -8,8 +8,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.skin import head, texture
 from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage.camera import Camera
-from profilefit.scenes.stage.mesh import parameters, sheet
+from profilefit.scenes.stage.world import Camera, parameters, sheet
 
 
 @pytest.fixture(scope="module")

@@ -5,14 +5,15 @@ import pytest
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.skin.separable_kernel import (
+from profilefit.scenes.skin.law import (
     FALLOFF,
     PUBLISHED_STRENGTH,
     Separable,
     exact_quartile,
     kernel_quartile,
 )
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.skin.passes import SeparableFilter
+from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from tests.profilefit.shader.stage import edges
 
@@ -59,7 +60,7 @@ def test_a_step_edge_rises_where_the_material_lets_it(context):
     buffers, x = edges.aslant((256, 4), 1.0, 1.0, 0.0)
     with Stage(context, (256, 4), shadow_side=16) as stage:
         stage.upload(buffers)
-        light = stage.scatter("separable", mfp, Sampling(255), fixed_alpha=alpha)
+        light = stage.scatter(SeparableFilter(), mfp, Sampling(255), fixed_alpha=alpha)
     for channel in range(3):
         np.testing.assert_allclose(np.interp([at, -at], x[2], light[2, :, channel]), [0.75, 0.25], atol=0.01)
 

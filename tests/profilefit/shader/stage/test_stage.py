@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
+from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.buffers import flat, step_edge
-from profilefit.scenes.stage.camera import Camera
-from profilefit.scenes.stage.combining import srgb_codes, to_srgb
-from profilefit.scenes.stage.sampling import Sampling
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 from profilefit.scenes.stage.stage import Stage, covered, covering
+from profilefit.scenes.stage.world import Camera
 from tests.profilefit.shader.stage.scenes import RADIUS, ball, scene
 
 SIZE = (64, 48)
@@ -100,7 +101,7 @@ def test_radiance_has_a_highlight_where_it_must(stage, burley):
     assert bright @ np.array([0.8, 0.0, 1.6]) / np.hypot(0.8, 1.6) > 0.97
 
 
-@pytest.mark.parametrize("law", ["burley", "separable"])
+@pytest.mark.parametrize("law", ["burley", SeparableFilter()], ids=["burley", "separable"])
 def test_buffers_come_back_as_they_went(stage, burley, law):
     """Drawn, read, uploaded: the same pixels and the same light."""
     stage.draw(scene((0.6, 0.5, 0.6), kind="perspective"))
@@ -123,7 +124,7 @@ def test_leaves_the_state_as_it_was(context, burley):
     with Stage(context, SIZE, shadow_side=16) as stage:
         stage.draw(scene((0.0, 1.0, 0.0)))
         stage.render(burley, 2.0, Sampling(4))
-        stage.render("separable", 2.0, Sampling(4))
+        stage.render(SeparableFilter(), 2.0, Sampling(4))
     assert context.fbo is own
     assert own.viewport == context.viewport == (0, 0, 4, 4)
     assert own.read() == before
@@ -210,14 +211,14 @@ def test_release_frees_the_gpu(context, burley):
     np.testing.assert_array_equal(
         unlit, stage.scatter(burley, 2.0, Sampling(4)) / np.float32(np.pi)
     )  # no scene, no light
-    textures = [*stage._targets.maps.values(), stage._targets.radiance]
+    textures = list(stage._targets._maps.values())
     stage.release()
     assert all(isinstance(texture.mglo, moderngl.InvalidObject) for texture in textures)
     for use in (
         lambda: stage.upload(step_edge(SIZE, 1.0, 0.5)),
         lambda: stage.draw(scene((0.0, 1.0, 0.0))),
         lambda: stage.scatter(burley, 2.0),
-        lambda: stage.render("separable", 2.0),
+        lambda: stage.render(SeparableFilter(), 2.0),
         lambda: stage.time(burley, 2.0),
         stage.buffers,
     ):

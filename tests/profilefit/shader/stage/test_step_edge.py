@@ -7,7 +7,7 @@ import profilefit
 from mcml_sim import Setting, exact
 from profilefit.scenes.stage.buffers import step_edge
 from profilefit.scenes.stage.exact_law import ExactLaw
-from profilefit.scenes.stage.sampling import KINDS, Sampling
+from profilefit.scenes.stage.pattern import KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.step_edge import step_response
 from tests.profilefit.shader.stage import edges

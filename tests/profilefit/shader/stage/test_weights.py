@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.stage.buffers import flat
-from profilefit.scenes.stage.sampling import CHANNELS, KINDS, Sampling
+from profilefit.scenes.stage.pattern import CHANNELS, KINDS, Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.step_edge import UNIFORM_SHARE, by_law
 from tests.profilefit.shader.stage import edges

@@ -1,13 +1,15 @@
-"""The kernel of Jimenez et al.'s separable filter, as wide as a material: what each tap weighs in each channel.
+"""The laws that draw the head: samples of any profile law, or the separable kernel, stretched to its material.
 
-Source: J. Jimenez et al., Separable subsurface scattering, Computer Graphics Forum 34, 2015, and the authors' own code
-(iryoku/separable-sss, SeparableSSS.cpp, calculateKernel; SeparableSSS.h, SSSSBlurPS). A slice through the skin profile
-is blurred with along rows, then along columns.
+Sampled are the laws of `profilefit.laws` that have a shader text, as fitted or printed, each by its own source; their
+light is diffuse, their albedo that of each pixel's A, and (22) of Z. Liang et al. weighs the samples (stage/gather.py).
+
+What each tap of the separable filter weighs in each channel: J. Jimenez et al., Separable subsurface scattering,
+Computer Graphics Forum 34, 2015, and the authors' own code (iryoku/separable-sss, SeparableSSS.cpp, calculateKernel;
+SeparableSSS.h, SSSSBlurPS). A slice through the skin profile is blurred with along rows, then along columns.
 
 Human skin as sums of Gaussians, the two sets that games still blur with [mm]: E. d'Eon and D. Luebke, Advanced
-techniques for realistic real-time skin rendering, GPU Gems 3, ch. 14, 2007, figure 14-13; J. Jimenez et al., Separable
-subsurface scattering, Computer Graphics Forum 34, 2015, with the authors' own code (iryoku/separable-sss,
-SeparableSSS.cpp), which rounds pi to 3.14.
+techniques for realistic real-time skin rendering, GPU Gems 3, ch. 14, 2007, figure 14-13; J. Jimenez et al., as above,
+whose code rounds pi to 3.14.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ from scipy.special import erf
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.scenes.skin.material import DIFFUSE, Rgb
+from profilefit.scenes.stage.exact_law import DIFFUSE
+from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
 
 Floats = NDArray[np.float64]
@@ -90,6 +93,9 @@ PUBLISHED_STRENGTH = (0.48, 0.41, 0.28)
 """The default of the authors' code for red, green, blue: an artist's choice, too weak for a width to be matched."""
 DARKEST = 1e-4  # an albedo below has no light to blur; its width is that of this one
 RADII = 4000
+# Share of a tap that its depth takes, per depth in units of the kernel: the authors' 300 / tan(10 degrees) times a
+# width of 0.0125 scene units, the middle of their slider, of which the kernel's unit is a third.
+FOLLOW = 300.0 / np.tan(np.radians(10.0)) * 0.0125**2 / 3.0
 
 
 @dataclass(frozen=True)
@@ -165,17 +171,12 @@ def kernel_quartile(strength: float) -> float:
     return float(brentq(within, 0.0, 10.0))
 
 
-def transmitted_text(name: str) -> str:
-    """The shader text of the light left beyond x, in units of the stretch: 1 - cdf of the red skin profile."""
+def transmitted() -> str:
+    """Shader expression of the share of the light within x, in units of the stretch: cdf of the red skin profile."""
     gaussians = separable()
     weights = np.array([w[0] for w in gaussians.weights])
     terms = " + ".join(
         f"{literal(float(w))} * exp(-x * x * {literal(0.5 / v)})"
         for w, v in zip(weights / weights.sum(), gaussians.variances, strict=True)
     )
-    return (
-        f"struct {name}_Shape {{ float unused; }};\n"
-        f"float {name}_alpha(float reflectance) {{ return reflectance; }}\n"
-        f"{name}_Shape {name}_shape(float alpha) {{ {name}_Shape s; s.unused = alpha; return s; }}\n"
-        f"float {name}_cumulated(float x, {name}_Shape s) {{ return 1.0 - ({terms}); }}\n"
-    )
+    return f"1.0 - ({terms})"

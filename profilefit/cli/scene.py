@@ -1,0 +1,83 @@
+"""profilefit scene: draw a scene by a technique, beside its truth, with its error and cost."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli.options import AsJson, Quiet
+
+OUT = Path("scene")
+
+
+def scene(
+    file: Annotated[
+        str,
+        typer.Argument(metavar="FILE.toml", help="What is drawn, and how; with --example the name of a scene: skin."),
+    ],
+    out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,
+    example: Annotated[bool, typer.Option("--example", help="Print an example of a scene's file instead.")] = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Draw a scene beside its truth (a minute).
+
+    NAME.png of FILE NAME.toml is the picture by the technique that the file names, NAME-truth.png what it should be,
+    NAME-error.png where and by how much it is not; NAME.json has error and cost in numbers, which are printed, too.
+    Times are of this machine's OpenGL, a GPU or a software rasteriser.
+
+    \b
+    Examples, the second on a file of profilefit examples:
+      profilefit scene skin --example
+      profilefit scene examples/skin-head.toml --out pictures
+    """
+    with interruptible(__name__):
+        from importlib import import_module
+
+        from mcml_sim.cli.screen import notes, print_json, screen, typed
+        from mcml_sim.files.plain import as_json as json_text
+        from mcml_sim.files.text_file import read_toml
+        from mcml_sim.files.version import __version__
+        from mcml_sim.files.whole_file import require_writable, write_together
+        from mcml_sim.runs.progress import working
+        from profilefit.errors import InputError
+        from profilefit.recipes.folder import shipped
+        from profilefit.scenes import SCENES
+
+    known = ", ".join(SCENES)
+    if example:
+        if file not in SCENES:
+            raise InputError(f"NAME must be one of {known} with --example, got {file!r}")
+        typer.echo((shipped("examples") / SCENES[file][1]).read_text(encoding="utf-8"), nl=False)
+        return
+    content = read_toml(file)
+    name = content.get("scene")
+    if not isinstance(name, str) or name not in SCENES:
+        raise InputError(f"{file}: scene must be one of {known}, got {'nothing' if name is None else repr(name)}")
+
+    with interruptible(__name__):
+        home = import_module(SCENES[name][0])
+        from profilefit.report.figures.scene_figure import scene_figures
+        from profilefit.report.tables.scene_table import content as numbers
+        from profilefit.report.tables.scene_table import scene_lines
+        from profilefit.shader.context import opened, renderer
+
+    asked = home.read(file, content)
+    stem = out / Path(file).stem
+    require_writable(Path(f"{stem}.json"))
+    with working("drawing, and summing the truth", quiet), opened() as context:
+        drawn, device = home.draw(context, asked), renderer(context)
+    files: dict[Path, Any] = {
+        Path(f"{stem}{end}.png"): png for end, png in scene_figures(drawn, device.partition(",")[0]).items()
+    }
+    told = {"made": {"by": typed(), "version": __version__}, "of": content, **numbers(drawn, device)}
+    write_together({**files, Path(f"{stem}.json"): json_text(told)})
+    if as_json:
+        print_json(told)
+    else:
+        for line in scene_lines(drawn, device):
+            screen().print(line, markup=False, soft_wrap=True)
+    notes(quiet).print(f"wrote {', '.join(map(str, (*files, f'{stem}.json')))}", markup=False)

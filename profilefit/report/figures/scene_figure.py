@@ -1,0 +1,79 @@
+"""What a scene shows: its pictures as they are, the map of its error, and its error against its cost."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib import colormaps, image
+from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
+from profilefit.scenes.stage.picture import Drawn, Point
+
+LAST = 0.99  # share of the pixels that the map's colours tell apart; the rest is as bright as the last of them
+NOWHERE = "#BBBBBB"  # where no error is measured
+
+
+def scene_figures(drawn: Drawn, device: str) -> dict[str, bytes]:
+    """PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart" of several points."""
+    found = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
+    if len(drawn.chart) > 1:
+        found["-chart"] = _chart(drawn.chart, device)
+    return found
+
+
+def _png(picture: NDArray[np.uint8]) -> bytes:
+    """A pixel for a pixel."""
+    written = io.BytesIO()
+    image.imsave(written, picture, format="png")
+    return written.getvalue()
+
+
+@styled
+def _error_map(drawn: Drawn) -> bytes:
+    rows, columns = drawn.error.shape
+    figure = canvas(0.4 + 5.6 * rows / columns, 7.0)
+    ax = figure.subplots()
+    ax.grid(False)
+    ax.set(xticks=[], yticks=[], facecolor=NOWHERE)
+    colours = colormaps["inferno"].with_extremes(bad=NOWHERE)
+    most = float(np.nanquantile(drawn.error, LAST))
+    shown = ax.imshow(drawn.error, cmap=colours, vmin=0.0, vmax=most or 1.0, interpolation="nearest")
+    bar = figure.colorbar(shown, ax=ax, extend="max", pad=0.02)
+    bar.set_label("error of scattered light over its mean [-]")
+    point = drawn.point
+    ax.set_title(f"{point.label}, {point.samples} samples: root mean square {point.rmse:.3g}")
+    return _written(figure)
+
+
+@styled
+def _chart(points: Sequence[Point], device: str) -> bytes:
+    figure = canvas(3.4, 7.0)
+    by_samples, by_time = figure.subplots(1, 2, sharey=True)
+    error = [one.rmse for one in points]
+    least = np.array([min(one.milliseconds) for one in points])
+    most = np.array([max(one.milliseconds) for one in points])
+    style = {"color": BLUE, "marker": "o", "markersize": 4.5}
+    samples = [one.samples for one in points]
+    by_samples.plot(samples, error, **style)
+    by_time.errorbar(least, error, xerr=(0.0 * least, most - least), capsize=2, elinewidth=0.8, **style)
+    for ax in (by_samples, by_time):
+        ax.set(xscale="log", yscale="log")
+    plain_log(by_samples.yaxis)
+    plain_log(by_time.xaxis)
+    by_samples.set_ylabel("root mean square error / mean [-]")
+    by_samples.set_xlabel("samples of a pixel [-]")
+    by_samples.set_xticks(samples, [str(number) for number in samples])
+    by_samples.minorticks_off()
+    by_time.set_xlabel("least time of its passes, and up to the most [ms]")
+    figure.suptitle(f"{points[0].label}, on {device}", fontsize=9.0)
+    return _written(figure)
+
+
+def _written(figure: Figure) -> bytes:
+    written = io.BytesIO()
+    figure.savefig(written, format="png", dpi=DPI)
+    return written.getvalue()

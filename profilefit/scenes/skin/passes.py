@@ -1,0 +1,48 @@
+"""The head's own technique: Jimenez et al.'s separable filter, which blurs along rows and then along columns."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.scenes.skin.law import FOLLOW, Separable, albedo_of, transmitted
+from profilefit.scenes.stage.technique import EXITANCE, Frame, LawText, Pass, Technique, maps, through_text
+from profilefit.shader.emit import text_beside
+
+Floats = NDArray[np.float64]
+HALFWAY = "halfway_map"
+
+
+@dataclass(frozen=True)
+class SeparableFilter(Technique):
+    """One kernel serves the whole picture: that of its mean A, where no alpha is fixed. A sample is a tap."""
+
+    kernel: Separable = field(default_factory=Separable)
+
+    def passes(self, frame: Frame) -> Sequence[Pass]:
+        stretches = self.lengths(frame)
+        source = text_beside(__name__, "separable.frag")
+        common = {**frame.camera, "follow": float(FOLLOW / np.max(stretches))}
+        reads = {
+            **maps("reflectance_map", "position_map"),
+            "kernel_map": self.kernel.taps(frame.sampling.samples, stretches)[None],
+        }
+        return [
+            Pass("separable", {"light_map": light, **reads}, into, source, {**common, "direction": along, "last": last})
+            for light, into, along, last in (
+                ("irradiance_map", HALFWAY, (1.0, 0.0), 0.0),
+                (HALFWAY, EXITANCE, (0.0, 1.0), 1.0),
+            )
+        ]
+
+    def through(self) -> LawText:
+        return LawText("separable", through_text(transmitted()))
+
+    def lengths(self, frame: Frame) -> Floats:
+        """Stretches of the kernel (3,) [mm]."""
+        by_reflectance = [albedo_of(a, self.kernel.setting) for a in frame.mean_reflectance().tolist()]
+        alpha = np.where(frame.fixed_alpha < 0, by_reflectance, frame.fixed_alpha)
+        return self.kernel.stretches(alpha, frame.mfp)

@@ -1,0 +1,72 @@
+"""Pictures: linear light for a screen; a scene as a technique draws it, beside its truth, with error and cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+Bytes = NDArray[np.uint8]
+
+
+@dataclass(frozen=True)
+class Point:
+    """Error and cost of a technique with so many samples (of the separable filter: taps).
+
+    rmse          root mean square error of the scattered light, over the mean of the truth [-]
+    milliseconds  of the technique's passes, each time that they were run (turns,)
+    """
+
+    label: str
+    samples: int
+    rmse: float
+    milliseconds: tuple[float, ...]
+
+
+class TruthError(NamedTuple):
+    """What half the pixel's side changes in the truth, over its mean [-].
+
+    Half of the pixels and nine in ten are below the first two; the root mean square is what outlines set.
+    """
+
+    half: float
+    most: float
+    rms: float
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """A scene, drawn; row 0 at the top.
+
+    picture, truth  (h, w, 3) as a screen shows them
+    error           (h, w) root mean square of the channels' errors, over the mean of the truth [-]; NaN where none is
+                    measured. Its own root mean square is `point.rmse`
+    point           of the technique;  chart  the same with other numbers of samples, too, the least first
+    frame           milliseconds of a whole frame, each time that it was drawn (turns,)
+    """
+
+    picture: Bytes
+    truth: Bytes
+    error: Floats
+    point: Point
+    chart: tuple[Point, ...]
+    frame: tuple[float, ...]
+    truth_error: TruthError
+
+
+def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:
+    """Linear (h, w, 3) times `exposure`, as 8-bit values for a screen (IEC 61966-2-1); same order of rows."""
+    if not exposure > 0:
+        raise InputError(f"exposure must be a factor > 0, got {exposure!r}")
+    return np.round(srgb_codes(np.asarray(image, float) * exposure)).astype(np.uint8)
+
+
+def srgb_codes(linear: ArrayLike) -> Floats:
+    """Values of a screen [8-bit steps, 0 to 255] for linear ones, white 1, not rounded: fractions of a step count."""
+    clipped = np.clip(np.asarray(linear, float), 0.0, 1.0)
+    return 255.0 * np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)

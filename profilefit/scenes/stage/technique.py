@@ -1,0 +1,227 @@
+"""Techniques: how light scatters in a picture, as passes over the screen between the G-buffer and the radiance.
+
+A pass is a value: which maps it reads and writes, its shader and its uniforms. The stage compiles and runs it.
+"""
+
+from __future__ import annotations
+
+import re
+import time
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.errors import ShaderError
+from profilefit.scenes.stage.buffers import Singles, Targets, float_texture
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.world import Scene, unit
+from profilefit.shader.context import check_errors, full_screen, program
+from profilefit.shader.emit import text_beside
+
+Floats = NDArray[np.float64]
+LAW = "law"  # the prefix of the law in every shader of the stage
+EXITANCE, RADIANCE = "exitance_map", "radiance_map"
+COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
+UNIFORM = re.compile(r"\buniform\s+(?:(?:low|medium|high)p\s+)?\w+\s+([^;]+);")
+
+
+@dataclass(frozen=True)
+class Pass:
+    """A fragment shader over the whole screen.
+
+    reads     sampler -> the map of that name, or an array (rows, columns, channels);  writes  the map that it fills
+    source    GLSL after its version line;  uniforms  values by name; every one of the source, and no other
+    """
+
+    name: str
+    reads: Mapping[str, str | Singles]
+    writes: str
+    source: str
+    uniforms: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What is known of a picture when its passes are made.
+
+    size  [pixels];  pixel  its side [mm], in perspective at a depth of 1 mm
+    mfp  of red, green, blue (3,) [mm];  fixed_alpha  (3,) [-], below 0 where a pixel's own A gives it
+    mean_reflectance  () -> (3,) mean A where light scatters [-]
+    """
+
+    size: tuple[int, int]
+    pixel: float
+    is_perspective: bool
+    sampling: Sampling
+    mfp: Floats
+    fixed_alpha: Floats
+    mean_reflectance: Callable[[], Floats]
+
+    @property
+    def camera(self) -> dict[str, Any]:
+        """Uniforms of shaders that look for another place on the screen."""
+        columns, rows = self.size
+        return {"size": (float(columns), float(rows)), "pixel": self.pixel, "perspective": float(self.is_perspective)}
+
+
+@dataclass(frozen=True)
+class LawText:
+    """A law with the prefix `LAW`: its name, its GLSL, and the arrays that its samplers read, by their names."""
+
+    name: str
+    text: str
+    tables: Mapping[str, Singles] = field(default_factory=dict)
+
+
+class Technique(ABC):
+    """A way to scatter light."""
+
+    @abstractmethod
+    def passes(self, frame: Frame) -> Sequence[Pass]:
+        """From the maps of the G-buffer to `EXITANCE`, which the last one writes."""
+
+    @abstractmethod
+    def through(self) -> LawText:
+        """LAW_alpha, LAW_shape and LAW_cumulated: the share of the light that a thin part keeps."""
+
+    def lengths(self, frame: Frame) -> Floats:
+        """The unit of LAW_cumulated's x, of red, green, blue (3,) [mm]."""
+        return frame.mfp
+
+
+class Lambert(Technique):
+    """Light comes out where it went in, and shines through nothing."""
+
+    def passes(self, frame: Frame) -> Sequence[Pass]:
+        reads = maps("irradiance_map", "reflectance_map", "position_map")
+        return [Pass("lambert", reads, EXITANCE, text_beside(__name__, "glsl/lambert.frag"), {})]
+
+    def through(self) -> LawText:
+        return LawText("lambert", through_text("1.0"))
+
+
+def combination(by: Technique, frame: Frame, scene: Scene | None) -> Pass:
+    """From `EXITANCE` to `RADIANCE`. Without a scene there is no light to mirror or to shine through."""
+    law = by.through()
+    uniforms = {
+        "perspective": float(frame.is_perspective),
+        "mfp": tuple(by.lengths(frame)),
+        "fixed_alpha": tuple(frame.fixed_alpha),
+        **_lit(scene),
+    }
+    surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map", EXITANCE)
+    source = f"{law.text}\n{text_beside(__name__, 'glsl/combine.frag')}"
+    return Pass(f"combine {law.name}", {**surface, **law.tables}, RADIANCE, source, uniforms)
+
+
+def _lit(scene: Scene | None) -> dict[str, Any]:
+    if scene is None:
+        return {"toward_light": (0.0, 0.0, 1.0), "light": (0.0, 0.0, 0.0), "f0": 0.0}
+    toward = scene.camera.view()[:3, :3] @ unit(scene.light.direction)
+    return {"toward_light": tuple(toward), "light": scene.light.irradiance, "f0": scene.f0}
+
+
+def maps(*names: str) -> dict[str, str | Singles]:
+    """Maps that are read by samplers of their own names."""
+    return {name: name for name in names}
+
+
+def through_text(cumulated: str) -> str:
+    """What `Technique.through` needs, of a share within x that no albedo changes: an expression of x."""
+    return (
+        f"struct {LAW}_Shape {{ float unused; }};\n"
+        f"float {LAW}_alpha(float reflectance) {{ return reflectance; }}\n"
+        f"{LAW}_Shape {LAW}_shape(float alpha) {{ {LAW}_Shape s; s.unused = alpha; return s; }}\n"
+        f"float {LAW}_cumulated(float x, {LAW}_Shape s) {{ return {cumulated}; }}\n"
+    )
+
+
+class Program:
+    """A compiled shader; `milliseconds` is how long that took."""
+
+    def __init__(self, context: moderngl.Context, name: str, fragment: str, vertex: str | None = None):
+        self.name, self._stands = name, uniforms_of(fragment + (vertex or ""))
+        start = time.perf_counter()
+        self.compiled = program(context, name, fragment, vertex)
+        self.milliseconds = 1e3 * (time.perf_counter() - start)
+
+    def assign(self, textures: Mapping[str, moderngl.Texture], values: Mapping[str, Any]) -> None:
+        """Textures to units of their own, and uniforms by name; matrices are (4, 4) arrays, rows first.
+
+        ShaderError, with its name, on a uniform of the source that gets no value, and on a value for none of them.
+        """
+        self._require_each({*textures, *values})
+        for place, (name, texture) in enumerate(textures.items()):
+            texture.use(place)
+            self._write(name, place)
+        for name, value in values.items():
+            self._write(name, value)
+
+    def release(self) -> None:
+        self.compiled.release()
+
+    def _require_each(self, given: set[str]) -> None:
+        for names, what in (
+            (given - self._stands, "is set, but stands nowhere in its source"),
+            (self._stands - given, "stands in its source, but is never set"),
+        ):
+            if names:
+                raise ShaderError(f"shader {self.name!r}: uniform {min(names)} {what}")
+
+    def _write(self, name: str, value: Any) -> None:
+        uniform = self.compiled.get(name, None)
+        if not isinstance(uniform, moderngl.Uniform):
+            return  # compiled away
+        if isinstance(value, np.ndarray):
+            uniform.write(np.ascontiguousarray(value.T, np.float32).tobytes())
+        else:
+            uniform.value = value
+
+
+class FullScreen:
+    """A pass, compiled. It is run with the values of each frame's own pass of the same source."""
+
+    def __init__(self, context: moderngl.Context, one: Pass):
+        self.context = context
+        self.program = Program(context, one.name, f"#version 330\n{one.source}")
+        self._triangle = full_screen(context, self.program.compiled)
+        self._tables: dict[str, tuple[Singles, moderngl.Texture]] = {}
+
+    def run(self, one: Pass, targets: Targets) -> None:
+        """Fill the map that the pass writes."""
+        textures = {
+            sampler: targets.map(read) if isinstance(read, str) else self._table(sampler, read)
+            for sampler, read in one.reads.items()
+        }
+        self.program.assign(textures, one.uniforms)
+        with self.context.scope(targets.into(one.writes), enable_only=moderngl.NOTHING):
+            self._triangle.render(moderngl.TRIANGLES, vertices=3)
+        check_errors(self.context, one.name)
+
+    def release(self) -> None:
+        self._triangle.release()
+        self.program.release()
+        for _, texture in self._tables.values():
+            texture.release()
+
+    def _table(self, sampler: str, array: Singles) -> moderngl.Texture:
+        """The array as a texture, which is sent once for as long as it is the same array."""
+        known = self._tables.get(sampler)
+        if known is not None and known[0] is array:
+            return known[1]
+        if known is not None:
+            known[1].release()
+        rows, columns, channels = array.shape
+        self._tables[sampler] = array, float_texture(self.context, (columns, rows), channels, array)
+        return self._tables[sampler][1]
+
+
+def uniforms_of(source: str) -> frozenset[str]:
+    """The names of all uniforms that a shader's source declares, those in parts that are switched off included."""
+    found = UNIFORM.findall(COMMENT.sub(" ", source))
+    return frozenset(name.partition("[")[0].strip() for names in found for name in names.split(","))

@@ -1,0 +1,164 @@
+"""What is drawn: parts with a mesh and a texture, one light far away, a little light from everywhere, and a camera.
+
+World and view space are in millimetres, y up; a view looks along -z.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+Rgb = tuple[float, float, float]
+KINDS = ("perspective", "orthographic")
+
+
+@dataclass(frozen=True)
+class Camera:
+    """eye, target  points of the world [mm];  height  of what is visible at the target [mm];  kind  one of `KINDS`."""
+
+    eye: tuple[float, float, float] = (0.0, 0.0, 700.0)
+    target: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    height: float = 300.0
+    kind: str = "perspective"
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise InputError(f"camera kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
+        if not 0 < self.height < np.inf:
+            raise InputError(f"camera height must be a length > 0 [mm], got {self.height!r}")
+
+    @property
+    def is_perspective(self) -> bool:
+        return self.kind == "perspective"
+
+    @property
+    def distance(self) -> float:
+        """From eye to target [mm]."""
+        return float(np.linalg.norm(np.subtract(self.eye, self.target)))
+
+    def pixel(self, rows: int) -> float:
+        """Side of a pixel [mm]; in perspective at a depth of 1 mm."""
+        return self.height / rows / (self.distance if self.is_perspective else 1.0)
+
+    def view(self) -> Floats:
+        """(4, 4) from world to view space."""
+        return looking(self.eye, self.target)
+
+    def projection(self, aspect: float, near: float, far: float) -> Floats:
+        """(4, 4) from view to clip space; near and far depths [mm]."""
+        if not self.is_perspective:
+            return orthographic(0.5 * self.height * aspect, 0.5 * self.height, near, far)
+        half = 0.5 * self.height / self.distance
+        depth = [(near + far) / (near - far), 2.0 * near * far / (near - far)]
+        return np.array([[1 / (half * aspect), 0, 0, 0], [0, 1 / half, 0, 0], [0, 0, *depth], [0, 0, -1, 0]])
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """position (n, 3) [mm], normal (n, 3), uv (n, 2) in [0, 1], triangles (m, 3) counter-clockwise from outside."""
+
+    position: Floats
+    normal: Floats
+    uv: Floats
+    triangles: NDArray[np.int32]
+
+    def vertices(self) -> NDArray[np.float32]:
+        """(n, 8) position, normal, uv, as a vertex buffer holds them."""
+        return np.concatenate([self.position, self.normal, self.uv], axis=1).astype(np.float32)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A mesh with its reflectance A (rows, columns, 3) over u and v, and its GGX roughness [-].
+
+    is_translucent  light scatters inside; else it is Lambert's
+    """
+
+    mesh: Mesh
+    reflectance: NDArray[np.float32]
+    roughness: float = 0.42
+    is_translucent: bool = True
+
+
+@dataclass(frozen=True)
+class Light:
+    """direction to the light, in the world; irradiance of a surface that faces it [-], in the picture's unit."""
+
+    direction: tuple[float, float, float] = (-0.90, 0.26, 0.36)
+    irradiance: Rgb = (3.6, 3.4, 3.1)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """ambient irradiance [-] comes from everywhere, without shadows; f0 is what the surface mirrors head-on [-]."""
+
+    parts: tuple[Part, ...]
+    light: Light = field(default_factory=Light)
+    ambient: Rgb = (0.16, 0.18, 0.21)
+    camera: Camera = field(default_factory=Camera)
+    f0: float = 0.028  # of skin, n = 1.4
+
+    def zoomed(self, height: float) -> Self:
+        """The same seen by a camera that shows `height` [mm] at its target."""
+        return replace(self, camera=replace(self.camera, height=height))
+
+
+def looking(eye: ArrayLike, target: ArrayLike) -> Floats:
+    """(4, 4) from the world to a space whose origin is the eye and whose -z points at the target."""
+    back = unit(np.subtract(eye, target))
+    up = (0.0, 1.0, 0.0) if abs(back[1]) < 0.99 else (0.0, 0.0, 1.0)
+    right = unit(np.cross(up, back))
+    turn = np.stack([right, np.cross(back, right), back])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = turn, -turn @ np.asarray(eye, float)
+    return matrix
+
+
+def orthographic(half_width: float, half_height: float, near: float, far: float) -> Floats:
+    """(4, 4) parallel projection of depths near ... far."""
+    matrix = np.diag([1 / half_width, 1 / half_height, 2 / (near - far), 1.0])
+    matrix[2, 3] = (near + far) / (near - far)
+    return matrix
+
+
+def unit(vectors: ArrayLike) -> Floats:
+    """The same directions with length 1 along the last axis."""
+    array = np.asarray(vectors, float)
+    return array / np.linalg.norm(array, axis=-1, keepdims=True)
+
+
+def parameters(rows: int, columns: int) -> tuple[Floats, Floats]:
+    """u and v (rows + 1, columns + 1), even over [0, 1]; u along a row."""
+    v, u = np.meshgrid(np.linspace(0, 1, rows + 1), np.linspace(0, 1, columns + 1), indexing="ij")
+    return u, v
+
+
+def sheet(points: Floats, u: Floats, v: Floats, closed: bool = False) -> Mesh:
+    """A grid of points (rows, columns, 3), outside where d/du x d/dv points; `closed`: its last column is its first."""
+    rows, columns = u.shape
+    index = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    a, b, c, d = (part.ravel() for part in (index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]))
+    triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    uv = np.stack([u, v], -1).reshape(-1, 2)
+    return Mesh(points.reshape(-1, 3), normals(points, closed).reshape(-1, 3), uv, triangles)
+
+
+def normals(points: Floats, closed: bool = False) -> Floats:
+    """(rows, columns, 3) unit normals of a grid: of each vertex, the mean of its faces by their area."""
+    across, along = np.diff(points, axis=1), np.diff(points, axis=0)
+    face = np.cross(across[:-1], along[:, 1:]) + np.cross(across[1:], along[:, :-1])
+    padded = np.pad(face, ((1, 1), (1, 1), (0, 0)))
+    if closed:
+        padded[1:-1, 0], padded[1:-1, -1] = face[:, -1], face[:, 0]
+    total = padded[:-1, :-1] + padded[:-1, 1:] + padded[1:, :-1] + padded[1:, 1:]
+    if closed:  # at a pole all vertices are one
+        for row in (0, -1):
+            if np.ptp(points[row], axis=0).max() < 1e-9:
+                total[row] = total[row].sum(axis=0)
+    return unit(total + 1e-30)

@@ -1,0 +1,153 @@
+"""profilefit scene: from a file to pictures and numbers, and one line for every mistake."""
+
+import io
+import json
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib import image
+
+from mcml_sim.files.text_file import read_toml
+from profilefit.errors import InputError, ShaderError
+from profilefit.scenes import SCENES
+from profilefit.shader.context import open_context
+
+EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "skin-head.toml"
+SMALL = """\
+scene = "skin"
+[technique]
+samples = 4
+chart = [64]
+[camera]
+resolution = [32, 24]
+"""
+
+
+@pytest.fixture
+def opengl():
+    """Skips a test where none answers."""
+    try:
+        open_context().release()
+    except ShaderError as error:
+        pytest.skip(str(error))
+
+
+@pytest.fixture
+def small(tmp_path):
+    path = tmp_path / "small.toml"
+    path.write_text(SMALL, encoding="utf-8")
+    return path
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
+    status, out, err = command("scene", name, "--example")
+    assert (status, err) == (0, "")
+    assert out == EXAMPLE.read_text(encoding="utf-8")
+    home = import_module(SCENES[name][0])
+    path = tmp_path / "printed.toml"
+    path.write_text(out, encoding="utf-8")
+    said, taken = home.read("", read_toml(path)), home.read("", {"scene": name})
+    for key in ("label", "sampling", "chart", "material", "camera", "light", "ambient", "size"):
+        assert getattr(said, key) == getattr(taken, key), key
+
+
+def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
+    """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
+    status, out, err = command("scene", str(small), "--out", "drawn", "--json", "--quiet")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    assert json.loads(Path("drawn/small.json").read_text(encoding="utf-8")) == told
+    assert sorted(path.name for path in Path("drawn").iterdir()) == [
+        "small-chart.png",
+        "small-error.png",
+        "small-truth.png",
+        "small.json",
+        "small.png",
+    ]
+    picture, truth = (image.imread(io.BytesIO(Path(f"drawn/small{end}.png").read_bytes())) for end in ("", "-truth"))
+    assert picture.shape[:2] == truth.shape[:2] == (24, 32)
+    assert 0.001 < np.abs(picture - truth)[..., :3].mean() < 0.1  # noise of four samples
+    few, many = told["chart"]
+    assert (few["samples"], many["samples"]) == (4, 64)
+    assert few["rmse"] == told["rmse"]
+    assert 0 < many["rmse"] < 0.5 * few["rmse"]
+    assert 0 < few["milliseconds"]["least"] <= few["milliseconds"]["median"] <= few["milliseconds"]["most"]
+    assert 0 < told["truth_error"]["half"] < told["truth_error"]["rms"] < 0.2
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('"skin"', '"fog"', "scene must be one of skin, got 'fog'"),
+        ('scene = "skin"', "", "scene must be one of skin, got nothing"),
+        ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
+        ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
+        ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
+        (
+            "samples = 4",
+            'law = "beam_diffusion"\nillumination = "searchlight"',
+            "[technique] law must have a closed form to become a shader",
+        ),
+        ("samples = 4", 'kind = "none"\nlaw = "liang"', "[technique] law must be left out where kind is none, got"),
+        ("[64]", "[0]", "[technique] chart must be at most 8 numbers of samples in 1 ... 256, got [0]"),
+        ("[32, 24]", "[1000, 1000]", "[camera] resolution must be 65536 pixels at most, which the truth sums over"),
+        ("[32, 24]", "[32, 0]", "[camera] resolution must be two whole numbers of pixels in 1 ... 1024, got [32, 0]"),
+        ("[32, 24]", "[9, 9]\ndistance = 10", "[camera] distance must be a length in 300 ... 10000 mm, got 10"),
+        ("[32, 24]", "[9, 9]\ntarget = [nan, 0, 0]", "[camera] target must be three numbers in -150 ... 150, got"),
+        ("[camera]", "[light]\ndirection = [0, 0, 0]\n[camera]", "[light] direction must be a direction, not 0, got"),
+    ],
+)
+def test_a_mistake_is_one_line_that_names_file_and_key(command, small, old, new, said):
+    assert old in SMALL
+    small.write_text(SMALL.replace(old, new, 1), encoding="utf-8")
+    status, out, err = command("scene", str(small), "--out", "drawn")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"profilefit: {small}: {said}")
+    assert not Path("drawn").exists()
+
+
+def test_nothing_to_see_is_one_line(command, small, opengl):
+    dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
+    small.write_text(SMALL + dark, encoding="utf-8")
+    status, out, err = command("scene", str(small), "--out", "drawn", "--quiet")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "the view must show something that light scatters in, and light must reach it" in err
+    assert not list(Path("drawn").iterdir())
+
+
+def test_names_and_places(command, small):
+    assert command("scene", "fog", "--example") == (
+        2,
+        "",
+        "profilefit: NAME must be one of skin with --example, got 'fog'\n",
+    )
+    assert command("scene", "nowhere.toml")[0] == 2
+    Path("file").write_text("")
+    status, out, err = command("scene", str(small), "--out", "file")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "cannot write into file" in err
+
+
+def test_a_file_without_a_gpu_is_one_line(small, tmp_path):
+    """In a process that finds no library of OpenGL's."""
+    code = "import moderngl, sys\n"
+    code += "def missing(**_): raise Exception('libEGL.so.1: cannot open shared object file')\n"
+    code += "moderngl.create_context = missing\n"
+    code += "from profilefit.cli import main\n"
+    code += f"sys.argv = ['profilefit', 'scene', {str(small)!r}, '--out', 'drawn']\nmain()\n"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert (done.returncode, done.stdout, done.stderr.count("\n")) == (2, "", 1)
+    assert done.stderr.startswith("profilefit: no OpenGL 3.3 without a window: libEGL.so.1 is missing")
+    assert not list((tmp_path / "drawn").iterdir())
+
+
+def test_a_list_of_scenes_is_enough_to_refuse(small):
+    """`read` is what the shell calls of every scene's home."""
+    for home, _ in SCENES.values():
+        with pytest.raises(InputError, match=r"here: keys must be of .* got 'other'"):
+            import_module(home).read("here", {"scene": "skin", "other": 1})

@@ -1,0 +1,103 @@
+"""Passes as values: what they read, what they write, and that every uniform is set and stands in the source."""
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import pytest
+
+from profilefit.errors import InputError, ShaderError
+from profilefit.scenes.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.technique import (
+    EXITANCE,
+    Lambert,
+    LawText,
+    Pass,
+    Technique,
+    maps,
+    through_text,
+    uniforms_of,
+)
+
+SIZE = (128, 128)
+SOURCE = """
+// uniform float not_this;
+uniform sampler2D irradiance_map, table;
+uniform float factor; /* uniform float
+nor_this; */
+#if 0
+uniform vec3 switched_off[2], too;
+#endif
+out vec4 light;
+void main() {
+    light = factor * texelFetch(irradiance_map, ivec2(gl_FragCoord.xy), 0) + texelFetch(table, ivec2(0), 0);
+}
+"""
+TABLE = np.full((1, 1, 4), 0.25, np.float32)
+
+
+@dataclass(frozen=True)
+class Scaled(Technique):
+    """Two passes through a map of their own."""
+
+    uniforms: dict = field(default_factory=lambda: {"factor": 3.0})
+    table: np.ndarray = field(default_factory=lambda: TABLE)
+
+    def passes(self, frame):
+        source = SOURCE.replace("uniform vec3 switched_off[2], too;", "")
+        steps = (("irradiance_map", "between_map"), ("between_map", EXITANCE))
+        return [
+            Pass("scaled", {"irradiance_map": read, "table": self.table}, into, source, self.uniforms)
+            for read, into in steps
+        ]
+
+    def through(self):
+        return LawText("scaled", through_text("1.0"))
+
+
+def test_uniforms_are_those_of_the_source():
+    assert uniforms_of(SOURCE) == {"irradiance_map", "table", "factor", "switched_off", "too"}
+
+
+def test_a_technique_adds_its_passes(stage):
+    stage.upload(flat(SIZE, 1.0, 0.5))
+    np.testing.assert_array_equal(stage.scatter(Scaled(), 1.0), np.full((128, 128, 3), 3.0 * 3.25 + 0.25))
+    again = stage.scatter(Scaled(table=2.0 * TABLE), 1.0)  # another array in the same program
+    np.testing.assert_array_equal(again, np.full((128, 128, 3), 3.0 * 3.5 + 0.5))
+    assert list(stage.compile_milliseconds) == ["scaled"]
+
+
+@pytest.mark.parametrize(
+    ("uniforms", "message"),
+    [
+        ({"factor": 1.0, "size": 2.0}, "shader 'scaled': uniform size is set, but stands nowhere in its source"),
+        ({}, "shader 'scaled': uniform factor stands in its source, but is never set"),
+    ],
+)
+def test_a_uniform_without_its_other_half_is_an_error(stage, uniforms, message):
+    stage.upload(flat(SIZE, 1.0, 0.5))
+    with pytest.raises(ShaderError, match=message):
+        stage.scatter(Scaled(uniforms), 1.0)
+
+
+def test_a_sampler_without_a_map_is_an_error(stage):
+    class Unread(Lambert):
+        def passes(self, frame):
+            return [replace(one, reads=maps("irradiance_map", "position_map")) for one in super().passes(frame)]
+
+    stage.upload(flat(SIZE, 1.0, 0.5))
+    with pytest.raises(ShaderError, match="uniform reflectance_map stands in its source, but is never set"):
+        stage.scatter(Unread(), 1.0)
+
+
+def test_lambert_is_the_light_that_arrives(stage):
+    edge = step_edge(SIZE, 1.0, (0.7, 0.5, 0.3))
+    stage.upload(edge)
+    np.testing.assert_array_equal(stage.scatter(Lambert(), 2.0, Sampling(1)), edge.irradiance * edge.reflectance)
+    assert np.isfinite(stage.render(Lambert(), 2.0)).all()
+
+
+def test_what_is_no_technique_is_refused(stage):
+    stage.upload(flat(SIZE, 1.0, 0.5))
+    with pytest.raises(InputError, match="law must be a profile law, an ExactLaw or a technique, got 'separable'"):
+        stage.scatter("separable", 1.0)
