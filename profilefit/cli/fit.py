@@ -11,12 +11,13 @@ from mcml_sim.cli.lazy import carried_out
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.cli import words
 from profilefit.cli.options import AsJson, Fits, Quiet
+from profilefit.laws import PROFILES
 
 
 @carried_out("profilefit.commands.fit")
 def fit(
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
-    law: Annotated[str, typer.Option(help=f"One of {', '.join(words.LAWS)}.", autocompletion=words.laws)] = "hazard",
+    law: Annotated[str, typer.Option(help=f"One of {', '.join(PROFILES)}.", autocompletion=words.laws)] = "hazard",
     constants: Annotated[
         str,
         typer.Option(

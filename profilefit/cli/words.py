@@ -10,22 +10,11 @@ from pathlib import Path
 
 import typer
 
+from profilefit.laws import MAPS, PROFILES
 from profilefit.laws.published import SETS
 from profilefit.recipes import record
 from profilefit.recipes.folder import fits_folder, known_folder
 
-LAWS = (
-    "liang",
-    "burley",
-    "burley_diffuse_mfp",
-    "dipole",
-    "better_dipole",
-    "beam_diffusion",
-    "gaussians",
-    "hazard",
-    "quantile",
-)
-MAPS = ("rational", "van_de_hulst", "chiang")  # and liang, which is a profile law's name, too
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 PARTS = ("truth", "laws", "samplers", "fits")
 FUNCTIONS = ("exact", "convert", "solver")
@@ -43,7 +32,7 @@ def recipes(incomplete: str) -> Iterator[str]:
 
 def subjects(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     """Names of laws, maps and records."""
-    return _starting(incomplete, dict.fromkeys((*LAWS, *MAPS, *record.available(_folder(ctx)))))
+    return _starting(incomplete, dict.fromkeys((*PROFILES, *MAPS, *record.available(_folder(ctx)))))
 
 
 def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
@@ -54,7 +43,7 @@ def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
 
 def laws(incomplete: str) -> Iterator[str]:
     """Names of profile laws."""
-    return _starting(incomplete, LAWS)
+    return _starting(incomplete, PROFILES)
 
 
 def languages(incomplete: str) -> Iterator[str]:

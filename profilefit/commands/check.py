@@ -16,7 +16,7 @@ from mcml_sim.files.plain import as_json as json_text
 from mcml_sim.files.whole_file import write_whole
 from mcml_sim.runs.progress import tracked, working
 from profilefit.recipes.evidence import made, require_apart
-from profilefit.recipes.folder import records_folder
+from profilefit.recipes.folder import Records, records_folder
 from profilefit.recipes.inventory import Named
 from profilefit.report.tables.check_tables import (
     check_tables,
@@ -66,10 +66,11 @@ def check(
 ) -> None:
     """Measure, print or keep, and exit with status 1 if a bound is broken."""
     folder = records_folder(fits, quiet)
-    laws, maps = chosen(names or [], constants, folder)
+    records = Records(folder)
+    laws, maps = chosen(names or [], constants, records)
     if out is not None:
         require_apart(out, folder)
-    found = _measured(laws, maps, folder, precision == HALF, quiet)
+    found = _measured(laws, maps, records, precision == HALF, quiet)
     if out is not None or as_json:
         told = {"made": made(typed(), folder), "of": asked(names, constants), **_content(found)}
     if out is not None:
@@ -83,7 +84,7 @@ def check(
         raise typer.Exit(BROKEN)
 
 
-def _measured(laws: Sequence[Named], maps: Sequence[Named], folder: Path, in_half: bool, quiet: bool) -> Found:
+def _measured(laws: Sequence[Named], maps: Sequence[Named], folder: Records, in_half: bool, quiet: bool) -> Found:
     with opened() as context:
         checks = list(tracked(_checks(context, laws, maps, folder), "checking", "laws", len(laws) + len(maps), quiet))
         with working("timing the texts", quiet):
@@ -102,7 +103,7 @@ def _measured(laws: Sequence[Named], maps: Sequence[Named], folder: Path, in_hal
 
 
 def _checks(
-    context: moderngl.Context, laws: Sequence[Named], maps: Sequence[Named], folder: Path
+    context: moderngl.Context, laws: Sequence[Named], maps: Sequence[Named], folder: Records
 ) -> Iterator[LawCheck | MapCheck]:
     yield from check_laws(context, laws, folder)
     for one in maps:

@@ -11,8 +11,7 @@ from mcml_sim.cli.screen import notes, print_json, put, screen, show
 from mcml_sim.files.whole_file import read_whole, require_folder, write_whole
 from mcml_sim.runs.progress import tracked, working
 from profilefit.errors import InputError, RecordError, ShaderError
-from profilefit.recipes import record
-from profilefit.recipes.folder import evidence_folder, records_folder
+from profilefit.recipes.folder import Records, evidence_folder, records_folder
 from profilefit.report import every_law, fill, markdown_sections, sections
 from profilefit.report.figures import record_figures
 from profilefit.report.page.document import write_page
@@ -122,13 +121,14 @@ def _fill(path: Path, contents: Contents, folder: Path, quiet: bool) -> None:
 
 
 def _contents(folder: Path, names: list[str] | None) -> Contents:
-    known = record.available(folder)
+    records = Records(folder)
+    known = records.paths
     if not known:
         raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
     for name in names or ():
         if name not in known:
             raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known))}")
-    return {name: record.read(known[name], whole=True) for name in (names or known)}
+    return {name: records.content(name, whole=True) for name in (names or known)}
 
 
 def _nearest(name: str, known: list[str]) -> str:

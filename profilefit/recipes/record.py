@@ -20,6 +20,7 @@ from mcml_sim.files.npz import read_npz
 from mcml_sim.files.plain import plain as to_plain
 from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.recipes import schema
 
@@ -64,9 +65,39 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     if not isinstance(content, dict) or content.get("format") != FORMAT:
         found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
         raise RecordError(f"{path}: is not a record of format {FORMAT}, got {found}")
+    require_sound(content, path, whole)
+    return content
+
+
+def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
+    """RecordError where a record lacks what `read` promises, or holds what is of another kind."""
     if text := schema.problem(content, whole):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return content
+
+
+def record_setting(content: Mapping[str, Any]) -> Setting:
+    """The setting that a record belongs to."""
+    try:
+        return Setting(**content["setting"])
+    except (KeyError, TypeError, InputError):
+        raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
+
+
+def record_name(base: str, setting: Setting) -> str:
+    """The record of another setting than Setting(): albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
+    usual, parts = Setting(), [base]
+    if setting.illumination != usual.illumination:
+        parts.append(setting.illumination)
+    if setting.n != usual.n:
+        parts.append(f"n{_shortest(setting.n)}")
+    if setting.g != usual.g:
+        parts.append(f"g{_shortest(setting.g)}")
+    return "-".join(parts)
+
+
+def _shortest(value: float) -> str:
+    """The fewest digits that are this number: 1.4, 2."""
+    return np.format_float_positional(value, trim="-")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:

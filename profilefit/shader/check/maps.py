@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from profilefit.recipes.folder import Folder
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check import bounds, claims, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
@@ -31,7 +31,7 @@ class MapCheck(Verdict):
     places: dict[str, str]
 
 
-def check_map(context: moderngl.Context, one: Named, folder: Path, text: str = "") -> MapCheck:
+def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str = "") -> MapCheck:
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
     model = bounds.of_map(one, folder)
     of_reflectance, of_alpha = validity.of_map(one, folder)
