@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from profilefit import laws
 from profilefit.errors import RecipeError
-from profilefit.fitting.estimate import Fit, Problem, discrepancy_covariance, judged
+from profilefit.fitting.estimate import Fit, Problem, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws import published
 from profilefit.laws.base import Constants
@@ -191,7 +191,7 @@ def _same(one: Solution, other: Solution) -> bool:
     """Whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
-    error = np.sqrt(np.diag(discrepancy_covariance(other)))
+    error = np.sqrt(np.diag(misfit_covariance(other)))
     near = np.maximum(SAME_CONSTANT * np.abs(other.parameters), SAME_IN_ERROR * error)
     return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
 

@@ -89,7 +89,7 @@ class Fitted:
     def converged(self) -> bool:
         return converged(self.content)
 
-    def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "discrepancy") -> tuple[Floats, Floats] | None:
+    def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "misfit") -> tuple[Floats, Floats] | None:
         """The 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
 
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).

@@ -33,6 +33,8 @@ TARGETS = {
 }
 TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
+# The exported JSON keeps its words where records have changed theirs.
+EXPORTED = {"misfit_error": "discrepancy_error"}
 MEASURES = {"rel": "mean relative error of R_d", "ks": "error of the cdf", "inversion_error": "error in xi"}
 LIGHT = {
     "searchlight": "a pencil beam along the normal (MCML's)",
@@ -201,7 +203,9 @@ def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
 
 def _record_data(source: _Source) -> dict[str, Any]:
     content = source.content
-    errors = {name: {key: one.get(key) for key in ERRORS} for name, one in content["constants"].items()}
+    errors = {
+        name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in content["constants"].items()
+    }
     kept = {key: content.get(key) for key in ("title", "equations", "data_digest", "truth")}
     fitted = {key: content["protocol"]["albedos"][key] for key in ("low", "high")}
     own = {"of": source.of, "sha256": source.digest, "came_with_profilefit": source.spare}
