@@ -83,7 +83,7 @@ def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
         yield Row(name, truth, "sandwich", coverage(again.names, off, sandwich), again.failed)
         yield Row(name, truth, "independent", coverage(again.names, off, independent), again.failed)
         if truth == "exact":
-            misfit = np.sqrt(np.diag(one.discrepancy))
+            misfit = np.sqrt(np.diag(one.misfit))
             yield Row(name, truth, "misfit", coverage(again.names, off, misfit), again.failed)
     if name in COUNTED:
         yield _of_counts(chosen, law, light, run, replicates)

@@ -44,11 +44,11 @@ def table(name: str, batches: int, photons: int, chain: int) -> list[tuple[str, 
     errors = {
         "photons": np.sqrt(np.diag(one.statistical)),
         "bootstrap": bootstrap(runs, one).standard_error,
-        "misfit": np.sqrt(np.diag(one.discrepancy)),
+        "misfit": np.sqrt(np.diag(one.misfit)),
         "model": np.sqrt(np.diag(discrepancy(one, profiles).covariance)),
         "jackknife": one.jackknife,
     }
-    for kind, column in (("statistical", "emcee, photons"), ("discrepancy", "emcee, misfit")):
+    for kind, column in (("statistical", "emcee, photons"), ("misfit", "emcee, misfit")):
         errors[column] = posterior(one, kind, max_steps=chain).standard_deviation
     values = one.solution.parameters
     return [

@@ -42,9 +42,9 @@ def moves() -> dict[str, Moves]:
 
 def line(one: Fit, chosen: Moves, longest: int) -> tuple[str, ...]:
     """tau, ms an independent draw, acceptance and what the chain said."""
-    posterior(one, "discrepancy", max_steps=100, moves=chosen)  # compiles
+    posterior(one, "misfit", max_steps=100, moves=chosen)  # compiles
     start = time.perf_counter()
-    chain = posterior(one, "discrepancy", max_steps=longest, moves=chosen)
+    chain = posterior(one, "misfit", max_steps=longest, moves=chosen)
     seconds = time.perf_counter() - start
     draws = chain.steps * chain.walkers / chain.tau
     return f"{chain.tau:.1f}", f"{1e3 * seconds / draws:.3f}", f"{chain.acceptance:.2f}", chain.result

@@ -11,7 +11,7 @@ law = OneExponential(Setting(), normalisation(Setting()), q0=0.5, q1=1.0, q2=1.0
 profiles = profilefit.Profiles.from_exact(np.linspace(0.1, 0.99, 8), np.append(0.0, np.geomspace(0.01, 100.0, 40)))
 fit = profilefit.fit(profiles, law, jackknife=False)  # which would take longer than the fit itself
 print(fit.result, {name: round(value, 3) for name, value in fit.constants.items()})
-errors = dict(zip(fit.free, np.sqrt(np.diag(fit.discrepancy)), strict=True))
+errors = dict(zip(fit.free, np.sqrt(np.diag(fit.misfit)), strict=True))
 print("±", {name: round(float(value), 3) for name, value in errors.items()})
 quality = profilefit.profile_quality(fit.law, np.array([0.5, 0.9]))
 print("mean relative error", quality.rel.round(2), "largest error of the cdf", quality.ks.round(3))

@@ -15,6 +15,7 @@ from profilefit.cli import options
 from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 from profilefit.errors import InputError, SettingError
+from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
     from mcml_sim import Setting
@@ -28,9 +29,7 @@ FREE = "free"
 
 def fit(
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
-    law: Annotated[
-        str, typer.Option(help=f"One of {', '.join(options.LAWS)}.", autocompletion=options.laws)
-    ] = "hazard",
+    law: Annotated[str, typer.Option(help=f"One of {', '.join(PROFILES)}.", autocompletion=options.laws)] = "hazard",
     constants: Annotated[
         str,
         typer.Option(

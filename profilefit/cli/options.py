@@ -14,6 +14,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.folders import known_folder
+from profilefit.laws import MAPS, PROFILES
 from profilefit.recipes.folder import fits_folder
 
 Fits = Annotated[
@@ -22,18 +23,6 @@ Fits = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print all of it as JSON instead.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes: the result only.")]
 
-LAWS = (
-    "liang",
-    "burley",
-    "burley_diffuse_mfp",
-    "dipole",
-    "better_dipole",
-    "beam_diffusion",
-    "gaussians",
-    "hazard",
-    "quantile",
-)
-MAPS = ("rational", "van_de_hulst", "chiang")  # and liang, which is a profile law's name, too
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
 PARTS = ("truth", "laws", "samplers", "fits")
@@ -73,7 +62,7 @@ def recipes(incomplete: str) -> Iterator[str]:
 
 def subjects(ctx: typer.Context, incomplete: str) -> Iterator[str]:
     """Names of laws, maps and records."""
-    return _starting(incomplete, dict.fromkeys((*LAWS, *MAPS, *_known_records(ctx))))
+    return _starting(incomplete, dict.fromkeys((*PROFILES, *MAPS, *_known_records(ctx))))
 
 
 def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
@@ -84,7 +73,7 @@ def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
 
 def laws(incomplete: str) -> Iterator[str]:
     """Names of profile laws."""
-    return _starting(incomplete, LAWS)
+    return _starting(incomplete, PROFILES)
 
 
 def languages(incomplete: str) -> Iterator[str]:

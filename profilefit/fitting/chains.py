@@ -4,7 +4,7 @@ statistical   exp(-Q(theta*) / 2 s^2) with theta* = theta^ + C (theta - theta^):
               adjusted to the sandwich covariance (Chandler and Bate, Biometrika 94, 2007), which is the spread that
               photon noise really causes when the working weights are not the inverse noise; s makes det C = 1, so
               that Q is probed as far from its optimum as the photons move it
-discrepancy   exp(-Q(theta) / 2 s^2), s^2 the misfit per degree of freedom: what the law's misfit leaves open if it were
+misfit        exp(-Q(theta) / 2 s^2), s^2 the misfit per degree of freedom: what the law's misfit leaves open if it were
               noise. It is not, so read it beside the fit's jackknife
 Priors are flat in the constants, each within ten times its size or its own misfit error, whichever is larger: a
 misfit that is blind to a constant leaves it to the prior, and the interval then shows it. Chains run until they are
@@ -113,7 +113,7 @@ KEPT = 1000
 class Posterior:
     """Chains of one fit's constants.
 
-    names       (p,) of the constants; kind "statistical" or "discrepancy"
+    names       (p,) of the constants; kind "statistical" or "misfit"
     law         its name, and objective what it was fitted by
     samples     (k, p) thinned draws after burn-in, all walkers of a step together; log_density (k,) of the target there
     tau         the longest integrated autocorrelation time of any constant [steps]
@@ -163,23 +163,22 @@ class Posterior:
 def posterior(
     fit: Fit, kind: str = "statistical", seed: int = 0, max_steps: int = 20_000, moves: Moves | None = None
 ) -> Posterior:
-    """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "discrepancy" (the law's misfit).
+    """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "misfit" (the law's, taken for noise).
 
     moves  emcee's, with their weights; by default those of `walking.default_moves`
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
     require_own_process()
-    if kind not in ("statistical", "discrepancy"):
-        raise InputError(f"kind must be 'statistical' or 'discrepancy', got {kind!r}")
+    if kind not in ("statistical", "misfit"):
+        renamed = ", which is called 'misfit' now" if kind == "discrepancy" else ""
+        raise InputError(f"kind must be 'statistical' or 'misfit', got {kind!r}{renamed}")
     if not fit.solution.converged:
         raise InputError(f"a posterior needs a fit that converged, got: {fit.result}")
     if max_steps < 1:
         raise InputError(f"max_steps must be at least 1, got {max_steps!r}")
-    covariance = fit.statistical if kind == "statistical" else fit.discrepancy
+    covariance = fit.statistical if kind == "statistical" else fit.misfit
     if covariance is None:
-        raise InputError(
-            "the truth of this fit has no photon noise: only kind='discrepancy' applies, got 'statistical'"
-        )
+        raise InputError("the truth of this fit has no photon noise: only kind='misfit' applies, got 'statistical'")
     density = _Density.of(fit, kind, covariance)
     return _walk(density, covariance, fit, kind, seed, max_steps, moves)
 
@@ -207,7 +206,7 @@ class _Density(eqx.Module):
             adjust, variance = np.eye(len(fit.free)), fit.variance
         problem = Problem(fit.objective, fit.free)
         centre = fit.solution.parameters
-        bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.discrepancy)))
+        bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.misfit)))
         with jax.enable_x64(True):
             density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
             return jax.tree.map(jnp.asarray, density)

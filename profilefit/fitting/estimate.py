@@ -3,8 +3,8 @@
 statistical   what another run's photons would change: the closed-form covariance of the ring energies carried to the
               constants through the exact derivative of the optimum (implicit function theorem, full Hessian), so it
               holds for a law that is not the truth (the sandwich of White, Econometrica 50, 1982)
-discrepancy   what the law's misfit leaves open if its residuals were independent noise: Levenberg-Marquardt's
-              s^2 (J^T J)^-1
+misfit        what the law's misfit leaves open if its residuals were independent noise: Levenberg-Marquardt's
+              s^2 (J^T J)^-1; the process that they are in truth is `fitting.discrepancy`'s
 jackknife     how much the constants move when the fit does not see a sixth of the albedos: a misfit is no noise, its
               neighbours repeat each other, and then this is the larger and the honest number
 structure     what the residuals still show: a law that is the truth leaves none
@@ -44,7 +44,7 @@ class Fit:
     objective    the name of what was minimised; rings its data
     solution     optimum, residuals, Jacobian, result
     statistical  (p, p) covariance from photon noise; None where the truth has none
-    discrepancy  (p, p) covariance from the law's misfit, taken for independent noise
+    misfit       (p, p) covariance from the law's misfit, taken for independent noise
     jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other; NaN with fewer
                  than six albedos, where a refit fails, or where none was asked for
     Covariances are NaN where the fit failed.
@@ -57,7 +57,7 @@ class Fit:
     rings: Rings
     solution: Solution
     statistical: Floats | None
-    discrepancy: Floats
+    misfit: Floats
     jackknife: Floats
     structure: Structure
 
@@ -143,7 +143,7 @@ def fit(
         rings,
         solution,
         _statistical(problem, solution, law, rings, profiles),
-        discrepancy_covariance(solution),
+        misfit_covariance(solution),
         _jackknife(problem, solution, law, rings) if jackknife else np.full(len(names), np.nan),
         residual_structure(solution.residuals.reshape(profiles.alpha.size, -1)),
     )
@@ -171,7 +171,7 @@ def degrees_of_freedom(solution: Solution) -> int:
     return max(int(np.count_nonzero(solution.residuals)) - solution.parameters.size, 1)
 
 
-def discrepancy_covariance(solution: Solution) -> Floats:
+def misfit_covariance(solution: Solution) -> Floats:
     """s^2 (J^T J)^-1 (p, p); NaN where the fit failed."""
     if not solution.converged:
         return np.full((solution.parameters.size,) * 2, np.nan)

@@ -1,0 +1,50 @@
+"""The laws and maps by name, each with its home: module and class. Nothing is imported until somebody asks for it."""
+
+from importlib import import_module
+
+TYPE_CHECKING = False  # a shell completes these names: importing typing would take longer than all the rest
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from typing import Any
+
+PROFILES = {
+    "liang": "liang.Liang",
+    "burley": "burley.Burley",
+    "burley_diffuse_mfp": "burley.BurleyDiffuseMfp",
+    "dipole": "dipole.Dipole",
+    "better_dipole": "better_dipole.BetterDipole",
+    "beam_diffusion": "beam_diffusion.BeamDiffusion",
+    "gaussians": "gaussians.Gaussians",
+    "hazard": "hazard.Hazard",
+    "quantile": "quantile.Quantile",
+}
+MAPS = {
+    "liang": "liang_albedo.LiangAlbedo",
+    "rational": "rational.Rational",
+    "van_de_hulst": "van_de_hulst.VanDeHulst",
+    "chiang": "chiang.Chiang",
+}
+
+
+def profile_classes() -> "dict[str, Any]":
+    """Name -> class of every profile law: `gaussians:2` is a sum of two."""
+    return _classes(PROFILES)
+
+
+def map_classes() -> "dict[str, Any]":
+    """Name -> class of every map between alpha and A."""
+    return _classes(MAPS)
+
+
+def home(place: str) -> "Any":
+    """The class at a home in one of the tables: "module.Class" of this package, or of another by its whole name."""
+    module, _, kind = place.rpartition(".")
+    return getattr(import_module(module if "." in module else f"{__name__}.{module}"), kind)
+
+
+def _classes(table: "Mapping[str, str]") -> "dict[str, Any]":
+    return {
+        f"{name}:{form}" if form else name: kind
+        for name, place in table.items()
+        for form, kind in home(place).forms().items()
+    }

@@ -4,21 +4,32 @@ from __future__ import annotations
 
 import abc
 from dataclasses import fields, replace
-from typing import Self
+from typing import ClassVar, Self
 
 import equinox as eqx
+import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
+from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.evaluate import evaluated
 
 
 class Constants(eqx.Module):
-    """A frozen set of named constants: fit, sampled, recorded and exported under these names."""
+    """A frozen set of named constants: fit, sampled, recorded and exported under these names.
+
+    entry  what is known of it by name; one that is in no table of `profilefit.laws` needs none
+    """
 
     setting: eqx.AbstractVar[Setting]
+    entry: ClassVar[Entry] = Entry()
+
+    @classmethod
+    def forms(cls) -> dict[str, type[Self]]:
+        """The classes that go by one name, by what stands behind its colon; "" for the name alone."""
+        return {"": cls}
 
     @classmethod
     def constant_names(cls) -> tuple[str, ...]:
@@ -34,6 +45,10 @@ class Constants(eqx.Module):
     def constants(self) -> dict[str, float]:
         """Every constant by name."""
         return {name: float(getattr(self, name)) for name in self.constant_names()}
+
+    def text_numbers(self) -> dict[str, float]:
+        """Numbers that its shader text needs beside its constants."""
+        return {}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """The named constants as a vector."""
@@ -59,9 +74,24 @@ class AlbedoLaw(Constants):
     def reflectance(self, alpha) -> Array:
         """Total reflectance A [-] at single-scattering albedo alpha [-]."""
 
+    @property
+    def reflectances(self) -> Range:
+        """Reflectances A [-] that it maps."""
+        return EVERYWHERE
+
+    @property
+    def albedos(self) -> Range:
+        """Albedos alpha [-] that it maps."""
+        return EVERYWHERE
+
 
 class ProfileLaw(Constants):
-    """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy."""
+    """A closed reflectance profile R_d(r; alpha, l) = R_d(r/l; alpha, 1) / l^2 and its cumulated share of energy.
+
+    own_reflectance  whether it has a total reflectance of its own, and none by a map `albedo`
+    """
+
+    own_reflectance: ClassVar[bool] = False
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -82,6 +112,15 @@ class ProfileLaw(Constants):
     @abc.abstractmethod
     def source_strength(self, alpha: Array) -> Array:
         """Limit of 2 pi x R_d at x -> 0, before any scaling [1/mfp]; the exact one is alpha / 2."""
+
+    def total(self, alpha) -> Array:
+        """Total reflectance A [-] that the profile integrates to: by the map `albedo`, where it has none of its own."""
+        return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
+
+    @property
+    def is_finite_at_source(self) -> bool:
+        """Whether R_d stays finite at r = 0, where that of a half space does not."""
+        return float(self.source_strength(jnp.array(0.5))) == 0.0
 
     @property
     @abc.abstractmethod

@@ -27,6 +27,7 @@ from profilefit.laws.diffusion import (
     flux_within,
     grosjean,
 )
+from profilefit.laws.entry import ANY_INDEX, Entry
 from profilefit.laws.rational import Rational
 
 Floats = NDArray[np.float64]
@@ -59,6 +60,13 @@ class BeamDiffusion(DiffusionLaw):
     setting: Setting = eqx.field(static=True)
     albedo: Rational | None = eqx.field(static=True, default=None)
     halves: int = eqx.field(static=True, default=2)
+    entry = Entry(
+        "beam_diffusion",
+        "photon beam diffusion",
+        n=ANY_INDEX,
+        text="law must have a closed form to become a shader, got beam_diffusion: its share within r is a quadrature "
+        "of 20 by 48 nodes; better_dipole is its near relative",
+    )
 
     @property
     def finer(self) -> BeamDiffusion:

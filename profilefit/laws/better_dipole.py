@@ -13,6 +13,8 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.diffusion import (
+    TEXT_ENDS,
+    TEXT_PARTS,
     DiffusionLaw,
     exitance_factors,
     fluence,
@@ -21,6 +23,7 @@ from profilefit.laws.diffusion import (
     flux_within,
     grosjean,
 )
+from profilefit.laws.entry import ANY_INDEX, CLAMPS, Entry, Text
 from profilefit.laws.rational import Rational
 
 
@@ -39,6 +42,14 @@ class BetterDipole(DiffusionLaw):
 
     setting: Setting = eqx.field(static=True)
     albedo: Rational | None = eqx.field(static=True, default=None)
+    entry = Entry(
+        "better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS)
+    )
+
+    def text_numbers(self) -> dict[str, float]:
+        """The share of the light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
+        c_phi, c_e, mismatch = exitance_factors(self.setting.n)
+        return {"entered": self.entered, "c_phi": c_phi, "c_e": c_e, "lift": 4.0 * mismatch}
 
     def image(self, alpha: Array) -> Array:
         """Height of the image above the surface z_v [mfp]."""

@@ -16,6 +16,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.entry import NEAR_CLAMPS, RATIONAL, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Rational
 
@@ -27,6 +28,7 @@ UNREAL = 2.6
 NEWTON_STEPS = 4
 # In falloff lengths; at this radius every exponential is 0, and below it nothing overflows.
 FARTHEST = 3000.0
+ENDS = ("normalized_diffusion", "wrappers")  # of both texts
 
 
 class NormalizedDiffusion(ProfileLaw):
@@ -88,6 +90,17 @@ class Burley(NormalizedDiffusion):
     s1: float
     s2: float
     s3: float
+    entry = Entry(
+        "burley",
+        "normalized diffusion",
+        records=("burley-whole",),
+        alpha=Range(open_low=True),
+        text=Text("burley", RATIONAL, ENDS, NEAR_CLAMPS),
+    )
+
+    def text_numbers(self) -> dict[str, float]:
+        """The exponent p [-]."""
+        return {"power": self.power}
 
     @property
     def power(self) -> int:
@@ -119,6 +132,12 @@ class BurleyDiffuseMfp(NormalizedDiffusion):
     s0: float
     s1: float
     s2: float
+    entry = Entry(
+        "burley_diffuse_mfp",
+        "normalized diffusion by diffuse mfp",
+        alpha=Range(open_low=True, open_high=True),
+        text=Text("burley_diffuse_mfp", RATIONAL, ENDS, f"{NEAR_CLAMPS}; falloff rate to 1e-7 / mfp"),
+    )
 
     @evaluated
     def scale(self, reflectance) -> Array:

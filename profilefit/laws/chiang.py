@@ -12,6 +12,7 @@ from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.entry import Entry, Text
 from profilefit.laws.evaluate import evaluated
 
 # The slope of the printed cubic stays within a factor of three: Newton settles in six.
@@ -31,6 +32,12 @@ class Chiang(AlbedoLaw):
     e1: float
     e2: float
     e3: float
+    entry = Entry(
+        "chiang",
+        "map of Chiang et al.",
+        is_map=True,
+        text=Text("chiang", ("near_zero",), clamps="alpha to that of A = 1"),
+    )
 
     @evaluated
     def alpha(self, reflectance) -> Array:

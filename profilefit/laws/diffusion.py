@@ -27,6 +27,8 @@ NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 NEAREST, FARTHEST = -25.0, 40.0
 # A bracket of 65 halved so often is 6e-5 wide, and Newton squares what is left.
 HALVINGS, NEWTON_STEPS = 20, 3
+# What the texts of dipoles rest on, and what completes them.
+TEXT_PARTS, TEXT_ENDS = ("near_zero", "diffusion"), ("numeric_inverse", "wrappers")
 
 
 class DiffusionLaw(ProfileLaw):
@@ -37,6 +39,7 @@ class DiffusionLaw(ProfileLaw):
     """
 
     albedo: eqx.AbstractVar[Rational | None]
+    own_reflectance = True
 
     def __check_init__(self) -> None:
         if self.setting.illumination != "searchlight" or self.setting.g != 0.0:
@@ -58,6 +61,9 @@ class DiffusionLaw(ProfileLaw):
     def reflectance(self, alpha) -> Array:
         """Total reflectance of the law itself at single-scattering albedo alpha [-]."""
         return self.unscaled_energy(jnp.asarray(jnp.inf), alpha)
+
+    def total(self, alpha) -> Array:
+        return self.reflectance(alpha)
 
     @property
     def entered(self) -> float:

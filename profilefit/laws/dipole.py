@@ -12,7 +12,8 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws.diffusion import DiffusionLaw, flux, flux_within
+from profilefit.laws.diffusion import TEXT_ENDS, TEXT_PARTS, DiffusionLaw, flux, flux_within
+from profilefit.laws.entry import ANY_INDEX, CLAMPS, Entry, Text
 from profilefit.laws.rational import Rational
 
 
@@ -28,6 +29,11 @@ class Dipole(DiffusionLaw):
 
     setting: Setting = eqx.field(static=True)
     albedo: Rational | None = eqx.field(static=True, default=None)
+    entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS))
+
+    def text_numbers(self) -> dict[str, float]:
+        """The share of the light that enters [-], and the height of the image [mfp]."""
+        return {"entered": self.entered, "image": self.image}
 
     @property
     def image(self) -> float:

@@ -43,6 +43,10 @@ class EscapeLaw(ProfileLaw):
     def scaled_density(self, x: Array, alpha: Array) -> Array:
         """2 pi x R_d / A [1/mfp], finite at x = 0."""
 
+    def text_numbers(self) -> dict[str, float]:
+        """The strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
+        return {"source": single_scattering.source_strength(self.setting)}
+
     def source_hazard(self, alpha) -> Array:
         """lambda_0 = lim 2 pi x R_d / A at x = 0 [1/mfp]: light scattered once, exact, over A."""
         return single_scattering.source_strength(self.setting) * self.albedo.albedo_over_reflectance(alpha)

@@ -8,6 +8,7 @@ time (`skin_gaussians`). The coefficient laws, which make it a law for every alb
 from __future__ import annotations
 
 import abc
+import math
 from functools import cache
 from types import new_class
 from typing import Any
@@ -21,6 +22,7 @@ from jax import Array
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.entry import CLAMPS, Entry, Text
 from profilefit.laws.rational import Rational
 
 MOST, DEFAULT = 8, 6
@@ -29,6 +31,7 @@ MOST, DEFAULT = 8, 6
 # both sevenfold towards alpha = 0.
 START_SPAN = 0.05, 8.0
 START_FALL = -6.0, 2.0
+RECORDED = (2, 4, 6)  # numbers of Gaussians that this project fitted
 # Where fits to the exact searchlight begin that would else creep to their end for 200 steps and more: constants in the
 # order of the class, rounded.
 STARTS = {
@@ -62,6 +65,11 @@ class Gaussians(ProfileLaw):
     v1: eqx.AbstractVar[float]
 
     @classmethod
+    def forms(cls) -> dict[str, type[Gaussians]]:
+        """The sum of six, and sums of 1 ... 8."""
+        return {"": law_class(), **{str(count): law_class(count) for count in range(1, MOST + 1)}}
+
+    @classmethod
     @abc.abstractmethod
     def count(cls) -> int:
         """The number N of Gaussians."""
@@ -77,6 +85,11 @@ class Gaussians(ProfileLaw):
         values |= {f"v{i}": float(np.log(np.expm1(ratio))) for i in range(2, cls.count() + 1)}
         values |= dict(zip(("f1", "f2"), START_FALL, strict=True))
         return values | {"v1": float(low if cls.count() > 1 else 0.5 * (low + high))}
+
+    def text_numbers(self) -> dict[str, float]:
+        """ln (v_i / v_{i-1}) [-]."""
+        own = self.constants()
+        return {f"rise{i}": math.log1p(math.exp(own[f"v{i}"])) for i in range(2, self.count() + 1)}
 
     def variances(self, alpha) -> Array:
         """v_i(alpha) [mfp^2], rising, along a last axis."""
@@ -165,4 +178,12 @@ def _law_class(count: int) -> type[Gaussians]:
         "albedo": eqx.field(static=True),
         "count": classmethod(lambda cls: count),
     }
-    return new_class(f"Gaussians{count}", (Gaussians,), exec_body=lambda namespace: namespace.update(body))
+    made: Any = new_class(f"Gaussians{count}", (Gaussians,), exec_body=lambda namespace: namespace.update(body))
+    made.entry = Entry(
+        f"gaussians:{count}",
+        f"{count} Gaussians",
+        records=(f"gaussians-{count}",) if count in RECORDED else (),
+        start=made.start(),
+        text=Text("gaussians", clamps=CLAMPS, count=count),
+    )
+    return made

@@ -9,6 +9,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
+from profilefit.laws.entry import CLAMPS, Entry, Range, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard_curve import FARTHEST, Shape, cumulative, density, growth, radius, radius_at
 from profilefit.laws.rational import Rational
@@ -53,6 +54,18 @@ class Hazard(EscapeLaw):
     c0: float
     c1: float
     c2: float
+    entry = Entry(
+        "hazard",
+        "hazard",
+        records=("hazard",),
+        start={  # within a tenth of the exact profile
+            **{"h0": 1.5, "h1": -0.2, "h2": -0.2, "c0": 0.5, "c1": 0.3, "c2": 0.2},
+            **{"a0": 0.5, "a1": -0.25, "a2": 0.04, "b0": 0.17, "b1": -0.2, "b2": 0.06},
+        },
+        n=Range(1.0, 1.5),
+        own=True,
+        text=Text("hazard", ("rational", "decay"), clamps=CLAMPS),
+    )
 
     def shape(self, alpha) -> Shape:
         """Everything that depends on alpha only: once a material, or once a pixel where A is a texture."""

@@ -6,18 +6,24 @@ Software). Equation numbers are that paper's.
 
 from __future__ import annotations
 
+import math
+
 import equinox as eqx
 import jax.numpy as jnp
+import numpy as np
 from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Rational
 
 PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
 INVERSE_CONSTANTS = ("g1", "g2", "g3", "g4", "h1", "h2", "h3")
 QUANTILES = ("radius", "relative_radius", "share")
+DARKEST = float(np.float32(1e-6))  # alpha [-] that the text takes where it is less: at 0 it is 0/0
+EPS = 0.01  # of (19)
 # Halvings of [0, 1] after which a float64 inverse stops moving.
 BISECTIONS = 60
 
@@ -57,7 +63,20 @@ class Liang(ProfileLaw):
     h1: float
     h2: float
     h3: float
-    eps: float = eqx.field(static=True, default=0.01)
+    eps: float = eqx.field(static=True, default=EPS)
+    entry = Entry(
+        "liang",
+        "Liang et al.",
+        records=("liang-whole", "liang-inverse-whole"),
+        alpha=Range(low=DARKEST),
+        xi=Range(low=EPS),  # below, a second time small radii
+        as_fitted=True,  # for dark media g turns back before xi = 1
+        text=Text(
+            "liang",
+            ("rational", "near_zero"),
+            clamps="R_d within 1e-6 mfp of the source to that at 1e-6 mfp; alpha to at least 1e-6; radii to r_max",
+        ),
+    )
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -65,6 +84,10 @@ class Liang(ProfileLaw):
         if objective in ("energy", "relative", "radial"):
             return PROFILE_CONSTANTS
         return INVERSE_CONSTANTS if objective in QUANTILES else ()
+
+    def text_numbers(self) -> dict[str, float]:
+        """eps of the inverse [-], its root, and the largest -ln(1 + eps - xi)."""
+        return {"eps": self.eps, "root": self.eps**0.5, "depth": -math.log(self.eps)}
 
     def coefficients(self, alpha) -> tuple[Array, Array, Array]:
         """a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""

@@ -8,6 +8,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 
 
@@ -24,6 +25,23 @@ class LiangAlbedo(AlbedoLaw):
     p: float
     q: float
     w: float
+    entry = Entry(
+        "liang",
+        "map of Liang et al.",
+        is_map=True,
+        records=("albedo-liang",),
+        as_fitted=True,
+        text=Text("liang_albedo", (), clamps="A to where it turns; alpha to 1"),
+    )
+
+    def text_numbers(self) -> dict[str, float]:
+        """The reflectance where it turns [-]."""
+        return {"fold": self.fold}
+
+    @property
+    def albedos(self) -> Range:
+        """Those below its largest, at the fold: it has no A for others."""
+        return Range(0.0, float(self.alpha(self.fold)), open_high=True)
 
     @evaluated
     def alpha(self, reflectance) -> Array:

@@ -14,6 +14,7 @@ from jax import Array, lax
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
+from profilefit.laws.entry import CLAMPS, Entry, Range, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
@@ -70,6 +71,18 @@ class Quantile(EscapeLaw):
     c0: float
     c1: float
     c2: float
+    entry = Entry(
+        "quantile",
+        "quantile",
+        records=("quantile",),
+        start={  # within a hundredth of the exact share of energy
+            **{"a0": 0.1, "a1": 0.3, "a2": -0.15, "b0": 0.9, "b1": -0.3, "b2": 0.2},
+            **{"c0": 0.05, "c1": -0.01, "c2": -0.004},
+        },
+        profile=Range(high=0.9999),
+        own=True,
+        text=Text("quantile", ("rational", "decay"), clamps=CLAMPS),
+    )
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:

@@ -9,6 +9,7 @@ from jax import Array
 from mcml_sim.exact import single_scattering
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 
 
@@ -27,6 +28,25 @@ class Rational(AlbedoLaw):
     b: float
     c: float
     d: float
+    entry = Entry(
+        "rational",
+        "rational map",
+        is_map=True,
+        records=("albedo-rational",),
+        start={"b": 0.5, "c": 2.0, "d": 1.0},  # the limits hold for any, and these give A within 0.1
+        n=Range(1.0, 1.5),
+        own=True,
+        text=Text("rational", (), clamps="A to the light that enters"),
+    )
+
+    def text_numbers(self) -> dict[str, float]:
+        """The share of the light that enters [-]."""
+        return {"entered": self.entered}
+
+    @property
+    def reflectances(self) -> Range:
+        """Those that the surface lets out of a white half space, and less."""
+        return Range(0.0, self.entered)
 
     @property
     def entered(self) -> float:

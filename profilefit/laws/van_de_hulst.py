@@ -13,6 +13,7 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.entry import Entry, Text
 from profilefit.laws.evaluate import evaluated
 
 
@@ -32,6 +33,12 @@ class VanDeHulst(AlbedoLaw):
     q0: float
     q1: float
     q2: float
+    entry = Entry(
+        "van_de_hulst",
+        "map of van de Hulst",
+        is_map=True,
+        text=Text("van_de_hulst", (), clamps="both results to [0, 1]"),
+    )
 
     @evaluated
     def alpha(self, reflectance) -> Array:

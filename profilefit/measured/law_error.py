@@ -19,10 +19,11 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
+from profilefit.laws import profile_classes
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.model import u_of
 from profilefit.measured.noise import Noise
-from profilefit.recipes import catalogue, record
+from profilefit.recipes.record_folder import Folder, Records
 
 Floats = NDArray[np.float64]
 RMS = 1.5
@@ -42,15 +43,16 @@ class Origin:
     quality: dict[str, Any]
 
 
-def origin(name: str, constants: str, setting: Setting, folder: Path) -> Origin | None:
+def origin(name: str, constants: str, setting: Setting, folder: Folder) -> Origin | None:
     """The record behind a law of this name; None of printed constants and of laws without any."""
+    records, bases = Records.of(folder), profile_classes()[name].entry.records
     if constants.endswith(".json"):
         path = Path(constants)
-    elif constants == "regenerated" and (key := catalogue.SHORT.get(name, name)) in catalogue.REGENERATED:
-        path = catalogue.record_file(catalogue.REGENERATED[key][0], setting, folder)
+    elif constants == "regenerated" and bases:
+        path = records.path(bases[0], setting)
     else:
         return None
-    quality = record.read(path).get("quality") or {}
+    quality = records.read(path).get("quality") or {}
     return Origin(path, hashlib.sha256(path.read_bytes()).hexdigest(), quality)
 
 

@@ -23,7 +23,6 @@ from scipy.special import expit
 
 from mcml_sim.exact.by_albedo import blocks
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.diffusion import DiffusionLaw
 
 Floats = NDArray[np.float64]
 NAMES = ("alpha", "l", "scale")
@@ -76,20 +75,13 @@ def u_of(alpha: float) -> float:
     return float(np.log(s) - np.log(alpha / (1.0 + s)))
 
 
-def total(law: ProfileLaw, alpha) -> jax.Array:
-    """Total reflectance A [-] that the profile integrates to."""
-    if isinstance(law, DiffusionLaw):
-        return law.reflectance(alpha)
-    return law.albedo.reflectance(alpha)  # type: ignore[attr-defined]
-
-
 def _blocks(inner: Floats, outer: Floats):
     return zip(blocks(inner, BLOCK), blocks(outer, BLOCK), strict=True)
 
 
 def _light(law: ProfileLaw, rings: bool, point, inner, outer):
     alpha = _alpha(point[U])
-    mfp, scale, reflected = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE]), total(law, alpha)
+    mfp, scale, reflected = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE]), law.total(alpha)
     if rings:
         within = law.scaled_cdf(jnp.stack([inner, outer]) / mfp, alpha)
         light = reflected * (within[1] - within[0]) / (jnp.pi * (outer - inner) * (outer + inner))

@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw
-from profilefit.measured.model import NAMES, total, u_of
+from profilefit.measured.model import NAMES, u_of
 
 Floats = NDArray[np.float64]
 LEAST, MOST = 1e-9, 1.0 - 1e-9  # albedos that can be held
@@ -59,11 +59,9 @@ def held_albedo(law: ProfileLaw, name: str, value: float) -> float:
             raise InputError(f"held alpha must be a single-scattering albedo in (0, 1), got {value:g}")
         return value
     with np.errstate(all="ignore"):
-        low, high = (float(np.asarray(total(law, np.float64(end)))) for end in (LEAST, MOST))
+        low, high = (float(np.asarray(law.total(np.float64(end)))) for end in (LEAST, MOST))
     if not low <= value <= high:
         raise InputError(
             f"held A must be a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface, got {value:g}"
         )
-    return float(
-        brentq(lambda alpha: float(np.asarray(total(law, np.float64(alpha)))) - value, LEAST, MOST, xtol=1e-14)
-    )
+    return float(brentq(lambda alpha: float(np.asarray(law.total(np.float64(alpha)))) - value, LEAST, MOST, xtol=1e-14))

@@ -23,6 +23,7 @@ from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
 from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
 from profilefit.recipes.recipe import Albedos, Recipe, Rings
+from profilefit.recipes.record_folder import Records
 from profilefit.recipes.run import Run
 from profilefit.recipes.summary import Arrays, curves, described, errors_by_name
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
@@ -162,8 +163,8 @@ def _described(recipe: Recipe, run: Run, profiles: Profiles, result: Fit) -> Mad
 
 def printed_sets(recipe: Recipe) -> dict[str, dict[str, float]]:
     """The printed constants of a recipe's law and setting by their names; the first one counts as the published one."""
-    key = f"{recipe.law}_albedo" if recipe.pipeline == "albedo" else recipe.law
-    sets = [s for s in published.SETS if (s.law, s.setting) == (key, recipe.setting)]
+    printed = starts.law_class(recipe).entry.printed
+    sets = [s for s in published.SETS if (s.law, s.setting) == (printed, recipe.setting)]
     return {s.name if i else "published": dict(s.constants) for i, s in enumerate(sets)}
 
 
@@ -200,15 +201,14 @@ def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
 
 def _regenerated_laws(run: Run) -> dict[str, ProfileLaw]:
     """The laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
-    laws = {}
+    laws, records = {}, Records(run.out)
     for label, law, name in (
         ("normalized diffusion, regenerated", "burley", "burley-whole"),
         ("paper, regenerated as published", "liang", "liang-as-published"),
         ("paper, regenerated whole", "liang", "liang-whole"),
     ):
-        path = run.out / f"{name}.json"
-        if not path.exists():
-            path = catalogue.fits_folder() / path.name
+        path = records.path_or_shipped(name)
+        if path.parent != run.out:
             run.say(f"compared with the shipped record {name}: {run.out} has none")
-        laws[label] = catalogue.load(law, str(path), folder=run.out)
+        laws[label] = catalogue.load(law, str(path), folder=records)
     return laws

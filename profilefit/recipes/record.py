@@ -21,10 +21,14 @@ from mcml_sim.files.npz import read_npz
 from mcml_sim.files.plain import plain as to_plain
 from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.recipes import schema
 
-FORMAT = 1
+FORMAT = 2
+# What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.
+MISFIT_BEFORE, MISFIT = "discrepancy", "misfit"
+ARRAYS_OF_FORMAT_1 = {f"{kind}_{MISFIT_BEFORE}": f"{kind}_{MISFIT}" for kind in ("samples", "log_density")}
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
@@ -63,12 +67,64 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
         raise RecordError(f"{path}: cannot be read ({str(error).rpartition('got: ')[2]})") from None
     except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
-    if not isinstance(content, dict) or content.get("format") != FORMAT:
+    if not isinstance(content, dict) or content.get("format") not in (1, FORMAT):
         found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
-        raise RecordError(f"{path}: is not a record of format {FORMAT}, got {found}")
+        raise RecordError(f"{path}: is not a record of format 1 or {FORMAT}, got {found}")
+    if content["format"] == 1:
+        content = _of_format_1(content)
+    require_sound(content, path, whole)
+    return content
+
+
+def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
+    """The same in the words of today, whatever is wrong with it."""
+
+    def renamed(table: Any, ending: str = "") -> Any:
+        if not isinstance(table, dict):
+            return table
+        return {f"{MISFIT}{ending}" if key == f"{MISFIT_BEFORE}{ending}" else key: one for key, one in table.items()}
+
+    found = {**content, "format": FORMAT}
+    for name in ("covariance", "posterior"):
+        if name in found:
+            found[name] = renamed(found[name])
+    if isinstance(found.get("constants"), dict):
+        found["constants"] = {name: renamed(one, "_error") for name, one in found["constants"].items()}
+        for one in found["constants"].values():
+            if isinstance(one, dict) and "intervals" in one:
+                one["intervals"] = renamed(one["intervals"])
+    return found
+
+
+def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
+    """RecordError where a record lacks what `read` promises, or holds what is of another kind."""
     if text := schema.problem(content, whole):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
-    return content
+
+
+def record_setting(content: Mapping[str, Any]) -> Setting:
+    """The setting that a record belongs to."""
+    try:
+        return Setting(**content["setting"])
+    except (KeyError, TypeError, InputError):
+        raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
+
+
+def record_name(base: str, setting: Setting) -> str:
+    """The record of another setting than Setting(): albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
+    usual, parts = Setting(), [base]
+    if setting.illumination != usual.illumination:
+        parts.append(setting.illumination)
+    if setting.n != usual.n:
+        parts.append(f"n{_shortest(setting.n)}")
+    if setting.g != usual.g:
+        parts.append(f"g{_shortest(setting.g)}")
+    return "-".join(parts)
+
+
+def _shortest(value: float) -> str:
+    """The fewest digits that are this number: 1.4, 2."""
+    return np.format_float_positional(value, trim="-")
 
 
 def read_arrays(path: Path) -> dict[str, np.ndarray]:
@@ -76,11 +132,12 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     file = path.with_suffix(".npz")
     try:
         with file.open("rb") as opened:
-            return read_npz(opened.read(MOST_ARRAYS + 1), MOST_ARRAYS)
+            found = read_npz(opened.read(MOST_ARRAYS + 1), MOST_ARRAYS)
     except FileNotFoundError:
         raise RecordError(f"{file}: the samples and curves of this record are missing; regenerate it") from None
     except (OSError, ValueError) as error:
         raise RecordError(f"{file}: is damaged ({error}); regenerate it") from None
+    return {ARRAYS_OF_FORMAT_1.get(name, name): array for name, array in found.items()}
 
 
 def available(folder: Path) -> dict[str, Path]:

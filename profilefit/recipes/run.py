@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from mcml_sim import Grid, Orders, Setting, simulate_orders
-from profilefit.recipes.catalogue import record_name
+from profilefit.recipes.record import record_name
 from profilefit.recipes.targets import RUN_EDGES
 
 Say = Callable[[str], None]

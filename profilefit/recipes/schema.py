@@ -75,7 +75,7 @@ ERRORS = {
     "statistical_error": "photons",
     "discretisation_error": "dr",
     "model_error": "model",
-    "discrepancy_error": "misfit",
+    "misfit_error": "misfit",
     "jackknife_error": "jackknife",
 }
 # What a law is made of.
@@ -118,7 +118,7 @@ SETS = ("published", "corrected", "regenerated")
 PARTS: Kinds = {
     "covariance?": TABLE,
     "covariance?.names": TEXTS,
-    **{f"covariance?.{name}?": MATRIX for name in ("statistical", "discrepancy", "model")},
+    **{f"covariance?.{name}?": MATRIX for name in ("statistical", "misfit", "model")},
     "left_out?": TABLE,
     "left_out?.rings": COUNT,
     "left_out?.albedos": COUNT,

@@ -12,29 +12,19 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit import laws
 from profilefit.errors import RecipeError
-from profilefit.fitting.estimate import Fit, Problem, discrepancy_covariance, judged
+from profilefit.fitting.estimate import Fit, Problem, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, solve_batch
-from profilefit.laws import gaussians, published
+from profilefit.laws import published
 from profilefit.laws.base import Constants
+from profilefit.laws.entry import Entry
 from profilefit.recipes import catalogue
 from profilefit.recipes.recipe import Recipe
 
 Floats = NDArray[np.float64]
-# Where a law without published constants begins, and one with such constants whose recipe says start = "none".
+# Where a law with published constants begins at those of its entry: one without such constants always does.
 OWN_START = "none"
-STARTS: dict[str, dict[str, float]] = {
-    "hazard": {  # within a tenth of the exact profile
-        **{"h0": 1.5, "h1": -0.2, "h2": -0.2, "c0": 0.5, "c1": 0.3, "c2": 0.2},
-        **{"a0": 0.5, "a1": -0.25, "a2": 0.04, "b0": 0.17, "b1": -0.2, "b2": 0.06},
-    },
-    "quantile": {  # within a hundredth of the exact share of energy
-        **{"a0": 0.1, "a1": 0.3, "a2": -0.15, "b0": 0.9, "b1": -0.3, "b2": 0.2},
-        **{"c0": 0.05, "c1": -0.01, "c2": -0.004},
-    },
-    **{f"gaussians:{n}": gaussians.law_class(n).start() for n in range(1, gaussians.MOST + 1)},
-    "rational": {"b": 0.5, "c": 2.0, "d": 1.0},  # the limits hold for any, and these give A within 0.1
-}
 # A random start multiplies each constant by e^(SPREAD * normal): two of three within a factor of two. It keeps its
 # sign, since most laws are not defined beyond; a constant that is 0 starts at SPREAD * normal.
 SPREAD = float(np.log(2.0))
@@ -60,7 +50,7 @@ def require_known(recipe: Recipe) -> None:
     """RecipeError if a recipe names a law, a starting set or a constant that there is not."""
     kind = law_class(recipe)
     if not _start_constants(recipe) and recipe.pipeline != "evidence":
-        accepted = [*_published_names(recipe), *([OWN_START] if recipe.law in STARTS else [])]
+        accepted = [*_published_names(kind.entry), *([OWN_START] if kind.entry.start else [])]
         raise RecipeError(
             f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
         )
@@ -88,21 +78,18 @@ def starting_law(recipe: Recipe, folder: Path) -> Any:
 
 
 def _laws(recipe: Recipe) -> Mapping[str, type[Constants]]:
-    return catalogue.ALBEDO_LAWS if recipe.pipeline == "albedo" else catalogue.PROFILE_LAWS
+    return laws.map_classes() if recipe.pipeline == "albedo" else laws.profile_classes()
 
 
-def _published_key(recipe: Recipe) -> str:
-    return f"{recipe.law}_albedo" if recipe.pipeline == "albedo" else recipe.law
-
-
-def _published_names(recipe: Recipe) -> list[str]:
-    return [s.name for s in published.SETS if s.law == _published_key(recipe)]
+def _published_names(entry: Entry) -> list[str]:
+    return [s.name for s in published.SETS if s.law == entry.printed]
 
 
 def _start_constants(recipe: Recipe) -> dict[str, float]:
-    if recipe.start == OWN_START or not _published_names(recipe):
-        return STARTS.get(recipe.law, {})
-    return published.constants(_published_key(recipe), recipe.start)
+    entry = law_class(recipe).entry
+    if recipe.start == OWN_START or not _published_names(entry):
+        return dict(entry.start)
+    return published.constants(entry.printed, recipe.start)
 
 
 @dataclass(frozen=True)
@@ -204,7 +191,7 @@ def _same(one: Solution, other: Solution) -> bool:
     """Whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
-    error = np.sqrt(np.diag(discrepancy_covariance(other)))
+    error = np.sqrt(np.diag(misfit_covariance(other)))
     near = np.maximum(SAME_CONSTANT * np.abs(other.parameters), SAME_IN_ERROR * error)
     return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
 

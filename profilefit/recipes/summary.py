@@ -88,7 +88,7 @@ def described(
     chains = _chains(result, seed, max_chain)
     off, width = discrepancy(result, profiles), discretisation_error(result)
     errors = {"model_error": np.sqrt(np.diag(off.covariance)), "discretisation_error": width}
-    covariances = {"statistical": result.statistical, "discrepancy": result.discrepancy, "model": off.covariance}
+    covariances = {"statistical": result.statistical, "misfit": result.misfit, "model": off.covariance}
     content = {
         "constants": _constants(result, printed, chains, errors),
         "covariance": {"names": result.free, **covariances},
@@ -139,7 +139,7 @@ def _constants(
     for i, name in enumerate(result.free):
         constants[name] |= {
             "statistical_error": None if result.statistical is None else float(np.sqrt(result.statistical[i, i])),
-            "discrepancy_error": float(np.sqrt(result.discrepancy[i, i])),
+            "misfit_error": float(np.sqrt(result.misfit[i, i])),
             "jackknife_error": float(result.jackknife[i]),
             **{name: float(error[i]) for name, error in errors.items()},
             "intervals": {c.kind: {f"{level:.0%}": c.interval(level)[i] for level in LEVELS} for c in chains},
@@ -159,7 +159,7 @@ def _left_out(profiles: Profiles, result: Fit) -> dict[str, int]:
 def _chains(result: Fit, seed: int, max_chain: int) -> list[Posterior]:
     if not result.solution.converged:
         return []  # the curvature there describes no optimum, and the record says why
-    kinds = ["discrepancy"] if result.statistical is None else ["statistical", "discrepancy"]
+    kinds = ["misfit"] if result.statistical is None else ["statistical", "misfit"]
     return [posterior(result, kind, seed, max_chain) for kind in kinds]
 
 

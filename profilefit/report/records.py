@@ -6,7 +6,6 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -18,6 +17,8 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
+from profilefit.recipes.record import record_setting
+from profilefit.recipes.record_folder import Records
 from profilefit.recipes.schema import ERRORS, SETS
 
 Content = Mapping[str, Any]
@@ -88,7 +89,7 @@ class Fitted:
     def converged(self) -> bool:
         return converged(self.content)
 
-    def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "discrepancy") -> tuple[Floats, Floats] | None:
+    def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "misfit") -> tuple[Floats, Floats] | None:
         """The 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
 
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
@@ -103,34 +104,21 @@ class Fitted:
 
 
 @dataclass(frozen=True)
-class Source:
-    """The records in `folder`, or those of them that are named."""
-
-    folder: Path
-    names: tuple[str, ...] | None = None
+class Source(Records):
+    """Records with their arrays and the laws that they make."""
 
     @cached_property
-    def paths(self) -> dict[str, Path]:
-        """Record name -> file."""
-        found = record.available(self.folder)
-        return found if self.names is None else {name: path for name, path in found.items() if name in self.names}
-
-    @cached_property
-    def _read(self) -> dict[str, Fitted]:
+    def _fitted(self) -> dict[str, Fitted]:
         return {}
-
-    def content(self, name: str) -> dict[str, Any]:
-        """What the .json of a record says."""
-        return self._read[name].content if name in self._read else record.read(self.paths[name])
 
     def fitted(self, name: str) -> Fitted | None:
         """A record and its law; None if the folder has none of that name. RecordError if it is damaged."""
         if name not in self.paths:
             return None
-        if name not in self._read:
-            content = record.read(self.paths[name])
-            self._read[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
-        return self._read[name]
+        if name not in self._fitted:
+            content = self.content(name)
+            self._fitted[name] = Fitted(content, record.read_arrays(self.paths[name]), self._law(name, content))
+        return self._fitted[name]
 
     def needed(self, name: str) -> Fitted:
         """A record and its law; RecordError if the folder has none of that name."""
@@ -146,12 +134,12 @@ class Source:
 
     def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
         """A profile law with printed constants, normalised as the records here are."""
-        return catalogue.load(law, constants, setting, self.folder)
+        return catalogue.load(law, constants, setting, self)
 
     def _law(self, name: str, content: dict[str, Any]) -> ProfileLaw | AlbedoLaw:
-        setting, path = catalogue.record_setting(content), str(self.paths[name])
+        setting, path = record_setting(content), str(self.paths[name])
         load = catalogue.albedo_law if content["pipeline"] == "albedo" else catalogue.load
-        return load(content["law"], path, setting, self.folder)
+        return load(content["law"], path, setting, self)
 
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:

@@ -10,30 +10,18 @@ from __future__ import annotations
 import hashlib
 import math
 import re
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import cache
 from importlib import resources
 from typing import Any
 
 import numpy as np
 
-from mcml_sim.exact import single_scattering
 from profilefit.errors import InputError
-from profilefit.laws import diffusion
+from profilefit.laws import map_classes, profile_classes
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
-from profilefit.laws.better_dipole import BetterDipole
-from profilefit.laws.burley import Burley, BurleyDiffuseMfp
-from profilefit.laws.chiang import Chiang
-from profilefit.laws.dipole import Dipole
-from profilefit.laws.gaussians import Gaussians
-from profilefit.laws.hazard import Hazard
-from profilefit.laws.liang import Liang
-from profilefit.laws.liang_albedo import LiangAlbedo
-from profilefit.laws.quantile import Quantile
+from profilefit.laws.entry import Text
 from profilefit.laws.rational import Rational
-from profilefit.laws.van_de_hulst import VanDeHulst
 from profilefit.shader.languages import translated
 
 Numbers = dict[str, float]
@@ -54,86 +42,15 @@ GUARD = """\
 DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them, a float32 drops what it cannot hold
 
 
-@dataclass(frozen=True)
-class Form:
-    """How a class of laws becomes text.
-
-    file    in `glsl/`; name its prefix, of the instance
-    parts   files that it rests on, before it in order; ends files that rest on it
-    extra   constants that are not the law's own; count of its `//% for` blocks
-    clamps  what the text takes for another number than was given, in words
-    """
-
-    file: str
-    parts: tuple[str, ...] = ("rational",)
-    ends: tuple[str, ...] = ("wrappers",)
-    extra: Callable[[Any], Numbers] = lambda law: {}
-    count: Callable[[Any], int] = lambda law: 0
-    clamps: str = "none"
-
-
-def _source(law: Any) -> Numbers:
-    """The strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
-    return {"source": single_scattering.source_strength(law.setting)}
-
-
-def _liang(law: Any) -> Numbers:
-    """eps of the inverse [-], its root, and the largest -ln(1 + eps - xi)."""
-    return {"eps": law.eps, "root": law.eps**0.5, "depth": -math.log(law.eps)}
-
-
-def _gaussians(law: Any) -> Numbers:
-    """ln (v_i / v_{i-1}) [-]."""
-    own = law.constants()
-    return {f"rise{i}": math.log1p(math.exp(own[f"v{i}"])) for i in range(2, law.count() + 1)}
-
-
-def _dipole(law: Any) -> Numbers:
-    """The share of the light that enters [-], and the height of the image [mfp]."""
-    return {"entered": law.entered, "image": law.image}
-
-
-def _better_dipole(law: Any) -> Numbers:
-    """The share of the light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
-    c_phi, c_e, mismatch = diffusion.exitance_factors(law.setting.n)
-    return {"entered": law.entered, "c_phi": c_phi, "c_e": c_e, "lift": 4.0 * mismatch}
-
-
-NEAR = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; xi to 1 - 2^-24"
-FAR = f"{NEAR}; r to 1e8 mfp"
-TO_R_MAX = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; alpha to at least 1e-6; radii to r_max"
-NORMALIZED = ("normalized_diffusion", "wrappers")
-NUMERIC = ("numeric_inverse", "wrappers")
-FORMS: dict[type[Any], Form] = {
-    Hazard: Form("hazard", ("rational", "decay"), extra=_source, clamps=FAR),
-    Quantile: Form("quantile", ("rational", "decay"), extra=_source, clamps=FAR),
-    Liang: Form("liang", ("rational", "near_zero"), extra=_liang, clamps=TO_R_MAX),
-    Burley: Form("burley", ends=NORMALIZED, extra=lambda law: {"power": law.power}, clamps=NEAR),
-    BurleyDiffuseMfp: Form("burley_diffuse_mfp", ends=NORMALIZED, clamps=f"{NEAR}; falloff rate to 1e-7 / mfp"),
-    Gaussians: Form("gaussians", extra=_gaussians, count=lambda law: law.count(), clamps=FAR),
-    Dipole: Form("dipole", ("near_zero", "diffusion"), NUMERIC, _dipole, clamps=FAR),
-    BetterDipole: Form("better_dipole", ("near_zero", "diffusion"), NUMERIC, _better_dipole, clamps=FAR),
-}
-MAPS: dict[type[Any], Form] = {
-    Rational: Form("rational", (), extra=lambda law: {"entered": law.entered}, clamps="A to the light that enters"),
-    LiangAlbedo: Form(
-        "liang_albedo", (), extra=lambda law: {"fold": law.fold}, clamps="A to where it turns; alpha to 1"
-    ),
-    VanDeHulst: Form("van_de_hulst", (), clamps="both results to [0, 1]"),
-    Chiang: Form("chiang", ("near_zero",), clamps="alpha to that of A = 1"),
-}
-
-
 def prefix(law: Constants) -> str:
     """What the names of a law's text begin with, less the underscore."""
-    form = _form(law, {**FORMS, **MAPS})
-    count = form.count(law)
-    return f"{form.file}{count}" if count else form.file
+    text = _text(law)
+    return f"{text.file}{text.count}" if text.count else text.file
 
 
 def clamps(law: Constants) -> str:
     """What a law's text takes for another number than was given, in words."""
-    return _form(law, {**FORMS, **MAPS}).clamps
+    return _text(law).clamps
 
 
 def law_text(
@@ -146,20 +63,20 @@ def law_text(
     told  a remark for each constant, which stands behind it
     InputError for a law that has no text.
     """
-    form = _form(law, FORMS)
-    map_constants = _map_constants(law) if "rational" in form.parts else {}
-    constants = {**map_constants, **form.extra(law), **law.constants()}
-    text = [_read(part) for part in ("common", *form.parts, form.file, *form.ends)]
-    return _filled(text, name or prefix(law), constants, form.count(law), lang, told or {})
+    text = _text(law, ProfileLaw)
+    map_constants = _map_constants(law) if "rational" in text.parts else {}
+    constants = {**map_constants, **law.text_numbers(), **law.constants()}
+    files = [_read(part) for part in ("common", *text.parts, text.file, *text.ends)]
+    return _filled(files, name or prefix(law), constants, text.count, lang, told or {})
 
 
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
     """The map between alpha and A: NAME_alpha(A) and NAME_map_reflectance(alpha); arguments as for `law_text`."""
-    form = _form(law, MAPS)
-    constants = {f"map_{key}": value for key, value in {**form.extra(law), **law.constants()}.items()}
+    text = _text(law, AlbedoLaw)
+    constants = {f"map_{key}": value for key, value in {**law.text_numbers(), **law.constants()}.items()}
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
-    text = [_read(part) for part in ("common", *form.parts, form.file)]
-    return _filled(text, name or prefix(law), constants, 0, lang, remarks)
+    files = [_read(part) for part in ("common", *text.parts, text.file)]
+    return _filled(files, name or prefix(law), constants, 0, lang, remarks)
 
 
 @cache
@@ -168,16 +85,15 @@ def text_beside(module: str, file: str) -> str:
     return (resources.files(module.rpartition(".")[0]) / file).read_text(encoding="utf-8")
 
 
-def _form(law: Constants, known: Mapping[Any, Form]) -> Form:
-    for kind, form in known.items():
-        if isinstance(law, kind):
-            return form
-    if isinstance(law, BeamDiffusion):
-        raise InputError(
-            "law must have a closed form to become a shader, got beam_diffusion: its share within r is a quadrature "
-            "of 20 by 48 nodes; better_dipole is its near relative"
-        )
-    has = ", ".join(kind.__name__ for kind in known)
+def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
+    """The text of a law of this kind, a profile law or a map."""
+    text = law.entry.text
+    if isinstance(law, kind) and isinstance(text, Text):
+        return text
+    if isinstance(text, str) and text:
+        raise InputError(text)
+    known = [*profile_classes().items(), *map_classes().items()]
+    has = ", ".join(name for name, one in known if issubclass(one, kind) and one.entry.has_text and ":" not in name)
     raise InputError(f"law must be one that has a shader text ({has}), got {type(law).__name__}")
 
 

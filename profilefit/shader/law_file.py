@@ -15,8 +15,9 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
-from profilefit.recipes import catalogue, record
-from profilefit.recipes.inventory import PRINTED_MAP, Named
+from profilefit.recipes import catalogue
+from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
@@ -32,6 +33,8 @@ TARGETS = {
 }
 TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
+# The exported JSON keeps its words where records have changed theirs.
+EXPORTED = {"misfit_error": "discrepancy_error"}
 MEASURES = {"rel": "mean relative error of R_d", "ks": "error of the cdf", "inversion_error": "error in xi"}
 LIGHT = {
     "searchlight": "a pencil beam along the normal (MCML's)",
@@ -56,7 +59,7 @@ alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s'
 A the total diffuse reflectance (the colour) under that light."""
 
 
-def export(named: Named, folder: Path, lang: str = "glsl", name: str | None = None) -> str:
+def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = None) -> str:
     """The whole file of a law or map in one of `LANGUAGES`; `folder` holds the record of the map that normalises it.
 
     name  what the names in it begin with, by default `emit.prefix`: two media in one shader need two
@@ -65,7 +68,7 @@ def export(named: Named, folder: Path, lang: str = "glsl", name: str | None = No
     """
     if lang not in LANGUAGES:
         raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
-    sources = _sources(named, folder)
+    sources = _sources(named, Records.of(folder))
     if lang == "json":
         if name is not None:
             raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
@@ -102,19 +105,18 @@ class _Source:
     spare: bool = False
 
 
-def _sources(named: Named, folder: Path) -> list[_Source]:
+def _sources(named: Named, records: Records) -> list[_Source]:
     """The records behind a law: its own, and that of the map which normalises it."""
     own = "map" if isinstance(named.law, AlbedoLaw) else "law"
-    found = [_source(own, path) for path in named.files]
+    found = [_source(own, path, records) for path in named.files]
     if getattr(named.law, "albedo", None) is not None:
-        path = catalogue.map_file(named.setting, folder)
-        found.append(_source("map", path, spare=path.parent != folder))
+        path = records.path_or_shipped(catalogue.ALBEDO_RECORD, named.setting)
+        found.append(_source("map", path, records, spare=path.parent != records.folder))
     return found
 
 
-def _source(of: str, path: Path, spare: bool = False) -> _Source:
-    content = record.read(path, whole=True)
-    return _Source(of, path, content, hashlib.sha256(path.read_bytes()).hexdigest(), spare)
+def _source(of: str, path: Path, records: Records, spare: bool = False) -> _Source:
+    return _Source(of, path, records.read(path, whole=True), hashlib.sha256(path.read_bytes()).hexdigest(), spare)
 
 
 def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None) -> list[str]:
@@ -176,8 +178,8 @@ def _remarks(named: Named, sources: Sequence[_Source]) -> dict[str, str]:
 
 def _printed(named: Named) -> Any:
     """The printed set that a law's constants are, or None."""
-    law = named.name + (PRINTED_MAP if isinstance(named.law, AlbedoLaw) else "")
-    return next((s for s in published.SETS if not named.files and (s.law, s.name) == (law, named.constants)), None)
+    own = named.law.entry.printed, named.constants
+    return next((s for s in published.SETS if not named.files and (s.law, s.name) == own), None)
 
 
 def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
@@ -201,7 +203,9 @@ def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
 
 def _record_data(source: _Source) -> dict[str, Any]:
     content = source.content
-    errors = {name: {key: one.get(key) for key in ERRORS} for name, one in content["constants"].items()}
+    errors = {
+        name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in content["constants"].items()
+    }
     kept = {key: content.get(key) for key in ("title", "equations", "data_digest", "truth")}
     fitted = {key: content["protocol"]["albedos"][key] for key in ("low", "high")}
     own = {"of": source.of, "sha256": source.digest, "came_with_profilefit": source.spare}

@@ -34,7 +34,7 @@ def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     # Four of 1/sqrt(2 * 48), and 3.5 % for each of the 400 resamples' own scatter and the one batch's covariance.
     np.testing.assert_allclose(ratio, 1.0, atol=0.45)
     # Negative control: the misfit taken for noise is another number.
-    wrong = np.sqrt(np.diag(one.discrepancy) / BATCHES)
+    wrong = np.sqrt(np.diag(one.misfit) / BATCHES)
     assert np.all(np.abs(found.standard_error / wrong - 1.0) > 0.45)
 
 

@@ -86,7 +86,7 @@ def test_a_law_that_is_not_the_truth_covers_its_pseudo_true_constants(tallies, b
     one, covariance, again = refitted(tallies, burley, ("s0", "s1", "s2"))
     off = again.found - again.truth
     assert coverage(one.free, off, again.sandwich_errors(covariance)).honest
-    misfit = coverage(one.free, off, np.sqrt(np.diag(one.discrepancy)))
+    misfit = coverage(one.free, off, np.sqrt(np.diag(one.misfit)))
     assert not np.any(misfit.inside)
     assert np.all(misfit.share > 0.99)
     assert not coverage(one.free, off, again.independent_errors(covariance)).honest

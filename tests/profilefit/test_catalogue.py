@@ -7,10 +7,13 @@ import pytest
 import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
+from profilefit.laws import profile_classes
 from profilefit.laws.base import AlbedoLaw, ProfileLaw, Sampler
 from profilefit.laws.published import SETS
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.catalogue import PROFILE_LAWS, REGENERATED, fits_folder, record_name, regenerated_settings
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.record import record_name
+from profilefit.recipes.record_folder import Records
 
 
 def constants_of(law, name):
@@ -34,7 +37,7 @@ def test_names():
 
 
 @pytest.mark.parametrize(
-    "name", [name for name, kind in PROFILE_LAWS.items() if name in REGENERATED or not kind.constant_names()]
+    "name", [name for name, kind in profile_classes().items() if kind.entry.records or not kind.constant_names()]
 )
 def test_every_law_loads_as_regenerated_and_is_a_law(name):
     law = profilefit.load(name)
@@ -196,7 +199,7 @@ def test_the_map_that_normalises_is_there_for_every_setting(setting):
 
 
 def test_settings_without_a_record_are_told_which_there_are(tmp_path):
-    assert set(SETTINGS) <= set(regenerated_settings("albedo-rational"))
+    assert set(SETTINGS) <= set(Records(fits_folder()).settings("albedo-rational"))
     with pytest.raises(
         SettingError, match=r"albedo-rational belongs to .*diffuse, n = 1\.4, g = 0.*, n = 1\.35, g = 0$"
     ):
@@ -213,7 +216,7 @@ def test_a_law_is_found_by_its_setting(tmp_path):
     with pytest.warns(ShippedMap, match="albedo-rational-diffuse"):
         law = profilefit.load("burley", setting=DIFFUSE, folder=tmp_path)
     assert (law.constants(), law.setting, law.albedo.setting) == (values, DIFFUSE, DIFFUSE)
-    assert regenerated_settings("burley-whole", tmp_path) == (DIFFUSE,)
+    assert Records(tmp_path).settings("burley-whole") == (DIFFUSE,)
     with pytest.raises(RecordError, match=r"hazard\.json: there is no such record; .* hazard --out .* makes it"):
         profilefit.load("hazard", folder=tmp_path)
     with pytest.raises(SettingError, match=r"belongs to diffuse, n = 1, g = 0, got a request"):

@@ -69,7 +69,7 @@ def whitened(samples, covariance):
     return (sample - np.eye(len(sample))) / np.sqrt((1 + np.eye(len(sample))) / INDEPENDENT)
 
 
-@pytest.mark.parametrize("kind", ["statistical", "discrepancy"])
+@pytest.mark.parametrize("kind", ["statistical", "misfit"])
 def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     found = posterior(line_fit, kind, seed=1, max_steps=4000)
     expected = getattr(line_fit, kind)
@@ -81,7 +81,7 @@ def test_chains_have_the_analytic_covariance(line_fit, kind, sidak):
     z = (found.samples.mean(axis=0) - line_fit.solution.parameters) / np.sqrt(np.diag(expected) / INDEPENDENT)
     assert np.abs(z).max() < sidak(2)
     # Negative control: the other kind's covariance is not this one.
-    other = line_fit.discrepancy if kind == "statistical" else line_fit.statistical
+    other = line_fit.misfit if kind == "statistical" else line_fit.statistical
     assert np.abs(whitened(found.samples, other)).max() > 3 * sidak(3)
     assert np.abs(whitened(found.samples, 2 * expected)).max() > 1.5 * sidak(3)
 
@@ -121,11 +121,11 @@ def test_same_seed_same_samples_other_seed_others(line_fit):
 
 def test_other_fits_of_a_law_compile_nothing(line_fit):
     """Other data, constants and covariances of one shape: a program for each fit would fill the memory."""
-    for kind in ("statistical", "discrepancy"):
+    for kind in ("statistical", "misfit"):
         posterior(line_fit, kind, max_steps=100)
     with Compiling() as again:
         other = fitted_line(9, Line(Setting(), 0.25, 0.55))
-        for kind in ("statistical", "discrepancy"):
+        for kind in ("statistical", "misfit"):
             posterior(other, kind, seed=5, max_steps=100)
     assert again.seconds == 0.0
     assert other.constants != line_fit.constants
@@ -148,7 +148,7 @@ def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
 
 def test_a_chain_that_is_too_short_says_so(line_fit):
     """tau is about ten steps here: 100 are no chain."""
-    found = posterior(line_fit, "discrepancy", max_steps=100)
+    found = posterior(line_fit, "misfit", max_steps=100)
     assert found.steps == 100
     assert found.result.startswith("chain of 100 steps is under 50 autocorrelation times")
     assert np.all(np.isfinite(found.samples))
@@ -181,12 +181,14 @@ def test_draws_go_to_arviz_and_back(line_fit):
 
 
 def test_kind_must_be_known(line_fit):
-    with pytest.raises(InputError, match="kind must be 'statistical' or 'discrepancy', got 'both'"):
+    with pytest.raises(InputError, match="'misfit', got 'discrepancy', which is called 'misfit' now"):
+        posterior(line_fit, "discrepancy")
+    with pytest.raises(InputError, match="kind must be 'statistical' or 'misfit', got 'both'"):
         posterior(line_fit, "both")
 
 
 def test_without_photon_noise_only_the_misfit_is_left(line_fit):
-    with pytest.raises(InputError, match=r"no photon noise: only kind='discrepancy' applies, got 'statistical'"):
+    with pytest.raises(InputError, match=r"no photon noise: only kind='misfit' applies, got 'statistical'"):
         posterior(replace(line_fit, statistical=None))
 
 

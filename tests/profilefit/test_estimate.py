@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
-from profilefit.fitting.estimate import Problem, discrepancy_covariance, fit, residual_structure, sensitivity
+from profilefit.fitting.estimate import Problem, fit, misfit_covariance, residual_structure, sensitivity
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import solve, solve_batch
@@ -83,7 +83,7 @@ def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sida
     assert spread(scattered, one.statistical) > 1e-3
     assert np.abs(whitened(scattered, one.statistical)).max() < sidak(6)
     # The misfit taken for noise is another question, and no answer to this one.
-    assert spread(scattered, one.discrepancy) < 1e-20
+    assert spread(scattered, one.misfit) < 1e-20
 
 
 def test_sensitivity_is_that_of_refitting(tallies, burley):
@@ -154,7 +154,7 @@ def test_a_linear_fit_is_linear_algebra(line):
     np.testing.assert_allclose(one.statistical, gain @ factor[0] @ factor[0].T @ gain.T, rtol=1e-8)
     misfit = reflectance - design @ gain @ reflectance
     np.testing.assert_allclose(one.variance, misfit @ misfit / 10, rtol=1e-8)
-    np.testing.assert_allclose(one.discrepancy, one.variance * np.linalg.inv(design.T @ design), rtol=1e-7)
+    np.testing.assert_allclose(one.misfit, one.variance * np.linalg.inv(design.T @ design), rtol=1e-7)
     assert one.result == "converged"
 
 
@@ -175,7 +175,7 @@ def test_the_jackknife_sees_misfit_that_repeats_itself():
     """Points on a parabola: their neighbours agree, so independent noise promises too much."""
     alpha = np.linspace(0.1, 0.9, 60)
     one = fit(line_profiles(0.2 + 0.5 * alpha**2, alpha), Line(Setting()), "reflectance")
-    assert np.all(one.jackknife > 2 * np.sqrt(np.diag(one.discrepancy)))
+    assert np.all(one.jackknife > 2 * np.sqrt(np.diag(one.misfit)))
     assert one.structure.along_alpha > 0.8
 
 
@@ -240,13 +240,13 @@ def test_settings_do_not_mix(tallies, toy):
 # What is left
 
 
-def test_discrepancy_counts_degrees_of_freedom():
+def test_misfit_counts_degrees_of_freedom():
     """Four residuals of which one does not count, two constants: s^2 = cost / 1."""
     design = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [0.0, 0.0]])
     y = np.array([0.0, 1.0, 1.0, 0.0])
     found = solve(lambda p, d: d[0] @ p - d[1], np.ones(2), (design, y))
     expected = found.cost / 1 * np.linalg.inv(design.T @ design)
-    np.testing.assert_allclose(discrepancy_covariance(found), expected, rtol=1e-9)
+    np.testing.assert_allclose(misfit_covariance(found), expected, rtol=1e-9)
 
 
 def test_structure_of_a_hand_made_table():
@@ -303,7 +303,7 @@ def test_a_constant_that_moves_nothing_is_a_failed_fit(tallies, liang):
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "b0", "g1"))
     assert one.result.startswith("degenerate, condition number")
     assert "g1 moves nothing" in one.result
-    assert np.all(np.isnan(one.discrepancy))
+    assert np.all(np.isnan(one.misfit))
     assert np.all(np.isnan(one.statistical))
     assert np.all(np.isnan(one.jackknife))
 

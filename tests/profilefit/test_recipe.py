@@ -8,8 +8,10 @@ import pytest
 from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.fitting.objectives import OBJECTIVES
-from profilefit.recipes.catalogue import ALBEDO_LAWS, PROFILE_LAWS, fits_folder, record_name
+from profilefit.laws import map_classes, profile_classes
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import PIPELINES, available, find, read
+from profilefit.recipes.record import record_name
 
 GOOD = """
 title = "A fit"
@@ -67,7 +69,7 @@ def test_every_shipped_recipe_reads(path):
     recipe = read(path)
     assert recipe.name == path.stem
     assert recipe.title
-    assert recipe.law in {**PROFILE_LAWS, **ALBEDO_LAWS}
+    assert recipe.law in {**profile_classes(), **map_classes()}
     assert recipe.weighting.objective in {**OBJECTIVES, "": None}
 
 

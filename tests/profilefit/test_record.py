@@ -109,9 +109,9 @@ def test_a_folder_that_cannot_be_made_is_named(tmp_path):
     [
         ("", r"mine\.json: is not a record"),
         ("{", r"mine\.json: is not a record"),
-        ("[1, 2]", r"mine\.json: is not a record of format 1, got 'list'"),
-        ("{}", r"mine\.json: is not a record of format 1, got null"),
-        ('{"format": 99}', r"mine\.json: is not a record of format 1, got 99"),
+        ("[1, 2]", r"mine\.json: is not a record of format 1 or 2, got 'list'"),
+        ("{}", r"mine\.json: is not a record of format 1 or 2, got null"),
+        ('{"format": 99}', r"mine\.json: is not a record of format 1 or 2, got 99"),
     ],
 )
 def test_what_is_no_record_is_named(tmp_path, text, words):
@@ -143,6 +143,24 @@ def _spoiled(key, spoil):
 @pytest.mark.parametrize("path", record.available(fits_folder()).values(), ids=lambda path: path.stem)
 def test_shipped_records_are_whole(path):
     assert record.read(path, whole=True)["name"] == path.stem
+
+
+def test_format_1_is_read_in_the_words_of_format_2(tmp_path):
+    """It called the misfit's covariance discrepancy, as the model's: nothing but words differs."""
+    path = fits_folder() / "burley-whole.json"
+    before, now = json.loads(path.read_text()), record.read(path, whole=True)
+    assert (before["format"], now["format"]) == (1, 2)
+    assert now["covariance"]["misfit"] == before["covariance"]["discrepancy"]
+    assert now["posterior"]["misfit"] == before["posterior"]["discrepancy"]
+    for name, one in now["constants"].items():
+        assert one["misfit_error"] == before["constants"][name]["discrepancy_error"]
+        assert one["intervals"]["misfit"] == before["constants"][name]["intervals"]["discrepancy"]
+    assert now["discrepancy"] == before["discrepancy"]
+    assert json.dumps(now).count("discrepancy") == 1
+    arrays = record.read_arrays(path)
+    assert {"samples_misfit", "log_density_misfit", "discrepancy_u"} <= set(arrays)
+    again = record.write(tmp_path, "burley-whole", {key: now[key] for key in now if key not in ("format", "name")}, {})
+    assert record.read(again, whole=True) == now
 
 
 @pytest.mark.parametrize("key", [key for key in PROFILE_KEYS if not key.endswith("*") and "?" not in key])

@@ -14,28 +14,20 @@ import re
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib.resources import files
-from pathlib import Path
 from string import Template
 
 import numpy as np
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
 from profilefit.materials import MATERIALS
 from profilefit.recipes.inventory import Named, profile_laws
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.explorer.still import still
 from profilefit.scenes.stage.exact_table import LEAST_ALPHA, log_profile
 from profilefit.shader.law_file import export
 
 PREFIX = "law"  # of the names in each text: one law runs at a time
 FIRST = ("hazard-diffuse", "hazard")  # what is shown at the start, if it is there
-TITLES = {
-    "burley": "normalized diffusion",
-    "burley_diffuse_mfp": "normalized diffusion by diffuse mfp",
-    "liang": "Liang et al.",
-    "dipole": "dipole",
-    "better_dipole": "better dipole",
-}
 ORDER = ("hazard", "quantile", "burley", "burley_diffuse_mfp", "liang", "gaussians", "better_dipole", "dipole")
 
 
@@ -50,15 +42,13 @@ class Offered:
     text: str
 
 
-def offered(folder: Path) -> list[Offered]:
+def offered(folder: Folder) -> list[Offered]:
     """Every law of a matched surface that has a text, the best first; records are those in `folder`."""
-    found = []
-    for named in sorted(profile_laws(folder), key=_place):
-        try:
-            text = export(named, folder, "glsl-es", PREFIX)
-        except InputError:  # a law without a closed form
-            continue
-        found.append(Offered(address(named), named.name, named.setting.illumination, _label(named), text))
+    records, found = Records.of(folder), []
+    for named in sorted(profile_laws(records), key=_place):
+        if named.law.entry.has_text:
+            text = export(named, records, "glsl-es", PREFIX)
+            found.append(Offered(address(named), named.name, named.setting.illumination, _label(named), text))
     return found
 
 
@@ -79,8 +69,7 @@ def _place(named: Named) -> int:
 
 
 def _label(named: Named) -> str:
-    kind, _, count = named.name.partition(":")
-    title = TITLES.get(kind, f"{count} Gaussians" if count else kind)
+    title = named.law.entry.title
     if not named.records:
         return f"{title}, {named.constants}" if named.constants else title
     return title if named.records[0].replace("-diffuse", "") == title else f"{title}: {named.records[0]}"
@@ -133,7 +122,7 @@ MEASURES = (
 )
 
 
-def explorer_section(folder: Path) -> str:
+def explorer_section(folder: Folder) -> str:
     """What goes into the page's section: laws with the records in `folder`, in a `<div class="explorer">`.
 
     It needs no network and no other file, works from file://, and follows the page's variables for colours, --fg, --bg,
@@ -159,7 +148,7 @@ def _slider(name: str, channel: str, low: float, high: float, step: float) -> st
     )
 
 
-def _data(folder: Path) -> str:
+def _data(folder: Folder) -> str:
     """All that the script reads, as JSON that cannot end the element it stands in."""
     laws = offered(folder)
     told = {

@@ -19,7 +19,7 @@ from profilefit.report.records import Source
 from profilefit.report.tables.cells import significant
 
 Floats = NDArray[np.float64]
-MEANING = {"discrepancy": "the law's misfit taken for noise", "statistical": "photon noise"}
+MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon noise"}
 # Probability inside one and two standard deviations of a normal pair of constants: 1 - exp(-k^2 / 2).
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
@@ -28,10 +28,10 @@ LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
 @styled
-def corner_figure(record_name: str, source: Source, out: Path, kind: str = "discrepancy", name: str = "") -> list[Path]:
+def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
     """The posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
 
-    kind  "discrepancy" or "statistical", as in `profilefit.fitting.chains`
+    kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
     """
     fitted = source.needed(record_name)
     samples = fitted.arrays[f"samples_{kind}"].astype(float)

@@ -6,8 +6,8 @@ import hashlib
 import shlex
 from collections.abc import Iterator, Mapping
 
-from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import digest
+from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons
 from profilefit.report.page.markup import command, markup, paragraph
 from profilefit.report.records import Content, Source
@@ -53,7 +53,7 @@ def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
 def _options(content: Content) -> str:
     told = f"--preset {content['preset']} --seed {content['seed']}"
     photons = (content.get("truth") or {}).get("photons")
-    usual = preset_photons(content["preset"], catalogue.record_setting(dict(content)))
+    usual = preset_photons(content["preset"], record_setting(content))
     return told if photons in (None, usual) else f"{told} --photons {photons}"
 
 

@@ -14,7 +14,6 @@ from numpy.typing import ArrayLike, NDArray
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, sampler_quality
 from profilefit.laws.base import Sampler
-from profilefit.laws.beam_diffusion import BeamDiffusion
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.targets import albedo_values
@@ -26,8 +25,8 @@ Track = Callable[[Iterator[Any], str, int], Iterator[Any]]
 # Where laws are judged: albedos that were not fitted. Samplers take longer and hardly change with alpha.
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))
 SAMPLED_ALBEDOS = (0.1, 0.5, 0.9)
-# Laws whose cdf is a quadrature of tens of milliseconds, which their sampler inverts step by step: one will do.
-SLOW, SLOW_ALBEDOS = (BeamDiffusion,), (0.5,)
+# A law without a text is a quadrature of tens of milliseconds, which its sampler inverts step by step: one will do.
+SLOW_ALBEDOS = (0.5,)
 SHARES = 256
 
 
@@ -71,7 +70,7 @@ def measured_map(one: Named) -> AlbedoQuality:
 
 def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
     """Every sampler of a profile law at `alpha` (m,)."""
-    albedos = alpha or (SLOW_ALBEDOS if isinstance(one.law, SLOW) else SAMPLED_ALBEDOS)
+    albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
     found = []
     for name, sampler in one.law.samplers.items():
         errors = np.array([_exact_error(sampler, float(value)) for value in albedos])

@@ -14,11 +14,12 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.media.setting import Setting
-from profilefit.laws import published
+from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.gaussians import Gaussians
-from profilefit.recipes import catalogue, record
-from profilefit.recipes.inventory import PRINTED_MAP, Named, albedo_laws, profile_laws, sampled_laws
+from profilefit.laws.entry import EVERYWHERE, Entry, Text
+from profilefit.recipes.inventory import Named, albedo_laws, all_profiles
+from profilefit.recipes.record import record_name, record_setting
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.records import SETS, TOTAL, Content, converged, known_errors, largest_error, z_score
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
@@ -35,7 +36,6 @@ MEASURED = {
 # What the table of all laws shows of each, and how it is headed there.
 WORST = {"rel": "rel", "ks": "ks", "inversion_error": "xi", "delta_A": "A"}
 MAP = "map-"
-FORMS: dict[Any, emit.Form] = {**emit.FORMS, **emit.MAPS}  # what has a shader text
 INDEX = "index"
 
 
@@ -54,29 +54,28 @@ class Page:
     @property
     def law_class(self) -> type:
         """The class whose docstring says what the law is."""
-        kind = type(self.members[0].law)
-        return Gaussians if issubclass(kind, Gaussians) else kind
+        name = self.members[0].name.partition(":")[0]
+        return home((MAPS if self.members[0].law.entry.is_map else PROFILES)[name])
 
     @property
     def records(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(name for one in self.members for name in one.records))
 
 
-def law_pages(folder: Path) -> list[Page]:
+def law_pages(folder: Folder) -> list[Page]:
     """Every law and map that loads with the records in `folder`, profile laws first."""
-    profiles = profile_laws(folder, matched=False)
-    taken = {name for one in profiles for name in one.records}
-    inverses = [one for one in sampled_laws(folder) if one.records and not set(one.records) & taken]
-    laws = _grouped(profiles + inverses, lambda one: one.name.split(":")[0])
-    maps = _grouped(albedo_laws(folder, matched=False), lambda one: MAP + one.name)
+    records = Records.of(folder)
+    laws = _grouped(all_profiles(records), lambda one: one.name.split(":")[0])
+    maps = _grouped(albedo_laws(records, matched=False), lambda one: MAP + one.name)
     return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
 
 
-def page_text(page: Page, folder: Path, figure: str | None = None) -> str:
+def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
     """One page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
     parts = [
         f"# {page.title}",
         f"```{{eval-rst}}\n.. autoclass:: {_constructor(page)}\n   :no-members:\n```",
+        _ranges(page.members[0].law.entry),
         _shader(page),
     ]
     if figure:
@@ -88,7 +87,7 @@ def page_text(page: Page, folder: Path, figure: str | None = None) -> str:
     return "\n\n".join(parts) + "\n"
 
 
-def index_text(pages: Sequence[Page], folder: Path) -> str:
+def index_text(pages: Sequence[Page], folder: Folder) -> str:
     """The table of all laws with the worst errors that their records state, and the list of the pages."""
     contents = _contents(folder)
     header = ("law", "constants", "light", "n", "number", *(f"{name} worst" for name in WORST.values()))
@@ -104,8 +103,8 @@ def index_text(pages: Sequence[Page], folder: Path) -> str:
     return "\n\n".join(["# All laws", told, markdown_table(header, rows), tree]) + "\n"
 
 
-def _contents(folder: Path) -> dict[str, Content]:
-    return {name: record.read(path) for name, path in record.available(folder).items()}
+def _contents(folder: Folder) -> Mapping[str, Content]:
+    return Records.of(folder).contents()
 
 
 def _grouped(found: Iterable[Named], key: Any) -> dict[str, list[Named]]:
@@ -153,7 +152,7 @@ def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tupl
     which = one.constants if one.constants in SETS else SETS[0]  # records call the printed set of their light so
     for content in contents.values():
         is_own = content["law"] == one.name and content["pipeline"] in pipelines
-        if is_own and catalogue.record_setting(dict(content)) == one.setting and which in content["quality"]:
+        if is_own and record_setting(content) == one.setting and which in content["quality"]:
             yield content, content["quality"][which]
 
 
@@ -169,10 +168,9 @@ def _loading(one: Named) -> str:
 def _arguments(one: Named) -> list[str]:
     """Of `load` or `albedo_law`: the constants' name, a record's path, or the setting of regenerated ones."""
     name = f'"{one.name}"'
-    key = f"albedo {one.name}" if isinstance(one.law, AlbedoLaw) else one.name
     if not one.records:
         return [name, f'constants="{one.constants}"'] if one.constants else [name]
-    if one.records != tuple(catalogue.record_name(base, one.setting) for base in catalogue.REGENERATED.get(key, ())):
+    if one.records != tuple(record_name(base, one.setting) for base in one.law.entry.records):
         return [name, f'constants="fits/{one.records[0]}.json"']
     return [name] if one.setting == Setting() else [name, f"setting={_setting(one.setting)}"]
 
@@ -186,26 +184,33 @@ def _setting(setting: Setting) -> str:
 
 def _export(one: Named) -> str:
     """The command that writes this law's shader text; none where it has none."""
-    if not isinstance(one.law, tuple(FORMS)):
+    if not one.law.entry.has_text:
         return ""
     if one.records:
         return f"profilefit export {one.records[0]} --lang glsl"
-    name = f'"albedo {one.name}"' if isinstance(one.law, AlbedoLaw) and one.name == "liang" else one.name
+    name = f'"{one.law.entry.key}"' if one.law.entry.is_map and one.name in PROFILES else one.name
     return f"profilefit export {name}{f' --constants {one.constants}' if one.constants else ''} --lang glsl"
 
 
+def _ranges(entry: Entry) -> str:
+    """Where the law says that it holds."""
+    n = f"n = {entry.n.low:g}" if entry.n.low == entry.n.high else f"n in {entry.n}"
+    profile = f", R_d in {entry.profile}" if entry.profile != entry.alpha and entry.profile != EVERYWHERE else ""
+    return f"Holds for alpha in {entry.alpha}{profile}; made for a surface of {n}."
+
+
 def _shader(page: Page) -> str:
-    if not isinstance(page.members[0].law, tuple(FORMS)):
-        return "In a shader: no text, since its share within r is a quadrature."
+    text = page.members[0].law.entry.text
+    if not isinstance(text, Text):
+        return f"In a shader: no text; {text}."
     prefixes = dict.fromkeys(f"`{emit.prefix(one.law)}_…`" for one in page.members)
-    form = next(form for kind, form in FORMS.items() if isinstance(page.members[0].law, kind))
-    return f"In a shader: `profilefit/shader/glsl/{form.file}.glsl`, its names begin with {', '.join(prefixes)}."
+    return f"In a shader: `profilefit/shader/glsl/{text.file}.glsl`, its names begin with {', '.join(prefixes)}."
 
 
-def _printed(one: Named, folder: Path) -> str:
+def _printed(one: Named, folder: Folder) -> str:
     """A printed set: its source, its constants and the errors that a record found for it."""
-    law = one.name + (PRINTED_MAP if isinstance(one.law, AlbedoLaw) else "")
-    found = next((s for s in published.SETS if not one.records and (s.law, s.name) == (law, one.constants)), None)
+    own = one.law.entry.printed, one.constants
+    found = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
     if found is None:
         return "" if one.records else "It has no constants: everything follows from alpha and the surface."
     table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in found.constants.items()])
@@ -215,10 +220,10 @@ def _printed(one: Named, folder: Path) -> str:
     return "\n\n".join(told if measured is None else [*told, _quality(measured[0], measured[1])])
 
 
-def _recorded(name: str, folder: Path) -> str:
+def _recorded(name: str, folder: Folder) -> str:
     """A record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
-    path = folder / f"{name}.json"
-    content = record.read(path, whole=True)
+    records = Records.of(folder)
+    path, content = records.paths[name], records.content(name, whole=True)
     facts = [
         f"**Record `{name}`**: {content['title']}. Equations: `{content['equations']}`",
         _fitted(content),

@@ -17,7 +17,8 @@ from rich.text import Text
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.fitting.sampling import SamplerQuality
-from profilefit.recipes.inventory import Named, Records, albedo_laws, profile_laws, sampled_laws
+from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.tables.all_laws import (
     ALBEDOS,
     Floats,
@@ -101,18 +102,19 @@ class Measured:
 
 
 def measured(
-    folder: Path,
-    records: Records = None,
+    folder: Folder,
+    names: Names = None,
     alpha: Floats = ALBEDOS,
     sampled_alpha: Sequence[float] | None = None,
     track: Track = untracked,
 ) -> Measured:
     """Measure profiles by setting, then maps, then samplers.
 
-    records  restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
+    names    restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
     track    is shown the progress
     """
-    profiles, maps, sampled = (find(folder, records) for find in (profile_laws, albedo_laws, sampled_laws))
+    records = Records.of(folder)
+    profiles, maps, sampled = (find(records, names) for find in (profile_laws, albedo_laws, sampled_laws))
     profiles, sampled = (sorted(laws, key=lambda one: _order(one.setting)) for laws in (profiles, sampled))
     qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
     of_maps = for_each(measured_map, maps, track, "maps")

@@ -34,7 +34,7 @@ DERIVED = {
     "reflectance": ("A", "Total reflectance"),
 }
 TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
-KINDS = {"statistical": "photon noise", "discrepancy": "misfit as noise"}
+KINDS = {"statistical": "photon noise", "misfit": "misfit as noise"}
 
 
 def _is_evidence(content: Content) -> bool:

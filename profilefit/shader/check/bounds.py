@@ -4,17 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from profilefit.errors import RecordError
 from profilefit.fitting.quality import albedo_quality, profile_quality
-from profilefit.laws.quantile import Quantile
-from profilefit.recipes import record
 from profilefit.recipes.inventory import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.targets import albedo_values
 
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted
@@ -53,15 +51,17 @@ class ModelError:
         return self.values.get(measure)
 
 
-def of_profile(one: Named, folder: Path) -> ModelError:
+def of_profile(one: Named, folder: Folder) -> ModelError:
     """The errors of a profile law, from its records, or those of the regenerated law of its name and setting.
 
     What no record tells is measured on the float64 law, where the setting has an exact profile.
     """
-    owner = one if one.records else _regenerated(one, profile_laws(folder, matched=False))
-    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, folder)
+    records = Records.of(folder)
+    owner = one if one.records else _regenerated(one, profile_laws(records, matched=False))
+    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, records)
     source = " + ".join(owner.records) if owner and found else "measured here"
-    whole = not one.records or isinstance(one.law, Quantile)
+    held = {name for each in one.records for name in records.content(each)["constants"]}
+    whole = not one.records or held >= set(one.law.constant_names())
     if whole and "rel" not in found and one.setting.is_matched_isotropic:
         quality = profile_quality(one.law, ALBEDOS)
         found |= {"rel": float(np.max(quality.rel)), "ks": float(np.max(quality.ks))}
@@ -70,11 +70,12 @@ def of_profile(one: Named, folder: Path) -> ModelError:
     return ModelError(found, source)
 
 
-def of_map(one: Named, folder: Path) -> ModelError:
+def of_map(one: Named, folder: Folder) -> ModelError:
     """The errors of a map, likewise."""
-    owner = one if one.records else _regenerated(one, albedo_laws(folder, matched=False))
+    records = Records.of(folder)
+    owner = one if one.records else _regenerated(one, albedo_laws(records, matched=False))
     if owner is not None:
-        return ModelError(_recorded(owner.records, MAP_MEASURES, folder), " + ".join(owner.records))
+        return ModelError(_recorded(owner.records, MAP_MEASURES, records), " + ".join(owner.records))
     quality = albedo_quality(one.law)
     return ModelError({name: getattr(quality, name) for name in MAP_MEASURES}, "measured here")
 
@@ -84,10 +85,10 @@ def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
     return next(same, None)
 
 
-def _recorded(names: Sequence[str], measures: Sequence[str], folder: Path) -> dict[str, float]:
+def _recorded(names: Sequence[str], measures: Sequence[str], records: Records) -> dict[str, float]:
     found: dict[str, float] = {}
     for name in names:
-        quality: dict[str, Any] = record.read(folder / f"{name}.json").get("quality", {}).get("regenerated", {})
+        quality: dict[str, Any] = records.content(name).get("quality", {}).get("regenerated", {})
         try:
             found |= {measure: float(np.max(quality[measure])) for measure in measures if measure in quality}
         except (TypeError, ValueError):

@@ -13,7 +13,7 @@ from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
-from profilefit.shader import emit
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check.cost import Cost, law_costs
 from profilefit.shader.check.evaluate import half_extension, no_half
 from profilefit.shader.check.half import HalfCheck, check_half
@@ -26,7 +26,7 @@ Chosen = tuple[list[Named], list[Named]]
 """Profile laws, and maps between A and alpha."""
 
 
-def chosen(names: Sequence[str], constants: str | None, folder: Path) -> Chosen:
+def chosen(names: Sequence[str], constants: str | None, folder: Folder) -> Chosen:
     """Profile laws and maps under these names, or all of them; a name may be a law's, a map's or a record's.
 
     A law's name means all its settings.
@@ -57,30 +57,28 @@ def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str
     return list(names or ()) or ("all" if constants in (None, REGENERATED) else f"all {constants}")
 
 
-def regenerated(folder: Path) -> Chosen:
+def regenerated(folder: Folder) -> Chosen:
     """All laws and maps made of records, in every setting."""
-    whole = [one for one in inventory.profile_laws(folder, matched=False) if one.records]
-    there = {name for one in whole for name in one.records}
-    inverses = [one for one in inventory.sampled_laws(folder) if one.records and not set(one.records) & there]
-    return [*whole, *inverses], [one for one in inventory.albedo_laws(folder, matched=False) if one.records]
+    profiles, maps = inventory.all_profiles(folder), inventory.albedo_laws(folder, matched=False)
+    return [one for one in profiles if one.records], [one for one in maps if one.records]
 
 
-def printed(constants: str, folder: Path) -> Chosen:
+def printed(constants: str, folder: Folder) -> Chosen:
     """All laws and maps of one printed set that have a text."""
     wanted = constants.removeprefix("published:")
     laws, maps = (
         [one for one in group if not one.records and one.constants == wanted]
         for group in (inventory.profile_laws(folder), inventory.albedo_laws(folder))
     )
-    return [one for one in laws if isinstance(one.law, tuple(emit.FORMS))], maps
+    return [one for one in laws if one.law.entry.has_text], maps
 
 
 def _under(name: str, group: Sequence[Named]) -> list[Named]:
-    full = catalogue.SHORT.get(name, name)
+    full = catalogue.key_of(name)
     return [one for one in group if full == one.name or name in one.records]
 
 
-def _loaded(name: str, constants: str | None, folder: Path) -> Chosen:
+def _loaded(name: str, constants: str | None, folder: Folder) -> Chosen:
     """A law or map that is in no list: one without constants, one that was not regenerated, or a mistake."""
     one = inventory.find(name, folder, constants)
     return ([], [one]) if isinstance(one.law, AlbedoLaw) else ([one], [])

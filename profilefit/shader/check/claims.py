@@ -5,14 +5,13 @@ Equation numbers are those of `laws.liang` and `laws.liang_albedo`.
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.liang import Liang
 from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.recipes.inventory import Named, profile_laws
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
 from profilefit.shader.check.grid import ULP
 
@@ -20,7 +19,7 @@ Floats = NDArray[np.float64]
 SHARES = np.linspace(0.0, 1.0, 2**12, endpoint=False)
 
 
-def of_profile(one: Named, folder: Path) -> list[Bound]:
+def of_profile(one: Named, folder: Folder) -> list[Bound]:
     """The promises of (17), (21) and of alpha = 0; none for other laws, nor for constants that were regenerated."""
     if not isinstance(one.law, Liang) or one.records:
         return []

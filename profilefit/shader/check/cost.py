@@ -11,7 +11,6 @@ import time
 from collections.abc import Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
-from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -20,6 +19,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader import emit
 from profilefit.shader.check.evaluate import Board
 from profilefit.shader.context import check_errors, full_screen, program
@@ -65,7 +65,7 @@ class Cost:
     ratio: dict[str, float]
 
 
-def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Path) -> dict[str, Cost]:
+def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> dict[str, Cost]:
     """What the laws' texts cost beside printed normalized diffusion; nothing if there is no law."""
     yardstick = catalogue.load(YARDSTICK, "published", folder=folder)
     return costs(context, [one.law for one in laws], yardstick) if laws else {}

@@ -12,7 +12,6 @@ import os
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import moderngl
@@ -23,6 +22,7 @@ from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.pipelines import inversion_error
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, claims, grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.evaluate import ShaderLaw, Values
@@ -84,7 +84,7 @@ class LawCheck(Verdict):
     spreads: dict[str, Spread]
 
 
-def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Path) -> Iterator[LawCheck]:
+def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         references = pool.map(lambda one: grid.reference(one.law, grid.arguments()), laws)
@@ -93,7 +93,7 @@ def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Path) -
 
 
 def check_law(
-    context: moderngl.Context, one: Named, folder: Path, text: str = "", exact: Values | None = None
+    context: moderngl.Context, one: Named, folder: Folder, text: str = "", exact: Values | None = None
 ) -> LawCheck:
     """Check a profile law with its constants. ShaderError if it does not compile.
 

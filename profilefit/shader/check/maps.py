@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from pathlib import Path
 
 import moderngl
 import numpy as np
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, claims, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.evaluate import ShaderMap
@@ -31,7 +31,7 @@ class MapCheck(Verdict):
     places: dict[str, str]
 
 
-def check_map(context: moderngl.Context, one: Named, folder: Path, text: str = "") -> MapCheck:
+def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str = "") -> MapCheck:
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
     model = bounds.of_map(one, folder)
     of_reflectance, of_alpha = validity.of_map(one, folder)

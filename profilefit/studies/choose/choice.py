@@ -9,8 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from mcml_sim import Setting
+from profilefit.laws import profile_classes
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.record import record_name
+from profilefit.recipes.record_folder import Records
 from profilefit.studies.choose.case import Case
 from profilefit.studies.choose.cost import Ratios, milliseconds
 from profilefit.studies.choose.error import Error, error
@@ -18,7 +22,6 @@ from profilefit.studies.choose.options import Option, filters, sampled
 from profilefit.studies.choose.scene import Range, Scene
 from profilefit.studies.choose.truth import truth
 
-LAWS = ("burley", "hazard", "quantile")
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is
 AS_GOOD = 1.1  # ratio of errors: predicted noise is known to 4 %, and less well where a few samples weigh much
@@ -68,12 +71,13 @@ def affordable(one: Predicted, scene: Scene) -> bool:
 
 
 def laws(setting: Setting) -> dict[str, ProfileLaw]:
-    """Sampled laws by the names of their records: those of the setting, else those of a matched surface."""
-    found = {}
-    for name in LAWS:
-        known = catalogue.regenerated_settings(catalogue.REGENERATED[name][0])
-        own = setting if setting in known else Setting(setting.illumination)
-        found[catalogue.record_name(catalogue.REGENERATED[name][0], own)] = catalogue.load(name, setting=own)
+    """Laws with a text and one record under this light, by its name: that of the setting, else of a matched surface."""
+    records, found = Records(fits_folder()), {}
+    for name, kind in profile_classes().items():
+        for base in kind.entry.records if kind.entry.has_text else ():
+            own = setting if record_name(base, setting) in records.paths else Setting(setting.illumination)
+            if kind.entry.records == (base,) and (of := record_name(base, own)) in records.paths:
+                found[of] = catalogue.load(name, setting=own, folder=records)
     return found
 
 
@@ -115,11 +119,12 @@ def worst(option: Option, scene: Scene) -> Error:
 
 
 def choose(scene: Scene, ratios: Ratios, track: Track = iter) -> Choice:
-    """Predict all options, and choose."""
+    """Predict all options whose cost was measured, and choose."""
     budget = scene.budget
     priced = {
         option: milliseconds(option, ratios, budget.gpu, budget.coverage, math.prod(scene.resolution))
         for option in options(scene.setting)
+        if ratios.knows(option)
     }
     found: list[Predicted] = []
     for option in track(sorted(priced, key=lambda option: priced[option])):

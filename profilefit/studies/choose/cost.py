@@ -66,14 +66,23 @@ class Ratios:
     fixed: Mapping[str, float]
     each: Mapping[str, float]
 
+    def knows(self, option: Option) -> bool:
+        """Whether its cost was measured."""
+        return option.kind == "nothing" or _key(option) in self.each
+
     def of(self, option: Option) -> float:
         """The frame of an option over the yardstick's [-]."""
         if option.kind == "nothing":
             return self.base
-        key = "separable" if option.law is None else prefix(option.law)
+        key = _key(option)
         if key not in self.each:
             raise InputError(f"option must be one whose cost was measured ({', '.join(self.each)}), got {key!r}")
         return self.base + option.count * (self.fixed[key] + self.each[key] * option.number)
+
+
+def _key(option: Option) -> str:
+    """The filter, or the law."""
+    return "separable" if option.law is None else prefix(option.law)
 
 
 def milliseconds(

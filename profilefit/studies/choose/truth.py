@@ -8,7 +8,9 @@ from functools import lru_cache
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.recipes import catalogue, record
+from profilefit.recipes import catalogue
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.record_folder import Records
 from profilefit.scenes.skin.law import DARKEST, albedo_of
 from profilefit.studies.choose.response import Beyond, beyond
 
@@ -50,11 +52,11 @@ def truth(setting: Setting) -> Truth:
     """Of a setting that has a record; InputError that lists them."""
     if setting.is_matched_isotropic:
         return Truth(setting)
-    known = [one for one in catalogue.regenerated_settings(STAND_IN) if one.illumination == setting.illumination]
+    records = Records(fits_folder())
+    known = [one for one in records.settings(STAND_IN) if one.illumination == setting.illumination]
     if setting not in known:
         accepted = ", ".join(f"{one.n:g}" for one in sorted(known, key=lambda one: one.n))
         raise InputError(f"index must be one of {accepted} under {setting.illumination} light, got {setting.n:g}")
-    name = catalogue.record_name(STAND_IN, setting)
-    measured = record.read(catalogue.fits_folder() / f"{name}.json")["quality"]["regenerated"]["ks"]
-    law = catalogue.load(STAND_IN, setting=setting)
-    return Truth(setting, law, catalogue.normalisation(setting), 0.5 * float(max(measured)))
+    measured = records.read(records.path(STAND_IN, setting))["quality"]["regenerated"]["ks"]
+    law = catalogue.load(STAND_IN, setting=setting, folder=records)
+    return Truth(setting, law, catalogue.normalisation(setting, records), 0.5 * float(max(measured)))

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
+from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.shader import emit
 
 NAME = "law"
@@ -52,8 +52,3 @@ class Text:
     def replace(self, function: str, other: Callable[..., Any]) -> None:
         """Have the text call another function by that name, less the prefix."""
         self._names[f"{NAME}_{function}"] = other
-
-
-def has_text(law: Constants) -> bool:
-    """Whether the law has a shader text."""
-    return isinstance(law, (*emit.FORMS, *emit.MAPS))

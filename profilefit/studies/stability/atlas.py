@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from pathlib import Path
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.laws import MAPS
+from profilefit.laws.entry import EVERYWHERE
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
-from profilefit.shader.check.validity import EVERYWHERE
 from profilefit.studies.stability import fits, gradients, halfspace, laws, maps, misuse, model
 from profilefit.studies.stability.cells import Cells
 from profilefit.studies.stability.fits import FitCase
@@ -36,7 +37,7 @@ DERIVED_IF_NAMED = {"hazard": (PDF,)}  # ten seconds
 DERIVED_MAPS = ("albedo-rational", "albedo-liang", "van_de_hulst, published", "chiang, published")
 # Law, objective and lanes of the fits.
 FITTED = (("rational", "reflectance", 16), ("burley", "relative", 16), ("hazard", "relative", 6))
-LONGEST = (SOLVER, "hazard", "beam_diffusion", "quantile")  # begun first, so that no core waits at the end
+LONGEST = (SOLVER, "hazard", "quantile")  # begun first, so that no core waits at the end
 # A look in seconds: what the paper prints, and what is ours; of profile laws their texts, which need no compiling.
 QUICK_ARITHMETICS = (TEXT32, TEXT16)
 QUICK = ("liang, published", "hazard", "albedo-rational", "map liang, published")
@@ -60,19 +61,19 @@ class Part:
 Job = tuple[str, Callable[[], Part]]
 
 
-def jobs(names: Iterable[str], folder: Path, quick: bool) -> list[Job]:
+def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     """What there is to do, a job a subject: all of it, or what is named; InputError for a name that there is not."""
-    asked = list(names)
-    profiles, albedos = _known(folder)
+    asked, records = list(names), Records.of(folder)
+    profiles, albedos = _known(records)
     found: list[Job] = []
     for one in profiles:
         if _is_asked(one, one.label, asked, quick):
             also = DERIVED_IF_NAMED.get(one.label, ()) if asked else ()
-            found.append((one.label, _of_law(one, folder, quick, also)))
+            found.append((one.label, _of_law(one, records, quick, also)))
     for one in albedos:
         if _is_asked(one, _map_label(one), asked, quick):
-            found.append((_map_label(one), _of_map(one, folder, quick)))
-    for name, job in _functions(folder, quick).items():
+            found.append((_map_label(one), _of_map(one, records, quick)))
+    for name, job in _functions(records, quick).items():
         if name in asked or not (asked or quick):
             found.append((name, job))
     _require_known(asked, [name for name, _ in found], profiles, albedos)
@@ -90,11 +91,10 @@ def run(todo: list[Job]) -> Iterator[Part]:
             pool.shutdown(wait=False, cancel_futures=True)
 
 
-def _known(folder: Path) -> tuple[list[Named], list[Named]]:
-    whole = inventory.profile_laws(folder, matched=False)
-    held = {name for one in whole for name in one.records}
-    inverses = [one for one in inventory.sampled_laws(folder) if one.records and not set(one.records) & held]
-    return [*whole, *inverses], inventory.albedo_laws(folder, matched=False)
+def _known(folder: Records) -> tuple[list[Named], list[Named]]:
+    """Those that have a text: no shader runs a quadrature."""
+    profiles = [one for one in inventory.all_profiles(folder) if one.law.entry.has_text]
+    return profiles, inventory.albedo_laws(folder, matched=False)
 
 
 def _map_label(one: Named) -> str:
@@ -103,7 +103,7 @@ def _map_label(one: Named) -> str:
 
 def _is_asked(one: Named, label: str, asked: list[str], quick: bool) -> bool:
     if asked:
-        return bool({label, one.name, catalogue.SHORT.get(one.name, one.name), *one.records} & set(asked))
+        return bool({label, one.name, *one.records} & set(asked))
     return not quick or label in QUICK
 
 
@@ -116,7 +116,7 @@ def _require_known(asked: list[str], found: list[str], profiles: list[Named], al
         raise InputError(f"name must be a law, map or record ({', '.join(names)}) or {', '.join(FUNCTIONS)}, got {got}")
 
 
-def _of_law(one: Named, folder: Path, quick: bool, also: tuple[str, ...]) -> Callable[[], Part]:
+def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> Callable[[], Part]:
     def job() -> Part:
         limits = laws.limits_of(one, folder)
         arithmetics = QUICK_ARITHMETICS if quick else laws.COMPUTED
@@ -128,7 +128,7 @@ def _of_law(one: Named, folder: Path, quick: bool, also: tuple[str, ...]) -> Cal
     return job
 
 
-def _of_map(one: Named, folder: Path, quick: bool) -> Callable[[], Part]:
+def _of_map(one: Named, folder: Records, quick: bool) -> Callable[[], Part]:
     def job() -> Part:
         cells = [*maps.cells_of(one, folder), *misuse.of_map(one)]
         if one.label in DERIVED_MAPS and not quick:
@@ -138,7 +138,7 @@ def _of_map(one: Named, folder: Path, quick: bool) -> Callable[[], Part]:
     return job
 
 
-def _functions(folder: Path, quick: bool) -> dict[str, Callable[[], Part]]:
+def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Part]]:
     def of_exact() -> Part:
         settings = SETTINGS[:1] if quick else SETTINGS
         cells = [each for s in settings for each in halfspace.cells_of(s, catalogue.normalisation(s, folder))]
@@ -147,7 +147,7 @@ def _functions(folder: Path, quick: bool) -> dict[str, Callable[[], Part]]:
     def of_solver() -> Part:
         told: list[FitCase] = []
         for name, objective, lanes in FITTED[:2] if quick else FITTED:
-            of_map = name in catalogue.ALBEDO_LAWS
+            of_map = name in MAPS
             law = (catalogue.albedo_law if of_map else catalogue.load)(name, folder=folder)
             told += fits.fits_of(law, objective, name, lanes)
         start = catalogue.load("liang", "corrected", folder=folder)

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from profilefit.laws.base import ProfileLaw
 from profilefit.laws.better_dipole import BetterDipole
 from profilefit.laws.burley import NormalizedDiffusion
 from profilefit.laws.chiang import Chiang
@@ -43,12 +44,11 @@ def _other_decay(cells: Cells) -> Mask:
 
 def _no_source(cells: Cells) -> Mask:
     """2 pi x R_d tends to 0 at the source, the half space's to alpha/2."""
-    finite = isinstance(cells.law, Gaussians | Dipole | BetterDipole) and cells.arithmetic == MODEL
-    if not finite or np.any(np.asarray(cells.law.source_strength(np.array([0.5]))) > 0.01):
+    if cells.arithmetic != MODEL or not (isinstance(cells.law, ProfileLaw) and cells.law.is_finite_at_source):
         return _nothing(cells)
     if cells.along("r/l") is None:
         return (isinstance(cells.law, DiffusionLaw) | (cells.spread("ξ", 1.0) < 0.1)) & as_stated(cells)
-    within = 5.0 if isinstance(cells.law, DiffusionLaw) else _narrowest(cells.law, _alpha(cells))
+    within = _narrowest(cells.law, _alpha(cells)) if isinstance(cells.law, Gaussians) else 5.0
     return (cells.spread("r/l", np.inf) <= within) & as_stated(cells)
 
 

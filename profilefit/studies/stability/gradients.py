@@ -16,11 +16,9 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.laws.rational import Rational
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability.cells import Cells, judged
-from profilefit.studies.stability.laws import OWN
 from profilefit.studies.stability.layout import ALPHA_OF, CDF, FLOAT64, PDF, PROFILE, REFLECTANCE_OF, SAMPLE, Axis
 
 Floats = NDArray[np.float64]
@@ -63,7 +61,7 @@ def of_law(one: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
             sure = valid & _within(symbol, u) & _within("α", a)
             yield _cells(
                 one.label,
-                isinstance(one.law, OWN),
+                one.law.entry.own,
                 one.law,
                 name,
                 by,
@@ -88,7 +86,7 @@ def of_map(one: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
             value, difference, scale = found[by]
             sure = valid & _within(symbol, u)
             label = one.label if one.records else f"map {one.label}"
-            own = isinstance(one.law, Rational)
+            own = one.law.entry.own
             yield _cells(label, own, one.law, name, by, (axis,), value, difference, scale, valid, sure)
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -12,16 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
-from profilefit.laws.better_dipole import BetterDipole
-from profilefit.laws.burley import BurleyDiffuseMfp
-from profilefit.laws.dipole import Dipole
-from profilefit.laws.hazard import Hazard
-from profilefit.laws.quantile import Quantile
 from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
-from profilefit.studies.stability.arithmetic import Text, has_text
+from profilefit.studies.stability.arithmetic import Text
 from profilefit.studies.stability.cells import Cells, Codes, Mask, absolute, judged, relative, steps_down, steps_up
 from profilefit.studies.stability.layout import (
     ARITHMETICS,
@@ -45,16 +39,13 @@ from profilefit.studies.stability.reference import LEAST_X, Right
 
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]
-OWN = (Hazard, Quantile)
 # Of laws that no record tells of: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
-MEASURED: dict[type, dict[str, float]] = {
-    BurleyDiffuseMfp: {"rel": 0.156, "ks": 0.0658},
-    Dipole: {"rel": 0.789, "ks": 0.435},
-    BetterDipole: {"rel": 0.953, "ks": 0.491},
-    BeamDiffusion: {"rel": 0.109, "ks": 0.0311},
+MEASURED: dict[str, dict[str, float]] = {
+    "burley_diffuse_mfp": {"rel": 0.156, "ks": 0.0658},
+    "dipole": {"rel": 0.789, "ks": 0.435},
+    "better_dipole": {"rel": 0.953, "ks": 0.491},
 }
 NO_BOUND = "its record tells no error of this quantity"
-UNKNOWN = "it has no text to compute in extended precision"
 BEYOND_TEXT = "beyond the radius at which texts stop, where no light is left"
 COMPUTED = tuple(one for one in ARITHMETICS if one != MODEL)
 
@@ -76,9 +67,9 @@ class Limits:
         return max(own, HALF_BOUND) if dtype is np.float16 else own
 
 
-def limits_of(one: Named, folder: Path) -> Limits:
+def limits_of(one: Named, folder: Folder) -> Limits:
     """A tenth of the law's own model error, as its record or `MEASURED` tells it, and its stated range."""
-    model = MEASURED.get(type(one.law)) or bounds.of_profile(one, folder).values
+    model = MEASURED.get(one.name) or bounds.of_profile(one, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
     found = {PROFILE: rel, PDF: rel, CDF: ks, SAMPLE: drawn}
@@ -87,11 +78,9 @@ def limits_of(one: Named, folder: Path) -> Limits:
 
 
 def cells_of(one: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
-    """All quantities of a law in these arithmetics, texts where it has one."""
+    """All quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
-        if has_text(one.law) or arithmetic in (FLOAT64, FLOAT32):
-            at = Grid.of(DTYPES[arithmetic], arithmetic != FLOAT64)
-            yield from _computed(one, limits, arithmetic, at if has_text(one.law) else at.thinned())
+        yield from _computed(one, limits, arithmetic, Grid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
 def _computed(one: Named, limits: Limits, arithmetic: str, at: Grid) -> Iterator[Cells]:
@@ -110,7 +99,7 @@ def _computed(one: Named, limits: Limits, arithmetic: str, at: Grid) -> Iterator
             twin = _classed(name, beside, reference, right, bound, inside, np.float32)[1]
         yield Cells(
             subject=one.label,
-            own=isinstance(one.law, OWN),
+            own=one.law.entry.own,
             quantity=name,
             arithmetic=arithmetic,
             axes=places,
@@ -123,7 +112,7 @@ def _computed(one: Named, limits: Limits, arithmetic: str, at: Grid) -> Iterator
             law=one.law,
             dtype=at.dtype,
             twin=twin,
-            unjudged=UNKNOWN if np.all(np.isnan(reference)) else BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
+            unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
         )
 
 

@@ -14,7 +14,7 @@ value is one of the format that it is made for, so that rounding an argument is 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,13 +191,6 @@ class Grid:
     def of(cls, dtype: type, beyond: bool = True) -> Grid:
         """`beyond` takes in lengths that the law does not accept."""
         return cls(dtype, alpha(dtype), radius(dtype), share(dtype), length(dtype, LENGTHS[dtype], beyond))
-
-    def thinned(self) -> Grid:
-        """Fewer of all, for a law that takes a thousand nodes for a number."""
-        alpha, x, xi = (
-            replace(one, values=one.values[::step]) for one, step in ((self.alpha, 5), (self.x, 4), (self.xi, 4))
-        )
-        return Grid(self.dtype, alpha, x, xi, replace(self.mfp, values=np.array([1.0])))
 
     @property
     def r(self) -> Floats:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import jax
@@ -16,8 +15,8 @@ from mcml_sim import exact
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
-from profilefit.laws.rational import Rational
 from profilefit.recipes.inventory import Named
+from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.check.validity import Range
@@ -48,7 +47,7 @@ ROOT_STORED = "A(√(1−α))"
 WAYS = {ALPHA_OF: ("delta_alpha", "alpha"), REFLECTANCE_OF: ("delta_A", "map_reflectance")}
 
 
-def cells_of(one: Named, folder: Path) -> Iterator[Cells]:
+def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
     """Both directions in every arithmetic, then what keeping alpha or its root in half costs."""
     model, spans = bounds.of_map(one, folder), validity.of_map(one, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
@@ -80,7 +79,7 @@ def _cells(
     twin = None if beside is None else _classed(beside, reference, limit, inside, np.float32)[1]
     return Cells(
         subject=one.label if one.records else f"map {one.label}",
-        own=isinstance(one.law, Rational),
+        own=one.law.entry.own,
         quantity=name,
         arithmetic=arithmetic,
         axes=(axis,),
@@ -138,7 +137,7 @@ def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bo
         back = np.asarray(one.law.alpha(reflectance.values))
         there = np.asarray(one.law.reflectance(alpha.values))
     in_a, in_alpha = (model.get(measure) or np.nan for measure, _ in reversed(WAYS.values()))
-    bound = min(MODEL_BOUND, FACTOR * in_a) if isinstance(one.law, Rational) else MODEL_BOUND  # ours as their records
+    bound = min(MODEL_BOUND, FACTOR * in_a) if one.law.entry.own else MODEL_BOUND  # ours as their records
     yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha, in_a)
     one_more = _cells(one, ALPHA_OF, MODEL, reflectance, back, alpha.values, np.inf, of_reflectance, in_alpha)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)

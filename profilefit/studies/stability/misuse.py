@@ -13,11 +13,9 @@ from mcml_sim import exact
 from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.laws.rational import Rational
 from profilefit.recipes.inventory import Named
-from profilefit.studies.stability.arithmetic import Text, has_text
+from profilefit.studies.stability.arithmetic import Text
 from profilefit.studies.stability.cells import Cells, Verdict
-from profilefit.studies.stability.laws import OWN
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     CDF,
@@ -49,14 +47,13 @@ def of_law(one: Named) -> Iterator[Cells]:
         SAMPLE: law.sampler.sample,
         PDF: law.sampler.pdf,
     }
-    own = isinstance(law, OWN)
-    text = Text(law, np.float32) if has_text(law) else None
+    own = law.entry.own
+    text = Text(law, np.float32)
     for name, call in calls.items():
         in_python = _refused(one.label, own, name, _cases(name), partial(_called, call, name))
         yield in_python
-        if text is not None:
-            refused = in_python.codes == Verdict.OUTSIDE
-            yield replace(_clamped(one.label, own, name, _cases(name), text), refused=refused)
+        refused = in_python.codes == Verdict.OUTSIDE
+        yield replace(_clamped(one.label, own, name, _cases(name), text), refused=refused)
 
 
 def of_map(one: Named) -> Iterator[Cells]:
@@ -69,7 +66,7 @@ def of_map(one: Named) -> Iterator[Cells]:
     )
     for name, (symbol, key, _), call in ways:
         cases = [(symbol, key, value) for value in SHARES]
-        yield _refused(label, isinstance(law, Rational), name, cases, partial(_alone, call))
+        yield _refused(label, law.entry.own, name, cases, partial(_alone, call))
 
 
 def of_exact() -> Iterator[Cells]:

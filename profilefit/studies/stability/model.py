@@ -10,11 +10,9 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.liang import Liang
-from profilefit.laws.quantile import Quantile
 from profilefit.recipes.inventory import Named
-from profilefit.shader.check.validity import EVERYWHERE, Range
 from profilefit.studies.stability.cells import Cells, absolute, judged, relative
-from profilefit.studies.stability.laws import OWN, Limits
+from profilefit.studies.stability.laws import Limits
 from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PROFILE, SAMPLE, Axis
 
 Floats = NDArray[np.float64]
@@ -24,8 +22,6 @@ ALPHA = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.
 RADIUS = tuple(float(one) for one in np.geomspace(NEAREST, 300.0, 19))
 SHARE = (1e-3, 5e-3, 0.0099, 0.0101, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.995, 0.999)
 INVERSE, ENERGY = "g, not clipped (19)", "energy (17)"
-# Where R_d of a law holds, if not where its radii do: by its own docstring.
-PROFILE_HOLDS: dict[type, Range] = {Quantile: Range(high=0.9999)}
 ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
 
 
@@ -50,7 +46,7 @@ def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
     truth = np.asarray(exact.profile(r, albedo, setting=setting))
     held = limits.valid.alpha.holds(albedo) if limits.valid.alpha else np.zeros_like(albedo, bool)
     draws = limits.valid.drawn.holds(albedo) if limits.valid.drawn else np.zeros_like(albedo, bool)
-    seen = (within <= ENERGY_WITHIN) & PROFILE_HOLDS.get(type(law), EVERYWHERE).holds(albedo)
+    seen = (within <= ENERGY_WITHIN) & law.entry.profile.holds(albedo)
     stated = {name: limits.stated(name) for name in BOUNDS}
     yield _cells(one, stated, PROFILE, (alpha, x), profile, truth, relative(profile, truth), held & seen)
     yield _cells(one, stated, CDF, (alpha, x), cdf, within, absolute(cdf, within), held & np.ones_like(within, bool))
@@ -65,7 +61,7 @@ def _cells(
 ) -> Cells:
     codes = judged(value, reference, error, BOUNDS[name], inside, np.float64)
     return Cells(
-        one.label, isinstance(one.law, OWN), name, MODEL, places, value, reference, error, BOUNDS[name], inside, codes,
+        one.label, one.law.entry.own, name, MODEL, places, value, reference, error, BOUNDS[name], inside, codes,
         one.law, stated=stated[name],
     )  # fmt: skip
 

@@ -1,7 +1,4 @@
-"""What is right: a law's text in extended precision, at the very arguments that a narrower format was given.
-
-Of beam diffusion, which has no text, the law itself with more nodes in float64: its quadratures and float32 are judged.
-"""
+"""What is right: a law's text in extended precision, at the very arguments that a narrower format was given."""
 
 from __future__ import annotations
 
@@ -11,13 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.beam_diffusion import BeamDiffusion
-from profilefit.laws.better_dipole import BetterDipole
-from profilefit.laws.dipole import Dipole
-from profilefit.laws.gaussians import Gaussians
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.shader.check import grid
-from profilefit.studies.stability.arithmetic import EXTENDED, Text, has_text
+from profilefit.studies.stability.arithmetic import EXTENDED, Text
 from profilefit.studies.stability.cells import DIMMEST, Mask
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, Grid
 
@@ -27,7 +20,7 @@ NOWHERE = np.finfo(EXTENDED).tiny ** EXTENDED(0.4)  # r/l that stands for 0 in a
 
 
 class Right:
-    """What is right on a grid; NaN where it is not known, for want of a text.
+    """What is right on a grid.
 
     albedo   alphas (m, 1, 1) in place of the grid's, where these are kept in some other form
     nearest  r/l at which R_d is taken where r/l is less, as shader texts do; 0 if it is not
@@ -35,11 +28,7 @@ class Right:
 
     def __init__(self, law: ProfileLaw, at: Grid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
         self.at, self._nearest = at, nearest
-        self._finite_source = isinstance(law, (Gaussians, Dipole, BetterDipole))
-        self._finer = law.finer if isinstance(law, BeamDiffusion) else None
-        self.known = has_text(law)
-        if not self.known:
-            return
+        self._finite_source = law.is_finite_at_source
         self._text = Text(law, EXTENDED)
         if isinstance(law, Quantile):  # its few steps do not settle for albedos that only float64 has
             self._text.replace("depth", self._depth)
@@ -49,10 +38,6 @@ class Right:
 
     def of(self, name: str) -> Floats:
         """The quantity, in its own unit, as a float64: infinite where it is beyond that."""
-        if self._finer is not None:
-            return _of_finer(self._finer, name, self.at)
-        if not self.known:
-            return np.full((1, 1, 1), np.nan)
         with np.errstate(all="ignore"):
             if name == PROFILE:
                 return np.asarray(self._known_at(self._scaled_profile()) / self._mfp**2, float)
@@ -65,7 +50,7 @@ class Right:
 
     def dim(self, name: str, reference: Floats) -> Mask:
         """Where a number in units of the mean free path has left the format before the unit of length enters."""
-        if not self.known or name not in (PROFILE, PDF):
+        if name not in (PROFILE, PDF):
             return np.zeros((1, 1, 1), bool)
         least = DIMMEST[self.at.dtype]
         with np.errstate(all="ignore"):
@@ -79,12 +64,6 @@ class Right:
 
     def misplaced(self, value: Floats) -> Floats:
         """Share of the energy between a drawn radius and the right one [-]."""
-        if self._finer is not None:
-            xi, alpha, mfp = self.at.arguments[1:]
-            reached = self._finer.cdf(np.where(value >= 0, value, np.inf), alpha, mfp)
-            return np.abs(np.asarray(reached) - xi)
-        if not self.known:
-            return np.full(value.shape, np.nan)
         with np.errstate(all="ignore"):
             x = np.where(value >= 0, value, np.inf).astype(EXTENDED) / self._mfp
             here, there = (self._text.call("cumulated", each, self._shape) for each in (x, self._radius()))
@@ -114,16 +93,6 @@ class Right:
 
     def _radius(self) -> NDArray:
         return np.asarray(self._text.call("radius", self._xi, self._shape))
-
-
-def _of_finer(law: BeamDiffusion, name: str, at: Grid) -> Floats:
-    """Radii, which halvings find, are judged by the share within them."""
-    r, _, alpha, mfp = at.arguments
-    if name == SAMPLE:
-        shares = at.xi.values[None, :, None]
-        return np.where(shares == 1.0, np.inf, np.where(shares == 0.0, 0.0, np.nan))
-    calls = {PROFILE: law.profile, CDF: law.cdf, PDF: law.sampler.pdf}
-    return np.asarray(calls[name](r, alpha, mfp))
 
 
 LEAST_X = grid.LEAST_X

@@ -176,7 +176,7 @@ def test_band_is_the_quantiles_of_laws_evaluated_one_by_one(source):
     fitted = next(f for f in map(source.usable, ("liang-whole", "liang-as-published")) if f is not None)
     alpha = np.array([0.2, 0.9, 0.995])
     band = fitted.band(lambda law: coefficients(law, alpha)[2])
-    samples = fitted.arrays["samples_discrepancy"].astype(float)
+    samples = fitted.arrays["samples_misfit"].astype(float)
     names = tuple(fitted.content["covariance"]["names"])
     some = samples[np.linspace(0, len(samples) - 1, DRAWS).astype(int)]
     one_by_one = [coefficients(fitted.law.with_vector(names, list(map(float, draw))), alpha)[2] for draw in some]
