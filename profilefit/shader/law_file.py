@@ -13,6 +13,7 @@ from typing import Any
 from mcml_sim import __version__
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
@@ -35,7 +36,6 @@ TRANSLATED = {"glsl-es": "glsl"}
 ES_HEAD = "precision highp float; // medium precision is float16, which the laws were not written for\n\n"
 # The exported JSON keeps its words where records have changed theirs.
 EXPORTED = {"misfit_error": "discrepancy_error"}
-MEASURES = {"rel": "mean relative error of R_d", "ks": "error of the cdf", "inversion_error": "error in xi"}
 LIGHT = {
     "searchlight": "a pencil beam along the normal (MCML's)",
     "diffuse": "diffuse, cosine-weighted light (what a blur of irradiance wants)",
@@ -152,9 +152,8 @@ def _told_of(source: _Source, before: str) -> list[str]:
     fitted = content["protocol"]["albedos"]
     lines.append(f"fitted for alpha from {fitted['low']:g} to {fitted['high']:g}")
     measured = content["quality"]["regenerated"]
-    worst = [f"{text} at most {max(measured[key]):.2g}" for key, text in MEASURES.items() if key in measured]
-    if "delta_A" in measured:
-        worst.append(f"error of A at most {measured['delta_A']:.2g}")
+    known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
+    worst = [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]
     if worst:
         lines.append(f"{', '.join(worst)} (albedos that were not fitted)")
     if content.get("data_digest"):

@@ -9,6 +9,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
+from profilefit.fitting.measures import MEASURES
 from profilefit.report.figures.canvas import (
     BLUE,
     GREEN,
@@ -24,10 +25,7 @@ from profilefit.report.figures.canvas import (
 )
 from profilefit.report.records import SETS, Content, Source, converged, measures
 
-MEASURES = {
-    "rel": "mean |R$_d$ / exact − 1| [-]",
-    "ks": "max |cdf − exact cdf| [-]",
-}
+SHOWN = (MEASURES["rel"], MEASURES["ks"])
 KINDS = {
     "searchlight": "pencil beam, n = 1",
     "diffuse": "diffuse light, n = 1",
@@ -68,15 +66,15 @@ def _drawn(source: Source, names: Iterable[str], out: Path, name: str) -> list[P
     rows = {kind: [c for c in contents.items() if _kind(c[1]) == kind] for kind in KINDS}
     shown = {kind: list(_lines(found)) for kind, found in rows.items() if found}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
-    grid = figure.subplots(len(shown), len(MEASURES), squeeze=False)
+    grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
     for row, (kind, lines) in zip(grid, shown.items(), strict=True):
-        for ax, key in zip(row, MEASURES, strict=True):
-            _panel(ax, key, lines)
+        for ax, one in zip(row, SHOWN, strict=True):
+            _panel(ax, one.name, lines)
         row[0].set_ylabel(KINDS[kind])
         if lines:  # none where every fit failed
             row[-1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), fontsize=7.0)
-    for ax, title in zip(grid[0], MEASURES.values(), strict=True):
-        ax.set_title(title)
+    for ax, one in zip(grid[0], SHOWN, strict=True):
+        ax.set_title(f"{one.formula} [{one.unit}]".replace("R_d", "R$_d$"))
     for ax in grid[:-1].flat:
         ax.set_xlabel("")
     return save(figure, out, name)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from html import escape
 
+from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.page.markup import details, element, markup, paragraph
 from profilefit.report.page.measured import Measured, Told, missing
 from profilefit.report.tables.cells import ABSENT, column_table, significant
@@ -19,8 +20,8 @@ RENDERS = {
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
 }
 GROUPS = {
-    "laws": ("Laws in float32", {"rel": "rel", "ks": "ks", "inversion_error": "sample"}),
-    "maps": ("Maps in float32", {"delta_A": "A", "delta_alpha": "α"}),
+    "laws": ("Laws in float32", OF_PROFILE),
+    "maps": ("Maps in float32", OF_MAP[:2]),
 }
 MEANING = (
     "model: the record's error against exact half space or photons, worst albedo; float32: what rounding adds; bad: "
@@ -53,14 +54,15 @@ def _check(told: Told) -> Iterator[str]:
         yield markup(column_table(COSTS, _costs(told["costs"]), left=("text",)))
 
 
-def _columns(group: Sequence[Told], measures: Mapping[str, str]) -> dict[str, list[str]]:
+def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[str]]:
     columns = {
         "law": [_label(one) for one in group],
         "result": ["FAIL" if one["broken"] else "pass" for one in group],
         "light": [one["setting"]["illumination"] for one in group],
         "n": [f"{one['setting']['n']:g}" for one in group],
     }
-    for name, short in measures.items():
+    for name in measures:
+        short = MEASURES[name].symbol
         columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
         columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
     for place in ("inside", "outside"):

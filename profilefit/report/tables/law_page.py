@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.media.setting import Setting
+from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Text
@@ -23,18 +24,12 @@ from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.records import SETS, TOTAL, Content, converged, known_errors, largest_error, z_score
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, MEANING, ROWS, albedo_number
+from profilefit.report.tables.quality_tables import ROWS, albedo_number
 from profilefit.shader import emit
 
-RINGS = ("rel", "ks", "l1", "inversion_error")
-MEASURED = {
-    "rel": "mean relative error of R_d",
-    "ks": "largest error of the cdf",
-    "l1": "misplaced share of the energy",
-    "inversion_error": "largest error of the inversion in xi, up to 0.999",
-}
-# What the table of all laws shows of each, and how it is headed there.
-WORST = {"rel": "rel", "ks": "ks", "inversion_error": "xi", "delta_A": "A"}
+PROFILE_MEASURES = ("rel", "ks", "l1", "inversion_error")
+# What the table of all laws shows of each.
+WORST = (*OF_PROFILE, "delta_A")
 MAP = "map-"
 INDEX = "index"
 
@@ -90,7 +85,7 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
 def index_text(pages: Sequence[Page], folder: Folder) -> str:
     """The table of all laws with the worst errors that their records state, and the list of the pages."""
     contents = _contents(folder)
-    header = ("law", "constants", "light", "n", "number", *(f"{name} worst" for name in WORST.values()))
+    header = ("law", "constants", "light", "n", "number", *(f"{MEASURES[key].symbol} worst" for key in WORST))
     rows = [_row(page, one, contents) for page in pages for one in page.members]
     told = (
         "Every law and map between alpha and A, with every set of constants that comes with this version. The errors "
@@ -143,7 +138,7 @@ def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
         own = [contents[name]["quality"]["regenerated"] for name in one.records]
     else:
         own = [values for _, values in _measured_sets(one, contents)]
-    return {key: float(np.max(values[key])) for values in own for key in WORST if values.get(key) is not None}
+    return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
 
 
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
@@ -273,14 +268,14 @@ def _plain(value: float | None, form: str) -> str:
 
 def _quality(content: Content, values: Content) -> str:
     if "delta_A" in values:
-        numbers = [(MEANING[key].replace("|", "\\|"), albedo_number(key, values[key])) for key in ALBEDO_MEASURES]
+        numbers = [(MEASURES[key].formula.replace("|", "\\|"), albedo_number(key, values[key])) for key in OF_MAP]
         return markdown_table(("measure", "value"), numbers)
     alpha = content["quality"]["alpha"]
     shown = np.unique(np.linspace(0, len(alpha) - 1, ROWS).round().astype(int))
-    measures = [key for key in RINGS if values.get(key) is not None]
+    measures = [key for key in PROFILE_MEASURES if values.get(key) is not None]
     rows: list[Sequence[str]] = [(f"{alpha[i]:.3f}", *(significant(values[key][i]) for key in measures)) for i in shown]
-    rows.append(("worst", *(significant(float(np.max(values[key]))) for key in measures)))
-    meaning = "; ".join(f"`{key}`: {MEASURED[key]}" for key in measures)
+    rows.append(("worst", *(significant(MEASURES[key].worst(values[key])) for key in measures)))
+    meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in measures)
     return f"{markdown_table(('alpha', *measures), rows)}\n\n{meaning}."
 
 

@@ -15,6 +15,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.fitting.sampling import SamplerQuality
 from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
@@ -33,7 +34,7 @@ from profilefit.report.tables.all_laws import (
 from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, albedo_number, worst
+from profilefit.report.tables.quality_tables import albedo_number
 
 INFINITE = "∞"
 NEGLIGIBLE = 5e-6  # a draw from 2^24 steps and the quadrature know no better
@@ -80,13 +81,11 @@ def sampler_number(value: float) -> str:
 
 PERCENT, BILLIONTHS = 100.0, 1e9
 SHOWN, SPARK = 3, 12  # albedos in columns, and characters of a sparkline over all of them
-# Measure: what it is, and in what unit its columns fit a line.
-MEASURES: Mapping[str, tuple[str, float]] = {
-    "rel": ("mean |law / exact - 1| of R_d [%]", PERCENT),
-    "ks": ("max |cdf - exact cdf| [%]", PERCENT),
-    "l1": ("share of misplaced energy [%]", PERCENT),
-    "mse": ("mean square error of r R_d [1e-9 / mfp²]", BILLIONTHS),
-    "r2": ("of r R_d", 1.0),
+# Measures of a profile, and the factor and unit with which their columns fit a line.
+SCALES: Mapping[str, tuple[float, str]] = {
+    **dict.fromkeys(("rel", "ks", "l1"), (PERCENT, " [%]")),
+    "mse": (BILLIONTHS, " [1e-9 / mfp²]"),
+    "r2": (1.0, ""),
 }
 MAP_HEADERS = ("δA", "δα", "√(1-α)", "rises", "α(1)", "fold")
 NOTHING = "None of these records holds a law that can be measured against the exact half space."
@@ -130,7 +129,7 @@ def every_law(found: Measured, in_detail: bool = False) -> Iterator[RenderableTy
     """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
     for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
         by_label = {one.label: quality for one, quality in laws}
-        for measure in MEASURES:
+        for measure in SCALES:
             yield _profile_table(measure, setting, by_label)
     if found.maps:
         yield _map_table(found.maps)
@@ -211,8 +210,8 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     for i in rows:
         columns[f"{alpha[i]:.3f}"] = [_number(measure, float(row[i])) for row in values]
     columns["mean"] = [_number(measure, float(np.mean(row))) for row in values]
-    columns["worst"] = [_number(measure, worst(measure, row)) for row in values]
-    title = f"{measure}: {MEASURES[measure][0]}, by α; {setting}"
+    columns["worst"] = [_number(measure, MEASURES[measure].worst(row)) for row in values]
+    title = f"{measure}: {MEASURES[measure].formula}{SCALES[measure][1]}, by α; {setting}"
     caption = f"mean and worst over {alpha.size} albedos; over α: from the least to the worst here, logarithmic"
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
 
@@ -220,7 +219,7 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
 def _map_table(measured: Sequence[tuple[Named, AlbedoQuality]]) -> RenderableType:
     maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
     columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
-    for header, measure in zip(MAP_HEADERS, ALBEDO_MEASURES, strict=True):
+    for header, measure in zip(MAP_HEADERS, OF_MAP, strict=True):
         columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
     columns["α(0)"] = [albedo_number("at_one", one.law.alpha(0.0)) for one in maps]
     caption = "δA, δα: largest errors; √(1-α): largest relative error; fold: A where it turns; each under its own light"
@@ -251,7 +250,7 @@ def _sampler_label(one: MeasuredSampler) -> str:
 
 def _number(measure: str, value: float) -> str:
     """A value in the measure's unit, in few characters."""
-    value *= MEASURES[measure][1]
+    value *= SCALES[measure][0]
     if measure == "r2":
         return f"{value:.3f}" if value > -1.0 else f"{value:.1f}"
     if value < 0.1:

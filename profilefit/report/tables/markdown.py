@@ -9,10 +9,11 @@ from typing import Any
 
 import numpy as np
 
+from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.recipes.paper.reproduction import LENGTH, PUBLISHED
 from profilefit.report.records import ERRORS, Content, converged, known_errors, largest_error, measured_sets, measures
 from profilefit.report.tables.cells import ABSENT, significant, to_error
-from profilefit.report.tables.quality_tables import ALBEDO_MEASURES, MEANING, albedo_number, worst
+from profilefit.report.tables.quality_tables import albedo_number
 
 PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
 # Which equation of the paper a constant of its profile law belongs to.
@@ -72,7 +73,7 @@ def markdown_hazard(records: Mapping[str, Content]) -> str:
         for name in names
     ]
     for measure in ("rel", "ks"):
-        worst_of = (worst(measure, c["quality"]["regenerated"][measure]) for c in fitted.values())
+        worst_of = (MEASURES[measure].worst(c["quality"]["regenerated"][measure]) for c in fitted.values())
         rows.append((f"{measure}, worst", *map(significant, worst_of)))
     return markdown_table(("constant", *fitted), rows)
 
@@ -149,7 +150,7 @@ def _short_quality(records: Mapping[str, Content]) -> str:
     found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     rows = [
         (owner, which, *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])))
-        for owner, which, values in sorted(found, key=lambda item: -worst("rel", item[2]["rel"]))
+        for owner, which, values in sorted(found, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
     ]
     header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
@@ -165,9 +166,9 @@ def _inversion_quality(records: Mapping[str, Content]) -> str:
 
 
 def _albedo_quality(records: Mapping[str, Content]) -> str:
-    header = ("record", "constants", *(MEANING[measure].replace("|", "\\|") for measure in ALBEDO_MEASURES))
+    header = ("record", "constants", *(MEASURES[measure].formula.replace("|", "\\|") for measure in OF_MAP))
     rows = [
-        (owner, which, *(albedo_number(measure, values[measure]) for measure in ALBEDO_MEASURES))
+        (owner, which, *(albedo_number(measure, values[measure]) for measure in OF_MAP))
         for owner, which, values in _measured(records, "delta_A")
     ]
     return markdown_table(header, rows) if rows else ""
@@ -190,7 +191,7 @@ def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, s
 def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
     if values is None:  # photons do not say it
         return ABSENT, ABSENT
-    return _number(measure, float(np.mean(values))), _number(measure, worst(measure, values))
+    return _number(measure, float(np.mean(values))), _number(measure, MEASURES[measure].worst(values))
 
 
 def _number(measure: str, value: float) -> str:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from rich.console import RenderableType
 
+from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.records import Content, converged, measured_sets, measures
 from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
 
@@ -21,31 +22,6 @@ TABLES = (
     ("r2 near", "r2 far"),
     ("inversion_error",),
 )
-MEANING = {
-    "rel": "mean |law / exact − 1| of R_d",
-    "ks": "max |cdf − exact cdf|",
-    "l1": "share of misplaced energy",
-    "mse": "of r R_d [1/mfp²]",
-    "r2": "of r R_d",
-    "mse near": "of the nearer half of the trimmed range [1/mfp²]",
-    "mse far": "of the farther half",
-    "r2 near": "of the nearer half of the trimmed range",
-    "r2 far": "of the farther half",
-    "inversion_error": "max |cdf(r(ξ)) − ξ|",
-    "delta_A": "max error of A",
-    "delta_alpha": "max error of α",
-    "largest_s": "max |√(1 − α) / exact − 1|",
-    "monotone": "rises all the way",
-    "at_one": "α at A = 1",
-    "fold": "A where it turns",
-}
-SPARKED = ("rel", "ks", "inversion_error")
-ALBEDO_MEASURES = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold")
-
-
-def worst(measure: str, values: Any) -> float:
-    """The worst of a measure over the albedos, in its own unit."""
-    return float(np.min(values) if measure.startswith("r2") else np.max(values))
 
 
 def values_of(one: Content, measure: str) -> list[float] | None:
@@ -61,21 +37,21 @@ def worst_measures(content: Content) -> dict[str, dict[str, float]]:
     """Measure -> set of constants -> its worst over alpha; a failed fit has no regenerated law to measure."""
     quality = content["quality"]
     names = [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
-    keys = [key for key in ("rel", "ks", "inversion_error", "delta_A", "largest_s") if key in quality["regenerated"]]
-    return {key: {name: worst(key, quality[name][key]) for name in names} for key in keys}
+    keys = [key for key in (*OF_PROFILE, "delta_A", "largest_s") if key in quality["regenerated"]]
+    return {key: {name: MEASURES[key].worst(quality[name][key]) for name in names} for key in keys}
 
 
 def spark_table(content: Content) -> list[RenderableType]:
     """Every set's errors over alpha as a row of blocks; nothing for what is not measured by albedo."""
     quality, names = content["quality"], measured_sets(content)
-    keys = [key for key in SPARKED if all(values_of(quality[name], key) for name in names)]
+    keys = [key for key in OF_PROFILE if all(values_of(quality[name], key) for name in names)]
     if not keys:
         return []
     rows = [(key, name, values_of(quality[name], key) or []) for key in keys for name in names]
     ends = {key: span(values for of, _, values in rows if of == key) for key in keys}
     alpha = quality["alpha"]
     columns = {
-        "": [f"{key.replace('inversion_error', 'error')} {name}" for key, name, _ in rows],
+        "": [f"{MEASURES[key].header} {name}" for key, name, _ in rows],
         f"α {alpha[0]:.3f} … {alpha[-1]:.3f}": [spark(values, ends[key]) for key, _, values in rows],
         "least": on_the_point([significant(min(values)) for _, _, values in rows]),
         "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
@@ -101,18 +77,18 @@ def _table(content: Content, group: list[str]) -> RenderableType:
     for measure in group:
         for name in names:
             values = values_of(quality[name], measure) or []
-            shown = [*(values[i] for i in rows), float(np.mean(values)), worst(measure, values)]
-            header = f"{measure.replace('inversion_error', 'error')}\n{SHORT[name]}"
+            shown = [*(values[i] for i in rows), float(np.mean(values)), MEASURES[measure].worst(values)]
+            header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
-    caption = "; ".join(f"{measure.replace('inversion_error', 'error')}: {MEANING[measure]}" for measure in group)
+    caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
     return column_table("Quality at albedos that were not fitted" + _failed(content), columns, caption, left=("α",))
 
 
 def _albedo_table(content: Content) -> RenderableType:
     quality = content["quality"]
-    columns = {"": [MEANING[measure] for measure in ALBEDO_MEASURES]}
+    columns = {"": [MEASURES[measure].formula for measure in OF_MAP]}
     for name in measured_sets(content):
-        columns[name] = [albedo_number(measure, quality[name][measure]) for measure in ALBEDO_MEASURES]
+        columns[name] = [albedo_number(measure, quality[name][measure]) for measure in OF_MAP]
     return column_table("Quality of the map" + _failed(content), columns)
 
 

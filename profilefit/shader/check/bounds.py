@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from profilefit.errors import RecordError
+from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.recipes.inventory import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
@@ -18,7 +19,7 @@ from profilefit.recipes.targets import albedo_values
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))  # those of the records: none of them was fitted
 # Rounding shall not show beside the model's error, nor change it.
 ROUNDING_SHARE, MODEL_FACTOR = 0.1, 1.1
-PROFILE_MEASURES, MAP_MEASURES = ("rel", "ks", "inversion_error"), ("delta_A", "delta_alpha")
+PROFILE_MEASURES, MAP_MEASURES = OF_PROFILE, OF_MAP[:2]
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,7 @@ def of_profile(one: Named, folder: Folder) -> ModelError:
     whole = not one.records or held >= set(one.law.constant_names())
     if whole and "rel" not in found and one.setting.is_matched_isotropic:
         quality = profile_quality(one.law, ALBEDOS)
-        found |= {"rel": float(np.max(quality.rel)), "ks": float(np.max(quality.ks))}
+        found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
     if not found:
         raise RecordError(f"{one.label} cannot be judged: no record tells its errors; regenerate it")
     return ModelError(found, source)
@@ -90,7 +91,7 @@ def _recorded(names: Sequence[str], measures: Sequence[str], records: Records) -
     for name in names:
         quality: dict[str, Any] = records.content(name).get("quality", {}).get("regenerated", {})
         try:
-            found |= {measure: float(np.max(quality[measure])) for measure in measures if measure in quality}
+            found |= {one: MEASURES[one].worst(quality[one]) for one in measures if one in quality}
         except (TypeError, ValueError):
             raise RecordError(f"record {name} is damaged: its quality has no numbers; regenerate it") from None
     return found

@@ -18,6 +18,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.fitting.measures import MEASURES
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST, profile_quality
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.inventory import Named
@@ -161,7 +162,7 @@ def _measured(shader: ShaderLaw, one: Named, model: ModelError) -> dict[str, flo
         return found
     if model.get("rel") is not None:
         quality = profile_quality(shader, ALBEDOS)  # type: ignore[arg-type]  # it asks for no more than there is
-        found |= {"rel": float(np.max(quality.rel)), "ks": float(np.max(quality.ks))}
+        found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
     if model.get("inversion_error") is not None:
         found["inversion_error"] = float(np.max(inversion_error(shader, ALBEDOS)))
     return found
