@@ -12,9 +12,9 @@ from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.rational import Rational
-from profilefit.recipes.folder import SEARCHLIGHT, fits_folder
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import record_setting
-from profilefit.recipes.record_folder import Folder, Records
+from profilefit.recipes.record_folder import SEARCHLIGHT, Folder, Records
 
 Law = TypeVar("Law", bound=Constants)
 # The map that profile laws normalise with: it is exact to a few parts in a million.
