@@ -22,10 +22,9 @@ from profilefit.scenes.stage.buffers import Buffers, step_edge
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
-from profilefit.studies.choose.case import Case, Within
-from profilefit.studies.choose.filtered import passes
-from profilefit.studies.choose.options import Option, is_filter
-from profilefit.studies.choose.truth import truth
+from profilefit.studies.choose.case import Case, Option, Within, is_filter
+from profilefit.studies.choose.predicted import passes
+from profilefit.studies.choose.response import truth
 
 Floats = NDArray[np.float64]
 # How far the picture goes beyond the places that count, and above and below them [longest mean free path]: the first

@@ -6,9 +6,8 @@ import sys
 
 import typer
 
-from mcml_sim.cli.help import FirstScreen, add
 from mcml_sim.cli.lazy import interruptible
-from mcml_sim.cli.program import Program, accepted
+from mcml_sim.cli.program import FirstScreen, Program, accepted, add
 from mcml_sim.cli.run import run
 from mcml_sim.cli.terminal import two_interrupts
 from mcml_sim.errors import ELSEWHERE, NAMED, RESUMES, ClusterError, InputError, OutputError, StoreError

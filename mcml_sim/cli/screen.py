@@ -11,7 +11,7 @@ from typing import Any
 from rich.console import Console, RenderableType
 from rich.measure import Measurement
 
-from mcml_sim.files.plain import as_json
+from mcml_sim.files.text_file import as_json
 
 WIDEST = 1000  # columns that any table fits
 WIDTH = 100  # columns of what goes into a file or a pipe, which have no width of their own; COLUMNS sets another

@@ -5,7 +5,7 @@ from __future__ import annotations
 import jax
 import jax.numpy as jnp
 
-from mcml_sim.exact.complex_functions import arctangent, square_root
+from mcml_sim.exact.special_functions import arctangent, square_root
 
 # Below this albedo 1 - kappa^2 = 4 e^{-2 / alpha} is far below rounding.
 LEAST_ALBEDO = 0.02

@@ -15,7 +15,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact.bessel import bessel_k
+from mcml_sim.exact.special_functions import bessel_k
 from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS, Transform
 
 MAX_STEPS = 60  # of Newton's method, which takes twelve at most where xi < 1 - 1e-8

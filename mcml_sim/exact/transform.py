@@ -32,8 +32,8 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact.complex_functions import inverse_sinh, logarithm, sinh_and_cosh, square_root
 from mcml_sim.exact.dispersion import dispersion, squared_decay_rate
+from mcml_sim.exact.special_functions import inverse_sinh, logarithm, sinh_and_cosh, square_root
 
 Floats = NDArray[np.float64]
 

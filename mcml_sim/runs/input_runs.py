@@ -5,6 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import jax.monitoring
 
 from mcml_sim.errors import ELSEWHERE, NAMED, InputError, StoreError
 from mcml_sim.files.version import __version__
@@ -14,9 +18,40 @@ from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
 from mcml_sim.results.tally import Precision, quantities
 from mcml_sim.results.tally_file import Results, read_results, results_bytes
-from mcml_sim.runs.compiling import Compiling
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
+
+EVENTS = "/jax/core/compile/"  # tracing, lowering and compiling
+
+
+class Compiling:
+    """While entered, notes when this process compiles, on whichever thread."""
+
+    def __init__(self) -> None:
+        self._spans: list[tuple[float, float]] = []
+
+    def __enter__(self) -> Self:
+        jax.monitoring.register_event_duration_secs_listener(self._note)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        jax.monitoring.unregister_event_duration_listener(self._note)
+
+    @property
+    def seconds(self) -> float:
+        """Time in which anything was compiled [s]; what overlaps counts once."""
+        total, end = 0.0, float("-inf")
+        for begun, ended in sorted(self._spans):
+            total += max(ended - max(begun, end), 0.0)
+            end = max(end, ended)
+        return total
+
+    def _note(self, event: str, duration_secs: float, **_: str | int | float) -> None:
+        if event.startswith(EVENTS):
+            now = time.perf_counter()
+            self._spans.append((now - duration_secs, now))
 
 
 @dataclass(frozen=True)

@@ -6,9 +6,8 @@ import sys
 
 import typer
 
-from mcml_sim.cli.help import FirstScreen, add
 from mcml_sim.cli.lazy import interruptible
-from mcml_sim.cli.program import Program
+from mcml_sim.cli.program import FirstScreen, Program, add
 from profilefit.cli.check import check
 from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert

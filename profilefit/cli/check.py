@@ -61,7 +61,7 @@ def check(
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes, print_json, typed
-        from mcml_sim.files.plain import as_json as json_text
+        from mcml_sim.files.text_file import as_json as json_text
         from mcml_sim.files.whole_file import write_whole
         from profilefit.recipes.evidence import made, require_apart
         from profilefit.report.tables.check_tables import content

@@ -111,7 +111,7 @@ def fit(
 def _write(answer: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
-        from mcml_sim.files.plain import as_json
+        from mcml_sim.files.text_file import as_json
         from mcml_sim.files.whole_file import write_whole
         from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
 

@@ -38,7 +38,7 @@ def scene(
         from importlib import import_module
 
         from mcml_sim.cli.screen import notes, print_json, screen, typed
-        from mcml_sim.files.plain import as_json as json_text
+        from mcml_sim.files.text_file import as_json as json_text
         from mcml_sim.files.text_file import read_toml
         from mcml_sim.files.version import __version__
         from mcml_sim.files.whole_file import require_writable, write_together

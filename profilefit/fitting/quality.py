@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.trimming import trimmed_radius
+from profilefit.fitting.profiles import trimmed_radius
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 
 Floats = NDArray[np.float64]

@@ -15,9 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.fitting.estimate import scaled_inverse
-from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.profiles import Profiles, trimmed_radius
 from profilefit.fitting.solver import Solution, solve, solve_batch
-from profilefit.fitting.trimming import trimmed_radius
 from profilefit.laws.liang import Liang
 
 Floats = NDArray[np.float64]

@@ -11,7 +11,7 @@ from scipy import stats
 
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.measured import derived, law_error
+from profilefit.measured import law_error, model
 from profilefit.measured.data import Measured, require_workable
 from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
@@ -70,12 +70,12 @@ class Found:
     @cached_property
     def values(self) -> dict[str, float]:
         """A, alpha, l, mu_s', mu_a, scale."""
-        found = derived.quantities(self.point[None], self.predicted[0][-1:])
+        found = model.quantities(self.point[None], self.predicted[0][-1:])
         return {name: float(value[0]) for name, value in found.items()}
 
     @cached_property
     def gradients(self) -> dict[str, Floats]:
-        return derived.slopes(self.point, self.predicted[1][-1])
+        return model.slopes(self.point, self.predicted[1][-1])
 
     @property
     def jacobian(self) -> Floats:
@@ -153,7 +153,7 @@ class Found:
 
     def errors(self, covariance: Floats) -> dict[str, float]:
         """Standard errors of the quantities from a covariance of the coordinates."""
-        return derived.errors(self.gradients, covariance)
+        return model.errors(self.gradients, covariance)
 
 
 def fitted(data: Measured, question: Question, source: law_error.Origin | None = None) -> Found:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.measured.derived import STRENGTHS
 from profilefit.measured.fitting import Found
-from profilefit.measured.model import NAMES, U, alpha_of
+from profilefit.measured.model import NAMES, STRENGTHS, U, alpha_of
 from profilefit.measured.solving import BLACK, FARTHEST_LN, FARTHEST_U, WHITE, descended
 
 Floats = NDArray[np.float64]

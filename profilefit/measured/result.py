@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.fitting.chains import Walk, walk
-from profilefit.measured import derived
+from profilefit.measured import model
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, Found
 from profilefit.measured.identifiability import Telling, told
@@ -117,7 +117,7 @@ class Answer:
     def _quantities(self, points: Floats) -> dict[str, Floats]:
         data = self.found.data
         reflectance = self.found.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
-        return derived.quantities(points, reflectance)
+        return model.quantities(points, reflectance)
 
     @property
     def moving(self) -> tuple[str, ...]:
@@ -299,7 +299,7 @@ def _quantities(answer: Answer) -> dict[str, Any]:
         name: {
             "value": answer.value(name),
             "at_edge": any(answer.ends(name)),
-            "unit": derived.unit_of(name, found.data.unit),
+            "unit": model.unit_of(name, found.data.unit),
             **{f"{kind}_error": one.get(name) if name in answer.told else None for kind, one in errors.items()},
             "interval_95_data": answer.interval(name),
             "interval_95_total": answer.whole_interval(name),
@@ -313,5 +313,5 @@ def _correlation(answer: Answer) -> dict[str, Any]:
     names = answer.told
     if not names:
         return {}
-    joint = derived.correlation(answer.found.gradients, answer.found.statistical, names)
+    joint = model.correlation(answer.found.gradients, answer.found.statistical, names)
     return {"names": names, "matrix": joint}

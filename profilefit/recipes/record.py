@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 from mcml_sim.files.npz import read_npz
-from mcml_sim.files.plain import plain as to_plain
 from mcml_sim.files.text_file import MOST_JSON, parse_json
+from mcml_sim.files.text_file import plain as to_plain
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
@@ -178,5 +178,5 @@ def versions() -> dict[str, str]:
 
 
 def plain(value: Any) -> Any:
-    """`mcml_sim.files.plain` with the digits of a record: numbers, text, lists, dicts; None for what is not finite."""
+    """`text_file.plain` with the digits of a record: numbers, text, lists and dicts; None for what is not finite."""
     return to_plain(value, DIGITS)

@@ -8,8 +8,7 @@ import pytest
 from benchmarks import choose
 from benchmarks.choose import Compared, verified
 from benchmarks.choose_render import Measured
-from profilefit.studies.choose.case import Case, Within
-from profilefit.studies.choose.options import NOTHING
+from profilefit.studies.choose.case import NOTHING, Case, Within
 
 
 @pytest.mark.slow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.special import hankel1, kv
 
-from mcml_sim.exact.bessel import SERIES_RADIUS, bessel_k
+from mcml_sim.exact.special_functions import SERIES_RADIUS, bessel_k
 
 ORDERS = pytest.mark.parametrize("order", [0, 1])
 

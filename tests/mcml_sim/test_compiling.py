@@ -7,7 +7,7 @@ import jax
 import jax.numpy as jnp
 import pytest
 
-from mcml_sim.runs.compiling import EVENTS, Compiling
+from mcml_sim.runs.input_runs import EVENTS, Compiling
 
 
 def test_the_first_call_compiles_and_the_second_does_not():

@@ -4,7 +4,7 @@ import jax
 import numpy as np
 import pytest
 
-from mcml_sim.exact.complex_functions import arctangent, inverse_sinh, logarithm, sinh_and_cosh, square_root
+from mcml_sim.exact.special_functions import arctangent, inverse_sinh, logarithm, sinh_and_cosh, square_root
 
 
 @pytest.fixture(autouse=True)

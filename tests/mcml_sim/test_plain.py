@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mcml_sim.files.plain import as_json, plain
+from mcml_sim.files.text_file import as_json, plain
 
 
 @dataclass(frozen=True)

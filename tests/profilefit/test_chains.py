@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from mcml_sim.runs.compiling import Compiling
+from mcml_sim.runs.input_runs import Compiling
 from profilefit.errors import InputError
 from profilefit.fitting.chains import _curvature_adjustment, posterior
 from profilefit.fitting.estimate import Problem, curvature, fit

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from profilefit.fitting.trimming import trimmed_radius, walk
+from profilefit.fitting.profiles import trimmed_radius, walk
 
 
 def test_strides_by_hand():

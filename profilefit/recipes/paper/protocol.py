@@ -11,9 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.profiles import Profiles
+from profilefit.fitting.profiles import Profiles, trimmed_radius, walk
 from profilefit.fitting.solver import solve_batch
-from profilefit.fitting.trimming import trimmed_radius, walk
 
 Floats = NDArray[np.float64]
 EPSILON = 0.005  # of the trimming (6)

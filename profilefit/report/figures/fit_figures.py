@@ -10,7 +10,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-from profilefit.measured.derived import unit_of
+from profilefit.measured.model import unit_of
 from profilefit.measured.result import Answer
 from profilefit.report.figures.canvas import (
     BLACK,

@@ -10,8 +10,7 @@ from pathlib import Path
 from profilefit.report.figures.albedo_figure import albedo_figure
 from profilefit.report.figures.coefficient_figures import a_figure, b_figure, c_figure, constants_figure, has_printed
 from profilefit.report.figures.corner_figure import corner_figure
-from profilefit.report.figures.inverse_figure import inverse_figure
-from profilefit.report.figures.inversion_figure import inversion_figure
+from profilefit.report.figures.inverse_figure import inverse_figure, inversion_figure
 from profilefit.report.figures.profile_figures import error_figure, profile_figure
 from profilefit.report.figures.quality_figure import quality_figure, record_quality_figure
 from profilefit.report.figures.residual_figure import residual_figure

@@ -14,9 +14,9 @@ from mcml_sim.files.whole_file import require_writable, write_whole
 from profilefit.recipes import record
 from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
+from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
 from profilefit.report.page.measured import Measured
-from profilefit.report.page.provenance import provenance
 from profilefit.report.page.sections import failures, shader, speed
 from profilefit.report.records import Source
 

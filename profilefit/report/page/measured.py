@@ -11,8 +11,7 @@ from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.recipes import evidence
-from profilefit.report.page.markup import command, paragraph
-from profilefit.report.page.vector import checked, inline
+from profilefit.report.page.markup import checked, command, inline, paragraph
 
 Told = dict[str, Any]
 ALL = "all"

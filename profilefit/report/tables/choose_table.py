@@ -9,13 +9,13 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from profilefit.report.tables.cells import column_table, on_the_point, significant
+from profilefit.studies.choose.case import is_filter
 from profilefit.studies.choose.choice import Choice, Predicted, affordable, middle
 from profilefit.studies.choose.cost import Ratios
 from profilefit.studies.choose.error import CHANNELS, Error
-from profilefit.studies.choose.filtered import passes
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.options import is_filter
-from profilefit.studies.choose.truth import truth
+from profilefit.studies.choose.predicted import passes
+from profilefit.studies.choose.response import truth
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {

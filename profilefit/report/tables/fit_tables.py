@@ -8,8 +8,8 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
-from profilefit.measured.derived import QUANTITIES, correlation, unit_of
 from profilefit.measured.misfit import DETECTED
+from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.optimal_design import CALIBRATED, REPEATS, Candidate
 from profilefit.measured.result import Answer, known_medium
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error

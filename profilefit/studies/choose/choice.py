@@ -15,12 +15,11 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import record_name
 from profilefit.recipes.record_folder import Records
-from profilefit.studies.choose.case import Case
+from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Ratios, milliseconds
 from profilefit.studies.choose.error import Error, error
-from profilefit.studies.choose.options import Option, filters, sampled
+from profilefit.studies.choose.response import truth
 from profilefit.studies.choose.scene import Range, Scene
-from profilefit.studies.choose.truth import truth
 
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is

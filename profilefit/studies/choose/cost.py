@@ -29,7 +29,7 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import By, Stage, covering
 from profilefit.shader.context import renderer
 from profilefit.shader.emit import prefix
-from profilefit.studies.choose.options import Option
+from profilefit.studies.choose.case import Option
 
 COVERED, PUBLISHED = (0.25, 0.50, 0.75), (3.5, 5.9, 8.6)  # share of the screen [-], ms a frame
 PUBLISHED_PIXELS = 1920 * 1080

@@ -9,12 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
-from profilefit.studies.choose.case import Case, Within
-from profilefit.studies.choose.filtered import filtered
-from profilefit.studies.choose.gather import estimates
-from profilefit.studies.choose.options import Option, is_filter
-from profilefit.studies.choose.response import averaged, beyond, response
-from profilefit.studies.choose.truth import Truth
+from profilefit.studies.choose.case import Case, Option, Within, is_filter
+from profilefit.studies.choose.predicted import estimates, filtered
+from profilefit.studies.choose.response import Truth, averaged, beyond, response
 
 Floats = NDArray[np.float64]
 CHANNELS = ("red", "green", "blue")

@@ -17,7 +17,7 @@ from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import TFLOPS, YARDSTICK
-from profilefit.studies.choose.truth import truth
+from profilefit.studies.choose.response import truth
 
 Range = tuple[float, float]
 TABLES = {

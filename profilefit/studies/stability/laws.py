@@ -15,8 +15,17 @@ from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
-from profilefit.studies.stability.arithmetic import Text
-from profilefit.studies.stability.cells import Cells, Codes, Mask, absolute, judged, relative, steps_down, steps_up
+from profilefit.studies.stability.cells import (
+    Cells,
+    Codes,
+    Mask,
+    Text,
+    absolute,
+    judged,
+    relative,
+    steps_down,
+    steps_up,
+)
 from profilefit.studies.stability.layout import (
     ARITHMETICS,
     CDF,

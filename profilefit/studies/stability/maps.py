@@ -21,8 +21,7 @@ from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability import layout
-from profilefit.studies.stability.arithmetic import EXTENDED, Text
-from profilefit.studies.stability.cells import Cells, Codes, Mask, Verdict, absolute, judged, steps_down
+from profilefit.studies.stability.cells import EXTENDED, Cells, Codes, Mask, Text, Verdict, absolute, judged, steps_down
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     DTYPES,

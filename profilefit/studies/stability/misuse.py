@@ -14,8 +14,7 @@ from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.recipes.inventory import Named
-from profilefit.studies.stability.arithmetic import Text
-from profilefit.studies.stability.cells import Cells, Verdict
+from profilefit.studies.stability.cells import Cells, Text, Verdict
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     CDF,

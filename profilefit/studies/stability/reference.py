@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.shader.check import grid
-from profilefit.studies.stability.arithmetic import EXTENDED, Text
-from profilefit.studies.stability.cells import DIMMEST, Mask
+from profilefit.studies.stability.cells import DIMMEST, EXTENDED, Mask, Text
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, Grid
 
 Floats = NDArray[np.float64]

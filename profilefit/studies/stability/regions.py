@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from profilefit.studies.stability.cause import UNEXPLAINED, Cause, nowhere
-from profilefit.studies.stability.causes_of_format import FORMAT
 from profilefit.studies.stability.causes_of_liang import LIANG
-from profilefit.studies.stability.causes_of_models import MODELS
+from profilefit.studies.stability.causes_of_models import FORMAT, MODELS
 from profilefit.studies.stability.cells import Cells, Mask, Verdict, red
 
 # The first that holds is told: what is special before what is general.

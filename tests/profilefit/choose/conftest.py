@@ -5,8 +5,8 @@ import pytest
 import profilefit
 from mcml_sim import Setting
 from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.response import Truth
 from profilefit.studies.choose.scene import Budget, Scene
-from profilefit.studies.choose.truth import Truth
 
 DIFFUSE = Setting("diffuse")
 COLOUR, MFP = (0.6, 0.4, 0.2), (1.0, 0.7, 0.5)

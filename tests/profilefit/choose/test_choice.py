@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.studies.choose.case import Case
+from profilefit.studies.choose.case import Case, Option
 from profilefit.studies.choose.choice import Predicted, cases, chosen, laws
 from profilefit.studies.choose.error import Error
-from profilefit.studies.choose.options import Option
 
 CASE = Case((0.5, 0.5, 0.5), (1.0, 1.0, 1.0), 0.1)
 

@@ -6,8 +6,8 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.studies.choose import cost
+from profilefit.studies.choose.case import NOTHING, Option, sampled
 from profilefit.studies.choose.cost import COVERED, PUBLISHED, Ratios, milliseconds
-from profilefit.studies.choose.options import NOTHING, Option, sampled
 
 SEVENTEEN = Option("separable", 17)
 

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.studies.choose.case import STEEPEST, Case, Within
+from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
 from profilefit.studies.choose.error import error
-from profilefit.studies.choose.options import NOTHING, Option
 
 WITHIN = Within()
 

@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ndtr
 
 from profilefit.scenes.skin.law import Separable
-from profilefit.studies.choose.filtered import OneGaussian, filtered, fitted, passes
-from profilefit.studies.choose.options import Option
+from profilefit.studies.choose.case import Option
+from profilefit.studies.choose.predicted import OneGaussian, filtered, fitted, passes
 from profilefit.studies.choose.response import FARTHEST, NEAR, Beyond, response
 
 X = np.array([0.125, 0.625, 1.625])

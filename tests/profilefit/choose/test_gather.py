@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points
-from profilefit.studies.choose.gather import LEAST_COSINE, OWN, drawn, estimates
+from profilefit.studies.choose.predicted import LEAST_COSINE, OWN, drawn, estimates
 from profilefit.studies.choose.response import beyond, response
 from tests.profilefit.choose.conftest import DIFFUSE, MFP
 

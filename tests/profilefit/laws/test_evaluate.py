@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import InputError
-from mcml_sim.runs.compiling import Compiling
+from mcml_sim.runs.input_runs import Compiling
 from profilefit.laws.evaluate import BLOCKS, evaluated
 
 

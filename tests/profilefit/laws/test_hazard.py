@@ -7,8 +7,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit import load, profile_quality
-from profilefit.laws.hazard import Hazard, HazardSampler
-from profilefit.laws.hazard_curve import SERIES, Shape, _early, density, radius
+from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, _early, density, radius
 from profilefit.laws.rational import Rational
 
 SETTINGS = [Setting(), Setting("diffuse")]

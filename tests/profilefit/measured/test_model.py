@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.measured import derived
+from profilefit.measured import model
 from profilefit.measured.model import BLOCK, Model, alpha_of, u_of
 from profilefit.measured.problem import held_albedo
 from profilefit.recipes import catalogue
@@ -49,20 +49,20 @@ def test_alpha_keeps_its_digits(alpha):
 
 
 def test_quantities_and_their_slopes():
-    found = derived.quantities(POINT[None], np.array([0.4]))
+    found = model.quantities(POINT[None], np.array([0.4]))
     assert {name: float(value[0]) for name, value in found.items()} == pytest.approx(
         {"A": 0.4, "alpha": 0.9, "l": 1.3, "mu_s'": 0.9 / 1.3, "mu_a": 0.1 / 1.3, "scale": 0.7}
     )
-    step, slopes = 1e-6, derived.slopes(POINT, np.zeros(3))
+    step, slopes = 1e-6, model.slopes(POINT, np.zeros(3))
     for at in range(3):
         ends = np.stack([POINT + step * np.eye(3)[at], POINT - step * np.eye(3)[at]])
-        two = derived.quantities(ends, np.zeros(2))
+        two = model.quantities(ends, np.zeros(2))
         for name in ("alpha", "l", "mu_s'", "mu_a", "scale"):
             assert (two[name][0] - two[name][1]) / (2 * step) == pytest.approx(slopes[name][at], abs=1e-8)
     names = ("alpha", "mu_a")
-    np.testing.assert_allclose(derived.correlation(slopes, np.diag([1.0, 0, 0]), names), [[1, -1], [-1, 1]])
-    assert derived.unit_of("mu_a", "mm") == "1/mm"
-    assert derived.unit_of("l", "") == "unit of r"
+    np.testing.assert_allclose(model.correlation(slopes, np.diag([1.0, 0, 0]), names), [[1, -1], [-1, 1]])
+    assert model.unit_of("mu_a", "mm") == "1/mm"
+    assert model.unit_of("l", "") == "unit of r"
 
 
 def test_a_held_reflectance_is_an_albedo():

@@ -8,12 +8,11 @@ from rich.console import Console
 
 from mcml_sim import Setting
 from profilefit.report.tables.choose_table import choose_table, content, headline
-from profilefit.studies.choose.case import Case, Within
+from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import shipped
 from profilefit.studies.choose.error import Error
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.options import NOTHING, Option
 from profilefit.studies.choose.scene import Budget, Scene
 
 ONE = ((0.5, 0.5),) * 3

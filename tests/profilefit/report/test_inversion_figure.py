@@ -8,7 +8,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.inversion_figure import _caption, _draw, _points, inversion_figure
+from profilefit.report.figures.inverse_figure import _caption, _draw, _points, inversion_figure
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from profilefit.report.figures import tradeoff_figure as figure
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.labels import Label, box_of, place_labels, renderer_of
+from profilefit.report.figures.tradeoff_figure import Label, box_of, place_labels, renderer_of
 from profilefit.report.tables.tradeoff_tables import tradeoff_tables
 from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
 

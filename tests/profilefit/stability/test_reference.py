@@ -9,8 +9,7 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
-from profilefit.studies.stability.arithmetic import EXTENDED, Text
-from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.cells import EXTENDED, Text, Verdict
 from profilefit.studies.stability.laws import MEASURED, _computed, limits_of
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, Grid
 from profilefit.studies.stability.reference import Right

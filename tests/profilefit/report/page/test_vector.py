@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
-from profilefit.report.page.vector import VARIABLES, checked, inline
+from profilefit.report.page.markup import VARIABLES, checked, inline
 
 NOBODY_SEES = r'<path [^>]*style="fill: none"[^>]*>'
 
