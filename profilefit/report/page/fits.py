@@ -1,4 +1,4 @@
-"""What was fitted from what: all records, then each with tables, figures and the command that makes it; digests, versions."""
+"""What was fitted from what: records, each with tables, figures, the command that makes it; digests and versions."""
 
 from __future__ import annotations
 
