@@ -21,8 +21,6 @@ PIPELINES = {
     "inverse": ("radius", "relative_radius", "share"),
     "evidence": (),
 }
-# Pipelines that know the equations of these laws only.
-PIPELINE_LAWS = {"as-published": ("liang",), "inverse": ("liang", "quantile")}
 TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
@@ -151,9 +149,6 @@ class Recipe:
             return f"truth must be one of {', '.join(TRUTHS)}, got {self.truth!r}"
         if text := self._problems_of_setting() or self._problems_of_tests():
             return text
-        laws = PIPELINE_LAWS.get(self.pipeline, (self.law,))
-        if self.law not in laws:
-            return f"law of pipeline {self.pipeline!r} must be {' or '.join(laws)}, got {self.law!r}"
         low, high = MFP
         if not self.mfp or not all(low <= length <= high for length in self.mfp):
             return f"mfp must be a list of lengths from {low:g} to {high:g}, got {list(self.mfp)!r}"

@@ -47,14 +47,18 @@ def law_class(recipe: Recipe) -> type[Constants]:
 
 
 def require_known(recipe: Recipe) -> None:
-    """RecipeError if a recipe names a law, a starting set or a constant that there is not."""
-    kind = law_class(recipe)
+    """RecipeError where there is no such law, start or constant, or where the law does not see the objective."""
+    kind, objective = law_class(recipe), recipe.weighting.objective
+    if objective and not kind.seen_by(objective):
+        seeing = [name for name, one in _laws(recipe).items() if one.seen_by(objective) and ":" not in name]
+        got = f"must be {' or '.join(seeing)}, got {recipe.law!r}"
+        raise RecipeError(f"{recipe.path}: law of pipeline {recipe.pipeline!r} {got}")
     if not _start_constants(recipe) and recipe.pipeline != "evidence":
         accepted = [*_published_names(kind.entry), *([OWN_START] if kind.entry.start else [])]
         raise RecipeError(
             f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
         )
-    if kind.seen_by(recipe.weighting.objective) and not free(recipe, kind):
+    if objective and not free(recipe, kind):
         raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
     unknown = [name for name in recipe.held if name not in kind.constant_names()]
     if unknown:

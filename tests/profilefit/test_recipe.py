@@ -12,6 +12,7 @@ from profilefit.laws import map_classes, profile_classes
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import PIPELINES, available, find, read
 from profilefit.recipes.record import record_name
+from profilefit.recipes.starts import require_known
 
 GOOD = """
 title = "A fit"
@@ -308,8 +309,6 @@ INVERSE = (
         (EVEN, "dr = 0.05", "dr = 20", "last * mfp / dr between 3 and 4000 rings"),
         (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [1, 10]', "got last = 30.0, mfp = 10.0, dr = 0.05"),
         (EVEN, 'truth = "exact"', 'truth = "exact"\nmfp = [0.5, 2]', "must contain 1.0, got [0.5, 2.0]"),
-        (EVEN, 'law = "liang"', 'law = "burley"', "law of pipeline 'as-published' must be liang, got 'burley'"),
-        (INVERSE, 'law = "liang"', 'law = "burley"', "of pipeline 'inverse' must be liang or quantile, got 'burley'"),
         (INVERSE, "shares = 64", "shares = 0", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
         (INVERSE, "shares = 64", "", "weighting.shares of pipeline 'inverse' must be between 1 and 10000"),
     ],
@@ -320,6 +319,15 @@ def test_each_pipeline_has_its_own_needs(write, good, old, new, words):
     with pytest.raises(RecipeError, match=re.escape(words)) as caught:
         read(write(good.replace(old, new)))
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("good", "laws"), [(EVEN, "'as-published' must be liang"), (INVERSE, "'inverse' must be liang or quantile")]
+)
+def test_a_pipeline_takes_the_laws_that_its_objective_sees(write, good, laws):
+    require_known(read(write(good)))
+    with pytest.raises(RecipeError, match=f"law of pipeline {laws}, got 'burley'"):
+        require_known(read(write(good.replace('law = "liang"', 'law = "burley"'))))
 
 
 @pytest.mark.parametrize(("dr", "last"), [(0.05, 0.15), (0.01, 40.0)])
