@@ -1,1 +1,13 @@
-"""The least model that a scene needs: what each way to scatter light costs there, and how wrong it will be."""
+"""The least that a scene needs to scatter light: options, their predicted errors, their costs."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+if TYPE_CHECKING:
+    from profilefit.studies.choose.choice import choose
+    from profilefit.studies.choose.cost import shipped
+    from profilefit.studies.choose.scene import read
+else:
+    __getattr__ = attributes(__name__, {"choose": "choice", "shipped": "cost", "read": "scene"})
+
+__all__ = ["choose", "read", "shipped"]
