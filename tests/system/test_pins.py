@@ -138,7 +138,9 @@ def help_texts() -> str:
     return "\n".join(found)
 
 
-@pytest.mark.parametrize("name", BITS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=pytest.mark.slow) if name == "record" else name for name in BITS]
+)
 def test_bits_are_those_of_before(name):
     pins = json.loads(PINS.read_text())["bits"]
     if (here := arithmetic()) not in pins:

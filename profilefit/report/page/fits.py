@@ -132,7 +132,7 @@ def record_part(source: Source, name: str, figures: bool = True) -> str:
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
     plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
-    corner = f"corner-{name}"  # a third of a page's bytes and half of its time, for a figure that few look at
+    corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
     drawings = "\n".join(drawn(plan, source) for plan in plans_of if plan.name != corner)
     draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
     asked = [draw] if any(plan.name == corner for plan in plans_of) else []
