@@ -17,7 +17,7 @@ from collections.abc import Sequence
 import numpy as np
 from rich.progress import Progress
 
-from benchmarks.coverage import fitted
+from benchmarks.interval_coverage import fitted
 from benchmarks.refits import bootstrap
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 import emcee
 from rich.progress import Progress
 
-from benchmarks.coverage import fitted
+from benchmarks.interval_coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, simulate_orders
 from profilefit.fitting.chains import Moves, default_moves, posterior

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 from rich.progress import track
 
-from benchmarks.coverage import fitted
+from benchmarks.interval_coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from profilefit.fitting.estimate import Problem, sensitivity

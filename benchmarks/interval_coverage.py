@@ -1,4 +1,4 @@
-"""Coverage of stated intervals: `python -m benchmarks.coverage` fits 2000 runs made anew, for each law and each truth.
+"""Coverage of stated intervals: `python -m benchmarks.interval_coverage` fits 2000 runs made anew, by law and truth.
 
     known       the law itself is the truth: intervals by the sandwich hold its constants
     exact       the exact half space is the truth: they hold the pseudo-true constants
