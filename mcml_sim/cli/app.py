@@ -6,8 +6,7 @@ import sys
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
-from mcml_sim.cli.program import FirstScreen, Program, accepted, add
+from mcml_sim.cli.program import FirstScreen, Program, accepted, add, add_version
 from mcml_sim.cli.run import run
 from mcml_sim.cli.terminal import two_interrupts
 from mcml_sim.errors import ELSEWHERE, NAMED, RESUMES, ClusterError, InputError, OutputError, StoreError
@@ -30,24 +29,7 @@ Writes NAME.mco, as MCML does, and NAME.npz with the standard error of each bin.
 After Ctrl-C the same command resumes."""
 
 app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_exceptions_enable=False)
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        with interruptible(__name__):
-            from mcml_sim.files.version import __version__
-
-        typer.echo(f"mcml-sim {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
-) -> None:
-    pass
-
-
+add_version(app, "mcml_sim")
 add(app, run)
 
 

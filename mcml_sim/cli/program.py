@@ -25,7 +25,7 @@ from rich.console import Console
 from rich.text import Text
 from typer.core import TyperGroup
 
-from mcml_sim.cli.lazy import INTERRUPTED
+from mcml_sim.cli.lazy import INTERRUPTED, interruptible
 from mcml_sim.cli.terminal import mend_streams
 from mcml_sim.errors import Notice
 
@@ -65,6 +65,24 @@ def add(app: typer.Typer, command: Callable[..., None], panel: str | None = None
     told, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
     paragraphs = [" ".join(one.split()) for one in told.split("\n\n")]  # rich would keep the source's line breaks
     app.command(help="\n\n".join(paragraphs), epilog=f"\b\n{examples}", rich_help_panel=panel)(command)
+
+
+def add_version(app: typer.Typer, package: str) -> None:
+    """Add --version, which is that of both packages."""
+
+    def show(wanted: bool) -> None:
+        if wanted:
+            with interruptible(package):
+                from mcml_sim.files.version import __version__
+
+            typer.echo(f"{package.replace('_', '-')} {__version__}")
+            raise typer.Exit
+
+    @app.callback()
+    def options(
+        version: bool = typer.Option(False, "--version", callback=show, is_eager=True, help="Print the version."),
+    ) -> None:
+        pass
 
 
 ANSWERS = (0, 1)

@@ -4,7 +4,7 @@
     int_0^r 2 pi r' R_d(r') dr' = r int_0^inf R^(k) J1(k r) dk
 
 J is the real part of the Hankel function H^(1), which decays above the real axis. So k may run along the contour of
-`half_space_transform`, where H0^(1)(z) = -(2i/pi) K0(-iz) and H1^(1)(z) = -(2/pi) K1(-iz): no zeros, no cancellation,
+`transform`, where H0^(1)(z) = -(2i/pi) K0(-iz) and H1^(1)(z) = -(2/pi) K1(-iz): no zeros, no cancellation,
 and full relative accuracy far into the exponential tail. On the way H1's pole at k = 0 is passed, which is all of the
 energy, and leaves that beyond r. Lengths are in mean free paths; `x` is r in them.
 """

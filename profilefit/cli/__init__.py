@@ -6,8 +6,7 @@ import sys
 
 import typer
 
-from mcml_sim.cli.lazy import interruptible
-from mcml_sim.cli.program import FirstScreen, Program, add
+from mcml_sim.cli.program import FirstScreen, Program, add, add_version
 from profilefit.cli.check import check
 from profilefit.cli.choose import choose
 from profilefit.cli.convert import convert
@@ -43,22 +42,7 @@ app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_excep
 for panel, commands in PANELS.items():
     for command in commands:
         add(app, command, panel)
-
-
-def _show_version(wanted: bool) -> None:
-    if wanted:
-        with interruptible(__name__):
-            from mcml_sim.files.version import __version__
-
-        typer.echo(f"profilefit {__version__}")
-        raise typer.Exit
-
-
-@app.callback()
-def _options(
-    version: bool = typer.Option(False, "--version", callback=_show_version, is_eager=True, help="Print the version."),
-) -> None:
-    pass
+add_version(app, "profilefit")
 
 
 def _stopped() -> str:

@@ -60,9 +60,8 @@ def scene(
 
     with interruptible(__name__):
         home = import_module(SCENES[name][0])
-        from profilefit.report.figures.scene_figure import scene_figures
-        from profilefit.report.tables.scene_table import content as numbers
-        from profilefit.report.tables.scene_table import scene_lines
+        from profilefit.report.scene_report import content as numbers
+        from profilefit.report.scene_report import scene_figures, scene_lines
         from profilefit.shader.context import opened, renderer
 
     asked = home.read(file, content)

@@ -33,6 +33,9 @@ Floats = NDArray[np.float64]
 LENGTHS = 50
 FIRST_LOOK = 1000  # steps after which the autocorrelation time is estimated first
 HALVINGS = 20
+PRIOR_WIDTH = 10.0
+LEVELS = (0.68, 0.95)
+KEPT = 1000
 Moves = Sequence[tuple[emcee.moves.Move, float]]
 
 
@@ -104,11 +107,6 @@ def _long_enough(sampler: emcee.EnsembleSampler, start: Floats, max_steps: int) 
         steps = min(2 * sampler.iteration, max_steps)
 
 
-PRIOR_WIDTH = 10.0
-LEVELS = (0.68, 0.95)
-KEPT = 1000
-
-
 @dataclass(frozen=True)
 class Posterior:
     """Chains of one fit's constants.
@@ -165,7 +163,7 @@ def posterior(
 ) -> Posterior:
     """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "misfit" (the law's, taken for noise).
 
-    moves  emcee's, with their weights; by default those of `walking.default_moves`
+    moves  emcee's, with their weights; by default those of `default_moves`
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
     require_own_process()

@@ -2,7 +2,7 @@
 
 Source of the form: E. d'Eon, D. Luebke and E. Enderton, Efficient rendering of human skin, EGSR 2007; E. d'Eon and D.
 Luebke, Advanced techniques for realistic real-time skin rendering, GPU Gems 3, ch. 14, 2007, who fit one material at a
-time (`skin_gaussians`). The coefficient laws, which make it a law for every albedo, are this project's.
+time (`scenes.skin.law`). The coefficient laws, which make it a law for every albedo, are this project's.
 """
 
 from __future__ import annotations

@@ -160,7 +160,7 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
 
     source  the record that the law's constants came from, which knows how far it is from the truth
-    InputError if there are not more rows than free coordinates, or if the data are beyond `limits`.
+    InputError if there are not more rows than free coordinates, or if the data are beyond `require_workable`.
     """
     require_own_process()
     free = len(question.free)

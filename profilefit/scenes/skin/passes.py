@@ -43,6 +43,7 @@ class SeparableFilter(Technique):
 
     def lengths(self, frame: Frame) -> Floats:
         """Stretches of the kernel (3,) [mm]."""
-        by_reflectance = [albedo_of(a, self.kernel.setting) for a in frame.mean_reflectance().tolist()]
-        alpha = np.where(frame.fixed_alpha < 0, by_reflectance, frame.fixed_alpha)
+        alpha = frame.fixed_alpha
+        if alpha is None:
+            alpha = np.array([albedo_of(a, self.kernel.setting) for a in frame.mean_reflectance().tolist()])
         return self.kernel.stretches(alpha, frame.mfp)

@@ -35,9 +35,9 @@ class Gather(Technique):
         uniforms = {
             **frame.camera,
             "mfp": tuple(frame.mfp),
-            "fixed_alpha": tuple(frame.fixed_alpha),
+            "fixed_alpha": frame.alpha_uniform,
             "samples": sampling.samples,
-            "longest": max(range(3), key=lambda channel: (frame.mfp[channel], frame.fixed_alpha[channel])),
+            "longest": max(range(3), key=lambda channel: (frame.mfp[channel], frame.alpha_uniform[channel])),
             "seed": sampling.seed,
             "generator": lattice.generator,
             # A channel's third of the points is no lattice: to be right in the mean, its shifts must go everywhere.

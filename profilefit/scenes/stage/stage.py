@@ -31,7 +31,6 @@ Floats = NDArray[np.float64]
 DEFAULT = Sampling()
 By = Law | Technique
 MOST_PIXELS = 16384  # of a side: what OpenGL drivers take at most
-BY_REFLECTANCE = -1.0  # alpha that tells a shader to take it from A
 # Of the time that passed until OpenGL had finished. A driver that says less put work off beyond the query's end, as
 # Mesa's llvmpipe does, and the clock on the wall is right.
 TRUSTED = 0.5
@@ -202,9 +201,9 @@ def _lengths(mfp: ArrayLike) -> Floats:
     return lengths
 
 
-def _albedos(alpha: ArrayLike | None) -> Floats:
+def _albedos(alpha: ArrayLike | None) -> Floats | None:
     if alpha is None:
-        return np.full(3, BY_REFLECTANCE)
+        return None
     albedos = _three("fixed_alpha", alpha)
     if not np.all((albedos >= 0) & (albedos <= 1)):
         raise InputError(f"fixed_alpha must be albedos in [0, 1], got {alpha!r}")

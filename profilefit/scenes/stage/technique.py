@@ -50,7 +50,7 @@ class Frame:
     """What is known of a picture when its passes are made.
 
     size  [pixels];  pixel  its side [mm], in perspective at a depth of 1 mm
-    mfp  of red, green, blue (3,) [mm];  fixed_alpha  (3,) [-], below 0 where a pixel's own A gives it
+    mfp  of red, green, blue (3,) [mm];  fixed_alpha  (3,) [-]; None where a pixel's own A gives it
     mean_reflectance  () -> (3,) mean A where light scatters [-]
     """
 
@@ -59,8 +59,13 @@ class Frame:
     is_perspective: bool
     sampling: Sampling
     mfp: Floats
-    fixed_alpha: Floats
+    fixed_alpha: Floats | None
     mean_reflectance: Callable[[], Floats]
+
+    @property
+    def alpha_uniform(self) -> tuple[float, ...]:
+        """`fixed_alpha` as shaders take it, in which a number below 0 stands for None."""
+        return (-1.0,) * 3 if self.fixed_alpha is None else tuple(self.fixed_alpha)
 
     @property
     def camera(self) -> dict[str, Any]:
@@ -111,7 +116,7 @@ def combination(by: Technique, frame: Frame, scene: Scene | None) -> Pass:
     uniforms = {
         "perspective": float(frame.is_perspective),
         "mfp": tuple(by.lengths(frame)),
-        "fixed_alpha": tuple(frame.fixed_alpha),
+        "fixed_alpha": frame.alpha_uniform,
         **_lit(scene),
     }
     surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map", EXITANCE)

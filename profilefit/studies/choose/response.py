@@ -1,6 +1,6 @@
 """What a profile makes of the step edge, flat or around a cylinder, at a place or over a pixel: integrals, no noise.
 
-On a plane the light from beyond an edge at the distance d is a share F(d) of A (`truth.step_edge`), and what a line at
+On a plane the light from beyond an edge at the distance d is a share F(d) of A (`step_edge`), and what a line at
 the distance c adds is -F'(c). On a cylinder of radius R the line at the arc s is c = 2R sin(s/2R) away, straight
 through, so that what lies within the arc s adds
 
