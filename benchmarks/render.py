@@ -24,6 +24,7 @@ from benchmarks.render_view import judged
 from profilefit.errors import ShaderError
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.shader.context import open_context, renderer
+from profilefit.studies.choose.cost import YARDSTICK_TAPS
 
 SAMPLES, QUICK_SAMPLES = (1, 4, 16, 64, 256), (1, 4, 16)
 SEEDS, QUICK_SEEDS = 4, 2
@@ -55,9 +56,9 @@ def table2(context: moderngl.Context, options: argparse.Namespace) -> dict:
     laws, size = contenders(), options.size or SCREEN
     works = {key: laws[key] for key in render_table2.KEYS}
     found = render_table2.timed(context, head_scene(), works, size, QUICK_TURNS if options.quick else 3)
-    title = f"{size[0]} x {size[1]}, {render_table2.SAMPLES} samples, over separable"
+    title = f"{size[0]} x {size[1]}, {YARDSTICK_TAPS} samples, over separable"
     render_table2.report(title, works, found)
-    return {"size": size, "samples": render_table2.SAMPLES, "shares": render_table2.as_json(found)}
+    return {"size": size, "samples": YARDSTICK_TAPS, "shares": render_table2.as_json(found)}
 
 
 def variance(context: moderngl.Context, options: argparse.Namespace) -> dict:

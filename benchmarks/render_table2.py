@@ -13,14 +13,11 @@ from benchmarks.render_laws import Contender
 from benchmarks.table import show
 from profilefit.scenes.skin.scene import Head
 from profilefit.scenes.stage.stage import PASSES, Stage, covered, covering
+from profilefit.studies.choose.cost import COVERED, PUBLISHED, YARDSTICK_TAPS
 from profilefit.studies.tradeoff.stopwatch import Ratio
 
 Floats = NDArray[np.float64]
-COVERED = (0.25, 0.50, 0.75)
-SAMPLES = 17  # of their Figure 14; Table 2 itself does not say
 YARDSTICK = "separable"
-# ms a frame of their Table 2, on a GTX 1050: the paper's own law is `liang`, normalized diffusion inverts by Golubev.
-PUBLISHED = {"separable": (3.5, 5.9, 8.6), "burley": (4.2, 6.9, 10.6), "liang": (3.9, 6.6, 9.8)}
 KEYS = ("separable", "burley", "liang", "hazard", "quantile")
 
 
@@ -61,7 +58,7 @@ def _timed(
             for passes, by_law in found.items():
                 for key, values in by_law.items():
                     one = works[key]
-                    values[turn] = stage.time(one.law, mfp, one.drawn(SAMPLES), repeats=1, passes=passes)[0]
+                    values[turn] = stage.time(one.law, mfp, one.drawn(YARDSTICK_TAPS), repeats=1, passes=passes)[0]
     return Timed(reached, found)
 
 

@@ -12,4 +12,7 @@ scene = read(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent /
 choice = choose(scene, shipped())  # with costs as they were measured for this release
 
 one = choice.chosen
-print("nothing serves" if one is None else f"{one.option.label}: error {one.error.total:.3g}, {one.ms:.2g} ms")
+if one is None:
+    print("nothing serves")
+else:
+    print(f"{one.option.label}: error {one.error.total:.3g}, {one.frame.least:.2g} to {one.frame.most:.2g} ms")

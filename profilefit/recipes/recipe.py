@@ -11,16 +11,8 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.recipes.schema import LONGEST_TEXT, is_line, is_number
+from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line, is_number
 
-# Each pipeline and the objectives it can make small.
-PIPELINES = {
-    "albedo": ("albedo", "reflectance"),
-    "profile": ("energy", "relative"),
-    "as-published": ("radial",),
-    "inverse": ("radius", "relative_radius", "share"),
-    "evidence": (),
-}
 TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()
 # Pipelines that answer questions about the paper, whose light is the searchlight and whose surface does not refract.
@@ -158,7 +150,7 @@ class Recipe:
             return f"mfp of pipeline 'as-published' must contain 1.0, got {list(self.mfp)!r}"
         if self.rings is None and self.pipeline not in ("albedo", "evidence"):
             return f"a recipe of pipeline {self.pipeline!r} needs a table [rings]"
-        objectives = PIPELINES[self.pipeline] or ("",)
+        objectives = PIPELINES[self.pipeline][0] or ("",)
         if self.weighting.objective not in objectives:
             accepted, got = ", ".join(objectives), self.weighting.objective
             return f"weighting.objective of pipeline {self.pipeline!r} must be one of {accepted}, got {got!r}"

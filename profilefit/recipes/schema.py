@@ -247,7 +247,14 @@ EVIDENCE: Kinds = {
     "halves?.*.model?": TEXT,
     "halves?.*.off?": MEASURE,
 }
-PIPELINES = {"albedo": ALBEDO, "profile": PROFILE, "inverse": INVERSE, "as-published": STAGED, "evidence": EVIDENCE}
+# Each pipeline: the objectives that its recipes can make small, and what its records hold.
+PIPELINES: dict[str, tuple[tuple[str, ...], Kinds]] = {
+    "albedo": (("albedo", "reflectance"), ALBEDO),
+    "profile": (("energy", "relative"), PROFILE),
+    "inverse": (("radius", "relative_radius", "share"), INVERSE),
+    "as-published": (("radial",), STAGED),
+    "evidence": ((), EVIDENCE),
+}
 ABSENT = object()
 
 
@@ -258,7 +265,7 @@ def problem(content: dict[str, Any], whole: bool) -> str | None:
     if whole and is_line(pipeline):
         if pipeline not in PIPELINES:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
-        kinds += [TOLD, PIPELINES[str(pipeline)]]
+        kinds += [TOLD, PIPELINES[str(pipeline)][1]]
     found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
 

@@ -50,6 +50,7 @@ def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) 
             for part, header in PARTS.items()
         },
         "ms": on_the_point([significant(one.ms) for one in rows.values()]),
+        "range": [f"{significant(one.frame.least)} to {significant(one.frame.most)}" for one in rows.values()],
         "serves": [_serves(one, choice) for one in rows.values()],
     }
     fold = ("way", "most of the error")
@@ -111,6 +112,7 @@ def _data(one: Predicted) -> dict[str, Any]:
     return {
         "option": one.option.label,
         "ms": one.ms,
+        "ms_range": [one.frame.least, one.frame.most],
         "error": error.total,
         "parts": {part: getattr(error, part) for part in PARTS},
         "worst": {
@@ -137,7 +139,8 @@ def _serves(one: Predicted, choice: Choice) -> str:
     """Which of the limits it keeps."""
     precise, paid = one.error.total <= choice.scene.tolerance, affordable(one, choice.scene)
     if precise and paid:
-        return "yes"
+        budget = choice.scene.budget.ms
+        return "yes" if budget is None or one.frame.most <= budget else "likely"
     return "no: " + " and ".join(what for what, good in (("error", precise), ("ms", paid)) if not good)
 
 
@@ -159,7 +162,8 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
         f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "
         "share of white; then its parts, which add in squares.",
         f"ms: an estimate of a frame on a {budget.gpu} at {100 * budget.coverage:.0f} % coverage: Table 2 of Liang et "
-        f"al. times ratios measured on {ratios.device.partition(' (')[0]}.",
+        f"al. times ratios measured on {ratios.device.partition(' (')[0]}; its range by what is not known of the GPU"
+        + ("." if budget.ms is None else "; likely: the estimate is within the budget, the end of the range is not."),
         f"light: {setting.illumination}, n = {setting.n:g}.",
     ]
     if (floor := truth(setting).floor) > 0:

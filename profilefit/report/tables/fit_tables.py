@@ -16,7 +16,7 @@ from profilefit.report.tables.cells import ABSENT, column_table, interval, on_th
 
 HELD, EDGE = "held", "edge"
 SHARES = ("A", "alpha")  # which end at 1
-# tests/profilefit/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
+# tests/physics/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
 HELD_IN = "tried on made-up replicates, such intervals hold in 93 to 98 %"
 TINIEST = 1e-16  # chance that is worth printing
 CAPTION = "± data: the data's own errors; ± law: the law's distance from the truth, taken for waves along ln r"

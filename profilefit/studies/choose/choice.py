@@ -16,7 +16,7 @@ from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import record_name
 from profilefit.recipes.record_folder import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
-from profilefit.studies.choose.cost import Ratios, milliseconds
+from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
 from profilefit.studies.choose.error import Error, error
 from profilefit.studies.choose.response import truth
 from profilefit.studies.choose.scene import Range, Scene
@@ -29,11 +29,16 @@ Track = Callable[[list[Option]], Iterable[Option]]
 
 @dataclass(frozen=True)
 class Predicted:
-    """An option's frame [ms], an estimate, and its error in the scene's worst case."""
+    """An option's frame, and its error in the scene's worst case."""
 
     option: Option
-    ms: float
+    frame: Milliseconds
     error: Error
+
+    @property
+    def ms(self) -> float:
+        """Of a frame, as estimated."""
+        return self.frame.estimate
 
 
 @dataclass(frozen=True)
@@ -65,7 +70,7 @@ class Choice:
 
 
 def affordable(one: Predicted, scene: Scene) -> bool:
-    """Whether its frame is within the budget."""
+    """Whether its frame, as estimated, is within the budget."""
     return scene.budget.ms is None or one.ms <= scene.budget.ms
 
 
@@ -126,7 +131,7 @@ def choose(scene: Scene, ratios: Ratios, track: Track = iter) -> Choice:
         if ratios.knows(option)
     }
     found: list[Predicted] = []
-    for option in track(sorted(priced, key=lambda option: priced[option])):
+    for option in track(sorted(priced, key=lambda option: priced[option].estimate)):
         found.append(Predicted(option, priced[option], worst(option, scene)))
         if _is_settled(found, scene.tolerance):  # what is dearer still need not be known
             break

@@ -7,14 +7,16 @@ published  a frame with the separable filter on a GTX 1050 (Liang et al., Table 
 ratio      a frame by the option over one by the separable filter with 17 taps, as this project's renderer measured it
 TFLOPS     what the maker states of the GPU, float32
 
-Real frames differ: memory, not arithmetic, may be what a GPU waits for, and software's ratios need not be hardware's.
+Its range holds two unknowns. Memory, not arithmetic, may be what a GPU waits for: the frame is scaled by either. And
+ratios that were measured elsewhere may lie `spread` times nearer to 1 or farther from it on the user's GPU, as far as
+those shipped are from the same table's frames with normalized diffusion.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from functools import cache
 from importlib import resources
 
@@ -31,22 +33,24 @@ from profilefit.shader.context import renderer
 from profilefit.shader.emit import prefix
 from profilefit.studies.choose.case import Option
 
-COVERED, PUBLISHED = (0.25, 0.50, 0.75), (3.5, 5.9, 8.6)  # share of the screen [-], ms a frame
+COVERED = (0.25, 0.50, 0.75)  # share of the screen [-]
+# ms a frame on a GTX 1050: the paper's own law is `liang`, normalized diffusion inverts by Golubev.
+PUBLISHED = {"separable": (3.5, 5.9, 8.6), "burley": (4.2, 6.9, 10.6), "liang": (3.9, 6.6, 9.8)}
 PUBLISHED_PIXELS = 1920 * 1080
-# float32 TFLOPS as their makers state them: shaders x 2 x boost clock.
-TFLOPS = {
-    "switch": 0.393,
-    "steam-deck": 1.6,
-    "gtx-1050": 1.862,
-    "gtx-1660": 5.03,
-    "ps5": 10.3,
-    "rtx-3060": 12.7,
-    "rtx-4070": 29.1,
-    "rtx-4090": 82.6,
+# float32 TFLOPS (shaders x 2 x boost clock) and memory bandwidth [GB/s] as their makers state them.
+GPUS = {
+    "switch": (0.393, 25.6),
+    "steam-deck": (1.6, 88.0),
+    "gtx-1050": (1.862, 112.0),
+    "gtx-1660": (5.03, 192.0),
+    "ps5": (10.3, 448.0),
+    "rtx-3060": (12.7, 360.0),
+    "rtx-4070": (29.1, 504.0),
+    "rtx-4090": (82.6, 1008.0),
 }
 YARDSTICK = "gtx-1050"
 SHIPPED = "ratios.json"
-YARDSTICK_TAPS = 17
+YARDSTICK_TAPS = 17  # and samples, of the paper's Figure 14; its Table 2 does not say
 TAPS = (9, 33)
 SAMPLES = (16, 64)
 SHARE, SIZE = 0.5, (640, 360)  # of the screen that is covered while it is measured [-], and its size [pixels]
@@ -58,13 +62,14 @@ class Ratios:
     """Frames over one by the separable filter with 17 taps: `base` + `fixed` + `each` x taps or samples.
 
     device  that was measured;  base  of a frame without scattering;  fixed, each  of its scatter pass, by the filter
-    ("separable") or law
+    ("separable") or law;  spread  how many times as far from 1 a ratio may be on the user's GPU: 1 if it was measured
     """
 
     device: str
     base: float
     fixed: Mapping[str, float]
     each: Mapping[str, float]
+    spread: float = 1.0
 
     def knows(self, option: Option) -> bool:
         """Whether its cost was measured."""
@@ -85,27 +90,44 @@ def _key(option: Option) -> str:
     return "separable" if option.law is None else prefix(option.law)
 
 
+@dataclass(frozen=True)
+class Milliseconds:
+    """Of a frame: an estimate, and the range that it lies in by what is not known of the GPU."""
+
+    estimate: float
+    least: float
+    most: float
+
+
 def milliseconds(
     option: Option, ratios: Ratios, gpu: str = YARDSTICK, coverage: float = 0.5, pixels: int = PUBLISHED_PIXELS
-) -> float:
-    """A frame [ms]: an estimate."""
-    if gpu not in TFLOPS:
-        raise InputError(f"gpu must be one of {', '.join(TFLOPS)}, got {gpu!r}")
-    slope, base = np.polyfit(COVERED, PUBLISHED, 1)
+) -> Milliseconds:
+    """A frame by an option."""
+    if gpu not in GPUS:
+        raise InputError(f"gpu must be one of {', '.join(GPUS)}, got {gpu!r}")
+    slope, base = np.polyfit(COVERED, PUBLISHED["separable"], 1)
     whole = float(base + slope * coverage) * pixels / PUBLISHED_PIXELS
-    return whole * ratios.of(option) * TFLOPS[YARDSTICK] / TFLOPS[gpu]
+    arithmetic, memory = (whole * old / new for old, new in zip(GPUS[YARDSTICK], GPUS[gpu], strict=True))
+    ratio = ratios.of(option)
+    low, high = sorted(max(1.0 + (ratio - 1.0) * by, 0.0) for by in (ratios.spread, 1.0 / ratios.spread))
+    return Milliseconds(arithmetic * ratio, min(arithmetic, memory) * low, max(arithmetic, memory) * high)
 
 
 @cache
 def shipped() -> Ratios:
-    """As they were measured for this release."""
+    """As they were measured for this release, in software."""
     content = json.loads((resources.files("profilefit.studies.choose") / SHIPPED).read_text(encoding="utf-8"))
-    return Ratios(**content)
+    ratios = Ratios(**content)
+    own = ratios.base + ratios.fixed["burley"] + ratios.each["burley"] * YARDSTICK_TAPS
+    hardware = np.divide(PUBLISHED["burley"], PUBLISHED["separable"])
+    return replace(ratios, spread=float(np.max(hardware - 1.0)) / (own - 1.0))
 
 
 def as_json(ratios: Ratios) -> str:
     """What `shipped` reads."""
-    return json.dumps(asdict(ratios), indent=1) + "\n"
+    content = asdict(ratios)
+    del content["spread"]
+    return json.dumps(content, indent=1) + "\n"
 
 
 def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tuple[int, int] = SIZE) -> Ratios:

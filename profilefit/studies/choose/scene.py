@@ -16,7 +16,7 @@ from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.studies.choose.case import Within
-from profilefit.studies.choose.cost import TFLOPS, YARDSTICK
+from profilefit.studies.choose.cost import GPUS, YARDSTICK
 from profilefit.studies.choose.response import truth
 
 Range = tuple[float, float]
@@ -36,7 +36,7 @@ MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pe
 
 @dataclass(frozen=True)
 class Budget:
-    """ms of a frame, None if there is no limit; gpu a class of `cost.TFLOPS`; coverage, share of the screen [-]."""
+    """ms of a frame, None if there is no limit; gpu a class of `cost.GPUS`; coverage, share of the screen [-]."""
 
     ms: float | None = None
     gpu: str = YARDSTICK
@@ -147,7 +147,7 @@ class _Reader(Tables):
     def budget(self, budget: Table, view: Table) -> Budget:
         return Budget(
             self.number("budget", "ms", budget) if "ms" in budget else None,
-            self.text("budget", "gpu", budget, YARDSTICK, tuple(TFLOPS)),
+            self.text("budget", "gpu", budget, YARDSTICK, tuple(GPUS)),
             self.number("view", "coverage", view, 0.5, most=1.0),
         )
 

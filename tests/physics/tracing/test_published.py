@@ -1,0 +1,92 @@
+"""`simulate` against numbers that others have published."""
+
+import functools
+
+import numpy as np
+import pytest
+
+from mcml_sim import Grid, exact, half_space, simulate
+from tests.physics.tracing import published
+from tests.physics.tracing.adding_doubling import solve
+
+GRID = Grid(0.05, 20)
+FEW, MANY = 2**19, 10**7
+EIGHT_ALBEDOS = (0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.99)
+sizes = pytest.mark.parametrize("photons", [FEW, pytest.param(MANY, marks=pytest.mark.slow)])
+
+
+@functools.lru_cache(maxsize=4)
+def three_layers(photons):
+    """MCML's sample."""
+    return simulate(published.THREE_LAYERS, GRID, photons, seed=31)
+
+
+def is_met(estimate, published_value, published_error=0.0, rounding=0.0):
+    """Within 4 standard errors of both (a chance of 6e-5 each), and what rounding to the last digit may hide."""
+    error = np.hypot(estimate.standard_error, published_error)
+    return np.all(np.abs(estimate.value - published_value) < 4 * error + rounding)
+
+
+@sizes
+def test_slab_of_van_de_hulst(photons):
+    tally = simulate(published.VAN_DE_HULST_SLAB, GRID, photons, seed=30)
+    rounding = published.VAN_DE_HULST_ROUNDING
+    assert is_met(tally.diffuse_reflectance, published.VAN_DE_HULST_REFLECTANCE, rounding=rounding)
+    assert is_met(tally.transmittance, published.VAN_DE_HULST_TRANSMITTANCE, rounding=rounding)
+    assert is_met(tally.diffuse_reflectance, published.ADDING_DOUBLING_REFLECTANCE)
+    assert is_met(tally.transmittance, published.ADDING_DOUBLING_TRANSMITTANCE)
+    assert tally.diffuse_reflectance.standard_error < 0.5 / np.sqrt(photons)
+    # The convention: transmittance includes the unscattered light.
+    assert not is_met(tally.diffuse_transmittance, published.VAN_DE_HULST_TRANSMITTANCE)
+
+
+@sizes
+def test_three_layers_of_mcml(photons):
+    tally = three_layers(photons)
+    error = published.THREE_LAYERS_ERROR
+    assert tally.specular_reflectance.value == pytest.approx(published.THREE_LAYERS_SPECULAR, abs=5e-8)
+    assert is_met(tally.diffuse_reflectance, published.THREE_LAYERS_REFLECTANCE, error)
+    assert is_met(tally.absorbed, published.THREE_LAYERS_ABSORBED, error)
+    assert is_met(tally.transmittance, published.THREE_LAYERS_TRANSMITTANCE, error)
+    by_layer, rounding = published.THREE_LAYERS_ABSORBED_BY_LAYER, published.THREE_LAYERS_ROUNDING_BY_LAYER
+    assert is_met(tally.absorbed_per_layer, by_layer, error, rounding)
+
+
+@sizes
+def test_three_layers_by_adding_doubling(photons):
+    """Known to 1e-7, so only the run's own error counts."""
+    tally, answer = three_layers(photons), solve(published.THREE_LAYERS, angles=10)
+    transmittance = answer.transmitted.sum() + answer.ballistic
+    assert is_met(tally.diffuse_reflectance, answer.reflected.sum())
+    assert is_met(tally.transmittance, transmittance)
+    assert is_met(tally.absorbed, 1 - answer.specular - answer.reflected.sum() - transmittance)
+
+
+@pytest.mark.slow
+def test_biased_generator_of_mcml_would_be_seen():
+    transmittance = three_layers(MANY).transmittance
+    biased = published.THREE_LAYERS_TRANSMITTANCE_OF_RAN3
+    assert abs(transmittance.value - biased) > 3.5 * transmittance.standard_error
+
+
+def test_adding_doubling_confirms_what_was_published_by_photons():
+    answer = solve(published.THREE_LAYERS, angles=10)
+    error = 4 * published.THREE_LAYERS_ERROR
+    assert answer.reflected.sum() == pytest.approx(published.THREE_LAYERS_REFLECTANCE, abs=error)
+    assert answer.transmitted.sum() + answer.ballistic == pytest.approx(published.THREE_LAYERS_TRANSMITTANCE, abs=error)
+    assert answer.specular == pytest.approx(published.THREE_LAYERS_SPECULAR, abs=5e-8)
+
+
+@sizes
+@pytest.mark.parametrize("alpha", EIGHT_ALBEDOS)
+def test_half_space_of_chandrasekhar(alpha, photons):
+    tally = simulate(half_space(alpha), GRID, photons // (1 if photons == MANY else 2), seed=32)
+    assert is_met(tally.diffuse_reflectance, exact.reflectance(alpha))
+    assert is_met(tally.diffuse_reflectance, published.HALF_SPACE_REFLECTANCE[alpha], rounding=5e-7)
+    # Negative control: with 5 % less absorption it is not met.
+    assert not is_met(tally.diffuse_reflectance, exact.reflectance(1 - 0.95 * (1 - alpha)))
+
+
+def test_exact_reflectance_is_the_published_one():
+    for alpha, reflectance in published.HALF_SPACE_REFLECTANCE.items():
+        assert exact.reflectance(alpha) == pytest.approx(reflectance, abs=5.1e-7)

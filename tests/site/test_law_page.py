@@ -1,0 +1,77 @@
+"""Pages of laws: every law and record has one, and it says what its record says."""
+
+import re
+import shlex
+import shutil
+from pathlib import Path
+
+import pytest
+
+import profilefit
+from mcml_sim import Setting
+from profilefit.recipes import inventory, record
+from profilefit.report.records import largest_error
+from profilefit.report.tables.cells import to_error
+from profilefit.report.tables.law_page import index_text, law_pages, page_text
+
+FITS = Path(__file__).resolve().parents[2] / "fits"
+
+
+@pytest.fixture(scope="module")
+def pages():
+    return law_pages(FITS)
+
+
+def test_every_law_and_every_record_has_its_place(pages):
+    members = [one for page in pages for one in page.members]
+    records = {name for name, path in record.available(FITS).items() if "constants" in record.read(path)}
+    assert {name for one in members for name in one.records} == records
+    printed = {one.label for one in inventory.profile_laws(FITS) if not one.records}
+    assert printed <= {one.label for one in members}
+    index = index_text(pages, FITS)
+    assert index.count("\n| [") == len(members)
+    assert all(f"\n{page.name}\n" in index for page in pages)
+
+
+def test_a_page_says_what_its_record_says(pages):
+    hazard = next(page for page in pages if page.name == "hazard")
+    text, content = page_text(hazard, FITS), record.read(FITS / "hazard.json")
+    for name, constant in content["constants"].items():
+        shown = to_error(constant["regenerated"], largest_error(constant))
+        assert re.search(rf"^\| {name} +\| +{re.escape(shown)} ", text, re.MULTILINE)
+    for wanted in (
+        content["data_digest"],
+        "profilefit regenerate hazard\n",
+        'load("hazard", setting=Setting("diffuse"',
+    ):
+        assert wanted in text
+    assert "profilefit export hazard-diffuse-n1.4 --lang glsl" in text
+    assert f"| worst | {max(content['quality']['regenerated']['rel']):.2g}" in text
+
+
+def test_a_page_changes_with_its_record(pages, tmp_path):
+    copied = shutil.copytree(FITS, tmp_path / "fits", ignore=shutil.ignore_patterns("figures", ".photons", "*.npz"))
+    path = copied / "quantile.json"
+    path.write_text(path.read_text(encoding="utf-8").replace('"converged"', '"did not converge"'), encoding="utf-8")
+    before = page_text(next(page for page in pages if page.name == "quantile"), FITS)
+    after = page_text(next(page for page in pages if page.name == "quantile"), copied)
+    assert before != after
+    assert "No constants: did not converge." in after
+
+
+@pytest.mark.slow
+def test_what_a_page_tells_to_type_gives_that_law(pages):
+    """Every call of `load` and `albedo_law` on every page."""
+    for page in pages:
+        text = page_text(page, FITS)
+        calls = re.findall(r"```python\n(.+)\n```", text)
+        assert len(calls) == len(page.members)
+        for call, one in zip(calls, page.members, strict=True):
+            here = call.replace('"fits/', f'"{FITS}/')
+            law = eval(here, {"profilefit": profilefit, "Setting": Setting})
+            assert law.constants() == one.law.constants(), call
+            assert law.setting == one.setting, call
+        for command in re.findall(r"^profilefit export (.+) --lang glsl$", text, re.MULTILINE):
+            name, *constants = shlex.split(command.replace("--constants ", ""))
+            law = inventory.find(name, FITS, *constants).law
+            assert any(law.constants() == one.law.constants() for one in page.members), command

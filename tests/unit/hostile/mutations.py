@@ -1,0 +1,522 @@
+"""Files as a careless or a hostile hand leaves them: records, .npz, tables, scenes, recipes and .mci, from a seed.
+
+The same seed gives the same bytes. What a payload would do, were it run anywhere, is to make a file named CANARY.
+"""
+
+from __future__ import annotations
+
+import copy
+import io
+import json
+import random
+import re
+import struct
+import warnings
+import zipfile
+import zlib
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+ROOT = Path(__file__).resolve().parents[3]
+CANARY = "CANARY"
+# All that ends a line for Python's splitlines, Python itself, GLSL, HLSL or a browser.
+LINE_ENDS = ("\n", "\r", "\r\n", "\v", "\f", "\x1c", "\x1d", "\x1e", "\x85", "\u2028", "\u2029")
+# A C preprocessor joins the next line to one that ends so, a comment's too; ??/ is a backslash to some of them.
+JOINED = ("\\", "\\ ", "\\\t", "??/", "??/ ")
+CODE = (
+    f'import os; os.system("touch {CANARY}")',
+    f'__import__("os").system("touch {CANARY}")',
+    f"open('{CANARY}', 'w')",
+    "float evil = 1.0;",
+    "#define hazard_burden evil",
+    '#include "evil"',
+)
+TEXTS = (
+    *(f"one{end}{code}" for end in LINE_ENDS for code in CODE),
+    *(f"one{end}" for end in (*LINE_ENDS, *JOINED)),
+    *("", " ", "\0", "\t", "\b", "\x7f", "\x1b[31mred", "\x1b]0;title\a", "\x9b31m", "\x1b[2J", "\ud800", "\udcff"),
+    *("\u202eevil", "\u2066evil\u2069", "\u200b", "\ufeff", "e\u0301" * 40, "\U0001f4a5", "Σ", "١"),
+    *("*/", "/*", "//", '"""', "'''", '"', "'", "`", "#", "`` ` ``", "\\n", "\\u000a", "${x}", "$title", "{0}", "%s"),
+    *(f'<script>fetch("{CANARY}")</script>', "</script>", "</SCRIPT ><b>", "<!--", "-->", "<![CDATA[", "]]>", "&lt;"),
+    *("<!-- quality -->", "<!-- /quality -->", "<img src=x onerror=alert(1)>", '" onmouseover="alert(1)', "</td><td>"),
+    *("[bold]one[/bold]", "[link=file:///etc/passwd]one[/link]", "[/]", "[", "a|b", "\\|", "| --- |", "# one", "> one"),
+    *("../../one", "/etc/passwd", "..", "~/one", f"$(touch {CANARY})", f"; touch {CANARY}", "-o", "--out=/dev/null"),
+    *("1.0; evil", "1.0\nevil", "nan", "inf", "1e400", "0x10", "1_0", "LAW_", "@i", "//% for 9\n@i\n//% end", "x|"),
+    *("PF_SELECT", "x" * 10_000, "x " * 10_000, "0" * 64, "F" * 64, "0" * 63),
+)  # fmt: skip
+WORDS = (
+    "converged",
+    "failed",
+    "profile",
+    "albedo",
+    "evidence",
+    "as-published",
+    "inverse",
+    "hazard",
+    "liang",
+    "diffuse",
+)
+# As they stand in a file: numbers that are large, tiny or none, and nests that are deep.
+NUMBERS = (
+    *("0", "-0.0", "1", "-1", "2", "3.5", "1e-300", "5e-324", "1e16", "1e22", "1e300", "1e308", "1e400", "-1e400"),
+    *("NaN", "Infinity", "-Infinity", "9007199254740993", "9" * 400, "9" * 5000, "-" + "9" * 5000, "0." + "3" * 5000),
+)
+DEEP = 100_000
+NESTS = ("[" * DEEP + "]" * DEEP, '{"a":' * DEEP + "1" + "}" * DEEP, "[" * DEEP, "[[]," * 2000 + "1" + "]" * 2000)
+FILE_NAMES = (
+    "\nimport os",
+    "\x1b[31mred",
+    "<img src=x onerror=alert(1)>",
+    "\\",
+    "[bold]a",
+    "*",
+    "\u202ea",
+    ".b",
+    "|",
+    "`",
+)
+TOML_WORDS = (
+    *NUMBERS, *("nan", "inf", "-inf", "true", "1_000", "0x10", "1979-05-27T07:32:00Z", "[]", "{}", "{a = 1}", "[[1]]"),
+    *("[1, 2]", "[2, 1]", "[1, 2, 3]", "[0.1, true]", '["a"]', "'''a", '"', "=", "[" * DEEP, "{a=" * DEEP, "[" * 500),
+)  # fmt: skip
+TOML_LINES = (
+    *("[view]", "[[layers]]", "[layers]", "layers = 3", "view = 3", "unknown = 1", "[", "]", "=", "a = ", '"" = 1'),
+    *(
+        f"{'a.' * DEEP}b = 1",
+        f"[{'a.' * 3000}b]",
+        f"{'k' * DEEP} = 1",
+        f"x = {'9' * 5000}",
+        "x = 1\nx = 2",
+        "\x1b[31m = 1",
+    ),
+)
+CELLS = (
+    *("0", "-1", "1e400", "-1e308", "5e-324", "nan", "inf", "1_000", "", '"', '"a', '"1"', "1,5", "1.5.5", "٣", "0x10"),
+    *(
+        "\x1b[31m",
+        "a\u2028b",
+        "\0",
+        "=cmd|' /C calc'!A0",
+        "x" * DEEP,
+        "9" * 5000,
+        ",",
+        ";",
+        "\t",
+        "#",
+        '"\n"',
+        "[",
+        "[a.u.]",
+    ),
+    *("r", "value", "sigma", "value1", "value_2", "r_in", "r_out", "r [mm]", "r [furlong]", "r (mm)", "value [1/cm^2]"),
+)
+CELL_LINES = (
+    *("", ",", ",,", "1,2,3,4", "#", "a,b,c", "r,value,sigma", "," * 60_000, "1," * 60_000, '"' * 1001, "\0", "1 2 3"),
+    ",".join(["r", *(f"value{i}" for i in range(1, 60_000))]),
+)
+MCI_WORDS = (
+    *NUMBERS, *("nan", "inf", "1e8", "-1", "0", "A", "B", "slab.mco", "thesis.tex", "../evil.mco", "/dev/null"),
+    *("a\x1b[31m.mco", "a\u2028.mco", "a\0", "x" * 300, "é" * 255, ".", "..", "~", "$(touch CANARY)", "-1e400", "1_0"),
+)  # fmt: skip
+MCI_LINES = ("1.0", "1", "0 0", "1 2 3 4 5", "slab.mco A", "#", "1.0  10  90  0.75  0.02", "9" * 5000, "x" * DEEP)
+TOKEN = re.compile(r'"[^"\n]*"|[^\s,;=\[\]{}#"]+')
+
+
+def damaged(rng: random.Random, data: bytes) -> bytes:
+    """A file's bytes cut, flipped, grown, or in another encoding."""
+    at = rng.randrange(len(data)) if data else 0
+    some = bytes(rng.randrange(256) for _ in range(rng.randint(1, 8)))
+    flipped = bytearray(data)
+    for _ in range(rng.randint(1, 4) if data else 0):
+        flipped[rng.randrange(len(data))] ^= 1 << rng.randrange(8)
+    ways: tuple[bytes, ...] = (
+        *(data[:at], data[at:], data[:at] + some + data[at:], data[:at] + data[at + len(some) :], bytes(flipped)),
+        *(data + data, data + some, some + data, b"\xef\xbb\xbf" + data, data[:at] + b"\0" + data[at:], b"", some),
+        *(b"\xff\xfe" + data, data.replace(b"\n", b"\r"), data.replace(b"\n", b"\r\n")),
+        data[:at] + b"\xed\xa0\x80" + data[at:],
+    )  # fmt: skip
+    return rng.choice(ways)
+
+
+def any_text(rng: random.Random, before: str = "") -> str:
+    """An odd text, alone or in what stood there."""
+    odd, at = rng.choice(TEXTS), rng.randint(0, len(before))
+    return rng.choice((odd, before + odd, before[:at] + odd + before[at:], rng.choice(WORDS)))
+
+
+class Tree:
+    """JSON that is changed place by place; what JSON cannot say (1e400, a nest) is put in as text."""
+
+    def __init__(self, rng: random.Random, content: Any) -> None:
+        self.rng, self.content, self.literal = rng, copy.deepcopy(content), dict[str, str]()
+
+    def change(self) -> None:
+        """Change one place: replace, rename, remove or add."""
+        rng = self.rng
+        if rng.random() < 0.4 and (texts := list(_texts(self.content))):
+            holder, key = rng.choice(texts)
+            holder[key] = any_text(rng, holder[key])
+            return
+        holder, key = self._somewhere()
+        way = rng.random()
+        if way < 0.5:
+            holder[key] = self._odd(holder[key])
+        elif way < 0.65:
+            del holder[key]
+        elif isinstance(holder, dict):
+            value = holder.pop(key) if way < 0.8 else self._odd(holder[key])
+            holder[any_text(rng, key)] = value
+        else:
+            holder.insert(rng.randrange(len(holder) + 1), self._odd(holder[key]))
+
+    def spelled(self) -> bytes:
+        """The file."""
+        as_ascii = self.rng.random() < 0.7
+        text = json.dumps(self.content, indent=self.rng.choice((None, 1)), ensure_ascii=as_ascii)
+        for mark, literal in self.literal.items():
+            text = text.replace(f'"{mark}"', literal)
+        if self.rng.random() < 0.05:  # a key twice: the last one counts
+            text = text.replace("{", '{"title": "one\\nimport os", ', 1) + rng_tail(self.rng)
+        return text.encode("utf-8", "surrogatepass")
+
+    def _somewhere(self) -> tuple[Any, Any]:
+        """A place, the likelier the higher it stands."""
+        holder = self.content
+        while True:
+            key = self.rng.choice(list(holder)) if isinstance(holder, dict) else self.rng.randrange(len(holder))
+            inside = holder[key]
+            if not (isinstance(inside, dict | list) and inside) or self.rng.random() < 0.2:
+                return holder, key
+            holder = inside
+
+    def _odd(self, value: Any) -> Any:
+        rng = self.rng
+        if isinstance(value, int | float) and rng.random() < 0.4:
+            return value * rng.choice((-1, 0, 10, 1.5, 1e-12, 1e12))
+        if isinstance(value, list) and value and rng.random() < 0.6:
+            return rng.choice((value[:-1], value[:1], value + value, [value], [*value, None], value[::-1]))
+        way = rng.random()
+        if way < 0.03:
+            return self._literal(rng.choice(NESTS))
+        if way < 0.4:
+            return self._literal(rng.choice(NUMBERS))
+        if way < 0.6:
+            return any_text(rng, value if isinstance(value, str) else "")
+        return copy.deepcopy(
+            rng.choice((None, True, False, [], {}, [1, 2], {"a": 1}, [[]], [None], "", value, self.content))
+        )
+
+    def _literal(self, text: str) -> str:
+        mark = f"@literal {len(self.literal)}@"
+        self.literal[mark] = text
+        return mark
+
+
+def rng_tail(rng: random.Random) -> str:
+    """What may stand behind the end of a file."""
+    return rng.choice(("", "\n", " ", "{}", "\0"))
+
+
+def _texts(content: Any) -> Iterator[tuple[Any, Any]]:
+    """Every place that holds a text."""
+    for key, value in content.items() if isinstance(content, dict) else enumerate(content):
+        if isinstance(value, str):
+            yield content, key
+        elif isinstance(value, dict | list):
+            yield from _texts(value)
+
+
+def json_mutant(rng: random.Random, content: Any) -> bytes:
+    """A JSON file with one to three places changed, or its bytes damaged."""
+    tree = Tree(rng, content)
+    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        if tree.content:
+            tree.change()
+    return damaged(rng, tree.spelled()) if rng.random() < 0.08 else tree.spelled()
+
+
+def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequence[str]) -> bytes:
+    """A text with one to three words or lines changed, or its bytes damaged."""
+    found = text.split("\n")
+    for _ in range(rng.choice((1, 1, 1, 2, 3))):
+        at, other = rng.randrange(len(found)), rng.randrange(len(found))
+        way = rng.random()
+        if way < 0.55:
+            places = [place for line, one in enumerate(found) for place in _words(line, one)]
+            if places:
+                line, begin, end = rng.choice(places)
+                word = rng.choice((rng.choice(words), rng.choice(words), _scaled(rng, found[line][begin:end])))
+                found[line] = found[line][:begin] + word + found[line][end:]
+        elif way < 0.65 and len(found) > 1:
+            del found[at]
+        elif way < 0.75:
+            found.insert(at, found[other])
+        elif way < 0.85:
+            found[at], found[other] = found[other], found[at]
+        else:
+            found.insert(at, rng.choice(lines))
+    data = "\n".join(found).encode("utf-8", "surrogatepass")
+    return damaged(rng, data) if rng.random() < 0.1 else data
+
+
+def _words(line: int, text: str) -> Iterator[tuple[int, int, int]]:
+    return ((line, *found.span()) for found in TOKEN.finditer(text.partition("#")[0]))
+
+
+def _scaled(rng: random.Random, word: str) -> str:
+    """Another number where there is one."""
+    try:
+        return f"{float(word) * rng.choice((0.5, 2, 10, -1, 0, 1e-9, 1e9)):.6g}"
+    except ValueError:
+        return word
+
+
+def toml_mutant(rng: random.Random, text: str) -> bytes:
+    """A scene or a recipe: odd words and lines, odd texts quoted as TOML quotes them."""
+    quoted = tuple(json.dumps(any_text(rng)) for _ in range(8))  # JSON's escapes are TOML's, lone surrogates apart
+    return text_mutant(rng, text, (*TOML_WORDS, *quoted), TOML_LINES)
+
+
+class Pickled:
+    """What runs when it is unpickled."""
+
+    def __reduce__(self) -> tuple[Callable[..., Any], tuple[str, ...]]:
+        return open, (CANARY, "w")
+
+
+def npz_mutant(rng: random.Random, arrays: Mapping[str, np.ndarray]) -> bytes:
+    """An .npz file: members changed, missing, doubled, lying about their shape or size, far larger than the file."""
+    members = [(f"{name}.npy", _npy(array)) for name, array in arrays.items()]
+    method = rng.choice((*[zipfile.ZIP_STORED] * 6, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2))
+    for _ in range(rng.choice((1, 1, 2))):
+        at = rng.randrange(len(members))
+        name, data = members[at]
+        array = arrays.get(name.removesuffix(".npy"), np.zeros(3))
+        way = rng.randrange(9)
+        if way < 3:
+            members[at] = (name, _npy(_odd_array(rng, array)))
+        elif way == 3:
+            members[at] = (name, _lying(rng, data))
+        elif way == 4:
+            del members[at]
+        elif way == 5:
+            odd = rng.choice(
+                ("../../evil.npy", "/etc/evil.npy", "evil\x1b[31m.npy", name.removesuffix(".npy"), "x" * 999)
+            )
+            members[at] = (odd, data)
+        elif way == 6:
+            members.insert(at, rng.choice(((name, data), (name, _npy(_odd_array(rng, array))), ("more.npy", data))))
+        elif way == 7 and array.dtype.kind == "U" and array.ndim == 0:
+            members[at] = (name, _npy(_odd_header(rng, str(array))))
+        else:
+            members[at] = (name, damaged(rng, data))
+        if not members:
+            break
+    whole = _zipped(members, method)
+    if rng.random() < 0.02:
+        return _with_bomb(rng, members)
+    if rng.random() < 0.08:
+        whole = _other_sizes(rng, whole)
+    return damaged(rng, whole) if rng.random() < 0.1 else whole
+
+
+def _npy(array: np.ndarray) -> bytes:
+    file = io.BytesIO()
+    np.lib.format.write_array(file, array, allow_pickle=True)
+    return file.getvalue()
+
+
+def _odd_array(rng: random.Random, array: np.ndarray) -> np.ndarray:
+    """The same with another type, shape or value, or something else altogether."""
+    as_number = array if array.dtype.kind == "f" else np.arange(3.0)
+    spoilt = as_number.astype(float).reshape(-1)
+    if spoilt.size:
+        spoilt[rng.randrange(spoilt.size)] = rng.choice((np.nan, np.inf, -np.inf, -1.0, 0.0, 1e300, 5e-324, 1e-30))
+    with np.errstate(all="ignore"):
+        ways: tuple[np.ndarray, ...] = (
+            *(spoilt.reshape(as_number.shape), spoilt.reshape(as_number.shape), -as_number, as_number * 1e300),
+            *(as_number * 0, as_number[..., :-1] if as_number.ndim else as_number, as_number.reshape(-1)[:0]),
+            *(as_number[None], as_number.T, np.float64(1.0).reshape(()), as_number.reshape(-1)[::-1], np.zeros((3, 0))),
+            *(as_number.astype("f2"), as_number.astype(">f8"), as_number.astype("c16") + 1j, as_number.astype("i8")),
+            *(as_number.astype("?"), as_number.astype("U"), as_number.astype("S"), np.array([Pickled()], object)),
+            *(np.zeros(3, "M8[s]"), np.zeros(3, [("a", "f8")]), np.array(any_text(rng)), np.array([b"\xff"])),
+        )  # fmt: skip
+    return rng.choice(ways)
+
+
+def _odd_header(rng: random.Random, text: str) -> np.ndarray:
+    """JSON inside a member."""
+    try:
+        return np.array(json_mutant(rng, json.loads(text)).decode("utf-8", "replace"))
+    except ValueError:
+        return np.array(any_text(rng))
+
+
+def _lying(rng: random.Random, data: bytes) -> bytes:
+    """A member whose header says what its bytes are not."""
+    shapes = (
+        "(100000000000000,)",
+        "(10000000, 10000000)",
+        "(-1,)",
+        "(1e9,)",
+        "(True,)",
+        "()",
+        "(3",
+        "(2**40,)",
+        "None",
+        "3",
+    )
+    told = (
+        *(f"{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}" for shape in shapes),
+        *(
+            f"{{'descr': '{kind}', 'fortran_order': False, 'shape': (3,), }}"
+            for kind in ("|O", "<U1000000000", "<f99", "")
+        ),
+        *(f"__import__('os').system('touch {CANARY}')", "{}", "[" * 1000, "'" * 999, "{'descr': '<f8'}", "1" * 5000),
+    )
+    body = data[128:] if rng.random() < 0.5 else b"cos\nsystem\n(S'touch CANARY'\ntR."
+    header = rng.choice(told).encode() + b"\n"
+    start = rng.choice((b"\x93NUMPY\x01\x00", b"\x93NUMPY\x01\x00", b"\x93NUMPY\x09\x00", b"\x93NUMPX\x01\x00"))
+    return start + struct.pack("<H", min(len(header) * rng.choice((1, 1, 1, 40)), 65535)) + header + body
+
+
+def _zipped(members: Sequence[tuple[str, bytes]], method: int) -> bytes:
+    file = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(file, "w", method, compresslevel=1) as archive:
+        warnings.filterwarnings("ignore", "Duplicate name")
+        for name, data in members:
+            archive.writestr(zipfile.ZipInfo(name), data, method)  # with its date fixed
+    return file.getvalue()
+
+
+@cache
+def _bomb(size: int = 2**29) -> tuple[bytes, int]:
+    """A member of zeros, deflated to a thousandth, and its CRC."""
+    head = _npy(np.zeros(0)).replace(b"'shape': (0,)", f"'shape': ({size // 8},)".encode())
+    head = head[:8] + struct.pack("<H", len(head) - 10) + head[10:]
+    deflate, crc = zlib.compressobj(1, zlib.DEFLATED, -15), zlib.crc32(head)
+    block, parts = bytes(2**24), [deflate.compress(head)]
+    for _ in range(size // len(block)):
+        parts.append(deflate.compress(block))
+        crc = zlib.crc32(block, crc)
+    return b"".join([*parts, deflate.flush()]), crc
+
+
+def _with_bomb(rng: random.Random, members: Sequence[tuple[str, bytes]], size: int = 2**29) -> bytes:
+    """One member, or one more, that unpacks to half a gigabyte; half of them say that they are small."""
+    data, crc = _bomb(size)
+    name = rng.choice([name for name, _ in members] + ["more.npy"])
+    whole = [(other, body) for other, body in members if other != name]
+    file = io.BytesIO()
+    with warnings.catch_warnings(), zipfile.ZipFile(file, "w") as archive:
+        warnings.filterwarnings("ignore", "Duplicate name")
+        for other, body in whole:
+            archive.writestr(zipfile.ZipInfo(other), body)
+        at = file.tell()
+        info = zipfile.ZipInfo(name)
+        info.header_offset, info.CRC, info.compress_size = at, crc, len(data)
+        info.file_size = rng.choice((size + 128, 100))
+        info.compress_type = zipfile.ZIP_DEFLATED
+        file.write(info.FileHeader(zip64=False) + data)
+        archive.filelist.append(info)
+        archive.NameToInfo[name] = info
+        archive.start_dir = file.tell()
+    return file.getvalue()
+
+
+def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
+    """The same with sizes in the directory that are not those of the members."""
+    found = [one.start() for one in re.finditer(b"PK\x01\x02", whole)]
+    changed = bytearray(whole)
+    for at in found:
+        if rng.random() < 0.5:
+            place = rng.choice((8, 10, 16, 20, 24, 42))  # flags, method, CRC, sizes, offset
+            size = 2 if place < 16 else 4
+            changed[at + place : at + place + size] = rng.choice((0, 1, 100, 2**16 - 1)).to_bytes(size, "little")
+    return bytes(changed)
+
+
+@cache
+def records() -> dict[str, Any]:
+    """Shipped records of every kind, the one of readings cut to a few."""
+    names = (
+        *("albedo-rational", "albedo-liang", "albedo-rational-diffuse-n1.4", "burley-whole", "gaussians-2", "quantile"),
+        *("hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
+    )
+    found = {name: json.loads((ROOT / "fits" / f"{name}.json").read_text(encoding="utf-8")) for name in names}
+    for key in ("readings", "table1"):
+        found["reproduction"][key] = found["reproduction"][key][:12]
+    return found
+
+
+def record(seed: int) -> tuple[str, bytes]:
+    """The name of a record's file, without its ending, and what is in it."""
+    rng = random.Random(seed)
+    name = rng.choice(list(records()))
+    odd = rng.choice(FILE_NAMES) if rng.random() < 0.04 else ""
+    return name + odd, json_mutant(rng, records()[name])
+
+
+@cache
+def _arrays(path: str) -> dict[str, np.ndarray]:
+    with np.load(ROOT / path) as found:
+        return dict(found)
+
+
+def results(seed: int) -> bytes:
+    """An .npz of `mcml-sim run`."""
+    return npz_mutant(random.Random(seed), _arrays("examples/half_space.npz"))
+
+
+def samples(seed: int) -> bytes:
+    """An .npz beside a record."""
+    return npz_mutant(random.Random(seed), _arrays("fits/albedo-rational.npz"))
+
+
+def table(seed: int) -> bytes:
+    """A .csv of `profilefit fit`: values with errors, replicates, or rings."""
+    rng = random.Random(seed)
+    plain = _text("examples/phantom.csv")
+    rows = [line.split(",") for line in plain.splitlines()[2:]]
+    replicates = [f"{r},{v},{float(v) * 1.02:.5g},{float(v) * 0.97:.5g}" for r, v, _ in rows]
+    rings = [f"{r},{float(r) * 1.2:.5g},{v},{s}" for r, v, s in rows]
+    headed = {"r [mm],value1,value2,value3": replicates, "r_in [mm];r_out;value;sigma": rings}
+    texts = (plain, *("\n".join([head, *lines]) for head, lines in headed.items()))
+    text = rng.choice(texts)
+    return text_mutant(rng, text.replace(",", ";") if ";" in text else text, CELLS, CELL_LINES)
+
+
+def mco(seed: int) -> bytes:
+    """An .mco of MCML."""
+    return text_mutant(random.Random(seed), _text("examples/half_space.mco"), MCI_WORDS, MCI_LINES)
+
+
+def mci(seed: int) -> bytes:
+    """An .mci of `mcml-sim run`."""
+    return text_mutant(random.Random(seed), _text("examples/slab.mci"), MCI_WORDS, MCI_LINES)
+
+
+def scene(seed: int) -> bytes:
+    """A .toml of `profilefit choose`."""
+    return toml_mutant(random.Random(seed), _text("examples/skin.toml"))
+
+
+def head(seed: int) -> bytes:
+    """A .toml of `profilefit scene`."""
+    return toml_mutant(random.Random(seed), _text("examples/skin-head.toml"))
+
+
+def recipe(seed: int) -> bytes:
+    """A .toml of `profilefit regenerate`."""
+    rng = random.Random(seed)
+    return toml_mutant(
+        rng, _text(f"fits/{rng.choice(('burley-whole', 'albedo-rational', 'liang-as-published', 'quantile'))}.toml")
+    )
+
+
+@cache
+def _text(path: str) -> str:
+    return (ROOT / path).read_text(encoding="utf-8")

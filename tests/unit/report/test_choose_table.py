@@ -1,0 +1,100 @@
+"""The table of a choice: one line that answers, and three rows."""
+
+import json
+import math
+
+import pytest
+from rich.console import Console
+
+from mcml_sim import Setting
+from profilefit.report.tables.choose_table import choose_table, content, headline
+from profilefit.studies.choose.case import NOTHING, Case, Option, Within
+from profilefit.studies.choose.choice import Predicted, chosen
+from profilefit.studies.choose.cost import Milliseconds, shipped
+from profilefit.studies.choose.error import Error
+from profilefit.studies.choose.layers import OneLayer
+from profilefit.studies.choose.scene import Budget, Scene
+
+ONE = ((0.5, 0.5),) * 3
+SCENE = Scene("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
+CURVED = Case((0.5, 0.5, 0.5), (0.5, 0.5, 0.5), 0.1, 5.0)
+SAMPLED = Option("sampled", 64, name="hazard-diffuse")
+LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6)
+
+
+@pytest.fixture(scope="module")
+def choice():
+    return chosen(
+        SCENE,
+        [
+            Predicted(NOTHING, Milliseconds(2.0, 1.0, 2.5), Error(0.1, 0.1, 0.0, 0.001, 0.0, 0, CURVED)),
+            Predicted(
+                Option("separable", 17), Milliseconds(3.0, 3.0, 3.5), Error(0.012, 0.01, 0.006, 0.001, 0.0, 1, CURVED)
+            ),
+            Predicted(
+                Option("sampled", 64, name="hazard-diffuse"),
+                Milliseconds(5.0, 4.0, 8.0),
+                Error(0.008, 0.0, 0.0, 0.001, 0.008, 2, CURVED),
+            ),
+        ],
+    )
+
+
+def printed(part):
+    console = Console(width=100, highlight=False)
+    with console.capture() as capture:
+        console.print(part)
+    return capture.get()
+
+
+def test_says_it_in_one_line_and_why(choice):
+    text = printed(choose_table(choice, shipped(), LAYER))
+    assert text.splitlines()[0] == "The least that serves: separable, 17 taps (asked: 2.0 % within 4 ms)"
+    rows = {line[:12]: line for line in text.splitlines()}
+    assert "nothing (Lambert)" in rows["best cheaper"]
+    assert "no: error" in rows["best cheaper"]
+    assert "1.2" in rows["chosen      "]
+    assert "yes" in rows["chosen      "]
+    assert "no: ms" in rows["next dearer "]
+    assert "4.0 to 8.0" in rows["next dearer "]
+    assert "worst: green, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
+    assert "the best cheaper: red, pixel 0.10 mm, radius 5.0 mm; mostly its shape." in text
+    assert "one layer is enough" in text
+    assert "law: with what that for n = 1.4 may be off from photons" in text  # where the truth is a law, and quick
+    assert "an estimate of a frame on a gtx-1050" in text
+
+
+def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
+    """0.012 of 0.02 leaves 0.016, in squares."""
+    verdicts = {}
+    for error in (0.014, 0.017, 0.03):
+        layer = OneLayer(**{**vars(LAYER), "error": error, "standard_error": 0.0005})
+        verdicts[error] = content(choice, shipped(), layer)["one_layer"]["verdict"]
+    assert verdicts == {0.014: "enough", 0.017: "enough alone", 0.03: "not enough"}
+
+
+def test_says_when_nothing_serves(choice):
+    scarce = chosen(Scene(**{**vars(SCENE), "budget": Budget(ms=1.0)}), choice.predicted)
+    assert headline(scarce).startswith(
+        "Nothing serves for 2.0 % within 1 ms: the cheapest within the tolerance is separable"
+    )
+    strict = chosen(Scene(**{**vars(SCENE), "tolerance": 0.001, "budget": Budget()}), choice.predicted)
+    assert headline(strict) == "Nothing serves for 0.10 %: the most accurate is hazard-diffuse, 64 samples"
+
+
+def test_a_budget_within_the_range_is_likely_kept(choice):
+    """3.0 ms, but 3.5 at worst."""
+    tight = chosen(Scene(**{**vars(SCENE), "budget": Budget(ms=3.2)}), choice.predicted)
+    text = printed(choose_table(tight, shipped()))
+    assert "likely" in next(line for line in text.splitlines() if line.startswith("chosen"))
+    assert "likely: the estimate is within the budget" in " ".join(text.split())
+
+
+def test_as_data(choice):
+    made = json.loads(json.dumps(content(choice, shipped(), LAYER)))
+    assert made["chosen"] == "separable, 17 taps"
+    assert [one["ms"] for one in made["options"]] == [2.0, 3.0, 5.0]
+    assert made["options"][2]["ms_range"] == [4.0, 8.0]
+    assert made["one_layer"]["verdict"] == "enough"
+    (one,) = made["filters"]
+    assert math.isclose(sum(tap[0] for tap in one["taps"]), 1.0, rel_tol=1e-6)
