@@ -52,10 +52,11 @@ class Cluster(Generic[R]):
             while True:
                 try:
                     return task.result(timeout=PATIENCE)
-                except TimeoutError:
-                    if task.done():  # it is the batch's own
-                        raise
-                self._warn_if_deserted()
+                except TimeoutError:  # of the wait, or the batch's own; and it may have ended since
+                    if task.status == "error":
+                        return task.result()
+                if not task.done():
+                    self._warn_if_deserted()
         except (CancelledError, self._dask.client.ClosedClientError):
             raise ClusterError(f"the scheduler at {self._scheduler} has gone; {RESUMES}") from None
         except self._dask.KilledWorker as error:

@@ -51,6 +51,21 @@ def test_two_processes_give_the_bits_of_one(workers, alone):
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
 
 
+def test_a_batch_that_ends_as_the_wait_for_it_does_is_taken(workers, alone, monkeypatch):
+    real, waited = distributed.Future.result, set()
+
+    def late(task, timeout=None):
+        found = real(task)
+        if task.key not in waited:
+            waited.add(task.key)
+            raise TimeoutError
+        return found
+
+    monkeypatch.setattr(distributed.Future, "result", late)
+    assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
+    assert len(waited) == BATCHES
+
+
 def test_a_worker_killed_in_the_middle_changes_no_bit(workers, alone, tmp_path):
     victims = pids(workers)
     victim = min(victims)
