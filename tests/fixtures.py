@@ -72,7 +72,7 @@ def white_run():
 
 @pytest.fixture(scope="session")
 def run():
-    """4 batches of the order-resolved run, seed 1, from far inside a mean free path to where only few photons arrive."""
+    """4 batches of the order-resolved run, seed 1, from far inside a mean free path to where few photons arrive."""
     return simulate_orders(Grid.from_edges(r=np.concatenate([[0.0], np.geomspace(0.01, 30.0, 40)])), 2**22, seed=1)
 
 

@@ -9,11 +9,11 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.fitting.objectives import OBJECTIVES
 from profilefit.laws import map_classes, profile_classes
-from profilefit.recipes.folder import fits_folder
 from profilefit.recipes import pipelines
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import available, find, read
-from profilefit.recipes.schema import PIPELINES
 from profilefit.recipes.record import record_name
+from profilefit.recipes.schema import PIPELINES
 from profilefit.recipes.starts import require_known
 
 GOOD = """
