@@ -15,7 +15,7 @@ SEVENTEEN = Option("separable", 17)
 def test_published_frames_come_back():
     """Within 3 %, by which the three are no straight line."""
     for share, ms in zip(COVERED, PUBLISHED, strict=True):
-        assert milliseconds(SEVENTEEN, cost.shipped(), coverage=share) == pytest.approx(ms, rel=0.03)
+        assert milliseconds(SEVENTEEN, cost.shipped(), screen_share=share) == pytest.approx(ms, rel=0.03)
 
 
 def test_scales_with_pixels_and_speed():
