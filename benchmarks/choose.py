@@ -35,7 +35,7 @@ from profilefit.shader.context import opened, renderer
 from profilefit.studies.choose import cost
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.choice import Choice, Predicted, cases, choose, laws
-from profilefit.studies.choose.scene import Budget, Scene
+from profilefit.studies.choose.requirements import Budget, Requirements
 
 SETTING = Setting("diffuse")
 SCENES, QUICK, SEED = 30, 3, 1
@@ -93,7 +93,7 @@ class Verified:
         return [one for one in cheaper if one.measured * (1.0 + TOLD) <= self.choice.scene.tolerance]
 
 
-def scenes(count: int, seed: int) -> Iterator[tuple[str, Scene]]:
+def scenes(count: int, seed: int) -> Iterator[tuple[str, Requirements]]:
     """Name and scene, in millimetres."""
     random = np.random.default_rng(seed)
 
@@ -110,14 +110,14 @@ def scenes(count: int, seed: int) -> Iterator[tuple[str, Scene]]:
         radius = float(mfp.max()) * log_uniform(RADII) if random.random() < 2 / 3 else math.inf
         tolerance = log_uniform(TOLERANCES)
         (a, b, c), (d, e, f) = (tuple((float(v), float(v)) for v in values) for values in (reflectance, mfp))
-        scene = Scene("mm", SETTING, (a, b, c), (d, e, f), (pixel, pixel), radius, tolerance, Within(), Budget())
+        scene = Requirements("mm", SETTING, (a, b, c), (d, e, f), (pixel, pixel), radius, tolerance, Within(), Budget())
         plane = next(cases(scene))
         if fits(plane, SETTING, scene.within):  # else another one
             count -= 1
             yield name, replace(scene, resolution=size(plane, SETTING, scene.within))
 
 
-def verified(context: moderngl.Context, name: str, scene: Scene) -> Verified:
+def verified(context: moderngl.Context, name: str, scene: Requirements) -> Verified:
     """Choose for a scene, and render what matters for the choice."""
     choice = choose(scene, cost.shipped())
     place = choice.predicted.index(choice.nearest)

@@ -24,7 +24,7 @@ from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
 from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import truth
+from profilefit.studies.choose.response import reference_light
 
 Floats = NDArray[np.float64]
 # How far the picture goes beyond the places that count, and above and below them [longest mean free path]: the first
@@ -72,7 +72,7 @@ def _lost(case: Case, setting: Setting, reach: float) -> float:
     """The largest share of a channel's light from beyond an edge that many of the longest mean free paths away."""
     pairs = zip(case.reflectance, case.mfp, strict=True)
     far = reach * max(case.mfp)
-    return max(float(truth(setting).beyond(a)(np.array(far / length))) for a, length in pairs)
+    return max(float(reference_light(setting).beyond(a)(np.array(far / length))) for a, length in pairs)
 
 
 class Measured:
@@ -109,7 +109,7 @@ class Measured:
             drawn = Sampling(option.number, seed=seed)
             return self._stage.scatter(option.law, self.case.mfp, drawn, rows=rows).astype(float)
         total = np.zeros((ROWS, self.size[0], 3))
-        for share, kernel, _ in passes(option, self.case, truth(self.setting)):
+        for share, kernel, _ in passes(option, self.case, reference_light(self.setting)):
             drawn = Sampling(option.number)
             total += share * self._stage.scatter(
                 SeparableFilter(kernel), self.case.mfp, drawn, self._kernel_alpha, rows

@@ -27,7 +27,7 @@ from mcml_sim import Grid, Orders, simulate_orders
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import write_whole
 from profilefit.fitting.discrepancy import predicted
-from profilefit.fitting.estimate import Fit, Problem, fit
+from profilefit.fitting.estimate import Fit, ResidualFunction, fit
 from profilefit.fitting.objectives import EVERYWHERE, Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue, inventory, recipe
@@ -111,10 +111,10 @@ def _of_law(chosen: Recipe, law, run: Profiles) -> Profiles:
     rings = Rings(run.alpha, run.r_edges, none, reflectance, none, run.alpha, np.zeros(3), np.zeros(0))
     objective = chosen.weighting.objective
     free = law.seen_by(objective)
-    energy, _ = predicted(Problem(objective, free), law, rings)
+    energy, _ = predicted(ResidualFunction(objective, free), law, rings)
     if objective in ("energy", "relative"):
         whole = replace_edges(rings, np.array([0.0, EVERYWHERE]))
-        reflectance = predicted(Problem(objective, free), law, whole)[0][:, 0]
+        reflectance = predicted(ResidualFunction(objective, free), law, whole)[0][:, 0]
     if chosen.pipeline == "albedo":
         reflectance = energy[:, 0]
     beyond = np.maximum(reflectance - energy.sum(axis=1), 0.0)

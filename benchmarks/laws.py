@@ -20,11 +20,11 @@ os.environ.setdefault("JAX_PLATFORMS", "cpu")
 from benchmarks.table import show
 from profilefit.studies.tradeoff import stopwatch
 from profilefit.studies.tradeoff.contenders import YARDSTICK, contenders
-from profilefit.studies.tradeoff.counting import Counts, described
-from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, Row, measured
+from profilefit.studies.tradeoff.counting import FunctionCounts, described
+from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, ContenderResult, measured
 
 
-def as_cells(row: Row) -> tuple[str, ...]:
+def as_cells(row: ContenderResult) -> tuple[str, ...]:
     """The row of the table of costs."""
     profile, sampler = row.contender.constants
     return (
@@ -37,16 +37,16 @@ def as_cells(row: Row) -> tuple[str, ...]:
     )
 
 
-def _few(counted: Counts) -> str:
+def _few(counted: FunctionCounts) -> str:
     return described(counted.point) if counted.transcendental <= MANY else f"{counted.transcendental} in all"
 
 
-def as_errors(row: Row) -> tuple[str, ...]:
+def as_errors(row: ContenderResult) -> tuple[str, ...]:
     """The row of the table of errors."""
     return row.contender.name, *(f"{value:.2g}" for e in (row.rel, row.ks) for value in (e.mean(), e.max()))
 
 
-def as_numbers(row: Row) -> dict[str, object]:
+def as_numbers(row: ContenderResult) -> dict[str, object]:
     """The same for --json."""
     return {
         "constants": sum(row.contender.constants),
@@ -74,7 +74,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         options.json.write_text(json.dumps(numbers, indent=2) + "\n", encoding="utf-8")
 
 
-def report(rows: Sequence[Row], left_out: Sequence[str]) -> None:
+def report(rows: Sequence[ContenderResult], left_out: Sequence[str]) -> None:
     """Print the tables, and what is not in them."""
     show(
         f"Functions a point and time over {YARDSTICK}'s, one core, float32",

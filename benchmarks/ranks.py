@@ -16,7 +16,7 @@ from rich.progress import track
 from benchmarks.interval_coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
-from profilefit.fitting.estimate import Problem, sensitivity
+from profilefit.fitting.estimate import ResidualFunction, sensitivity
 from profilefit.fitting.profiles import COVARIANCE_RANK, Covariance, Profiles
 from profilefit.recipes import catalogue, inventory, recipe
 from profilefit.recipes.targets import albedo_values, ring_edges
@@ -40,7 +40,7 @@ def lines(name: str, photons: int) -> Iterator[tuple[str, ...]]:
     alpha = albedo_values(chosen.albedos, chosen.setting)
     profiles = Profiles.from_orders(light, alpha)
     one = fitted(chosen, inventory.find(name, catalogue.fits_folder()).law, profiles)
-    gain = sensitivity(Problem(one.objective, one.free), one.solution, one.law, one.rings)
+    gain = sensitivity(ResidualFunction(one.objective, one.free), one.solution, one.law, one.rings)
     exact = np.sqrt(whole_variance(light, alpha, gain))
     if profiles.covariance is None:
         raise RuntimeError("profiles of photons have a covariance")

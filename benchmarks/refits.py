@@ -24,7 +24,7 @@ from scipy.stats import beta, norm
 
 from mcml_sim.errors import InputError
 from mcml_sim.results.orders import Orders
-from profilefit.fitting.estimate import Fit, Problem, scaled_inverse
+from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
 from profilefit.fitting.profiles import Covariance
 from profilefit.fitting.solver import solve_batch
 
@@ -50,12 +50,12 @@ def whole_chunk(count: int) -> NDArray[np.intp]:
 def _chunk(fit: Fit, energy: Floats, start: Floats) -> tuple[Floats, NDArray[np.bool_]]:
     starts = np.tile(start, (CHUNK, 1))
     data = _data(fit, energy[whole_chunk(len(energy))])
-    solutions = solve_batch(Problem(fit.objective, fit.free), starts, data)[: len(energy)]
+    solutions = solve_batch(ResidualFunction(fit.objective, fit.free), starts, data)[: len(energy)]
     return np.stack([one.parameters for one in solutions]), np.array([one.converged for one in solutions])
 
 
 def _data(fit: Fit, energy: Floats) -> Any:
-    """What `Problem` reads, once for each of `energy` (k, m, n + 1)."""
+    """What `ResidualFunction` reads, once for each of `energy` (k, m, n + 1)."""
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(energy), *np.shape(leaf))), (fit.law, fit.rings))
     return eqx.tree_at(lambda tree: (tree[1].energy, tree[1].beyond), data, (energy[..., :-1], energy[..., -1]))
 
@@ -213,7 +213,7 @@ def binomial_band(level: float, number: int, shares: int) -> tuple[float, float]
 
 def _gains(fit: Fit, parameters: Floats, energy: Floats) -> Floats:
     count, fill = len(parameters), whole_chunk(len(parameters))
-    problem = Problem(fit.objective, fit.free)
+    problem = ResidualFunction(fit.objective, fit.free)
     with jax.enable_x64(True):
         law, rings = (jax.tree.map(jnp.asarray, part) for part in (fit.law, fit.rings))
         points = jnp.asarray(parameters[fill]), jnp.asarray(energy[fill])

@@ -26,7 +26,7 @@ from mcml_sim import Setting
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.stage.step_edge import (
-    Gather,
+    EdgeGather,
     by_law,
     by_quantile,
     by_uniform,
@@ -84,7 +84,7 @@ def bias(law: ProfileLaw, alpha: float) -> float:
     )
 
 
-def noise(gather: Gather, points: Floats, alpha: float, setting: Setting) -> float:
+def noise(gather: EdgeGather, points: Floats, alpha: float, setting: Setting) -> float:
     """Root mean square of one estimate against the exact answer, over NOISY_PLACES and trials, as a share of A."""
     return float(np.sqrt(np.mean(edge_estimate(gather, points, NOISY_PLACES, alpha, setting).rmse ** 2)))
 
@@ -94,13 +94,13 @@ def measured(illumination: str, samples: int, trials: int, seed: int) -> tuple[d
     setting = Setting(illumination)
     points = {kind: draw(samples, trials, seed) for kind, draw in POINTS.items()}
 
-    def over_albedos(gathers: Sequence[Gather]) -> dict[str, Floats]:
+    def over_albedos(gathers: Sequence[EdgeGather]) -> dict[str, Floats]:
         pairs = list(zip(gathers, ALPHAS, strict=True))
         return {kind: np.array([noise(g, drawn, a, setting) for g, a in pairs]) for kind, drawn in points.items()}
 
     floor = over_albedos([by_quantile(a, setting) for a in ALPHAS])
 
-    def row(label: str, biases: Floats | None, gathers: Sequence[Gather]) -> Row:
+    def row(label: str, biases: Floats | None, gathers: Sequence[EdgeGather]) -> Row:
         found = over_albedos(gathers)
         return Row(label, biases, {kind: found[kind] / floor[kind] for kind in found})
 

@@ -9,8 +9,8 @@ from pathlib import Path
 from profilefit.measured import fit
 
 data = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "phantom.csv"
-answer = fit(data, law="hazard", seed=0)
+result = fit(data, law="hazard", seed=0)
 
 for name in ("A", "alpha", "l", "mu_s'", "mu_a"):
-    interval = answer.interval(name)
-    print(f"{name:6} {answer.value(name):.4g}, 95 % in {interval[0]:.4g} ... {interval[1]:.4g}")
+    interval = result.interval(name)
+    print(f"{name:6} {result.value(name):.4g}, 95 % in {interval[0]:.4g} ... {interval[1]:.4g}")

@@ -11,7 +11,7 @@ import numpy as np
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.results.tally import Precision
 from mcml_sim.results.tally_file import Results
-from mcml_sim.runs.input_runs import Done, Job, Plan
+from mcml_sim.runs.input_runs import Done, Job, RunOptions
 
 # What is printed of a run, in MCML's order; ballistic light apart, since MCML's transmittance has it included.
 TOTALS = {
@@ -30,17 +30,17 @@ SHORT = 0.05  # compiling that is not worth a word [s]
 def totals(kept: Results) -> Iterator[str]:
     """A line for each share of the light, and one for their sum."""
     for name, title in TOTALS.items():
-        yield _line(title, told(kept.estimates[name]))
+        yield _line(title, with_error(kept.estimates[name]))
     if kept.cut > 0:
         yield _line("at scattering limit", f"{kept.cut:.2g}")
-    yield _line("all of these", told(kept.estimates["energy"]))
+    yield _line("all of these", with_error(kept.estimates["energy"]))
 
 
 def _line(title: str, text: str) -> str:
     return f"{title:<22} {text}"
 
 
-def told(estimate: Estimate) -> str:
+def with_error(estimate: Estimate) -> str:
     """A value and its standard error with two digits, such as 0.23783 ± 0.00042."""
     value, error = float(estimate.value), float(estimate.standard_error)
     if not math.isfinite(error):
@@ -71,7 +71,7 @@ def times(seconds: float, compiling: float) -> str:
     return f"{max(seconds - compiling, 0):.1f} s and {compiling:.1f} s to compile"
 
 
-def answer(estimate: Estimate, goal: Precision, photons: int) -> str:
+def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
     """Whether the precision was reached, and if not, what would reach it."""
     if goal.is_reached(estimate):
         return f"{goal.quantity}: relative standard error {goal.relative_error:g} reached"
@@ -88,13 +88,13 @@ def answer(estimate: Estimate, goal: Precision, photons: int) -> str:
     )
 
 
-def lines(job: Job, done: Done, plan: Plan) -> Iterator[str]:
+def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
     """Lines that tell of a run that is done."""
     kept = done.results
-    yield f"{kept.photons} photons, seed {plan.seed}, {pace(done, plan.scheduler is not None)}"
+    yield f"{kept.photons} photons, seed {options.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)
-    if plan.goal is not None:
-        yield answer(kept.estimates[plan.goal.quantity], plan.goal, kept.photons)
+    if options.goal is not None:
+        yield precision_reached(kept.estimates[options.goal.quantity], options.goal, kept.photons)
     if job.is_part_of_more:
         yield f"{job.store} is kept, since it holds more photons than these: more --photons use them"
 

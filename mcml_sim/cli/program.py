@@ -44,9 +44,9 @@ class FirstScreen(TyperGroup):
         rows = self._commands(ctx)
         titles, names = (max(len(row[at]) for row in rows) + GAP for at in (0, 1))
         for title, group in groupby(rows, key=lambda row: row[0]):
-            for at, (_, name, told) in enumerate(group):
+            for at, (_, name, help_text) in enumerate(group):
                 shown = "" if at else title
-                console.print(Text.assemble((f"{shown:{titles}}", "dim"), (f"{name:{names}}", "bold cyan"), told))
+                console.print(Text.assemble((f"{shown:{titles}}", "dim"), (f"{name:{names}}", "bold cyan"), help_text))
         options = [one.opts[0] for one in self.get_params(ctx) if one.opts[0] not in NOT_SHOWN]
         console.print(Text.assemble((f"{'Options':{titles}}", "dim"), ", ".join(options)))
         console.print(Text(f"More, with examples: {ctx.command_path} COMMAND --help", style="dim"))
@@ -62,8 +62,8 @@ class FirstScreen(TyperGroup):
 
 def add(app: typer.Typer, command: Callable[..., None], panel: str | None = None) -> None:
     """Add a subcommand; the examples at the end of its docstring come last in its --help, below the options."""
-    told, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
-    paragraphs = [" ".join(one.split()) for one in told.split("\n\n")]  # rich would keep the source's line breaks
+    help_text, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
+    paragraphs = [" ".join(one.split()) for one in help_text.split("\n\n")]  # rich would keep the source's line breaks
     app.command(help="\n\n".join(paragraphs), epilog=f"\b\n{examples}", rich_help_panel=panel)(command)
 
 
@@ -209,9 +209,9 @@ def _lost_interrupts() -> Iterator[list[bool]]:
         elif at_work:
             _thread.interrupt_main()
 
-    def hook(told: sys.UnraisableHookArgs) -> None:
-        if not issubclass(told.exc_type, KeyboardInterrupt):
-            before(told)
+    def hook(raised: sys.UnraisableHookArgs) -> None:
+        if not issubclass(raised.exc_type, KeyboardInterrupt):
+            before(raised)
             return
         lost.append(True)
         _thread.start_new_thread(again, ())  # threading's locks may be held by what the collector interrupted

@@ -110,24 +110,24 @@ def run(
     number = None if photons is None else _whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     if quantity is not None and precision is None:
         raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
-    plan = input_runs.Plan(
+    options = input_runs.RunOptions(
         seed=_whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
         workers=checked_workers(workers, scheduler),
         scheduler=scheduler,
         progress=False if quiet else None,
     )
-    jobs = input_runs.jobs(file, runs, number, out, plan)
+    jobs = input_runs.jobs(file, runs, number, out, options)
     console = Console(highlight=False, soft_wrap=True, quiet=quiet or as_json)
     found = []
     with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines
         for at, job in enumerate(jobs, start=1):
             console.print(f"run {at} of {len(jobs)}: {job.mco}", markup=False)
-            done = input_runs.done(job, plan)
-            found.append(printed.summary(job, done.results, plan.goal))
-            for line in printed.lines(job, done, plan):
+            done = input_runs.done(job, options)
+            found.append(printed.summary(job, done.results, options.goal))
+            for line in printed.lines(job, done, options):
                 console.print(f"  {line}", markup=False)
-    if plan.goal is not None:
+    if options.goal is not None:
         console.print(REPEATS, markup=False)
     if as_json:
         print_json({"runs": found})

@@ -31,7 +31,7 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, illumination: str, rule: Rule =
         return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), illumination, rule)
     x, alpha = np.broadcast_arrays(x, alpha)
     out = np.empty(x.shape)
-    # Worked out at once, even where the caller is being traced: what is kept must hold no tracer.
+    # Worked out at once, even where the caller is being traced: what is kept must hold no tracer of JAX.
     with jax.enable_x64(True), jax.core.eval_context():
         started = []  # all, before the first is waited for
         for value in np.unique(alpha):

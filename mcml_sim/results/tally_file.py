@@ -137,8 +137,8 @@ def _results(content: bytes) -> Results:
     )
 
 
-def _medium(told: object) -> Medium:
-    table = _table("medium", told, MEDIUM)
+def _medium(value: object) -> Medium:
+    table = _table("medium", value, MEDIUM)
     layers = table.pop("layers")
     if not isinstance(layers, list) or len(layers) > MAX_LAYERS:
         raise ValueError(f"layers must be a list of at most {MAX_LAYERS}, got {shown(layers)}")
@@ -157,13 +157,13 @@ def _grid(arrays: Mapping[str, NDArray]) -> Grid:
     return grid
 
 
-def _table(name: str, told: object, keys: frozenset[str]) -> dict[str, Any]:
+def _table(name: str, value: object, keys: frozenset[str]) -> dict[str, Any]:
     """An object of just these keys."""
-    if not isinstance(told, dict):
-        raise ValueError(f"{name} must be an object, got {shown(told)}")
-    for key in sorted(keys ^ told.keys()):
+    if not isinstance(value, dict):
+        raise ValueError(f"{name} must be an object, got {shown(value)}")
+    for key in sorted(keys ^ value.keys()):
         raise ValueError(f"{name} has no key {key!r}" if key in keys else f"{name} has the unknown key {shown(key)}")
-    return dict(told)
+    return dict(value)
 
 
 def _estimate(arrays: Mapping[str, NDArray], name: str) -> Estimate:

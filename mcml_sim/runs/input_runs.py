@@ -55,7 +55,7 @@ class Compiling:
 
 
 @dataclass(frozen=True)
-class Plan:
+class RunOptions:
     """What all runs have in common; arguments as for `simulate`.
 
     goal  the precision at which a run may stop early
@@ -122,30 +122,30 @@ class Done:
     resumed: bool = False
 
 
-def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | None, plan: Plan) -> list[Job]:
+def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | None, options: RunOptions) -> list[Job]:
     """The runs of an input file, each with the paths of its results; nothing is written yet.
 
     photons  instead of the file's;  folder  for the results instead of the current one
     InputError, OutputError or StoreError where a run could not keep its results: better now than hours later.
     """
     found = [Job(one, photons or one.photons, *_outputs(one, folder)) for one in runs]
-    _require_room(file, found, plan)
+    _require_room(file, found, options)
     return found
 
 
-def done(job: Job, plan: Plan) -> Done:
+def done(job: Job, options: RunOptions) -> Done:
     """Do a run, unless the same was done before, and keep its results."""
-    kept = _finished(job, plan)
-    found = _traced(job, plan) if kept is None else Done(kept)
+    kept = _finished(job, options)
+    found = _traced(job, options) if kept is None else Done(kept)
     kept = found.results
-    is_enough = plan.goal is None or plan.goal.is_reached(kept.estimates[plan.goal.quantity])
+    is_enough = options.goal is None or options.goal.is_reached(kept.estimates[options.goal.quantity])
     if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
         discard(job.store)
     return found
 
 
-def _traced(job: Job, plan: Plan) -> Done:
-    if job.is_in_the_way(plan.seed):
+def _traced(job: Job, options: RunOptions) -> Done:
+    if job.is_in_the_way(options.seed):
         discard(job.store)
     resumed, start = job.is_begun, time.perf_counter()
     with Compiling() as compiling:
@@ -153,12 +153,12 @@ def _traced(job: Job, plan: Plan) -> Done:
             job.run.medium,
             job.run.grid,
             job.photons,
-            seed=plan.seed,
+            seed=options.seed,
             store=job.store,
-            workers=plan.workers,
-            precision=plan.goal,
-            scheduler=plan.scheduler,
-            progress=plan.progress,
+            workers=options.workers,
+            precision=options.goal,
+            scheduler=options.scheduler,
+            progress=options.progress,
         )
     seconds = time.perf_counter() - start
     # The .npz is last: by it the run counts as finished.
@@ -183,11 +183,11 @@ def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
     return mco, Path(f"{bare}.npz"), Path(f"{bare}.photons")
 
 
-def _require_room(file: Path, jobs: list[Job], plan: Plan) -> None:
+def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
     taken = {file.resolve(): f"the input file {file}"}
     for job in jobs:
-        if plan.goal is not None and plan.goal.quantity not in (names := quantities(job.run.grid)):
-            raise InputError(f"quantity must be one of {', '.join(names)}, got {plan.goal.quantity!r}")
+        if options.goal is not None and options.goal.quantity not in (names := quantities(job.run.grid)):
+            raise InputError(f"quantity must be one of {', '.join(names)}, got {options.goal.quantity!r}")
         for path in (job.mco, job.npz):
             require_target(path)
         for path in (job.mco, job.npz, job.store):
@@ -196,7 +196,7 @@ def _require_room(file: Path, jobs: list[Job], plan: Plan) -> None:
                 raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
             taken[place] = job.run.output
         _require_ours(job)
-        job.is_in_the_way(plan.seed)
+        job.is_in_the_way(options.seed)
     for job in jobs:
         for path in (job.mco, job.npz):
             require_writable(path)
@@ -215,14 +215,19 @@ def _require_ours(job: Job) -> None:
         raise InputError(f"{found}: it is not replaced, {ELSEWHERE}")
 
 
-def _finished(job: Job, plan: Plan) -> Results | None:
+def _finished(job: Job, options: RunOptions) -> Results | None:
     """The run's results, if its files are there and of this very run."""
     found = _results(job.npz)
-    if found is None or not job.mco.is_file() or made_by(plan.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
+    if found is None or not job.mco.is_file() or made_by(options.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
-    if (found.medium, found.grid, found.seed, found.version) != (job.run.medium, job.run.grid, plan.seed, __version__):
+    if (found.medium, found.grid, found.seed, found.version) != (
+        job.run.medium,
+        job.run.grid,
+        options.seed,
+        __version__,
+    ):
         return None
-    goal = plan.goal
+    goal = options.goal
     is_enough = goal is not None and found.photons < job.photons and goal.is_reached(found.estimates[goal.quantity])
     return found if is_enough or found.photons == job.photons else None
 

@@ -38,11 +38,11 @@ class HalfSpace(NamedTuple):
     """Cosines of the light that has entered, to the normal and inside; see `_entry_cosines`, (STEPS + 1,)."""
 
 
-class Lanes(NamedTuple):
+class HalfSpaceLanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
-    """As in `isotropic_event.Lanes`: rho + i z, complex64, where -z counts events once the photon has ended."""
+    """As in `isotropic_event.IsotropicLanes`: rho + i z, complex64, where -z counts events once it has ended."""
     direction: Array
     """Components outwards + i down of the flight that ended here, complex64."""
     order: Array
@@ -69,7 +69,7 @@ def half_space(setting: Setting) -> HalfSpace:
     return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(_entry_cosines(setting)))
 
 
-def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> Lanes:
+def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpaceLanes:
     """Photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
@@ -79,10 +79,10 @@ def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> Lanes:
     place = lax.complex(path * sine, path * cosine)
     # Outwards is where the light goes; straight down that is any direction.
     direction = lax.complex(sine, cosine)
-    return Lanes(place, direction, event.astype(jnp.int32), stop(toss_word, stops), photon)
+    return HalfSpaceLanes(place, direction, event.astype(jnp.int32), stop(toss_word, stops), photon)
 
 
-def fly(key: Array, lanes: Lanes, events: int, where: HalfSpace) -> Lanes:
+def fly(key: Array, lanes: HalfSpaceLanes, events: int, where: HalfSpace) -> HalfSpaceLanes:
     """Scatter every photon up to `events` times, until it ends; those that have ended stay where they are."""
     first = lanes.order.astype(jnp.uint32) + 1
     left = lanes.last - lanes.order

@@ -37,10 +37,10 @@ DOUBLINGS = FIRST_ROULETTE * 2 ** np.arange(1 + round(np.log2(MAX_ORDER / FIRST_
 SINE = (3.141591787338257, -5.167705535888672, 2.5500307083129883, -0.5980450510978699, 0.07722011208534241)
 
 
-L = TypeVar("L", bound=Any)  # Lanes, or others with a place and an order
+L = TypeVar("L", bound=Any)  # IsotropicLanes, or others with a place and an order
 
 
-class Lanes(NamedTuple):
+class IsotropicLanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
@@ -65,7 +65,7 @@ class Lanes(NamedTuple):
 
 
 def has_ended(place: Array) -> Array:
-    """True where a place, as in Lanes, is that of a photon that has left or was stopped."""
+    """True where a place, as in IsotropicLanes, is that of a photon that has left or was stopped."""
     return place.imag < 0
 
 
@@ -74,7 +74,7 @@ def was_stopped(place: Array) -> Array:
     return place.imag != jnp.floor(place.imag)
 
 
-def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> Lanes:
+def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> IsotropicLanes:
     """Photons at the place of their first scattering; `stops` rise, int32 (at most 32,).
 
     A searchlight comes straight down. Diffuse light comes from all sides alike, so the square of its cosine to the
@@ -87,7 +87,7 @@ def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchli
     if illumination == "diffuse":
         square = rng.uniform(square_word)
         place = lax.complex(path * jnp.sqrt(1 - square), path * jnp.sqrt(square))
-    return Lanes(place, event.astype(jnp.int32), stop(toss_word, stops), photon)
+    return IsotropicLanes(place, event.astype(jnp.int32), stop(toss_word, stops), photon)
 
 
 def stop(words: Array, stops: Array) -> Array:
@@ -95,7 +95,7 @@ def stop(words: Array, stops: Array) -> Array:
     return stops[jnp.minimum(lax.clz(words).astype(jnp.int32), len(stops) - 1)]
 
 
-def fly(key: Array, lanes: Lanes, events: int) -> Lanes:
+def fly(key: Array, lanes: IsotropicLanes, events: int) -> IsotropicLanes:
     """Scatter every photon up to `events` times, until it ends; those that have ended stay where they are."""
     place = lax.fori_loop(
         0, events, lambda number, place: scatter(key, lanes, place, number), lanes.place, unroll=min(events, UNROLLED)
@@ -103,7 +103,7 @@ def fly(key: Array, lanes: Lanes, events: int) -> Lanes:
     return landed(lanes, place, events)
 
 
-def scatter(key: Array, lanes: Lanes, place: Array, number: Array) -> Array:
+def scatter(key: Array, lanes: IsotropicLanes, place: Array, number: Array) -> Array:
     """Places after one more scattering and flight, where `number` of them (int32) have brought the lanes to `place`.
 
     XLA compiles one loop an output, and each would draw all random words again. So a place is one complex number, and

@@ -23,7 +23,15 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.tracing import deposits, layered_event, pool, rng
 from mcml_sim.tracing.bins import Axis, axis, groups
 from mcml_sim.tracing.deposits import Deposits
-from mcml_sim.tracing.layered_event import CUT, EVENTS_PER_TURN, FLIGHTS, ROULETTED, SELECTED_LAYERS, Lanes, Stack
+from mcml_sim.tracing.layered_event import (
+    CUT,
+    EVENTS_PER_TURN,
+    FLIGHTS,
+    ROULETTED,
+    SELECTED_LAYERS,
+    LayeredLanes,
+    Stack,
+)
 
 Floats = NDArray[np.float64]
 
@@ -37,7 +45,7 @@ SUM_BITS, EVENT_BITS = 42, 18
 BALLISTIC, INSIDE = -1.0, -2.0  # "radii" of light that was transmitted unscattered, and that was cut
 
 
-class Bins(NamedTuple):
+class LayeredBins(NamedTuple):
     """A grid as the kernels want it."""
 
     r: Axis
@@ -50,7 +58,7 @@ class Bins(NamedTuple):
     """Units of the sums in a weight of 1, float64."""
 
 
-class Shape(NamedTuple):
+class KernelShape(NamedTuple):
     """What the kernels are compiled for, besides the shapes of their arrays."""
 
     groups: int
@@ -60,7 +68,7 @@ class Shape(NamedTuple):
     lanes: int
 
 
-class Results(NamedTuple):
+class PhotonFates(NamedTuple):
     """What became of the photons of a batch; by photon, with one more place for what nobody asks for."""
 
     exits: Array
@@ -97,7 +105,7 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
 
 @partial(jax.jit, static_argnames="shape", compiler_options=pool.COMPILER_OPTIONS)
 def trace(
-    key: Array, photons: Array, first: Array, stack: Stack, bins: Bins, shape: Shape
+    key: Array, photons: Array, first: Array, stack: Stack, bins: LayeredBins, shape: KernelShape
 ) -> tuple[Array, Array, Array, Array]:
     """The first `photons` (int32) photons of a batch: exits, sums, and what was left by layer and by cell.
 
@@ -107,7 +115,7 @@ def trace(
     angles = len(bins.cosines) > 0
     followed = stack.layers if stack.layers <= SELECTED_LAYERS else 1
     cells = (bins.r.bins + 1) * (bins.z.bins + 1) if shape.depths else 0
-    results = Results(
+    results = PhotonFates(
         exits=jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64),
         cosines=jnp.zeros(BATCH_PHOTONS + 1 if angles else 1, jnp.float32),
         absorbed=(jnp.zeros(BATCH_PHOTONS + 1, jnp.float32),) * followed,
@@ -115,10 +123,10 @@ def trace(
         by_cell=jnp.zeros(shape.groups * cells, jnp.int64),
     )
 
-    def enter(numbers: Array) -> Lanes:
+    def enter(numbers: Array) -> LayeredLanes:
         return layered_event.enter(numbers, first, followed)
 
-    def turn(lanes: Lanes, results: Results) -> tuple[Lanes, Results]:
+    def turn(lanes: LayeredLanes, results: PhotonFates) -> tuple[LayeredLanes, PhotonFates]:
         most = round((1 - IDLE_SHARE) * len(lanes.layer))
 
         def step(state: tuple[State, Array]) -> tuple[State, Array]:
@@ -133,15 +141,15 @@ def trace(
     return _sorted(results, bins), _summed(results), results.by_layer, results.by_cell
 
 
-State = tuple[Lanes, Array, Array]
+State = tuple[LayeredLanes, Array, Array]
 
 
-def _turn(go: Array, key: Array, stack: Stack, bins: Bins, shape: Shape, state: State) -> State:
+def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelShape, state: State) -> State:
     """Flights, what they leave behind, the step across interfaces, and roulette."""
     lanes, by_layer, by_cell = state
-    here, group = layered_event.material(stack, lanes.layer), _group(lanes, bins, shape.groups)
+    here, group = layered_event.optics(stack, lanes.layer), _group(lanes, bins, shape.groups)
 
-    def flight(number: Array, state: tuple[Lanes, Array, Array]) -> tuple[Lanes, Array, Array]:
+    def flight(number: Array, state: tuple[LayeredLanes, Array, Array]) -> tuple[LayeredLanes, Array, Array]:
         lanes, absorbed, by_cell = state
         after, left = layered_event.scatter(go, key, lanes, lanes.event + number, here)
         if by_cell.size:
@@ -165,24 +173,24 @@ def _turn(go: Array, key: Array, stack: Stack, bins: Bins, shape: Shape, state: 
     return lanes._replace(event=lanes.event + EVENTS_PER_TURN, absorbed=absorbed), by_layer, by_cell
 
 
-def _group(lanes: Lanes, bins: Bins, parts: int) -> Array:
+def _group(lanes: LayeredLanes, bins: LayeredBins, parts: int) -> Array:
     """Group of each photon, int32."""
     return jnp.minimum(lanes.photon.astype(jnp.float32) * bins.groups_per_photon, parts - 1).astype(jnp.int32)
 
 
-def _cell(bins: Bins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
+def _cell(bins: LayeredBins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
     """Index into the table of groups, rings and depths, and what is left there, in units."""
     ring = bins.r.index(jnp.sqrt(place.real * place.real + place.imag * place.imag))
     depth = bins.z.index(top + down.real)
     return (group * (bins.r.bins + 1) + ring) * (bins.z.bins + 1) + depth, _units(left, bins)
 
 
-def _units(left: Array, bins: Bins) -> Array:
+def _units(left: Array, bins: LayeredBins) -> Array:
     """Weights in whole units, int64."""
     return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
-def _recorded(results: Results, lanes: Lanes, layers: int, angles: bool) -> Results:
+def _recorded(results: PhotonFates, lanes: LayeredLanes, layers: int, angles: bool) -> PhotonFates:
     """Keep what became of the photons that have ended since the last time.
 
     The others write too, beyond the last photon: a branch that no processor can foresee costs more.
@@ -208,7 +216,7 @@ def _written(values: Array, number: Array, new: Array) -> Array:
     return values.at[number].set(new, mode="promise_in_bounds")
 
 
-def _sorted(results: Results, bins: Bins) -> Array:
+def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
     """Weights and squared weights by side (above, below), ring and angle, float64 (2, rings + 1, angles or 1, 2)."""
     rho, signed = results.exits.real[:-1], results.exits.imag[:-1]
     weight = jnp.where(rho >= 0, jnp.abs(signed), 0).astype(jnp.float64)
@@ -223,7 +231,7 @@ def _sorted(results: Results, bins: Bins) -> Array:
     return jnp.stack(sums, axis=-1).reshape(2, bins.r.bins + 1, angles, 2)
 
 
-def _summed(results: Results) -> Array:
+def _summed(results: PhotonFates) -> Array:
     """Sums and sums of squares over photons, float64 (quantities, 2).
 
     Quantities: what was left in layers, in all of them, what is accounted for, ballistic, cut.
@@ -242,20 +250,20 @@ def _unit(medium: Medium) -> float:
     return 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
 
 
-def _bins(medium: Medium, grid: Grid, unit: float, photons: int, lanes: int) -> tuple[Bins, Shape]:
+def _bins(medium: Medium, grid: Grid, unit: float, photons: int, lanes: int) -> tuple[LayeredBins, KernelShape]:
     parts = groups(grid, photons, GROUPS)
     z_edges = grid.z_edges if grid.z_edges is not None else np.array([0.0, 1.0])
     # The angles' lower edges.
     cosines = np.cos(grid.a_edges[:-1]) if grid.a_edges is not None else np.zeros(0)
     with jax.enable_x64(True):
-        bins = Bins(
+        bins = LayeredBins(
             axis(grid.r_edges, unit),
             axis(z_edges, unit),
             jnp.asarray(cosines, jnp.float32),
             jnp.float32(parts / photons),
             jnp.float64(2.0 ** _sum_bits(medium)),
         )
-    return bins, Shape(parts, grid.depths > 0, lanes)
+    return bins, KernelShape(parts, grid.depths > 0, lanes)
 
 
 def _sum_bits(medium: Medium) -> int:

@@ -76,7 +76,7 @@ class Stack(NamedTuple):
         return len(self.mfp)
 
 
-class Lanes(NamedTuple):
+class LayeredLanes(NamedTuple):
     """Photons in flight, arrays (lanes,)."""
 
     place: Array
@@ -118,13 +118,13 @@ def stack(medium: Medium, unit: float) -> Stack:
     return Stack(phase=HenyeyGreenstein(arrays.pop("g")), **arrays)
 
 
-def enter(photon: Array, first: Array, followed: int) -> Lanes:
+def enter(photon: Array, first: Array, followed: int) -> LayeredLanes:
     """Photons on their way straight down from the top of the layer `first`, not scattered yet.
 
-    What they leave behind is followed in that many layers one by one; see Lanes.absorbed.
+    What they leave behind is followed in that many layers one by one; see LayeredLanes.absorbed.
     """
     zero = jnp.zeros(photon.shape, jnp.complex64)
-    return Lanes(
+    return LayeredLanes(
         place=zero,
         down=zero + jnp.complex64(1j),
         heading=zero,
@@ -141,7 +141,7 @@ def inside(layer: Array, layers: int | Array) -> Array:
     return (layer > 0) & (layer <= layers)
 
 
-def is_scattered(lanes: Lanes) -> Array:
+def is_scattered(lanes: LayeredLanes) -> Array:
     """False where a photon is still on the line of the beam."""
     return (lanes.heading != 0) | (lanes.place != 0)
 
@@ -154,7 +154,7 @@ def staged(go: Array, make: Callable[..., Any], *arrays: Any) -> Any:
     return lax.cond(go, make, lambda *_: jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes), *arrays)
 
 
-class Material(NamedTuple):
+class LayerOptics(NamedTuple):
     """What a photon's layer is made of, arrays (lanes,); see Stack."""
 
     thickness: Array
@@ -163,13 +163,13 @@ class Material(NamedTuple):
     phase: Phase
 
 
-def material(stack: Stack, layer: Array) -> Material:
+def optics(stack: Stack, layer: Array) -> LayerOptics:
     """That of each photon."""
-    everywhere = Material(stack.thickness, stack.mfp, stack.absorbs, stack.phase)
+    everywhere = LayerOptics(stack.thickness, stack.mfp, stack.absorbs, stack.phase)
     return jax.tree.map(lambda values: pick(values, layer), everywhere)
 
 
-def scatter(go: Array, key: Array, lanes: Lanes, event: Array, here: Material) -> tuple[Lanes, Array]:
+def scatter(go: Array, key: Array, lanes: LayeredLanes, event: Array, here: LayerOptics) -> tuple[LayeredLanes, Array]:
     """Fly each photon to its next interaction, absorb a share of it and scatter the rest; or let it wait.
 
     Also returns what is absorbed. `go` as in `staged`.
@@ -197,7 +197,7 @@ def scatter(go: Array, key: Array, lanes: Lanes, event: Array, here: Material) -
     return after, left
 
 
-def settle(go: Array, key: Array, stack: Stack, lanes: Lanes, event: Array) -> Lanes:
+def settle(go: Array, key: Array, stack: Stack, lanes: LayeredLanes, event: Array) -> LayeredLanes:
     """Take the waiting photons to their interface, and through it or back from it; then roulette for all."""
     layers, thickness = stack.layers, pick(stack.thickness, lanes.layer)
     waits = (lanes.weight < 0) & inside(lanes.layer, layers)
@@ -257,7 +257,7 @@ def _aside(turns: Array) -> Array:
     return lax.complex(sine * cos_azimuth, sine * sin_azimuth)
 
 
-def _at_interface(key: Array, n: Array, lanes: Lanes, event: Array, waits: Array) -> Array:
+def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits: Array) -> Array:
     """uz afterwards, and i times n1 / n2 where a photon passes, 0 elsewhere; BACK or ON where roulette ends it."""
     toss, coin, _ = rng.draw_three(key, lanes.photon, event)
     uz = lanes.down.imag * _renormalising(lanes, len(n) - 2)
@@ -273,7 +273,7 @@ def _at_interface(key: Array, n: Array, lanes: Lanes, event: Array, waits: Array
     return lax.complex(uz_after, jnp.where(loses, jnp.where(passes, ON, BACK), bend).astype(jnp.float32))
 
 
-def _next_layer(layers: Array, lanes: Lanes, event: Array, outcome: Array) -> Array:
+def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array) -> Array:
     """Layer after the interface and after roulette."""
     passes = (outcome.imag > 0) | (outcome.imag == ON)
     step = jnp.where(passes, jnp.where(outcome.real > 0, 1, -1), 0)
@@ -295,7 +295,7 @@ def _is_late(event: Array) -> Array:
     return (event >= FIRST_TOSS) & (event < MAX_EVENTS) & (event ^ before > before)
 
 
-def _renormalising(lanes: Lanes, layers: int) -> Array:
+def _renormalising(lanes: LayeredLanes, layers: int) -> Array:
     """1 / length of the direction, to first order: rounding lets it drift by 1e-7 an event. 1 for those that ended."""
     ux, uy, uz = lanes.heading.real, lanes.heading.imag, lanes.down.imag
     return jnp.where(inside(lanes.layer, layers), 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz), 1)

@@ -28,7 +28,7 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
 from mcml_sim.tracing.bins import Axis, axis, groups
 from mcml_sim.tracing.deposits import Deposits
-from mcml_sim.tracing.isotropic_event import Lanes
+from mcml_sim.tracing.isotropic_event import IsotropicLanes
 from mcml_sim.tracing.orders_batch import Ends
 from mcml_sim.tracing.pool import LANES
 
@@ -111,7 +111,7 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     return _deposits(np.asarray(exits), np.asarray(orders), values, photons, 1 - layer.alpha, visited)
 
 
-class Bins(NamedTuple):
+class MatchedBins(NamedTuple):
     """A grid as the kernels want it."""
 
     r: Axis
@@ -129,22 +129,22 @@ class Visits(NamedTuple):
     z_variance: Array
 
 
-def _bins(grid: Grid, mfp: float) -> Bins:
+def _bins(grid: Grid, mfp: float) -> MatchedBins:
     z = None if grid.z_edges is None else axis(grid.z_edges, mfp)
     between: NDArray | list[float] = [] if grid.a_edges is None else np.cos(grid.a_edges[-2:0:-1])
-    return Bins(axis(grid.r_edges, mfp), z, jnp.asarray(between, jnp.float32))
+    return MatchedBins(axis(grid.r_edges, mfp), z, jnp.asarray(between, jnp.float32))
 
 
 @partial(jax.jit, static_argnames=("parts", "lanes"), compiler_options=pool.COMPILER_OPTIONS)
 def _trace_visits(
-    key: Array, photons: Array, stops: Array, visiting: Array, bins: Bins, parts: int, lanes: int
+    key: Array, photons: Array, stops: Array, visiting: Array, bins: MatchedBins, parts: int, lanes: int
 ) -> tuple[Ends, Visits]:
     """Ends as of `orders_batch.trace`, and what arrived where; `visiting` (MAX_ORDER + 1,) int64 in units of UNIT."""
     depths = cast("Axis", bins.z)
     shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
 
-    def turn(flying: Lanes, state: tuple[Array, Array]) -> tuple[Lanes, tuple[Array, Array]]:
+    def turn(flying: IsotropicLanes, state: tuple[Array, Array]) -> tuple[IsotropicLanes, tuple[Array, Array]]:
         group = ((flying.photon.astype(jnp.float32) + 0.5) * (jnp.float32(parts) / photons)).astype(jnp.int32)
         first = jnp.minimum(group, parts - 1) * (size // parts)
 
@@ -180,7 +180,7 @@ def _summed(by_group: Array) -> tuple[Array, Array]:
 
 
 @jax.jit
-def _counted(key: Array, ends: Ends, leaving: Array, bins: Bins) -> tuple[Array, Array]:
+def _counted(key: Array, ends: Ends, leaving: Array, bins: MatchedBins) -> tuple[Array, Array]:
     """Weight that left, w + i w^2 by ring and angle, and photons by order + MAX_ORDER, int32 (2 MAX_ORDER + 1,).
 
     The direction in which a photon left is the last it drew, so it is drawn again.

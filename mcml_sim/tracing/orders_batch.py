@@ -19,9 +19,10 @@ from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
 from mcml_sim.tracing.bins import rounded_up
 from mcml_sim.tracing.counts import Counts
-from mcml_sim.tracing.isotropic_event import DOUBLINGS, MAX_ORDER, Lanes
+from mcml_sim.tracing.isotropic_event import DOUBLINGS, MAX_ORDER, IsotropicLanes
 from mcml_sim.tracing.pool import BATCH_PHOTONS, LANES
 
+OrderLanes = IsotropicLanes | half_space_event.HalfSpaceLanes
 MATCHED = Setting()
 EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 
@@ -80,13 +81,13 @@ def trace(
     nothing but the speed.
     """
 
-    def enter(photon: Array) -> Lanes | half_space_event.Lanes:
+    def enter(photon: Array) -> OrderLanes:
         if where is None:
             return isotropic_event.enter(key, photon, stops, illumination)
         return half_space_event.enter(key, photon, stops, where)
 
-    def turn(flying: Lanes | half_space_event.Lanes, ends: Array) -> tuple[Lanes | half_space_event.Lanes, Array]:
-        if isinstance(flying, Lanes):
+    def turn(flying: OrderLanes, ends: Array) -> tuple[OrderLanes, Array]:
+        if isinstance(flying, IsotropicLanes):
             flying = isotropic_event.fly(key, flying, events)
         elif where is not None:
             flying = half_space_event.fly(key, flying, events, where)
@@ -105,7 +106,7 @@ def as_ends(ends: Array) -> Ends:
     return Ends(ends.real[:-1], ends.imag[:-1].astype(jnp.int32))
 
 
-def recorded(ends: Array, lanes: Lanes | half_space_event.Lanes) -> Array:
+def recorded(ends: Array, lanes: OrderLanes) -> Array:
     """Write the lanes that ended to their photons' places, rho + i order.
 
     The others write too, beyond the last photon: a branch that no processor can foresee costs more.

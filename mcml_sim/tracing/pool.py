@@ -22,7 +22,7 @@ COLUMNS = 64  # of the table in which lanes are ranked
 # A Zen 4 core gains a third by it, and hardware without such vectors ignores it: to be given to jax.jit.
 COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
 
-# Any NamedTuple of arrays (lanes,) that has `place`, `photon` and `ended`, as isotropic_event.Lanes.
+# Any NamedTuple of arrays (lanes,) that has `place`, `photon` and `ended`, as isotropic_event.IsotropicLanes.
 Lanes = Any
 Results = TypeVar("Results")
 Enter = Callable[[Array], Lanes]

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 BROKEN = 1  # exit status
 
 
-class Precision(enum.StrEnum):
+class FloatFormat(enum.StrEnum):
     """What is measured besides float32, in which every bound is judged."""
 
     SINGLE = "float32"
@@ -42,8 +42,8 @@ def check(
         ),
     ] = None,
     precision: Annotated[
-        Precision, typer.Option(help="float16 measures also what half precision costs, where it is offered.")
-    ] = Precision.SINGLE,
+        FloatFormat, typer.Option(help="float16 measures also what half precision costs, where it is offered.")
+    ] = FloatFormat.SINGLE,
     out: Annotated[Path | None, typer.Option(help="Folder for check.json, what --json prints.")] = None,
     fits: Fits = None,
     as_json: AsJson = False,
@@ -71,17 +71,17 @@ def check(
     those = chosen(names or [], constants, folder)
     if out is not None:
         require_apart(out, folder)
-    found = checked(those, folder, precision is Precision.HALF, quiet)
+    found = checked(those, folder, precision is FloatFormat.HALF, quiet)
     if out is not None or as_json:
         whole = content(found.laws, found.maps, found.costs, found.halves, found.device)
-        told = {"made": made(typed(), folder), "of": scope(names, constants), **whole}
+        body = {"made": made(typed(), folder), "of": scope(names, constants), **whole}
     if out is not None:
-        write_whole(out / "check.json", json_text(told))
+        write_whole(out / "check.json", json_text(body))
         notes(quiet).print(f"wrote {out / 'check.json'}", markup=False)
     if as_json:
-        print_json(told)
+        print_json(body)
     else:
-        _show(found, bool(names), precision is Precision.HALF)
+        _show(found, bool(names), precision is FloatFormat.HALF)
     if found.is_broken:
         raise typer.Exit(BROKEN)
 

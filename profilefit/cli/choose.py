@@ -12,7 +12,7 @@ from profilefit.cli.options import AsJson, Quiet
 
 if TYPE_CHECKING:
     from profilefit.studies.choose.cost import Ratios
-    from profilefit.studies.choose.scene import Scene
+    from profilefit.studies.choose.requirements import Requirements
 
 UNSERVED = 1  # exit status
 
@@ -47,14 +47,16 @@ def choose(
         from profilefit.studies.choose import cost
         from profilefit.studies.choose.choice import choose as chosen
         from profilefit.studies.choose.layers import one_layer
-        from profilefit.studies.choose.scene import read
+        from profilefit.studies.choose.requirements import read
 
-    asked = read(scene)
-    ratios = _measured(asked, quiet) if measure else cost.shipped()
-    choice = chosen(asked, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
+    requirements = read(scene)
+    ratios = _measured(requirements, quiet) if measure else cost.shipped()
+    choice = chosen(requirements, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
     layer = None
-    if asked.layers is not None:
-        layer = one_layer(asked.layers, asked.tolerance, asked.within, progress=False if quiet else None)
+    if requirements.layers is not None:
+        layer = one_layer(
+            requirements.layers, requirements.tolerance, requirements.within, progress=False if quiet else None
+        )
     if as_json:
         print_json(content(choice, ratios, layer))
     else:
@@ -63,7 +65,7 @@ def choose(
         raise typer.Exit(UNSERVED)
 
 
-def _measured(asked: Scene, quiet: bool) -> Ratios:
+def _measured(requirements: Requirements, quiet: bool) -> Ratios:
     with interruptible(__name__):
         from mcml_sim.runs.progress import working
         from profilefit.shader import opened
@@ -71,4 +73,4 @@ def _measured(asked: Scene, quiet: bool) -> Ratios:
         from profilefit.studies.choose.choice import laws
 
     with working("measuring costs", quiet), opened() as context:
-        return cost.measured(context, laws(asked.setting))
+        return cost.measured(context, laws(requirements.setting))

@@ -93,22 +93,22 @@ def fit(
         require_folder(out)
     try:
         with working("fitting", quiet):
-            answer = fitted(measured, law, constants, setting, held, known, factor, seed, folder=folder)
+            result = fitted(measured, law, constants, setting, held, known, factor, seed, folder=folder)
     except SettingError as error:
         raise SettingError(f"{error}; --n and --light choose one of these") from None
-    body = options.in_options(content(answer, law, constants))
+    body = options.in_options(content(result, law, constants))
     if out is not None:
-        _write(answer, body, out, quiet)
+        _write(result, body, out, quiet)
     if as_json:
         print_json(body)
     else:
         points = f"{measured.value.size} {'rings' if measured.rings else 'points'}"
-        _show(answer, f"{one_line(data.name)}: {points}, law {law}, {answer.found.question.law.setting}")
-    if answer.telling is None:
+        _show(result, f"{one_line(data.name)}: {points}, law {law}, {result.found.question.law.setting}")
+    if result.identifiability is None:
         raise typer.Exit(FAILED)
 
 
-def _write(answer: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
+def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.text_file import as_json
@@ -116,18 +116,18 @@ def _write(answer: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None
         from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
 
     write_whole(out / "fit.json", as_json(body))
-    figures = [*residual_figure(answer, out), *posterior_figure(answer, out)]
+    figures = [*residual_figure(result, out), *posterior_figure(result, out)]
     notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
 
 
-def _show(answer: Answer, title: str) -> None:
+def _show(result: Answer, title: str) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import screen, show
         from profilefit.report.tables.fit_tables import fit_lines, fit_tables
 
     console = screen()
-    show(list(fit_tables(answer, title)), console)
-    for line in fit_lines(answer):
+    show(list(fit_tables(result, title)), console)
+    for line in fit_lines(result):
         console.print(options.in_options(line.plain), markup=False, emoji=False)
 
 

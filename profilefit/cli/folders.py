@@ -10,37 +10,37 @@ from profilefit.errors import InputError, OtherRecords
 from profilefit.recipes.folder import EVIDENCE, LOCAL, fits_folder
 
 
-def records_folder(asked: Path | None = None, quiet: bool = False) -> Path:
+def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
     """The folder that was asked for, or ./fits if it has records, or the one shipped.
 
     One that is not the shipped one is told of by an OtherRecords warning, since constants of a strange folder look like
     ours; of one that was asked for, not if `quiet`. InputError if it is no folder.
     """
-    if asked is not None and not asked.is_dir():
-        raise InputError(f"--fits must be a folder of records, got {str(asked)!r}, which is none")
-    folder = known_folder(asked)
-    if folder.resolve() != fits_folder().resolve() and not (quiet and asked):
-        where = "" if asked else " in the folder that you are in; --fits chooses others"
+    if requested is not None and not requested.is_dir():
+        raise InputError(f"--fits must be a folder of records, got {str(requested)!r}, which is none")
+    folder = known_folder(requested)
+    if folder.resolve() != fits_folder().resolve() and not (quiet and requested):
+        where = "" if requested else " in the folder that you are in; --fits chooses others"
         warnings.warn(f"records of {str(folder)!r}{where}", OtherRecords, stacklevel=2)
     return folder
 
 
-def known_folder(asked: Path | None = None) -> Path:
+def known_folder(requested: Path | None = None) -> Path:
     """The same without a word, there or not."""
     with interruptible(__name__):
         from profilefit.recipes.record import available
 
-    return asked or (LOCAL if available(LOCAL) else fits_folder())
+    return requested or (LOCAL if available(LOCAL) else fits_folder())
 
 
-def evidence_folder(records: Path, asked: Path | None = None) -> Path:
+def evidence_folder(records: Path, requested: Path | None = None) -> Path:
     """The folder that was asked for, or ./evidence if it is there, or the one beside the records.
 
     One that nobody named is told of by an OtherRecords warning. InputError if it was asked for and is no folder.
     """
-    if asked is not None and not asked.is_dir():
-        raise InputError(f"--evidence must be a folder, got {str(asked)!r}, which is none")
-    if asked is None and EVIDENCE.is_dir():
+    if requested is not None and not requested.is_dir():
+        raise InputError(f"--evidence must be a folder, got {str(requested)!r}, which is none")
+    if requested is None and EVIDENCE.is_dir():
         where = f"measurements of {str(EVIDENCE)!r} in the folder that you are in; --evidence chooses others"
         warnings.warn(where, OtherRecords, stacklevel=2)
-    return asked or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)
+    return requested or (EVIDENCE if EVIDENCE.is_dir() else records / EVIDENCE)

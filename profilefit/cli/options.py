@@ -41,13 +41,13 @@ OPTIONS = {
 ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
 
 
-def in_options(told: Any) -> Any:
+def in_options(text: Any) -> Any:
     """What the library says, a text or content with texts in it, with options in place of arguments."""
-    if isinstance(told, str):
-        return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), told)
-    if isinstance(told, Mapping):
-        return {name: in_options(value) for name, value in told.items()}
-    return [in_options(value) for value in told] if isinstance(told, list | tuple) else told
+    if isinstance(text, str):
+        return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), text)
+    if isinstance(text, Mapping):
+        return {name: in_options(value) for name, value in text.items()}
+    return [in_options(value) for value in text] if isinstance(text, list | tuple) else text
 
 
 def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
@@ -98,8 +98,8 @@ def _known_records(ctx: typer.Context) -> list[str]:
     with interruptible(__name__):
         from profilefit.recipes.record import available
 
-    asked = ctx.params.get("fits")
-    return list(available(known_folder(Path(asked) if asked else None)))
+    requested = ctx.params.get("fits")
+    return list(available(known_folder(Path(requested) if requested else None)))
 
 
 def _starting(incomplete: str, known: Iterable[str]) -> Iterator[str]:

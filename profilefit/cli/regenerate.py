@@ -62,7 +62,7 @@ def regenerate(
         from mcml_sim.runs.progress import is_watched
         from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
-        from profilefit.recipes.run import Run
+        from profilefit.recipes.run import RecipeRun
         from profilefit.report.tables.summary_tables import outcome
 
     if not 0 <= seed <= MAX_SEED:
@@ -73,7 +73,7 @@ def regenerate(
     those = chosen(recipes or (), fits_folder())
     require_folder(out)
     begin = time.perf_counter()
-    run = Run(
+    run = RecipeRun(
         preset=str(preset),
         seed=seed,
         out=out,

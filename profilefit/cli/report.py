@@ -15,7 +15,7 @@ from profilefit.cli.options import AsJson, Fits, Quiet
 from profilefit.errors import InputError, ShaderError
 
 if TYPE_CHECKING:
-    from profilefit.report.tables.law_tables import Measured
+    from profilefit.report.tables.law_tables import Qualities
 
 MEGABYTE = 1e6
 MOST_MARKDOWN = 2**24  # bytes of a page whose tables are filled in
@@ -75,10 +75,10 @@ def report(
     elif html is not None:
         _page(html, folder, evidence_folder(folder, evidence), names, quiet)
     elif as_json:
-        told: dict[str, Any] = {"records": contents}
+        body: dict[str, Any] = {"records": contents}
         if quality:
-            told["quality"] = law_tables.content(_measured(folder, names, quiet))
-        print_json(told)
+            body["quality"] = law_tables.content(_measured(folder, names, quiet))
+        print_json(body)
     elif quality:
         show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())
     else:
@@ -87,10 +87,10 @@ def report(
         _draw(folder, figures_to, names, quiet)
 
 
-def _require_one(asked: dict[str, object]) -> None:
-    given = [option for option, value in asked.items() if value]
+def _require_one(flags: dict[str, object]) -> None:
+    given = [option for option, value in flags.items() if value]
     if len(given) > 1:
-        raise InputError(f"report takes one of {', '.join(asked)}, or --json with --quality, got {' and '.join(given)}")
+        raise InputError(f"report takes one of {', '.join(flags)}, or --json with --quality, got {' and '.join(given)}")
 
 
 def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
@@ -104,7 +104,7 @@ def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
         put(part, console)
 
 
-def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Measured:
+def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Qualities:
     with interruptible(__name__):
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables import law_tables

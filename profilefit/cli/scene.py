@@ -64,18 +64,18 @@ def scene(
         from profilefit.report.scene_report import scene_figures, scene_lines
         from profilefit.shader.context import opened, renderer
 
-    asked = home.read(file, content)
+    request = home.read(file, content)
     stem = out / Path(file).stem
     require_writable(Path(f"{stem}.json"))
     with working("drawing, and summing the truth", quiet), opened() as context:
-        drawn, device = home.draw(context, asked), renderer(context)
+        drawn, device = home.draw(context, request), renderer(context)
     files: dict[Path, Any] = {
         Path(f"{stem}{end}.png"): png for end, png in scene_figures(drawn, device.partition(",")[0]).items()
     }
-    told = {"made": {"by": typed(), "version": __version__}, "of": content, **numbers(drawn, device)}
-    write_together({**files, Path(f"{stem}.json"): json_text(told)})
+    body = {"made": {"by": typed(), "version": __version__}, "of": content, **numbers(drawn, device)}
+    write_together({**files, Path(f"{stem}.json"): json_text(body)})
     if as_json:
-        print_json(told)
+        print_json(body)
     else:
         for line in scene_lines(drawn, device):
             screen().print(line, markup=False, soft_wrap=True)

@@ -14,7 +14,7 @@ from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 
 if TYPE_CHECKING:
-    from profilefit.studies.stability.atlas import Part
+    from profilefit.studies.stability.atlas import Findings
 
 BROKEN = 1  # exit status
 
@@ -63,20 +63,20 @@ def stability(
         require_apart(out, folder)
     parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
     if out is not None or as_json:
-        told = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}
+        body = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}
     if out is not None:
         _write(parts, out)
-        write_whole(out / "stability.json", json_text(told))
+        write_whole(out / "stability.json", json_text(body))
         notes(quiet).print(f"{out}: stability*.png, .svg; stability.csv, .json", markup=False)
     if as_json:
-        print_json(told)
+        print_json(body)
     else:
         _show(parts, bool(names))
     if any(part.failures for part in parts):
         raise typer.Exit(BROKEN)
 
 
-def _show(parts: Sequence[Part], named: bool) -> None:
+def _show(parts: Sequence[Findings], named: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import screen, show
         from profilefit.report.tables.stability_tables import (
@@ -87,19 +87,19 @@ def _show(parts: Sequence[Part], named: bool) -> None:
             verdict_lines,
         )
 
-    told = [region_table(part) for part in parts if part.regions] if named else []
+    tables = [region_table(part) for part in parts if part.regions] if named else []
     found = [one for part in parts for one in part.fits]
     if any(part.regions for part in parts):
-        told.append(cause_table(parts))
+        tables.append(cause_table(parts))
     if found:
-        told.append(fit_table(found) if named else fit_summary(found))
+        tables.append(fit_table(found) if named else fit_summary(found))
     console = screen()
-    show(told, console)
+    show(tables, console)
     for line in verdict_lines(parts):
         console.print(line)
 
 
-def _write(parts: Sequence[Part], out: Path) -> None:
+def _write(parts: Sequence[Findings], out: Path) -> None:
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
         from profilefit.report.figures.stability_figure import stability_figures

@@ -14,7 +14,7 @@ from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 
 if TYPE_CHECKING:
-    from profilefit.studies.tradeoff.points import Part
+    from profilefit.studies.tradeoff.points import TradeoffPart
 
 OUT = Path("tradeoff")
 WIDTH = 120  # columns that the tables take
@@ -68,20 +68,20 @@ def tradeoff(
         return tracked(turns, title, "turns", quiet=quiet)
 
     with stopwatch.on_processor(), stopwatch.on_one_core() as pinned:
-        told: dict[str, Any] = {**origin, "machine": (known := stopwatch.facts(pinned))}
+        body: dict[str, Any] = {**origin, "machine": (known := stopwatch.facts(pinned))}
         for name in names:
             found = measured(name, quick, folder, track)
             files = _written(found, known, out)
-            told[name] = {**as_numbers(found), **origin, "machine": known}
-            keep(file, told)
+            body[name] = {**as_numbers(found), **origin, "machine": known}
+            keep(file, body)
             if not as_json:
                 show(list(tradeoff_tables(found)), screen(WIDTH))
             said.print(f"wrote {', '.join(map(str, (*files, file)))}", markup=False)
     if as_json:
-        print_json(told)
+        print_json(body)
 
 
-def _written(found: Part, known: dict[str, str], out: Path) -> list[Path]:
+def _written(found: TradeoffPart, known: dict[str, str], out: Path) -> list[Path]:
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
         from profilefit.report.figures.tradeoff_figure import tradeoff_figure

@@ -26,7 +26,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import Fit, Problem, curvature
+from profilefit.fitting.estimate import Fit, ResidualFunction, curvature
 
 Floats = NDArray[np.float64]
 # emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
@@ -194,7 +194,7 @@ class _Density(eqx.Module):
     variance: float | jax.Array
     least: float | jax.Array
     bound: Floats | jax.Array
-    problem: Problem = eqx.field(static=True)
+    problem: ResidualFunction = eqx.field(static=True)
 
     @classmethod
     def of(cls, fit: Fit, kind: str, covariance: Floats) -> _Density:
@@ -202,7 +202,7 @@ class _Density(eqx.Module):
             adjust, variance = _curvature_adjustment(_positive_curvature(fit), covariance)
         else:
             adjust, variance = np.eye(len(fit.free)), fit.variance
-        problem = Problem(fit.objective, fit.free)
+        problem = ResidualFunction(fit.objective, fit.free)
         centre = fit.solution.parameters
         bound = PRIOR_WIDTH * np.maximum(np.abs(centre), np.sqrt(np.diag(fit.misfit)))
         with jax.enable_x64(True):
@@ -222,7 +222,7 @@ class _Density(eqx.Module):
 
 def _positive_curvature(fit: Fit) -> Floats:
     """The Hessian of Q/2, or J^T J where a saddle of the residuals' own curvature has made it indefinite."""
-    hessian = curvature(Problem(fit.objective, fit.free), fit.solution, fit.law, fit.rings)
+    hessian = curvature(ResidualFunction(fit.objective, fit.free), fit.solution, fit.law, fit.rings)
     scale = np.sqrt(np.abs(np.diag(hessian)))
     if np.all(np.linalg.eigvalsh(hessian / np.outer(scale, scale)) > 0):
         return hessian

@@ -18,7 +18,7 @@ from scipy.stats import norm
 from mcml_sim.errors import InputError
 from profilefit.fitting import discrepancy
 from profilefit.fitting.discrepancy import Discrepancy, predicted, unit_energy
-from profilefit.fitting.estimate import Fit, Problem
+from profilefit.fitting.estimate import Fit, ResidualFunction
 from profilefit.fitting.objectives import NO_LIMITS, Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN
@@ -52,7 +52,7 @@ class Quantity:
 
 
 @dataclass(frozen=True)
-class Known:
+class LawWithErrors:
     """A law with what its fit knows of its errors.
 
     law, free names of its constants, objective it was fitted by; statistical (p, p), None without photon noise
@@ -65,11 +65,11 @@ class Known:
     off: Discrepancy | None
 
     @classmethod
-    def of_fit(cls, fit: Fit, off: Discrepancy | None) -> Known:
+    def of_fit(cls, fit: Fit, off: Discrepancy | None) -> LawWithErrors:
         return cls(fit.law, fit.free, fit.objective, fit.statistical, off)
 
     @classmethod
-    def of_record(cls, law: Any, content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Known:
+    def of_record(cls, law: Any, content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> LawWithErrors:
         """`law` with the constants of a record, and what that record says; old ones say nothing of the model."""
         covariance = content["covariance"]
         statistical = covariance["statistical"]
@@ -95,12 +95,12 @@ class AtAlbedo:
     energy (n,) [-]; slope (n, p) d energy / d constants
     """
 
-    known: Known
+    known: LawWithErrors
     alpha: float
 
     @cached_property
     def _predicted(self) -> tuple[Floats, Floats]:
-        problem = Problem(self.known.objective, self.known.free)
+        problem = ResidualFunction(self.known.objective, self.known.free)
         total = float(self.known.law.albedo.reflectance(self.alpha))
         alone, none = np.array([self.alpha]), np.zeros((1, EDGES.size - 1))
         rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
@@ -150,7 +150,7 @@ class AtAlbedo:
         return float(value), float(self.known.statistical_error(gain[None])[0]), model
 
 
-def radius(known: Known, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quantity:
+def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quantity:
     """Radius (k,) [mfp] within which `share` of the reflected light leaves, at albedos `alpha` (k,).
 
     Its model error knows nothing of light beyond 99.5 % of the energy, where the discrepancy is not looked at: for
@@ -162,7 +162,7 @@ def radius(known: Known, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quan
     return Quantity(*np.array(rows).T)
 
 
-def profile(known: Known, r: ArrayLike, alpha: float) -> Quantity:
+def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     """R_d (k,) [1/mfp^2] at radii `r` (k,) [mfp] of one albedo."""
     if known.is_map or known.objective in QUANTILES:
         raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
@@ -176,14 +176,14 @@ def profile(known: Known, r: ArrayLike, alpha: float) -> Quantity:
     return Quantity(value, np.abs(value) * relative[0], np.abs(value) * relative[1])
 
 
-def reflectance(known: Known, alpha: ArrayLike) -> Quantity:
+def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     """Total reflectance A (k,) [-] at albedos `alpha` (k,), by a map."""
     if not known.is_map:
         raise InputError(f"known must be of a map between alpha and A, got {type(known.law).__name__}")
     albedos = np.atleast_1d(np.asarray(alpha, float))
     one, none = np.ones(albedos.size), np.zeros((albedos.size, 1))
     rings = Rings(albedos, np.array([0.0, 1.0]), none, one, none, one, np.array(NO_LIMITS), np.zeros(0))
-    energy, slope = predicted(Problem(known.objective, known.free), known.law, rings)
+    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.law, rings)
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.off is not None:
@@ -192,7 +192,7 @@ def reflectance(known: Known, alpha: ArrayLike) -> Quantity:
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 
 
-def tail_error(known: Known, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
+def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
     """Root mean square of law/data - 1 of the radius of `share`, over the albedos of `profiles` that hold it [-]."""
     off = []
     for alpha, cdf in zip(profiles.alpha, profiles.cdf, strict=True):
@@ -202,7 +202,7 @@ def tail_error(known: Known, profiles: Profiles, share: float = ENERGY_WITHIN) -
     return float(np.sqrt(np.mean(np.square(off)))) if off else np.nan
 
 
-def summary(known: Known, profiles: Profiles) -> dict[str, Any]:
+def summary(known: LawWithErrors, profiles: Profiles) -> dict[str, Any]:
     """What a record says of A, or of the radius that holds 99.5 % of the energy, at a few albedos."""
     if known.is_map:
         return {"alpha": SHOWN, "quantity": "reflectance", **vars(reflectance(known, SHOWN))}

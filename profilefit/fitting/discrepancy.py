@@ -28,7 +28,7 @@ import optimistix as optx
 from jax import Array
 from numpy.typing import NDArray
 
-from profilefit.fitting.estimate import Fit, Problem, sensitivity
+from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
@@ -166,7 +166,7 @@ def of_residuals(data: Residuals) -> Discrepancy:
 
 def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     """What `discrepancy` looks at: rings from 0.01 mfp to 99.5 % of the energy that the fit used, in groups."""
-    problem, rings = Problem(fit.objective, fit.free), fit.rings
+    problem, rings = ResidualFunction(fit.objective, fit.free), fit.rings
     gain = sensitivity(problem, fit.solution, fit.law, rings)
     energy, slope = predicted(problem, fit.law, rings)
     albedos = np.asarray(rings.weight)[:, None] > 0
@@ -194,7 +194,7 @@ def unit_energy(objective: str, energy: Floats, alpha: Floats, r_edges: Floats) 
     return 0.5 * alpha[:, None] * np.diff(r_edges) if objective == "radial" else energy
 
 
-def predicted(problem: Problem, law: Any, rings: Rings) -> tuple[Floats, Floats]:
+def predicted(problem: ResidualFunction, law: Any, rings: Rings) -> tuple[Floats, Floats]:
     """Ring energies of a law as the problem's objective means them (m, n), and their derivatives (m, n, p)."""
     with jax.enable_x64(True):
         theta = jnp.asarray(law.vector(problem.free))
@@ -307,7 +307,7 @@ def _likeliest(begin, args):
 
 
 @eqx.filter_jit
-def _predicted(problem: Problem, theta, law, rings: Rings):
+def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
     def energy(vector):
         return _energy(problem.objective, law.with_vector(problem.free, vector), rings)
 

@@ -131,7 +131,7 @@ def fit(
         raise InputError(f"free must name at least one constant, each once, got {', '.join(names) or '(none)'}")
     if unknown := [name for name in names if name not in law.constant_names()]:
         raise InputError(f"free must name constants of the law ({', '.join(law.constant_names())}), got {unknown[0]!r}")
-    problem = Problem(target, names)
+    problem = ResidualFunction(target, names)
     rings = rings_of(profiles, used, limits, xi)
     if counted is not None:
         rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
@@ -150,7 +150,7 @@ def fit(
 
 
 @dataclass(frozen=True)
-class Problem:
+class ResidualFunction:
     """The residual of a fit: which constants of a law move, and what is made small.
 
     A callable value and not a method: jax compiles anew for what does not compare equal, and bound methods of equal
@@ -202,7 +202,7 @@ def residual_structure(table: Floats) -> Structure:
     return Structure(rms, float(np.max(np.abs(table), initial=0.0)), _lag_one(table), _lag_one(table.T), waves)
 
 
-def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
     m = rings.alpha.size
     if not solution.converged or m < JACKKNIFE_GROUPS:
@@ -221,7 +221,7 @@ def _jackknife(problem: Problem, solution: Solution, law: Constants, rings: Ring
     return np.sqrt((len(groups) - 1) / len(groups) * spread)
 
 
-def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
     its data."""
     with jax.enable_x64(True):
@@ -230,7 +230,7 @@ def sensitivity(problem: Problem, solution: Solution, law: Constants, rings: Rin
     return -np.einsum("pq,aiq->pai", scaled_inverse(np.asarray(hessian)), np.asarray(mixed))
 
 
-def curvature(problem: Problem, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def curvature(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)

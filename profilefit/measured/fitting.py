@@ -29,7 +29,7 @@ LEVEL = 0.95  # of every interval
 
 
 @dataclass(frozen=True)
-class Found:
+class MediumFit:
     """Where a fit ended. `source` is the record of the law's constants, `rel` its own relative error there.
 
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
@@ -156,7 +156,7 @@ class Found:
         return model.errors(self.gradients, covariance)
 
 
-def fitted(data: Measured, question: Question, source: law_error.Origin | None = None) -> Found:
+def fitted(data: Measured, question: Question, source: law_error.Origin | None = None) -> MediumFit:
     """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
 
     source  the record that the law's constants came from, which knows how far it is from the truth
@@ -178,4 +178,4 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
         problem = replace(problem, noise=noise(data, expected, wider))
         minimum = descended(problem, minimum.point, question.free)
     alpha = float(alpha_of(minimum.point[0]))
-    return Found(problem, minimum, source, law_error.relative_error(question.law, alpha, source), wider)
+    return MediumFit(problem, minimum, source, law_error.relative_error(question.law, alpha, source), wider)

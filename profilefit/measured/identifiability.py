@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.measured.fitting import Found
+from profilefit.measured.fitting import MediumFit
 from profilefit.measured.model import NAMES, STRENGTHS, U, alpha_of
 from profilefit.measured.solving import BLACK, FARTHEST_LN, FARTHEST_U, WHITE, descended
 
@@ -36,7 +36,7 @@ class Interval:
 
 
 @dataclass(frozen=True)
-class Telling:
+class Identifiability:
     """What a fit can tell.
 
     intervals  of the free coordinates; loose the quantities that are not told, with their relative errors
@@ -49,16 +49,16 @@ class Telling:
     correlation: float
 
     @property
-    def told(self) -> bool:
+    def all_identified(self) -> bool:
         """True if the data tell every quantity."""
         return not self.loose and not any(one.is_open for one in self.intervals)
 
     @property
     def trades(self) -> bool:
-        return not self.told and abs(self.correlation) > TRADING
+        return not self.all_identified and abs(self.correlation) > TRADING
 
 
-def told(found: Found) -> Telling:
+def identifiability(found: MediumFit) -> Identifiability:
     """Judge a fit by what is left of it when one coordinate is moved and the others follow."""
     intervals = tuple(_interval(found, at) for at in found.question.free)
     relative = relative_errors(found, found.statistical)
@@ -66,17 +66,17 @@ def told(found: Found) -> Telling:
         relative["mu_a"] = np.inf
     loose = {name: value for name, value in relative.items() if not value < LOOSE}
     pair, correlation = _pair(found)
-    return Telling(intervals, loose, pair, correlation)
+    return Identifiability(intervals, loose, pair, correlation)
 
 
-def relative_errors(found: Found, covariance: Floats) -> dict[str, float]:
+def relative_errors(found: MediumFit, covariance: Floats) -> dict[str, float]:
     """Standard errors of mu_s', mu_a and a free scale over themselves [-]."""
     errors = found.errors(covariance)
     names = [name for name in STRENGTHS if name != "scale" or "scale" not in found.question.held]
     return {name: errors[name] / max(abs(found.values[name]), np.finfo(float).tiny) for name in names}
 
 
-def _pair(found: Found) -> tuple[tuple[str, str] | None, float]:
+def _pair(found: MediumFit) -> tuple[tuple[str, str] | None, float]:
     free = list(found.question.free)
     if len(free) < 2:
         return None, 0.0
@@ -87,7 +87,7 @@ def _pair(found: Found) -> tuple[tuple[str, str] | None, float]:
     return (NAMES[free[i]], NAMES[free[j]]), float(upper[i, j])
 
 
-def _interval(found: Found, at: int) -> Interval:
+def _interval(found: MediumFit, at: int) -> Interval:
     """Both ends of the profile likelihood in coordinate `at`."""
     ends = [_end(found, at, side) for side in (-1.0, 1.0)]
     values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
@@ -97,7 +97,7 @@ def _interval(found: Found, at: int) -> Interval:
     return Interval(NAMES[at], values[0], values[1], opened[0], opened[1])
 
 
-def _end(found: Found, at: int, side: float) -> tuple[float, bool]:
+def _end(found: MediumFit, at: int, side: float) -> tuple[float, bool]:
     """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does.
 
     Nor does it where alpha is 0 or 1 for all that data can say.

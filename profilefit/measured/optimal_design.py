@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.measured.fitting import Found
+from profilefit.measured.fitting import MediumFit
 from profilefit.measured.identifiability import relative_errors
 from profilefit.measured.law_error import WITHIN
 from profilefit.measured.model import NAMES, SCALE
 
 Floats = NDArray[np.float64]
-CALIBRATED = 0.01  # relative error of a total reflectance or of a reference standard that is easily had
+REFERENCE_ERROR = 0.01  # relative error of a total reflectance or of a reference standard that is easily had
 REPEATS = 4
 # Radii, in mean free paths, where one more point could be measured; only those within 99.5 % of the energy.
 NEAREST, FARTHEST, RADII = 0.03, 60.0, 32
@@ -53,7 +53,7 @@ class Advice:
     candidates: tuple[Candidate, ...]
 
 
-def advised(found: Found) -> Advice:
+def advised(found: MediumFit) -> Advice:
     """Rank what could be measured besides by the largest relative error that it would leave."""
     now = relative_errors(found, found.statistical)
     name = max(now, key=lambda one: now[one])
@@ -64,7 +64,7 @@ def advised(found: Found) -> Advice:
     return Advice(name, now[name], tuple(sorted(best.values(), key=lambda one: one.worst[1])))
 
 
-def _points(found: Found) -> list[Candidate]:
+def _points(found: MediumFit) -> list[Candidate]:
     """One more point or ring anywhere, as precise as the data are, in the median."""
     data, model = found.data, found.problem.model
     width = float(np.median((data.outer - data.inner) / (data.outer + data.inner)))
@@ -77,22 +77,22 @@ def _points(found: Found) -> list[Candidate]:
     return [_candidate(found, "point", float(a), float(b), float(v), float(e), slope) for a, b, v, e, slope in rows]
 
 
-def _others(found: Found) -> list[Candidate]:
+def _others(found: MediumFit) -> list[Candidate]:
     (*_, reflectance), slopes = found.predicted[0], found.predicted[1]
     scale = found.values["scale"]
     four = {name: one / np.sqrt(REPEATS) for name, one in relative_errors(found, found.statistical).items()}
     out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
     if found.question.total is None and found.data.medium is None:  # a simulation has told it already
-        error = CALIBRATED * reflectance
+        error = REFERENCE_ERROR * reflectance
         out.append(_candidate(found, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
     if SCALE in found.question.free and found.question.scale is None:
         slope = scale * np.eye(len(NAMES))[SCALE]
-        out.append(_candidate(found, "scale", np.nan, np.nan, scale, CALIBRATED * scale, slope))
+        out.append(_candidate(found, "scale", np.nan, np.nan, scale, REFERENCE_ERROR * scale, slope))
     return out
 
 
 def _candidate(
-    found: Found, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
+    found: MediumFit, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
 ) -> Candidate:
     free = list(found.question.free)
     rows = np.vstack([found.jacobian, slope[free] / error])

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 from profilefit.fitting.chains import Walk, walk
 from profilefit.measured import model
 from profilefit.measured.data import Measured
-from profilefit.measured.fitting import LEVEL, Found
-from profilefit.measured.identifiability import Telling, told
+from profilefit.measured.fitting import LEVEL, MediumFit
+from profilefit.measured.identifiability import Identifiability, Interval, identifiability
 from profilefit.measured.model import FLOCK, NAMES, U, u_of
 from profilefit.measured.optimal_design import Advice, advised
 from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, descended
@@ -31,7 +31,7 @@ ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a densit
 WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not hold
 
 
-def posterior(found: Found, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
+def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
     """Walk over the free coordinates of a fit: samples (k, p)."""
     free, centre = list(found.question.free), found.point
     reach = np.full(centre.size, FARTHEST_LN)
@@ -60,7 +60,7 @@ def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
     return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
-def points(found: Found, samples: Floats) -> Floats:
+def points(found: MediumFit, samples: Floats) -> Floats:
     """The coordinates (k, 3) of samples (k, p) of the free ones."""
     full = np.repeat(found.point[None], len(samples), axis=0)
     full[:, list(found.question.free)] = samples
@@ -74,7 +74,7 @@ GREY = 0.9  # albedo that advice is given for where the data leave it open altog
 
 @dataclass(frozen=True)
 class Answer:
-    """A fit judged. telling, advice and walk are None where the fit failed, walk also where the chain had no bounds.
+    """A fit judged. identifiability, advice, walk are None where the fit failed, walk also where a chain has no bounds.
 
     Where the data do not exclude the end of what a coordinate may be (alpha = 1, say: chi-square there is within the
     square of the 95 % quantile, 3.84 of known errors, of the least), the optimum is no estimate and the derivatives
@@ -85,8 +85,8 @@ class Answer:
     knows of the law's own error.
     """
 
-    found: Found
-    telling: Telling | None
+    found: MediumFit
+    identifiability: Identifiability | None
     advice: Advice | None
     walk: Walk | None
 
@@ -104,7 +104,7 @@ class Answer:
         Empty if none is known, or where derivatives, which carry them over, are no errors: at an end.
         """
         found = self.found
-        if self.walk is None or not self.told or not (found.misfit.detected or found.rel is not None):
+        if self.walk is None or not self.identified or not (found.misfit.detected or found.rel is not None):
             return {}
         free = list(found.question.free)
         others = found.of_law + (found.of_misfit if found.misfit.detected else 0.0)
@@ -120,19 +120,24 @@ class Answer:
         return model.quantities(points, reflectance)
 
     @property
+    def _intervals(self) -> tuple[Interval, ...]:
+        """Those of the free coordinates."""
+        return self.identifiability.intervals if self.identifiability else ()
+
+    @property
     def moving(self) -> tuple[str, ...]:
         """The quantities that the fit decided."""
         return tuple(name for name, one in self.found.gradients.items() if np.any(one[list(self.found.question.free)]))
 
     @property
-    def told(self) -> tuple[str, ...]:
+    def identified(self) -> tuple[str, ...]:
         """Those with symmetric errors: none where an end is not excluded, or where the fit failed."""
-        opened = self.telling is None or any(one.is_open for one in self.telling.intervals)
+        opened = self.identifiability is None or any(one.is_open for one in self._intervals)
         return () if opened or not self.found.minimum.converged else self.moving
 
     def ends(self, name: str) -> tuple[bool, bool]:
         """Whether the data exclude neither how little nor how much a quantity may be: (low, high)."""
-        of = {one.name: (one.open_low, one.open_high) for one in (self.telling.intervals if self.telling else ())}
+        of = {one.name: (one.open_low, one.open_high) for one in self._intervals}
         (dark, white), (short, long) = of.get("alpha", (False, False)), of.get("l", (False, False))
         return {
             "A": (dark, white),
@@ -147,7 +152,7 @@ class Answer:
         if name not in self.moving:
             return value
         intervals = [one for one in (self.interval(name), self.whole_interval(name)) if one is not None]
-        if any(self.ends(name)) or not (intervals or name in self.told):
+        if any(self.ends(name)) or not (intervals or name in self.identified):
             return None
         inside = all(low is not None and high is not None and low <= value <= high for low, high in intervals)
         return value if inside else None
@@ -159,7 +164,7 @@ class Answer:
         """
         if name in self.draws and name in self.moving:
             return self._middle(name, self.draws[name])
-        found = [one for one in (self.telling.intervals if self.telling else ()) if one.name == name]
+        found = [one for one in self._intervals if one.name == name]
         return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
 
     def whole_interval(self, name: str) -> Ends | None:
@@ -179,7 +184,7 @@ def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
     return None if all(opened) else (None if opened[0] else low, None if opened[1] else high)
 
 
-def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
+def judged(found: MediumFit, seed: int = 0, walk: bool = True) -> Answer:
     """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate.
 
     Where numbers on the way are none, that is the fit's result, and nothing is told of it.
@@ -188,26 +193,26 @@ def answered(found: Found, seed: int = 0, walk: bool = True) -> Answer:
         return Answer(found, None, None, None)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _judged(found, seed, walk)
+            return _judged_finite(found, seed, walk)
     except (FloatingPointError, np.linalg.LinAlgError):
         return Answer(replace(found, minimum=replace(found.minimum, result=BEYOND)), None, None, None)
 
 
-def _judged(found: Found, seed: int, walk: bool) -> Answer:
-    telling = told(found)
+def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
+    judgement = identifiability(found)
     # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
-    endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in telling.intervals)
+    endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
     walked = posterior(found, seed) if walk and found.question.free and not endless else None
-    answer = Answer(found, telling, advised(_inside(found, telling)), walked)
-    _ = found.misfit, answer.draws, answer.whole_draws  # worked out when first asked for: they fail here or never
-    return answer
+    result = Answer(found, judgement, advised(_inside(found, judgement)), walked)
+    _ = found.misfit, result.draws, result.whole_draws  # worked out when first asked for: they fail here or never
+    return result
 
 
-def _inside(found: Found, telling: Telling) -> Found:
+def _inside(found: MediumFit, judgement: Identifiability) -> MediumFit:
     """A fit at an edge moved to the other end of what alpha may be: from the edge no measurement seems to help."""
     if not found.minimum.at_edge:
         return found
-    (alpha,) = [one for one in telling.intervals if one.name == "alpha"]
+    (alpha,) = [one for one in judgement.intervals if one.name == "alpha"]
     start = found.point.copy()
     start[U] = u_of(
         next((x for x, is_open in ((alpha.low, alpha.open_low), (alpha.high, alpha.open_high)) if not is_open), GREY)
@@ -224,12 +229,12 @@ def known_medium(data: Measured) -> dict[str, float]:
     return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
 
 
-def content(answer: Answer, law: str, constants: str) -> dict[str, Any]:
+def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
     """Everything, as JSON takes it; errors of the law are null where they are not known.
 
     Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
     """
-    found = answer.found
+    found = result.found
     data, question = found.data, found.question
     body = {
         "data": {
@@ -264,54 +269,54 @@ def content(answer: Answer, law: str, constants: str) -> dict[str, Any]:
         "steps": found.minimum.steps,
         "widening": found.widening,
         "quantile_95": found.quantile,
-        "quantities": _quantities(answer),
-        "correlation": _correlation(answer),
+        "quantities": _quantities(result),
+        "correlation": _correlation(result),
         "light": found.light,
         "residuals": found.minimum.residuals,
         "versions": record.versions(),
     }
-    if answer.telling is not None and answer.advice is not None:
+    if result.identifiability is not None and result.advice is not None:
         body["misfit"] = {
             **vars(found.misfit),
             "detected": found.misfit.detected,
             "within_law": found.misfit.within_law,
         }
-        body["telling"] = {**vars(answer.telling), "told": answer.telling.told}
-        body["advice"] = answer.advice
+        body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
+        body["advice"] = result.advice
         body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
-    if answer.walk is not None:
-        body["posterior"] = {k: v for k, v in vars(answer.walk).items() if k not in ("samples", "log_density")}
+    if result.walk is not None:
+        body["posterior"] = {k: v for k, v in vars(result.walk).items() if k not in ("samples", "log_density")}
     plain: dict[str, Any] = record.plain(body)
     return plain
 
 
-def _quantities(answer: Answer) -> dict[str, Any]:
-    found = answer.found
+def _quantities(result: Answer) -> dict[str, Any]:
+    found = result.found
     kinds: dict[str, Floats | None] = {
-        "statistical": found.statistical if answer.told else None,
-        "law": found.of_law if answer.told and found.rel is not None else None,
+        "statistical": found.statistical if result.identified else None,
+        "law": found.of_law if result.identified and found.rel is not None else None,
     }
-    if answer.telling is not None:
-        kinds["misfit"] = found.of_misfit if answer.told else None
+    if result.identifiability is not None:
+        kinds["misfit"] = found.of_misfit if result.identified else None
     errors = {kind: found.errors(one) if one is not None else {} for kind, one in kinds.items()}
     truth = known_medium(found.data)
     return {
         name: {
-            "value": answer.value(name),
-            "at_edge": any(answer.ends(name)),
+            "value": result.value(name),
+            "at_edge": any(result.ends(name)),
             "unit": model.unit_of(name, found.data.unit),
-            **{f"{kind}_error": one.get(name) if name in answer.told else None for kind, one in errors.items()},
-            "interval_95_data": answer.interval(name),
-            "interval_95_total": answer.whole_interval(name),
+            **{f"{kind}_error": one.get(name) if name in result.identified else None for kind, one in errors.items()},
+            "interval_95_data": result.interval(name),
+            "interval_95_total": result.whole_interval(name),
             "of_file": truth.get(name),
         }
         for name in found.values
     }
 
 
-def _correlation(answer: Answer) -> dict[str, Any]:
-    names = answer.told
+def _correlation(result: Answer) -> dict[str, Any]:
+    names = result.identified
     if not names:
         return {}
-    joint = model.correlation(answer.found.gradients, answer.found.statistical, names)
+    joint = model.correlation(result.found.gradients, result.found.statistical, names)
     return {"names": names, "matrix": joint}

@@ -165,8 +165,8 @@ def _header(path: Path, at: int, cells: tuple[str, ...], delimiter: str) -> _Hea
     if len(cells) > MOST_COLUMNS:
         raise InputError(f"{path}:{at}: expected at most {MOST_COLUMNS} columns, got {len(cells)}")
     cells = tuple(" ".join(cell.split()) for cell in cells)
-    are_told = [len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells]  # as they are, in messages
-    matches = [HEADING.fullmatch(cell) if told else None for cell, told in zip(cells, are_told, strict=True)]
+    are_shown = [len(cell) <= LONGEST_HEADING and cell.isprintable() for cell in cells]  # as they are, in messages
+    matches = [HEADING.fullmatch(cell) if shown else None for cell, shown in zip(cells, are_shown, strict=True)]
     words = [match["name"].strip().lower() if match else cell for match, cell in zip(matches, cells, strict=True)]
     names = tuple(NAMES.get(word, word) for word in words)
     units = tuple(_unit(match) for match in matches)
@@ -291,8 +291,8 @@ def _length_unit(path: Path, header: _Header, unit: str | None) -> str:
                 f"{path}:{header.line}: column {names[0]}: expected a unit of {', '.join(UNITS)}, got {_shown(one)}"
             )
     if len({UNITS.get(one) for one in found | ({unit} if unit else set())}) > 1:
-        told = ", ".join(sorted(found | ({unit} if unit else set())))
-        raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in `unit`, got {told}")
+        units = ", ".join(sorted(found | ({unit} if unit else set())))
+        raise InputError(f"{path}:{header.line}: column {names[0]}: expected one unit, here and in `unit`, got {units}")
     return found.pop() if found else checked_unit("unit", unit) if unit else ""
 
 

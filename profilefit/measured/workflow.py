@@ -15,7 +15,7 @@ from profilefit.measured.fitting import fitted
 from profilefit.measured.law_error import origin
 from profilefit.measured.problem import Known, Question, held_albedo
 from profilefit.measured.reading import read
-from profilefit.measured.result import Answer, answered
+from profilefit.measured.result import Answer, judged
 from profilefit.recipes import catalogue
 
 HOLDABLE = ("alpha", "A", "l")
@@ -51,7 +51,7 @@ def fit(
     measured = _noted(measured, where)
     chosen = catalogue.load(law, constants, where, records)
     question = Question(chosen, _held(chosen, held or {}, scale), total, scale if isinstance(scale, Known) else None)
-    return answered(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
+    return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 
 
 def _noted(measured: Measured, setting: Setting) -> Measured:

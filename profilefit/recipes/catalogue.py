@@ -91,12 +91,12 @@ def _checked(setting: Setting | None) -> Setting | None:
 
 
 def _constants(
-    kind: type[Constants], which: str, asked: Setting | None, records: Records
+    kind: type[Constants], which: str, requested: Setting | None, records: Records
 ) -> tuple[dict[str, float], Setting]:
     """The constants of a law, and the setting that they belong to."""
     entry = kind.entry
     if which == "regenerated" or (which == "published" and not kind.constant_names()):
-        where = asked or SEARCHLIGHT
+        where = requested or SEARCHLIGHT
         return _all_regenerated(kind, where, records), where
     if which.endswith(".json"):
         content = records.read(Path(which))
@@ -104,9 +104,9 @@ def _constants(
         owner = f"albedo {owner}" if content.get("pipeline") == "albedo" else key_of(str(owner))
         if owner != entry.key:
             raise RecordError(f"{which}: holds constants of law {owner!r}, got a request for {entry.key!r}")
-        where = asked or record_setting(content)
+        where = requested or record_setting(content)
         return {**published.constants(entry.printed), **_of_record(content, where, which)}, where
-    return _printed(entry.printed, which, asked)
+    return _printed(entry.printed, which, requested)
 
 
 def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) -> dict[str, float]:
@@ -126,14 +126,14 @@ def _all_regenerated(kind: type[Constants], setting: Setting, records: Records) 
     return values
 
 
-def _printed(law: str, which: str, asked: Setting | None) -> tuple[dict[str, float], Setting]:
+def _printed(law: str, which: str, requested: Setting | None) -> tuple[dict[str, float], Setting]:
     wanted = which.removeprefix("published:")
     sets = [s for s in published.SETS if s.law == law]
     chosen = next((s for s in sets if s.name == wanted), None)
     if chosen is None:
         raise InputError(f"constants must be one of regenerated, {_accepted(law)}, got {which!r}")
-    if asked not in (None, chosen.setting):
-        raise SettingError(f"the {which} constants of {law} belong to {chosen.setting}, got a request for {asked}")
+    if requested not in (None, chosen.setting):
+        raise SettingError(f"the {which} constants of {law} belong to {chosen.setting}, got a request for {requested}")
     return dict(chosen.constants), chosen.setting
 
 

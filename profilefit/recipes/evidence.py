@@ -35,9 +35,9 @@ def made(command: str, folder: Path) -> dict[str, Any]:
     }
 
 
-def stale(told: Mapping[str, Any], folder: Path) -> bool:
+def stale(origin: Mapping[str, Any], folder: Path) -> bool:
     """Whether what `made` told is of other records than those in `folder`, or of another version."""
-    return (told.get("version"), told.get("sha256")) != (__version__, digest(folder))
+    return (origin.get("version"), origin.get("sha256")) != (__version__, digest(folder))
 
 
 def digest(folder: Path) -> str:

@@ -112,8 +112,8 @@ def find(name: str, folder: Folder, constants: str | None = None) -> Named:
 
 def _unknown(name: str, there: Sequence[str]) -> str:
     near = get_close_matches(name.lower(), sorted(set(there)), n=2, cutoff=NEAR)
-    told = f"did you mean {', '.join(near)}?" if near else f"laws: {', '.join(catalogue.names())};"
-    return f"name must be a law, map or record, got {name!r}; {told} `profilefit report` lists records"
+    hint = f"did you mean {', '.join(near)}?" if near else f"laws: {', '.join(catalogue.names())};"
+    return f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records"
 
 
 def _entries(classes: Mapping[str, Any]) -> list[Entry]:
@@ -130,8 +130,8 @@ def _named(entry: Entry, which: str, law: Any, records: Records) -> Named:
         files = _files(entry, law.setting, records)
     else:
         files = (Path(which),) if which.endswith(".json") else ()
-    told = " + ".join(path.stem for path in files) or which.removeprefix("published:")
-    return Named(entry.name, told if law.constant_names() else "", law, files)
+    constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
+    return Named(entry.name, constants if law.constant_names() else "", law, files)
 
 
 def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]:

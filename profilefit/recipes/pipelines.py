@@ -22,15 +22,15 @@ from profilefit.recipes.crosscheck import crosscheck
 from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
 from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
-from profilefit.recipes.recipe import Albedos, Recipe, Rings
+from profilefit.recipes.recipe import Albedos, Recipe, RingLayout
 from profilefit.recipes.record_folder import Records
-from profilefit.recipes.run import Run
+from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.summary import Arrays, curves, described, errors_by_name
 from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
 
 Floats = NDArray[np.float64]
 Made = tuple[dict[str, Any], Arrays]
-EVIDENCE_RINGS = Rings(last=30.0, dr=0.01)
+EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
 
 
@@ -39,7 +39,7 @@ def needs_photons(recipe: Recipe) -> bool:
     return "orders" in (recipe.truth, recipe.check)
 
 
-def _albedo(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     profiles = truth_of(recipe, light)
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
@@ -49,7 +49,7 @@ def _albedo(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return content | found, arrays
 
 
-def _profile(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     profiles = truth_of(recipe, light)
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
@@ -58,7 +58,7 @@ def _profile(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return content | found, arrays | curves(profiles)
 
 
-def _inverse(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+def _inverse(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     profiles = truth_of(recipe, light)
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
@@ -71,7 +71,7 @@ def _inverse(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return content | found, arrays | curves(profiles) | {"shares": np.asarray(result.rings.xi)}
 
 
-def _as_published(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     rings = recipe.rings
     if rings is None:
         raise RecipeError(f"{recipe.path}: a recipe of pipeline {recipe.pipeline!r} needs a table [rings]")
@@ -107,7 +107,7 @@ def _as_published(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return content, arrays | curves(profiles)
 
 
-def _evidence(recipe: Recipe, run: Run, light: Orders | None) -> Made:
+def _evidence(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     if recipe.truth == "orders" and light is not None:
         truth: Truth = TallyTruth(light.merged(ring_edges(EVIDENCE_RINGS)))
     else:
@@ -117,7 +117,7 @@ def _evidence(recipe: Recipe, run: Run, light: Orders | None) -> Made:
     return {**found, "compared": {label: law.constants() for label, law in laws.items()}}, {}
 
 
-Pipeline = Callable[[Recipe, Run, Orders | None], Made]
+Pipeline = Callable[[Recipe, RecipeRun, Orders | None], Made]
 PIPELINES: dict[str, Pipeline] = {
     "albedo": _albedo,
     "profile": _profile,
@@ -134,7 +134,7 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
     return np.array(errors)
 
 
-def _fitted(recipe: Recipe, run: Run, profiles: Profiles, light: Orders | None) -> tuple[Fit, dict[str, Any]]:
+def _fitted(recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | None) -> tuple[Fit, dict[str, Any]]:
     """The fit of a recipe, and what random starts and the other truth say of it."""
     start, found = starts.starting_law(recipe, run.out), {}
     result = _fit(recipe, profiles, start)
@@ -156,7 +156,7 @@ def _fit(recipe: Recipe, profiles: Profiles, start: Constants, used: NDArray[np.
     return fit(profiles, start, weighting.objective, starts.free(recipe, start), used, limits, tuple(shares))
 
 
-def _described(recipe: Recipe, run: Run, profiles: Profiles, result: Fit) -> Made:
+def _described(recipe: Recipe, run: RecipeRun, profiles: Profiles, result: Fit) -> Made:
     printed = next(iter(printed_sets(recipe).values()), {})
     return described(result, profiles, printed, run.seed, run.max_chain)
 
@@ -168,7 +168,7 @@ def printed_sets(recipe: Recipe) -> dict[str, dict[str, float]]:
     return {s.name if i else "published": dict(s.constants) for i, s in enumerate(sets)}
 
 
-def _printed_laws(recipe: Recipe, run: Run) -> dict[str, Any]:
+def _printed_laws(recipe: Recipe, run: RecipeRun) -> dict[str, Any]:
     """The laws that the printed constants make."""
     kind: Any = starts.law_class(recipe)
     given: dict[str, Any] = {"setting": recipe.setting}
@@ -177,7 +177,7 @@ def _printed_laws(recipe: Recipe, run: Run) -> dict[str, Any]:
     return {name: kind(**given, **values) for name, values in printed_sets(recipe).items()}
 
 
-def _compare(recipe: Recipe, run: Run, law: Any, light: Orders | None) -> dict[str, Any]:
+def _compare(recipe: Recipe, run: RecipeRun, law: Any, light: Orders | None) -> dict[str, Any]:
     """The measures of every set of constants of this law, at albedos that were not fitted."""
     alpha = albedo_values(QUALITY_ALBEDOS)
     table: dict[str, Any] = {"alpha": alpha}
@@ -199,7 +199,7 @@ def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
     return quality_tally.albedo_quality(law, light)
 
 
-def _regenerated_laws(run: Run) -> dict[str, ProfileLaw]:
+def _regenerated_laws(run: RecipeRun) -> dict[str, ProfileLaw]:
     """The laws that a table of published ones is compared with: of the run's records, else the shipped ones."""
     laws, records = {}, Records(run.out)
     for label, law, name in (

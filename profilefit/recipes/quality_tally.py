@@ -16,11 +16,11 @@ from mcml_sim import Orders
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.recipes.recipe import Rings
+from profilefit.recipes.recipe import RingLayout
 from profilefit.recipes.targets import ring_edges
 
 Floats = NDArray[np.float64]
-RINGS = Rings(first=NEAREST, last=400.0, count=70)  # fifteen a decade
+RINGS = RingLayout(first=NEAREST, last=400.0, count=70)  # fifteen a decade
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(4)  # 2 pi r R_d over such a ring, to 1e-7
 # Nearer to white the photons' own noise exceeds every law's error, and the maps are exact at white itself.
 WHITEST = 0.999

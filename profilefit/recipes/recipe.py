@@ -47,7 +47,7 @@ class Albedos:
 
 
 @dataclass(frozen=True)
-class Rings:
+class RingLayout:
     """On which rings: even ones of width `dr`, or log-spaced from `first` to `last` [mfp]; `trim` is (6)."""
 
     last: float
@@ -127,7 +127,7 @@ class Recipe:
     random_starts: int = 0
     albedos: Albedos = Albedos(0.05, 0.995, 24)
     weighting: Weighting = Weighting("")
-    rings: Rings | None = None
+    rings: RingLayout | None = None
     mfp: tuple[float, ...] = (1.0,)
     held: tuple[str, ...] = ()
     note: str = ""
@@ -156,7 +156,7 @@ class Recipe:
             return f"weighting.objective of pipeline {self.pipeline!r} must be one of {accepted}, got {got!r}"
         if self.pipeline == "inverse" and self.weighting.shares == 0:
             return "weighting.shares of pipeline 'inverse' must be between 1 and 10000, got 0"
-        parts: tuple[Albedos | Rings | Weighting | None, ...] = (self.albedos, self.rings, self.weighting)
+        parts: tuple[Albedos | RingLayout | Weighting | None, ...] = (self.albedos, self.rings, self.weighting)
         if text := next((text for part in parts if part is not None and (text := part.problems())), None):
             return text
         lengths = self.mfp if self.pipeline == "as-published" else (1.0,)
@@ -256,7 +256,7 @@ def _build(kind: type, table: Mapping[str, Any], where: str, given: frozenset[st
 
 def _typed(annotation: Any, key: str, value: Any, where: str) -> Any:
     """A TOML value as the type its field declares, or RecipeError."""
-    tables = {"Albedos": Albedos, "Rings | None": Rings, "Weighting": Weighting, "Setting": Setting}
+    tables = {"Albedos": Albedos, "RingLayout | None": RingLayout, "Weighting": Weighting, "Setting": Setting}
     if annotation in tables:
         if not isinstance(value, dict):
             raise RecipeError(f"{where}: [{key}] must be a table, got {shown(value)}")

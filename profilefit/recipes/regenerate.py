@@ -14,7 +14,7 @@ from mcml_sim.runs.progress import tracked
 from profilefit.recipes import record, starts
 from profilefit.recipes.pipelines import PIPELINES, Pipeline, needs_photons
 from profilefit.recipes.recipe import Recipe
-from profilefit.recipes.run import Run
+from profilefit.recipes.run import RecipeRun
 
 # Every law compiles a fit of its own for each setting: one to three thousand memory maps, of which Linux gives a
 # process 65 thousand, and a hundred megabytes. No later recipe needs them.
@@ -22,7 +22,7 @@ CLEARED = 8  # recipes after which compiled programs go
 
 
 def regenerate(
-    recipes: tuple[Recipe, ...], run: Run, pipelines: Mapping[str, Pipeline] = MappingProxyType(PIPELINES)
+    recipes: tuple[Recipe, ...], run: RecipeRun, pipelines: Mapping[str, Pipeline] = MappingProxyType(PIPELINES)
 ) -> list[Path]:
     """Run recipes and write their records: first the maps that others are normalised with, last what compares them.
 
@@ -44,7 +44,7 @@ def regenerate(
     return written
 
 
-def _header(recipe: Recipe, run: Run, light: Orders | None) -> dict[str, Any]:
+def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, Any]:
     header: dict[str, Any] = {
         "title": recipe.title,
         "law": recipe.law,

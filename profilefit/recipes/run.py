@@ -18,7 +18,7 @@ MAX_CHAIN = {"quick": 64_000, "full": 256_000}
 
 
 @dataclass(frozen=True)
-class Run:
+class RecipeRun:
     """One command's run. `photons` overrides the preset's number; `store` keeps the photons for a later run."""
 
     preset: str

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from profilefit import laws
 from profilefit.errors import RecipeError
-from profilefit.fitting.estimate import Fit, Problem, judged, misfit_covariance
+from profilefit.fitting.estimate import Fit, ResidualFunction, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws import published
 from profilefit.laws.base import Constants
@@ -143,7 +143,7 @@ def random_starts(own: Fit, start: Constants, count: int, seed: int) -> RandomSt
     constants = start.vector(own.free)
     begins = spread_out(constants, count, seed)
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (count, *np.shape(leaf))), (start, own.rings))
-    found = solve_batch(Problem(own.objective, own.free), begins, data)
+    found = solve_batch(ResidualFunction(own.objective, own.free), begins, data)
     rule = f"constant x e^({SPREAD:.3g} normal), around the recipe's start"
     return summarised(own.solution, [judged(one, own.free) for one in found], own.free, seed, rule)
 

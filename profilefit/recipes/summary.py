@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from profilefit.fitting import derived
 from profilefit.fitting.chains import LEVELS, Posterior, posterior
 from profilefit.fitting.discrepancy import discrepancy
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, Fit, Problem, judged
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, Fit, ResidualFunction, judged
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import solve_batch
@@ -50,7 +50,7 @@ def discretisation_error(fit: Fit) -> Floats:
 
 def by_width(fit: Fit, factors: Sequence[int] = FACTORS) -> dict[int, Floats]:
     """Constants (p,) by how many rings are taken together; NaN where a fit fails."""
-    problem = Problem(fit.objective, fit.free)
+    problem = ResidualFunction(fit.objective, fit.free)
     wider = [widened(fit.rings, factor) for factor in factors]
     rings = jax.tree.map(lambda *leaves: np.stack([np.asarray(leaf) for leaf in leaves]), *wider)
     law = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(factors), *np.shape(leaf))), fit.law)
@@ -103,7 +103,7 @@ def described(
         "data_digest": record.digest(profiles.alpha, profiles.r_edges, profiles.energy),
     }
     if result.solution.converged:
-        content["derived"] = derived.summary(derived.Known.of_fit(result, off), profiles)
+        content["derived"] = derived.summary(derived.LawWithErrors.of_fit(result, off), profiles)
     if profiles.covariance is not None:
         content["covariance_rank"] = {"rank": profiles.covariance.rank, "dropped": profiles.covariance.dropped}
         content["left_out"] = _left_out(profiles, result)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from mcml_sim import Orders, Setting, exact
 from profilefit.errors import RecipeError, SettingError
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes.recipe import Albedos, Recipe, Rings
+from profilefit.recipes.recipe import Albedos, Recipe, RingLayout
 
 Floats = NDArray[np.float64]
 SEARCHLIGHT = Setting()
@@ -30,7 +30,7 @@ def albedo_values(albedos: Albedos, setting: Setting = SEARCHLIGHT) -> Floats:
     return 1.0 - s**2
 
 
-def ring_edges(rings: Rings | None, mfp: float = 1.0) -> Floats:
+def ring_edges(rings: RingLayout | None, mfp: float = 1.0) -> Floats:
     """The edges [mfp] of a recipe's rings in a medium of this mean free path, each one an edge of the run."""
     if rings is None:
         return np.array([0.0, RUN_EDGES[-1]])

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
-from profilefit.scenes.stage.picture import Drawn, Point
+from profilefit.scenes.stage.picture import ChartPoint, Drawn
 
 LAST = 0.99  # share of the pixels that the map's colours tell apart; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured
@@ -52,7 +52,7 @@ def _error_map(drawn: Drawn) -> bytes:
 
 
 @styled
-def _chart(points: Sequence[Point], device: str) -> bytes:
+def _chart(points: Sequence[ChartPoint], device: str) -> bytes:
     figure = canvas(3.4, 7.0)
     by_samples, by_time = figure.subplots(1, 2, sharey=True)
     error = [one.rmse for one in points]
@@ -105,7 +105,7 @@ def content(drawn: Drawn, device: str) -> dict[str, Any]:
     }
 
 
-def _point(point: Point) -> dict[str, Any]:
+def _point(point: ChartPoint) -> dict[str, Any]:
     return {
         "technique": point.label,
         "samples": point.samples,

@@ -4,8 +4,8 @@ from mcml_sim.cli.lazy import attributes
 
 TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
 if TYPE_CHECKING:
-    from profilefit.shader.check.evaluate import ShaderLaw
-    from profilefit.shader.check.laws import check_law
+    from profilefit.shader.check.law_check import check_law
+    from profilefit.shader.check.shader_law import ShaderLaw
     from profilefit.shader.context import open_context, opened, renderer
     from profilefit.shader.emit import law_text
     from profilefit.shader.law_file import export
@@ -13,8 +13,8 @@ else:
     __getattr__ = attributes(
         __name__,
         {
-            "ShaderLaw": "check.evaluate",
-            "check_law": "check.laws",
+            "ShaderLaw": "check.shader_law",
+            "check_law": "check.law_check",
             **dict.fromkeys(("open_context", "opened", "renderer"), "context"),
             "law_text": "emit",
             "export": "law_file",

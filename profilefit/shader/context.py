@@ -86,10 +86,12 @@ def _missing(message: str) -> str:
 
 
 def _located(name: str, source: str, message: str) -> str:
-    told = [line.strip() for line in message.splitlines() if PLACE.search(line)] or [message.strip().splitlines()[-1]]
-    number = PLACE.search(told[0])
+    located = [line.strip() for line in message.splitlines() if PLACE.search(line)] or [
+        message.strip().splitlines()[-1]
+    ]
+    number = PLACE.search(located[0])
     lines = source.splitlines()
     if number is None or not 0 < int(number.group(1)) <= len(lines):
-        return f"shader {name!r} does not compile: {told[0]}"
+        return f"shader {name!r} does not compile: {located[0]}"
     line = int(number.group(1))
-    return f"shader {name!r} does not compile, line {line}, `{lines[line - 1].strip()}`: {told[0]}"
+    return f"shader {name!r} does not compile, line {line}, `{lines[line - 1].strip()}`: {located[0]}"

@@ -133,7 +133,7 @@ def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None)
     if printed := _printed(named):
         lines.append(f"constants as printed: {printed.source}")
     for source in sources:
-        lines += _told_of(source, f"{source.of}: ")
+        lines += _provenance(source, f"{source.of}: ")
     return lines
 
 
@@ -143,7 +143,7 @@ def _setting_lines(setting: Setting) -> list[str]:
     return [light, surface, *CONVENTIONS.splitlines()]
 
 
-def _told_of(source: _Source, before: str) -> list[str]:
+def _provenance(source: _Source, before: str) -> list[str]:
     """A record: its title, equations, range, error and digests, each line after whose it is."""
     content = source.content
     lines = [f"record {source.path.stem}: {content['title']}", content["equations"]]

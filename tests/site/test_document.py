@@ -12,7 +12,7 @@ from profilefit.errors import InputError, OutputError, RecordError
 from profilefit.recipes import catalogue, evidence
 from profilefit.report.page.document import PARTS, write_page
 from profilefit.report.page.fits import record_part
-from profilefit.report.page.measured import Measured
+from profilefit.report.page.measured import EvidenceFolder
 from profilefit.report.page.sections import failures, shader, speed
 from profilefit.report.records import Source
 
@@ -165,18 +165,18 @@ def test_it_says_what_was_measured_where_and_what_is_missing(page, records, meas
         assert told in text
     assert "Not measured here" not in text
     assert "run it again" not in text
-    bare = "\n".join(text for part in SECTIONS for text in part(Measured(tmp_path, records)))
+    bare = "\n".join(text for part in SECTIONS for text in part(EvidenceFolder(tmp_path, records)))
     assert [f"profilefit {name} --out evidence" in bare for name in MEASURED] == [True] * 3
     # Measured with the constants of other records, and told so.
     other = tmp_path / "other"
     shutil.copytree(records, other)
     (other / "albedo-liang.json").unlink()
-    old = "\n".join(text for part in SECTIONS for text in part(Measured(measured, other)))
+    old = "\n".join(text for part in SECTIONS for text in part(EvidenceFolder(measured, other)))
     assert old.count("run it again") == 3
 
 
 def test_what_the_commands_wrote_last_can_be_read():
-    found = Measured(SHIPPED / "evidence", SHIPPED)
+    found = EvidenceFolder(SHIPPED / "evidence", SHIPPED)
     told = ["\n".join(part(found)) for part in SECTIONS]
     assert not any("Not measured here" in text for text in told)
     assert [name in text for name, text in zip(("misprint of b0", "quantile", "hazard"), told, strict=True)] == [

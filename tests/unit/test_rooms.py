@@ -173,13 +173,28 @@ def test_a_file_is_one_noun():
     assert wrong == set(EXCEPTIONS)
 
 
+def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:
+    """Class name -> the modules that define one."""
+    found: dict[str, list[str]] = {}
+    for package in packages:
+        for module, path in modules(root, package).items():
+            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+                if isinstance(node, ast.ClassDef):
+                    found.setdefault(node.name, []).append(module)
+    return found
+
+
+def test_no_two_classes_have_one_name():
+    assert {name: homes for name, homes in class_homes(ROOT, list(PACKAGES)).items() if len(homes) > 1} == {}
+
+
 def test_checks_see_what_they_look_for(tmp_path):
     """Negative control: one small package that breaks every rule."""
     package = tmp_path / "bad"
     (package / "sub").mkdir(parents=True)
     (package / "__init__.py").write_text("from .first import f\n")
-    (package / "first.py").write_text("from bad import second\n")
-    (package / "second.py").write_text("from .first import f\n")
+    (package / "first.py").write_text("from bad import second\nclass Grid: ...\n")
+    (package / "second.py").write_text("from .first import f\nclass Grid: ...\n")
     (package / "sub" / "__init__.py").write_text("from ..second import g\n")
     (package / "sub" / "leaf.py").write_text("def f():\n    import json\n")
 
@@ -196,6 +211,7 @@ def test_checks_see_what_they_look_for(tmp_path):
         "bad.first imports bad.second",
         "bad.sub imports bad.second",
     ]
+    assert class_homes(tmp_path, ["bad"]) == {"Grid": ["bad.first", "bad.second"]}
     assert inner_imports(package / "sub" / "leaf.py") == [f"{package / 'sub' / 'leaf.py'}:2"]
 
 

@@ -76,7 +76,7 @@ def _label(named: Named) -> str:
 
 
 @dataclass(frozen=True)
-class Grid:
+class TableGrid:
     """rows of albedos, columns of radii; low, high the first and last x [mfp]."""
 
     rows: int = 65
@@ -84,17 +84,13 @@ class Grid:
     low: float = 1e-4
     high: float = 1e4
 
-    def told(self) -> dict[str, float]:
-        """For JSON."""
-        return asdict(self)
 
-
-GRID = Grid()
+GRID = TableGrid()
 LIGHTS = ("searchlight", "diffuse")
 
 
 @lru_cache(maxsize=len(LIGHTS))
-def baked(illumination: str, grid: Grid = GRID) -> str:
+def baked(illumination: str, grid: TableGrid = GRID) -> str:
     """A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64. Takes a second."""
     setting = Setting(illumination)
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, grid.rows) ** 3) ** 2
@@ -151,15 +147,15 @@ def _slider(name: str, channel: str, low: float, high: float, step: float) -> st
 def _data(folder: Folder) -> str:
     """All that the script reads, as JSON that cannot end the element it stands in."""
     laws = offered(folder)
-    told = {
-        "grid": GRID.told(),
+    content = {
+        "grid": asdict(GRID),
         "tables": {light: baked(light) for light in LIGHTS},
         "laws": [asdict(law) for law in laws],
         "materials": [{"name": one.name, "alpha": one.alpha, "mfp": one.mfp} for one in MATERIALS],
         "start": first(laws),
         "shaders": _shaders(),
     }
-    return json.dumps(told, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
+    return json.dumps(content, ensure_ascii=False, allow_nan=False).replace("<", "\\u003c")
 
 
 def _shaders() -> dict[str, str]:

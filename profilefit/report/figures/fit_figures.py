@@ -33,9 +33,9 @@ LABEL_DISTANCE = 0.3  # of an axis name, in panels
 
 
 @styled
-def residual_figure(answer: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
+def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
     """Light per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
-    found, data = answer.found, answer.found.data
+    found, data = result.found, result.found.data
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     unit = data.unit or "unit of r"
@@ -55,7 +55,7 @@ def residual_figure(answer: Answer, out: Path, name: str = "fit-residuals") -> l
     below.axhspan(-1, 1, color=GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
     below.axhline(0.0, color=BLUE, linewidth=1.0)
     below.plot(r, residual, color=BLACK, marker="o", markersize=3.0, linewidth=0.6)
-    if found.rel is not None and answer.telling is not None:
+    if found.rel is not None and result.identifiability is not None:
         band = found.law_size / found.sigma
         below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="the law's own error")
         below.plot(r, -band, color=VERMILION, linestyle="--", linewidth=0.9)
@@ -66,12 +66,12 @@ def residual_figure(answer: Answer, out: Path, name: str = "fit-residuals") -> l
 
 
 @styled
-def posterior_figure(answer: Answer, out: Path, name: str = "fit-corner") -> list[Path]:
+def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> list[Path]:
     """The posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
-    names = shown(answer)
+    names = shown(result)
     if not names:
         return []
-    samples = np.column_stack([answer.draws[one] for one in names])
+    samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)
     figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
     corner.corner(
@@ -83,9 +83,9 @@ def posterior_figure(answer: Answer, out: Path, name: str = "fit-corner") -> lis
     for row in range(size):
         for column in range(row + 1):
             _dressed(grid[row, column], row, column)
-            _marked(grid[row, column], [answer.value(names[at]) for at in (column, row)], row != column)
+            _marked(grid[row, column], [result.value(names[at]) for at in (column, row)], row != column)
     for at, one in enumerate(names):
-        unit = unit_of(one, answer.found.data.unit)
+        unit = unit_of(one, result.found.data.unit)
         label = f"{_symbol(one)} [{unit or '-'}]"
         grid[size - 1, at].set_xlabel(label)
         grid[size - 1, at].xaxis.set_label_coords(0.5, -LABEL_DISTANCE)
@@ -97,14 +97,14 @@ def posterior_figure(answer: Answer, out: Path, name: str = "fit-corner") -> lis
     return save(figure, out, name)
 
 
-def shown(answer: Answer) -> tuple[str, ...]:
+def shown(result: Answer) -> tuple[str, ...]:
     """The quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
-    if answer.walk is None:
+    if result.walk is None:
         return ()
-    free = answer.found.question.free
+    free = result.found.question.free
     if len(free) == 1:
         return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
-    return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in answer.moving)
+    return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)
 
 
 def _marked(ax: Axes, best: list[float | None], is_pair: bool) -> None:

@@ -132,7 +132,7 @@ def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | No
     """Where a fitted law says that the truth is; None where it says nothing, as printed ones and old records don't."""
     if not isinstance(one, Fitted):
         return None
-    known = derived.Known.of_record(one.law, one.content, one.arrays)
+    known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)
     return None if known.off is None else derived.profile(known, r, alpha).interval()
 
 

@@ -15,7 +15,7 @@ from scipy import ndimage
 
 from profilefit.report.figures.canvas import BLACK, ORANGE, PURPLE, VERMILION, WIDTH, YELLOW, canvas, save, styled
 from profilefit.studies.stability.cells import Cells, Verdict
-from profilefit.studies.stability.layout import ARITHMETICS, LENGTHS, QUANTITIES, Axis
+from profilefit.studies.stability.layout import ARITHMETICS, LENGTHS, QUANTITIES, ArgumentAxis
 
 # Red classes differ in lightness and carry a sign, as does what is not judged; the others are pale.
 LOOKS: Mapping[Verdict, tuple[str, str]] = {
@@ -141,7 +141,7 @@ def _sign(ax: Axes, part: NDArray[np.bool_], sign: str) -> None:
         ax.text(float(x), float(y), sign, ha="center", va="center", fontsize=8.0)
 
 
-def _ticks(put: Any, axis: Axis) -> None:
+def _ticks(put: Any, axis: ArgumentAxis) -> None:
     places: dict[int, str] = {}
     for value in TICKS[axis.name]:
         index = axis.values.size - 1 if np.isinf(value) else axis.nearest(value)

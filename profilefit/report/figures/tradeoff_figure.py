@@ -35,7 +35,17 @@ from profilefit.report.figures.canvas import (
     save,
     styled,
 )
-from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Measured, Panel, Part, Point, front, standings
+from profilefit.studies.tradeoff.points import (
+    BEATEN,
+    FRONT,
+    TIED,
+    Panel,
+    Point,
+    TradeoffPart,
+    WithSpread,
+    front,
+    standings,
+)
 
 STEP = 4.5  # from a point to the nearest place of its label [pt]
 # Where a label may stand about its point, in such steps, the nearest places first.
@@ -147,7 +157,7 @@ MEANINGS = {
 
 
 @styled
-def tradeoff_figure(part: Part, caption: str, out: Path) -> list[Path]:
+def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     """Draw a part's panels below each other; `caption` says which machine."""
     rows = len(part.panels)
     figure = canvas(HEIGHT * rows + FEET)
@@ -191,7 +201,7 @@ def _mark(axes: Axes, point: Point, standing: str, colour: str) -> None:
         axes.plot(x.value, point.worst.value, "_", color=colour, ms=6.0, mew=0.9, zorder=2)
 
 
-def _spread(measured: Measured) -> list[list[float]]:
+def _spread(measured: WithSpread) -> list[list[float]]:
     return [[measured.value - measured.low], [measured.high - measured.value]]
 
 
@@ -235,7 +245,7 @@ def _steps(axes: Axes, panel: Panel) -> Iterator[Bbox]:
         yield box_of(axes, [(next_x, y), (next_x, next_y)], 0.7)
 
 
-def _feet(figure: Figure, part: Part, caption: str) -> None:
+def _feet(figure: Figure, part: TradeoffPart, caption: str) -> None:
     """What the marks mean, and on which machine."""
     used = {standing for panel in part.panels for standing in standings(panel.points)}
     joined = any(panel.joined for panel in part.panels)

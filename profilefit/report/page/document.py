@@ -16,7 +16,7 @@ from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
-from profilefit.report.page.measured import Measured
+from profilefit.report.page.measured import EvidenceFolder
 from profilefit.report.page.sections import failures, shader, speed
 from profilefit.report.records import Source
 
@@ -89,7 +89,7 @@ def write_page(
     """
     require_writable(path)
     source = Source(folder, tuple(names) if names else None)
-    found = Measured(evidence, folder)
+    found = EvidenceFolder(evidence, folder)
     for file in source.paths.values():  # what is damaged is better said now than after a minute
         record.read(file, whole=True)
     measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}

@@ -19,7 +19,7 @@ MOST_DRAWING = 2**24  # bytes; the largest of ours has a fourteenth of it
 
 
 @dataclass(frozen=True)
-class Measured:
+class EvidenceFolder:
     """A folder that `profilefit check`, `stability` and `tradeoff` wrote into with `--out`.
 
     records  the folder whose records the page shows
@@ -28,7 +28,7 @@ class Measured:
     folder: Path
     records: Path
 
-    def section(self, name: str, parts: Callable[[Measured], Iterator[str]]) -> str:
+    def section(self, name: str, parts: Callable[[EvidenceFolder], Iterator[str]]) -> str:
         """The parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
         try:
             return "\n".join(parts(self))

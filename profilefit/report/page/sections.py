@@ -8,7 +8,7 @@ from html import escape
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.page.markup import details, element, markup, paragraph
-from profilefit.report.page.measured import Measured, Told, missing
+from profilefit.report.page.measured import EvidenceFolder, Told, missing
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.studies.stability.cells import Verdict
 
@@ -30,7 +30,7 @@ MEANING = (
 COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
 
 
-def shader(found: Measured) -> Iterator[str]:
+def shader(found: EvidenceFolder) -> Iterator[str]:
     """The parts of the section."""
     told = found.told("check")
     yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
@@ -101,7 +101,7 @@ CHARTS = {
 }
 
 
-def speed(found: Measured) -> Iterator[str]:
+def speed(found: EvidenceFolder) -> Iterator[str]:
     """The parts of the section."""
     told = found.told("tradeoff")
     if told is None:
@@ -151,7 +151,7 @@ ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
-def failures(found: Measured) -> Iterator[str]:
+def failures(found: EvidenceFolder) -> Iterator[str]:
     """The parts of the section."""
     told = found.told("stability")
     if told is None:

@@ -15,10 +15,10 @@ from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.shader.check import half
 from profilefit.shader.check.chosen import REGENERATED, checked, chosen
-from profilefit.shader.check.cost import WORKS, Cost
 from profilefit.shader.check.half import HalfCheck
-from profilefit.shader.check.laws import JUDGED, OWN, LawCheck
-from profilefit.shader.check.maps import MapCheck
+from profilefit.shader.check.law_check import JUDGED, OWN, LawCheck
+from profilefit.shader.check.law_cost import WORKS, Cost
+from profilefit.shader.check.map_check import MapCheck
 
 PASS, FAIL = "pass", "FAIL"
 LAW_COLUMNS = ("rel\nmodel", "rel\nfloat32", "ks\nmodel", "ks\nfloat32", "sample\nfloat32", "pdf\n99 %")
@@ -148,18 +148,18 @@ def content(
 ) -> dict[str, Any]:
     """All of it as plain numbers and text, for --json; what is not finite is null."""
     checks: list[LawCheck | MapCheck] = [*laws, *maps]
-    told = {
+    whole = {
         "device": device,
         "passed": not any(one.broken for one in checks),
-        "laws": [{**_told(one), "spreads": one.spreads} for one in laws],
-        "maps": [_told(one) for one in maps],
+        "laws": [{**_check_content(one), "spreads": one.spreads} for one in laws],
+        "maps": [_check_content(one) for one in maps],
         "costs": dict(costs),
         "float16": {one.of.label: {"rel": one.rel, "ks": one.ks} for one in halves},
     }
-    return dict(plain(told))
+    return dict(plain(whole))
 
 
-def _told(one: LawCheck | MapCheck) -> dict[str, Any]:
+def _check_content(one: LawCheck | MapCheck) -> dict[str, Any]:
     return {
         "name": one.of.name,
         "constants": one.of.constants,

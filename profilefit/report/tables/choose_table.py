@@ -15,7 +15,7 @@ from profilefit.studies.choose.cost import Ratios
 from profilefit.studies.choose.error import CHANNELS, Error
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.predicted import passes
-from profilefit.studies.choose.response import truth
+from profilefit.studies.choose.response import reference_light
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {
@@ -65,15 +65,15 @@ def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) 
 def headline(choice: Choice) -> str:
     """The answer in a line."""
     scene, one = choice.scene, choice.nearest
-    asked = f"{_percent(scene.tolerance)} %"
+    request = f"{_percent(scene.tolerance)} %"
     if scene.budget.ms is not None:
-        asked += f" within {scene.budget.ms:g} ms"
+        request += f" within {scene.budget.ms:g} ms"
     if choice.chosen:
-        return f"The least that serves: {one.option.label} (asked: {asked})"
+        return f"The least that serves: {one.option.label} (asked: {request})"
     if choice.meets_tolerance:
-        return f"Nothing serves for {asked}: the cheapest within the tolerance is {one.option.label}"
+        return f"Nothing serves for {request}: the cheapest within the tolerance is {one.option.label}"
     where = " in the budget" if choice.meets_budget and scene.budget.ms is not None else ""
-    return f"Nothing serves for {asked}: the most accurate{where} is {one.option.label}"
+    return f"Nothing serves for {request}: the most accurate{where} is {one.option.label}"
 
 
 def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> dict[str, Any]:
@@ -128,7 +128,7 @@ def _filters(choice: Choice) -> list[dict[str, Any]]:
     option, scene = choice.nearest.option, choice.scene
     if not is_filter(option):
         return []
-    found = passes(option, middle(scene), truth(scene.setting))
+    found = passes(option, middle(scene), reference_light(scene.setting))
     return [
         {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
         for share, kernel, stretches in found
@@ -161,12 +161,12 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
         f"error: root mean square of radiance within {scene.within.mfp:g} mean free paths (at least "
         f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "
         "share of white; then its parts, which add in squares.",
-        f"ms: an estimate of a frame on a {budget.gpu} at {100 * budget.coverage:.0f} % coverage: Table 2 of Liang et "
-        f"al. times ratios measured on {ratios.device.partition(' (')[0]}; its range by what is not known of the GPU"
+        f"ms: an estimate of a frame on a {budget.gpu} at {100 * budget.screen_share:.0f} % coverage: Table 2 of Liang "
+        f"et al. times ratios measured on {ratios.device.partition(' (')[0]}; its range by what is not known of the GPU"
         + ("." if budget.ms is None else "; likely: the estimate is within the budget, the end of the range is not."),
         f"light: {setting.illumination}, n = {setting.n:g}.",
     ]
-    if (floor := truth(setting).floor) > 0:
+    if (floor := reference_light(setting).floor) > 0:
         lines.append(f"law: with what that for n = {setting.n:g} may be off from photons, {_percent(floor)} % of A.")
     return "\n".join([*lines, export_hint(choice)])
 
@@ -182,15 +182,15 @@ def _layer(layer: OneLayer, choice: Choice) -> str:
     verdict = _verdict(layer, choice)
     unit = choice.scene.unit
     together = math.hypot(layer.error, choice.nearest.error.total)
-    told = (
+    text = (
         f"Layers, of one colour: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
         f"mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a searchlight) is off by "
         f"{_percent(layer.error)} ± {_percent(layer.standard_error)} %; with the choice {_percent(together)} %."
     )
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
-        told += f" The choice is for n = {index:g}, as material.index says, and these layers are not."
-    return told
+        text += f" The choice is for n = {index:g}, as material.index says, and these layers are not."
+    return text
 
 
 def _places(shares: list[float]) -> int:

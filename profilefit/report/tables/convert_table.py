@@ -19,7 +19,7 @@ NONE = "none"
 
 
 @dataclass(frozen=True)
-class Row:
+class ConventionRow:
     """One convention: its name, what the table says of it, and a value a channel."""
 
     name: str
@@ -30,17 +30,19 @@ class Row:
     values: Floats
 
 
-def _rows(medium: Optical) -> list[Row]:
+def _rows(medium: Optical) -> list[ConventionRow]:
     colour = [
-        Row(f"reflectance_{light}", "reflectance A", light, 0, "exact, index-matched", medium.reflectance(light))
+        ConventionRow(
+            f"reflectance_{light}", "reflectance A", light, 0, "exact, index-matched", medium.reflectance(light)
+        )
         for light in ILLUMINATIONS
     ]
     return [
-        Row("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
+        ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
         *colour,
-        Row("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
-        Row("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
-        *(Row(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
+        ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
+        ConventionRow("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
+        *(ConventionRow(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
     ]
 
 

@@ -45,7 +45,7 @@ def _readings(equation: str, readings: list[Content]) -> RenderableType:
         "verdict": [str(reading.get("verdict", ABSENT)) for reading in best],
         "curve": [_share(reading.get("curve_distance")) for reading in best],
         "constants": [_share(reading.get("constant_distance")) for reading in best],
-        "reading, its constants, its evidence": [_told(reading) for reading in best],
+        "reading, its constants, its evidence": [_summary(reading) for reading in best],
     }
     more = len(readings) - len(best)
     caption = f"and {more} more in the record, further from print" if more else ""
@@ -53,7 +53,7 @@ def _readings(equation: str, readings: list[Content]) -> RenderableType:
     return column_table(title, columns, caption, left=("verdict",), fold=("reading, its constants, its evidence",))
 
 
-def _told(reading: Content) -> str:
+def _summary(reading: Content) -> str:
     constants = reading.get("constants") or {}
     printed = reading.get("published") or {}
     pairs = ", ".join(

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
-from profilefit.measured.optimal_design import CALIBRATED, REPEATS, Candidate
+from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
 from profilefit.measured.result import Answer, known_medium
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
 
@@ -22,45 +22,45 @@ TINIEST = 1e-16  # chance that is worth printing
 CAPTION = "± data: the data's own errors; ± law: the law's distance from the truth, taken for waves along ln r"
 
 
-def fit_tables(answer: Answer, title: str) -> list[RenderableType]:
+def fit_tables(result: Answer, title: str) -> list[RenderableType]:
     """What was found, how well it is told apart, and what would tell more."""
-    parts: list[RenderableType] = [_quantity_table(answer, title)]
-    if answer.telling is not None:
-        if len(answer.told) > 1:
-            parts.append(_correlation_table(answer))
-        parts.append(_advice_table(answer))
+    parts: list[RenderableType] = [_quantity_table(result, title)]
+    if result.identifiability is not None:
+        if len(result.identified) > 1:
+            parts.append(_correlation_table(result))
+        parts.append(_advice_table(result))
     return parts
 
 
-def fit_lines(answer: Answer) -> list[Text]:
+def fit_lines(result: Answer) -> list[Text]:
     """A sentence each on goodness, misfit, what the data cannot tell, and what was done to them."""
-    return [Text(line) for line in _lines(answer)]
+    return [Text(line) for line in _lines(result)]
 
 
-def _quantity_table(answer: Answer, title: str) -> RenderableType:
-    found, names = answer.found, QUANTITIES
-    data = found.errors(found.statistical) if answer.told else {}
-    law = found.errors(found.of_law) if found.rel is not None and answer.told else {}
-    moving = answer.told
+def _quantity_table(result: Answer, title: str) -> RenderableType:
+    found, names = result.found, QUANTITIES
+    data = found.errors(found.statistical) if result.identified else {}
+    law = found.errors(found.of_law) if found.rel is not None and result.identified else {}
+    moving = result.identified
     truth = known_medium(found.data)
     columns = {
         "": list(names),
-        "value": on_the_point([to_error(answer.value(name), data[name] if name in moving else None) for name in names]),
-        "± data": [significant(data[name]) if name in moving else _mark(answer, name) for name in names],
+        "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
+        "± data": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
         "± law": [significant(law[name]) if name in law and name in moving else ABSENT for name in names],
     }
     caption = CAPTION
-    if answer.telling is not None and found.misfit.detected:
+    if result.identifiability is not None and found.misfit.detected:
         misfit = found.errors(found.of_misfit) if moving else {}
         columns["± misfit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± misfit: what is left unexplained, taken likewise"
-    whole = bool(answer.whole_draws)
+    whole = bool(result.whole_draws)
     columns["95 %"] = [
-        interval(answer.whole_interval(name) if whole else answer.interval(name), 1.0 if name in SHARES else None)
+        interval(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
         for name in names
     ]
     caption += "; 95 %: " + ("all of these errors together" if whole else "the data's errors alone")
-    if any(any(answer.ends(name)) for name in answer.moving):
+    if any(any(result.ends(name)) for name in result.moving):
         caption += f"; {EDGE}: the data do not exclude that it ends there, so a limit at 95 % and no value"
     columns["unit"] = [unit_of(name, found.data.unit) for name in names]
     if truth:
@@ -69,33 +69,33 @@ def _quantity_table(answer: Answer, title: str) -> RenderableType:
     return column_table(title, columns, caption, left=("", "unit"))
 
 
-def _mark(answer: Answer, name: str) -> str:
+def _mark(result: Answer, name: str) -> str:
     """What stands where a quantity has no symmetric error."""
-    if name not in answer.moving:
+    if name not in result.moving:
         return HELD
-    return EDGE if any(answer.ends(name)) else ABSENT
+    return EDGE if any(result.ends(name)) else ABSENT
 
 
-def _correlation_table(answer: Answer) -> RenderableType:
-    names = answer.told
-    joint = correlation(answer.found.gradients, answer.found.statistical, names)
+def _correlation_table(result: Answer) -> RenderableType:
+    names = result.identified
+    joint = correlation(result.found.gradients, result.found.statistical, names)
     columns = {"": list(names)}
     for at, name in enumerate(names):
         columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
     return column_table("Correlations", {k: v for k, v in columns.items() if k != names[-1]})
 
 
-def _advice_table(answer: Answer) -> RenderableType:
-    advice = answer.advice
+def _advice_table(result: Answer) -> RenderableType:
+    advice = result.advice
     if advice is None:
         return Text("")
-    unit = answer.found.data.unit or "units of r"
+    unit = result.found.data.unit or "units of r"
     columns = {
         "one more measurement": ["none: as it is", *(described(one, unit) for one in advice.candidates)],
         "worst known": [advice.name, *(one.worst[0] for one in advice.candidates)],
         "± data, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
     }
-    place = "from the far end of what alpha may be" if answer.found.minimum.at_edge else "from the fit's own place"
+    place = "from the far end of what alpha may be" if result.found.minimum.at_edge else "from the fit's own place"
     caption = f"predicted {place}, best first; a point has the median relative error of the data"
     return column_table("What would tell more", columns, caption, left=("one more measurement", "worst known"))
 
@@ -108,27 +108,27 @@ def described(one: Candidate, unit: str) -> str:
             where = f"on a ring from {one.inner:.3g} to {one.outer:.3g} {unit}"
         return f"a value {where}, to {100 * one.error / one.value:.2g} %"
     if one.kind == "reflectance":
-        return f"the total reflectance A, to {100 * CALIBRATED:g} %"
+        return f"the total reflectance A, to {100 * REFERENCE_ERROR:g} %"
     if one.kind == "scale":
-        return f"the scale, by a reference standard, to {100 * CALIBRATED:g} %"
+        return f"the scale, by a reference standard, to {100 * REFERENCE_ERROR:g} %"
     return f"all of it {REPEATS} times"
 
 
-def _lines(answer: Answer) -> Iterator[str]:
-    found = answer.found
+def _lines(result: Answer) -> Iterator[str]:
+    found = result.found
     for note in found.data.notes:
         yield f"data: {note}"
     yield f"errors of the data: {found.data.errors}"
-    if answer.telling is None:
+    if result.identifiability is None:
         yield f"the fit failed: {found.minimum.result}"
         return
     if found.minimum.at_edge:
         yield f"AT AN EDGE: {found.minimum.result}"
     if np.isfinite(found.data.pooled):
-        yield from _estimated(answer)
-    yield from _goodness(answer)
-    yield from _telling(answer)
-    if (g := _forward(answer)) is not None:
+        yield from _estimated(result)
+    yield from _goodness(result)
+    yield from _identifiability(result)
+    if (g := _forward(result)) is not None:
         yield (
             f"the medium scatters with g = {g:g}, the law isotropically: nearer than ten mean free paths this is "
             "off by tens of percent, and seen as a misfit only where rows lie within one"
@@ -138,13 +138,13 @@ def _lines(answer: Answer) -> Iterator[str]:
     elif beyond := int(found.beyond.sum()):
         rows = f"{beyond} row{'s lie' if beyond > 1 else ' lies'}"
         yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
-    if answer.walk is not None and answer.walk.result != "converged":
-        yield f"posterior: {answer.walk.result}"
+    if result.walk is not None and result.walk.result != "converged":
+        yield f"posterior: {result.walk.result}"
 
 
-def _estimated(answer: Answer) -> Iterator[str]:
+def _estimated(result: Answer) -> Iterator[str]:
     """What was done about errors that are estimates."""
-    found = answer.found
+    found = result.found
     yield (
         f"these are estimates, each of {np.median(found.data.freedom):.2g} degrees of freedom, their trend of "
         f"{found.data.pooled:.2g}: so ± data is {np.sqrt(found.widening):.2f} times what they make, 95 % is "
@@ -152,9 +152,9 @@ def _estimated(answer: Answer) -> Iterator[str]:
     )
 
 
-def _forward(answer: Answer) -> float | None:
+def _forward(result: Answer) -> float | None:
     """g of the first layer of a simulation whose scattering the law takes for isotropic."""
-    medium = answer.found.data.medium
+    medium = result.found.data.medium
     return None if medium is None or medium.layers[0].g == 0 else medium.layers[0].g
 
 
@@ -162,9 +162,9 @@ def _chance(value: float) -> str:
     return f"below {TINIEST:g}" if value < TINIEST else f"{value:.2g}"
 
 
-def _goodness(answer: Answer) -> Iterator[str]:
-    one = answer.found.misfit
-    at_most = " (at most: the errors are bounds)" if answer.found.data.bounded else ""
+def _goodness(result: Answer) -> Iterator[str]:
+    one = result.found.misfit
+    at_most = " (at most: the errors are bounds)" if result.found.data.bounded else ""
     yield (
         f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, chance {_chance(one.chance)}; "
         f"neighbours correlate {one.along_r:+.2f}, {one.runs[0]} runs (noise: {one.runs[1]:.0f})"
@@ -176,27 +176,27 @@ def _goodness(answer: Answer) -> Iterator[str]:
         )
     elif one.within_law:
         yield "the misfit is within the law's own error: a better law, not another medium, is what is missing"
-    elif not answer.found.data.bounded and 1.0 - one.chance < DETECTED:
+    elif not result.found.data.bounded and 1.0 - one.chance < DETECTED:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
         yield "no misfit is seen: one layer explains the data"
 
 
-def _telling(answer: Answer) -> Iterator[str]:
-    telling, advice, unit = answer.telling, answer.advice, answer.found.data.unit
-    if telling is None or advice is None:
+def _identifiability(result: Answer) -> Iterator[str]:
+    identifiability, advice, unit = result.identifiability, result.advice, result.found.data.unit
+    if identifiability is None or advice is None:
         return
-    if telling.told:
+    if identifiability.all_identified:
         return
-    if telling.trades and telling.pair is not None:
-        first, second = telling.pair
-        yield f"THE DATA CANNOT TELL {first} FROM {second} (correlation {telling.correlation:+.4f}):"
+    if identifiability.trades and identifiability.pair is not None:
+        first, second = identifiability.pair
+        yield f"THE DATA CANNOT TELL {first} FROM {second} (correlation {identifiability.correlation:+.4f}):"
     else:
         yield "THE DATA DO NOT TELL ALL:"
-    for one in telling.intervals:
+    for one in identifiability.intervals:
         low = "anything less" if one.open_low else f"{one.low:.3g}"
         high = "anything more" if one.open_high else f"{one.high:.3g}"
         yield f"  {one.name} from {low} to {high} {unit_of(one.name, unit)}".rstrip() + " fits as well, at 95 %"
-    for name, error in (telling.loose if answer.told else {}).items():  # at an edge, derivatives are no errors
+    for name, error in (identifiability.loose if result.identified else {}).items():  # no errors at an edge
         yield f"  {name} is known to {100 * min(error, 99.0):.0f} %" + (" or worse" if error > 99 else "")
     yield f"  what would tell: {described(advice.candidates[0], unit or 'units of r')}"

@@ -87,7 +87,7 @@ def index_text(pages: Sequence[Page], folder: Folder) -> str:
     contents = _contents(folder)
     header = ("law", "constants", "light", "n", "number", *(f"{MEASURES[key].symbol} worst" for key in WORST))
     rows = [_row(page, one, contents) for page in pages for one in page.members]
-    told = (
+    caption = (
         "Every law and map between alpha and A, with every set of constants that comes with this version. The errors "
         "are those at the worst albedo that was not fitted, as the records state them: `rel` the mean relative error "
         "of R_d, `ks` the largest error of the cumulated energy, `xi` that of the inversion, `A` that of the "
@@ -95,7 +95,7 @@ def index_text(pages: Sequence[Page], folder: Folder) -> str:
         "[The laws](../guide/laws.md) measures also those that have no record."
     )
     tree = "```{toctree}\n:hidden:\n\n" + "\n".join(page.name for page in pages) + "\n```"
-    return "\n\n".join(["# All laws", told, markdown_table(header, rows), tree]) + "\n"
+    return "\n\n".join(["# All laws", caption, markdown_table(header, rows), tree]) + "\n"
 
 
 def _contents(folder: Folder) -> Mapping[str, Content]:
@@ -211,8 +211,8 @@ def _printed(one: Named, folder: Folder) -> str:
     table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in found.constants.items()])
     contents = _contents(folder)
     measured = next(_measured_sets(one, contents), None)
-    told = [f"Source: {found.source}.", table]
-    return "\n\n".join(told if measured is None else [*told, _quality(measured[0], measured[1])])
+    parts = [f"Source: {found.source}.", table]
+    return "\n\n".join(parts if measured is None else [*parts, _quality(measured[0], measured[1])])
 
 
 def _recorded(name: str, folder: Folder) -> str:
@@ -235,17 +235,17 @@ def _fitted(content: Content) -> str:
     light = "the exact half space" if truth["kind"] == "exact" else f"{truth['photons']:,} photons"
     objective = content["protocol"]["weighting"]["objective"]
     span = f"alpha from {albedos['low']:g} to {albedos['high']:g}, {albedos['count']} even in `{albedos['spacing']}`"
-    told = f"Fitted to {light}: {span}; objective `{objective}`; the fit {content['fit']['result']}."
-    return f"{told} {content.get('note', '')}".strip()
+    summary = f"Fitted to {light}: {span}; objective `{objective}`; the fit {content['fit']['result']}."
+    return f"{summary} {content.get('note', '')}".strip()
 
 
 def _constants(content: Content) -> str:
     if not converged(content):
         return f"No constants: {content['fit']['result']}."
-    told = known_errors(content["constants"])
+    errors = known_errors(content["constants"])
     has_printed = any(value.get("published") is not None for value in content["constants"].values())
-    header = ["constant", "regenerated", *(f"± {word}" for word in told.values())]
-    rows = [[name, *_with_errors(value, list(told))] for name, value in content["constants"].items()]
+    header = ["constant", "regenerated", *(f"± {word}" for word in errors.values())]
+    rows = [[name, *_with_errors(value, list(errors))] for name, value in content["constants"].items()]
     if has_printed:
         header[1:1], header[len(header) :] = ["published"], ["z"]
         for row in rows:

@@ -92,7 +92,7 @@ NOTHING = "None of these records holds a law that can be measured against the ex
 
 
 @dataclass(frozen=True)
-class Measured:
+class Qualities:
     """What was measured of the laws of a folder, in the order in which it is shown."""
 
     profiles: list[tuple[Named, Quality]]
@@ -106,7 +106,7 @@ def measured(
     alpha: Floats = ALBEDOS,
     sampled_alpha: Sequence[float] | None = None,
     track: Track = untracked,
-) -> Measured:
+) -> Qualities:
     """Measure profiles by setting, then maps, then samplers.
 
     names    restricts all to laws of the records named; alpha, sampled_alpha where profiles and samplers are measured
@@ -118,14 +118,14 @@ def measured(
     qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
     of_maps = for_each(measured_map, maps, track, "maps")
     samplers = for_each(lambda one: measured_samplers(one, sampled_alpha), sampled, track, "samplers")
-    return Measured(
+    return Qualities(
         profiles=list(zip(profiles, qualities, strict=True)),
         maps=list(zip(maps, of_maps, strict=True)),
         samplers=list(chain.from_iterable(samplers)),
     )
 
 
-def every_law(found: Measured, in_detail: bool = False) -> Iterator[RenderableType]:
+def every_law(found: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
     """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
     for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
         by_label = {one.label: quality for one, quality in laws}
@@ -142,7 +142,7 @@ def every_law(found: Measured, in_detail: bool = False) -> Iterator[RenderableTy
         yield Text(NOTHING)
 
 
-def content(found: Measured) -> dict[str, Any]:
+def content(found: Qualities) -> dict[str, Any]:
     """The same for JSON: every measure at every albedo."""
     return {
         "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],

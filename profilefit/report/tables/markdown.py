@@ -29,8 +29,8 @@ SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regen
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
     """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
-    told = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
-    known = {key: word for key, word in ERRORS.items() if key in told}
+    present = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
+    known = {key: word for key, word in ERRORS.items() if key in present}
     header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
     rows: list[Sequence[str]] = []
     failures = []

@@ -74,12 +74,12 @@ def constants_table(content: Content) -> RenderableType:
             texts = [text if row.get("free", True) else "held" for text, row in zip(texts, rows, strict=True)]
         columns[f"±\n{word}"] = texts
     scores = [z_score(row) for row in rows]
-    told = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
+    meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
         columns["\nz"] = [_signed(score) for score in scores]
-        told.append(f"z: published less regenerated, over {TOTAL}, together")
+        meanings.append(f"z: published less regenerated, over {TOTAL}, together")
     title = "Constants, lengths in units of the mean free path"
-    caption = "; ".join(told)
+    caption = "; ".join(meanings)
     if not converged(content):
         caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
     return column_table(title, {"": list(constants), **columns}, caption)
@@ -137,10 +137,10 @@ def fit_facts(content: Content) -> RenderableType:
     if off := content.get("discrepancy"):
         lines += _discrepancy(off)
     if left := content.get("left_out"):
-        told = (
+        facts = (
             f"{left['rings']} rings and {left['albedos']} albedos left out: too few photons for an error of their own"
         )
-        lines.append(("data", told))
+        lines.append(("data", facts))
     return _facts("Fit", lines + _second_opinions(content))
 
 

@@ -12,9 +12,9 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from profilefit.report.tables.cells import ABSENT, column_table, significant
-from profilefit.studies.stability.atlas import Part
+from profilefit.studies.stability.atlas import Findings
 from profilefit.studies.stability.cells import Cells, Verdict, cell_count
-from profilefit.studies.stability.fits import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
+from profilefit.studies.stability.fit_cases import ALBEDO, BINS, NOISE, NONSENSE, STARTS, TRIMMING, FitCase
 from profilefit.studies.stability.regions import Region
 
 COLUMNS = (
@@ -54,7 +54,7 @@ SUMMARY = (
 )
 
 
-def cause_table(parts: Sequence[Part]) -> RenderableType:
+def cause_table(parts: Sequence[Findings]) -> RenderableType:
     """A line a cause: whom it hits, in which classes, and what helps, shortened."""
     groups: dict[str, list[Region]] = {}
     for region in _regions(parts):
@@ -72,7 +72,7 @@ def cause_table(parts: Sequence[Part]) -> RenderableType:
     return column_table("Why cells are red, and what helps", columns, caption, ("cause", "of", "as", "remedy"))
 
 
-def region_table(part: Part, most: int = 20) -> RenderableType:
+def region_table(part: Findings, most: int = 20) -> RenderableType:
     """The regions of one subject, those inside its range first."""
     regions = sorted(part.regions, key=lambda one: (one.inside == 0, -one.count))[:most]
     columns = {
@@ -96,7 +96,7 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
         columns["fit"].append(subject)
         for header, case, begins, is_share in SUMMARY:
             found = [o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins)]
-            columns[header].append(_told(found[0], is_share) if found else ABSENT)
+            columns[header].append(_cell(found[0], is_share) if found else ABSENT)
     refused = sum(one.case == NONSENSE and one.converged == 0 for one in fits)
     nonsense = sum(one.case == NONSENSE for one in fits)
     caption = (
@@ -107,7 +107,7 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
     return column_table("Fits", columns, caption, ("fit",))
 
 
-def _told(one: FitCase, is_share: bool) -> str:
+def _cell(one: FitCase, is_share: bool) -> str:
     return f"{100.0 * one.converged:.0f} %" if is_share else significant(one.spread) if one.worst else ABSENT
 
 
@@ -122,9 +122,9 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
             f"{100.0 * one.best:.0f} %" if one.case not in (BINS, NOISE, TRIMMING) else ABSENT for one in shown
         ],
         "spread": [f"{significant(one.spread)} {one.worst}" if one.worst else ABSENT for one in shown],
-        "else": [", ".join(f"{count} {told}" for told, count in one.results if told != "converged") for one in shown],
+        "else": [", ".join(f"{count} {kind}" for kind, count in one.results if kind != "converged") for one in shown],
     }
-    nonsense = sorted({told for one in fits if one.case == NONSENSE for told, _ in one.results})
+    nonsense = sorted({kind for one in fits if one.case == NONSENSE for kind, _ in one.results})
     caption = (
         "spread: of the constant that moves most, over its size. Nonsense (NaN, no light, one albedo): "
         + "; ".join(nonsense)
@@ -132,7 +132,7 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
     return column_table("Fits", columns, caption, ("fit",), ("case", "else"))
 
 
-def verdict_lines(parts: Sequence[Part]) -> list[Text]:
+def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
     """Each broken promise of our own laws and solvers, and how many hold; each region without a cause."""
     lines = []
     for part in parts:
@@ -150,22 +150,22 @@ def verdict_lines(parts: Sequence[Part]) -> list[Text]:
         ]
     ours = [part for part in parts if part.fits or any(one.own for one in part.cells)]
     broken = sum(part.failures > 0 for part in ours)
-    told = (
+    summary = (
         "none has a red cell inside its range" if not broken else f"{broken} of them with red cells inside their range"
     )
     aside, inside = _unjudged(parts)
     share = Text(f"of ours {aside} of {inside} cells inside their ranges are not judged: no truth there")
-    return [*lines, Text(f"ours: {len(ours)} laws, maps and functions, {told}"), *([share] if aside else [])]
+    return [*lines, Text(f"ours: {len(ours)} laws, maps and functions, {summary}"), *([share] if aside else [])]
 
 
-def _unjudged(parts: Sequence[Part]) -> tuple[int, int]:
+def _unjudged(parts: Sequence[Findings]) -> tuple[int, int]:
     """Of our own, cells that are not judged, and all, inside their ranges."""
     own = [one for part in parts for one in part.cells if one.own]
     aside = sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own)
     return aside, sum(int(np.sum(one.inside)) for one in own)
 
 
-def regions_csv(parts: Iterable[Part]) -> str:
+def regions_csv(parts: Iterable[Findings]) -> str:
     """Every region that is red or not judged, a line each."""
     rows = [
         (
@@ -182,14 +182,14 @@ def fits_csv(fits: Iterable[FitCase]) -> str:
     rows = [
         (
             one.subject, one.case, one.value, one.converged, one.best, one.spread, one.worst,
-            "; ".join(f"{count} {told}" for told, count in one.results),
+            "; ".join(f"{count} {kind}" for kind, count in one.results),
         )
         for one in fits
     ]  # fmt: skip
     return _csv(FIT_COLUMNS, rows)
 
 
-def content(parts: Sequence[Part]) -> dict[str, Any]:
+def content(parts: Sequence[Findings]) -> dict[str, Any]:
     """All of it for JSON."""
     return {
         "passed": not any(part.failures for part in parts),
@@ -207,7 +207,7 @@ def _counts(cells: Sequence[Cells]) -> Mapping[str, int]:
     return total
 
 
-def _regions(parts: Iterable[Part]) -> list[Region]:
+def _regions(parts: Iterable[Findings]) -> list[Region]:
     return [region for part in parts for region in part.regions]
 
 

@@ -32,20 +32,20 @@ from typing import Any
 from rich.console import RenderableType
 
 from profilefit.report.tables.cells import ABSENT, column_table, significant
-from profilefit.studies.tradeoff.points import BEATEN, Measured, Panel, Part, Point, standings
+from profilefit.studies.tradeoff.points import BEATEN, Panel, Point, TradeoffPart, WithSpread, standings
 
 DIGITS = 6  # of a number in the CSV: beyond what any repeat gives again
 MEASURES = ("cost", "error", "worst")
 ENDS = {"": "value", "_low": "low", "_high": "high"}
 
 
-def tradeoff_tables(part: Part) -> list[RenderableType]:
+def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
     """A table a panel; under the last one what was left out, and what is not in the times."""
     last = len(part.panels) - 1
     return [_table(part, panel, "\n".join(part.notes) if i == last else "") for i, panel in enumerate(part.panels)]
 
 
-def _table(part: Part, panel: Panel, notes: str) -> RenderableType:
+def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
     points = panel.points
     columns = {
         "": [f"{p.method}, {p.label}" if p.label else p.method for p in points],
@@ -63,7 +63,7 @@ def _table(part: Part, panel: Panel, notes: str) -> RenderableType:
     return column_table(title, columns, "\n".join(filter(None, (caption, notes))), left=("", "stands"))
 
 
-def _with_spread(measured: Measured) -> str:
+def _with_spread(measured: WithSpread) -> str:
     """1.23 (1.20 … 1.31), or the number alone where it has no spread."""
     value = significant(measured.value, 3)
     if measured.low == measured.high:
@@ -71,7 +71,7 @@ def _with_spread(measured: Measured) -> str:
     return f"{value} ({significant(measured.low)} … {significant(measured.high)})"
 
 
-def as_csv(part: Part, machine: Mapping[str, str]) -> str:
+def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
     """The part's file."""
     comments = [f"{part.name}: {part.title}", *(f"{name}: {value}" for name, value in machine.items())]
     comments += [f"panel {p.name}: {p.title}; cost: {p.cost}; error, worst: {p.error}" for p in part.panels]
@@ -86,7 +86,7 @@ def as_csv(part: Part, machine: Mapping[str, str]) -> str:
     return text.getvalue()
 
 
-def as_numbers(part: Part) -> dict[str, Any]:
+def as_numbers(part: TradeoffPart) -> dict[str, Any]:
     """The same for --json."""
     return {
         "title": part.title,
@@ -113,7 +113,7 @@ def _rows(panel: Panel) -> list[dict[str, str]]:
 def _row(point: Point, standing: str) -> dict[str, str]:
     row = {"panel": point.panel, "method": point.method, "label": point.label}
     for name in MEASURES:
-        measured: Measured | None = getattr(point, name)
+        measured: WithSpread | None = getattr(point, name)
         row |= {f"{name}{end}": "" if measured is None else _text(getattr(measured, at)) for end, at in ENDS.items()}
     return row | {"standing": standing} | {name: _text(value) for name, value in point.facts.items()}
 

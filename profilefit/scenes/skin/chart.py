@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.picture import Point
+from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import By, Stage
 from profilefit.scenes.stage.world import Rgb
 
@@ -42,7 +42,7 @@ class Judge:
 
 def points(
     judge: Judge, label: str, by: By, sampling: Sampling, samples: Sequence[int], turns: int = TURNS
-) -> list[Point]:
+) -> list[ChartPoint]:
     """Error and cost of a technique with each number of samples.
 
     Times are taken in turns, so that what else the machine does hits all of them.
@@ -51,6 +51,6 @@ def points(
     errors = [judge.rmse(judge.stage.scatter(by, judge.mfp, one)) for one in each]
     times = np.array([[judge.stage.time(by, judge.mfp, one, repeats=1)[0] for one in each] for _ in range(turns)])
     return [
-        Point(label, one.samples, error, tuple(taken))
+        ChartPoint(label, one.samples, error, tuple(taken))
         for one, error, taken in zip(each, errors, times.T.tolist(), strict=True)
     ]

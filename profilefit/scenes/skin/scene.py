@@ -79,7 +79,7 @@ EXPOSURE = 1.1  # of the pictures: few of their pixels are clipped by it
 
 
 @dataclass(frozen=True)
-class Asked:
+class SceneRequest:
     """What a file asks for. chart  other numbers of samples, whose error and cost are measured;  size  [pixels]"""
 
     file: str
@@ -94,7 +94,7 @@ class Asked:
     size: tuple[int, int]
 
 
-def read(file: str, content: Table) -> Asked:
+def read(file: str, content: Table) -> SceneRequest:
     """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
@@ -107,7 +107,7 @@ def read(file: str, content: Table) -> Asked:
     size = tables.sides("camera", "resolution", view, (160, 120), 1024)
     if size[0] * size[1] > MOST_PIXELS:
         raise tables.bad("camera", "resolution", f"{MOST_PIXELS} pixels at most, which the truth sums over", list(size))
-    return Asked(
+    return SceneRequest(
         file=file,
         label=label,
         technique=by,
@@ -121,22 +121,25 @@ def read(file: str, content: Table) -> Asked:
     )
 
 
-def draw(context: moderngl.Context, asked: Asked) -> Drawn:
+def draw(context: moderngl.Context, request: SceneRequest) -> Drawn:
     """The picture, its truth, error and cost: a minute for 26 000 pixels, which the truth takes."""
     scene = replace(
-        head_scene(asked.material, asked.camera), light=asked.light, ambient=asked.ambient, camera=asked.camera
+        head_scene(request.material, request.camera),
+        light=request.light,
+        ambient=request.ambient,
+        camera=request.camera,
     )
-    mfp, by, sampling = scene.material.mfp, asked.technique, asked.sampling
-    with Stage(context, (2 * asked.size[0], 2 * asked.size[1])) as stage:
+    mfp, by, sampling = scene.material.mfp, request.technique, request.sampling
+    with Stage(context, (2 * request.size[0], 2 * request.size[1])) as stage:
         stage.draw(scene)
         fine = stage.buffers()
-    with Stage(context, asked.size) as stage:
+    with Stage(context, request.size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()
-        _require_lit(asked.file, buffers)
+        _require_lit(request.file, buffers)
         judge = chart.Judge(stage, mfp, exitance_of(buffers, mfp), buffers.mask > INSIDE)
-        numbers = dict.fromkeys((sampling.samples, *asked.chart))
-        point, *others = chart.points(judge, asked.label, by, sampling, tuple(numbers))
+        numbers = dict.fromkeys((sampling.samples, *request.chart))
+        point, *others = chart.points(judge, request.label, by, sampling, tuple(numbers))
         exitance, radiance = stage.scatter(by, mfp, sampling), stage.render(by, mfp, sampling)
         frame = tuple(stage.time(by, mfp, sampling, chart.TURNS, "frame"))
     # What the surface mirrors and what shines through thin parts is the stage's own in both.

@@ -8,7 +8,7 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.stage.technique import Program
+from profilefit.scenes.stage.technique import ShaderProgram
 from profilefit.scenes.stage.world import Part, Scene, looking, orthographic, unit
 from profilefit.shader.context import check_errors
 from profilefit.shader.emit import text_beside
@@ -34,7 +34,7 @@ class Geometry:
     def __init__(self, context: moderngl.Context, shadow_side: int = SHADOW_SIDE):
         self.context = context
         self._shadow, self._surface = (
-            Program(context, name, *(text_beside(__name__, f"glsl/{name}.{stage}") for stage in ("frag", "vert")))
+            ShaderProgram(context, name, *(text_beside(__name__, f"glsl/{name}.{stage}") for stage in ("frag", "vert")))
             for name in ("shadow", "surface")
         )
         self._map = context.texture((shadow_side, shadow_side), 1, dtype="f4")
@@ -105,7 +105,7 @@ class Geometry:
 class _Drawn:
     """A part on the GPU, for as long as it is drawn."""
 
-    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program, surface: Program):
+    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program, surface: ShaderProgram):
         self.part, self._shader = part, surface
         self._vertices = context.buffer(part.mesh.vertices().tobytes())
         self._triangles = context.buffer(part.mesh.triangles.astype("i4").tobytes())

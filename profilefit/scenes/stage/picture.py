@@ -15,7 +15,7 @@ Bytes = NDArray[np.uint8]
 
 
 @dataclass(frozen=True)
-class Point:
+class ChartPoint:
     """Error and cost of a technique with so many samples (of the separable filter: taps).
 
     rmse          root mean square error of the scattered light, over the mean of the truth [-]
@@ -53,8 +53,8 @@ class Drawn:
     picture: Bytes
     truth: Bytes
     error: Floats
-    point: Point
-    chart: tuple[Point, ...]
+    point: ChartPoint
+    chart: tuple[ChartPoint, ...]
     frame: tuple[float, ...]
     truth_error: TruthError
 

@@ -128,7 +128,7 @@ NEAREST_XI = 1e-9
 
 
 @dataclass(frozen=True)
-class Gather:
+class EdgeGather:
     """How radii are drawn and what they weigh, for one albedo; lengths in mfp.
 
     sample  xi in [0, 1) -> x = r/l;  weight  x -> w of (22), up to a factor that cancels [-]
@@ -160,7 +160,7 @@ class EdgeEstimate:
         return self.mean - self.truth
 
 
-def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> Gather:
+def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> EdgeGather:
     """Radii by the law's sampler, or by another, each with its own density."""
     drawn, target = sampler or law.sampler, LawTarget(law)
 
@@ -168,23 +168,23 @@ def by_law(law: ProfileLaw, alpha: float, sampler: Sampler | None = None) -> Gat
         own = np.asarray(drawn.pdf(x, alpha))
         return np.where(own > 0, target.density(x, alpha) / np.where(own > 0, own, 1.0), 0.0)
 
-    return Gather(lambda xi: np.asarray(drawn.sample(np.minimum(xi, LAST_XI), alpha)), weight)
+    return EdgeGather(lambda xi: np.asarray(drawn.sample(np.minimum(xi, LAST_XI), alpha)), weight)
 
 
-def by_quantile(alpha: float, setting: Setting | None = None) -> Gather:
+def by_quantile(alpha: float, setting: Setting | None = None) -> EdgeGather:
     """The exact profile with radii by its exact quantile: every weight is 1."""
     curve = _quantile_curve(alpha, setting or Setting())
-    return Gather(lambda xi: np.exp(curve(np.log(_depth(xi)))), np.ones_like)
+    return EdgeGather(lambda xi: np.exp(curve(np.log(_depth(xi)))), np.ones_like)
 
 
-def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | None = None) -> Gather:
+def by_uniform(alpha: float, setting: Setting | None = None, law: ProfileLaw | None = None) -> EdgeGather:
     """Radii uniform up to that of 99.5 % of the light, for a law or the exact profile."""
     target = target_of(setting, law)
     low, high = 0.0, 1e6
     while high - low > 1e-9 * high:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if target.cdf(np.array([middle]), alpha)[0] < UNIFORM_SHARE else (low, middle)
-    return Gather(lambda xi: xi * high, lambda x: target.density(x, alpha))
+    return EdgeGather(lambda xi: xi * high, lambda x: target.density(x, alpha))
 
 
 def random_points(samples: int, trials: int, seed: int) -> Floats:
@@ -208,7 +208,7 @@ def shifted_points(samples: int, trials: int, seed: int, points: ArrayLike | Non
 
 
 def edge_estimate(
-    gather: Gather, points: Floats, x: ArrayLike, alpha: float, setting: Setting, law: ProfileLaw | None = None
+    gather: EdgeGather, points: Floats, x: ArrayLike, alpha: float, setting: Setting, law: ProfileLaw | None = None
 ) -> EdgeEstimate:
     """The estimator at places x (m,) [mfp] with each trial's points (trials, samples, 2), the same at every place.
 

@@ -146,7 +146,7 @@ def through_text(cumulated: str) -> str:
     )
 
 
-class Program:
+class ShaderProgram:
     """A compiled shader; `milliseconds` is how long that took."""
 
     def __init__(self, context: moderngl.Context, name: str, fragment: str, vertex: str | None = None):
@@ -193,7 +193,7 @@ class FullScreen:
 
     def __init__(self, context: moderngl.Context, one: Pass):
         self.context = context
-        self.program = Program(context, one.name, f"#version 330\n{one.source}")
+        self.program = ShaderProgram(context, one.name, f"#version 330\n{one.source}")
         self._triangle = full_screen(context, self.program.compiled)
         self._tables: dict[str, tuple[Singles, moderngl.Texture]] = {}
 

@@ -14,11 +14,11 @@ from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
-from profilefit.shader.check.cost import Cost, law_costs
-from profilefit.shader.check.evaluate import half_extension, no_half
 from profilefit.shader.check.half import HalfCheck, check_half
-from profilefit.shader.check.laws import LawCheck, check_laws
-from profilefit.shader.check.maps import MapCheck, check_map
+from profilefit.shader.check.law_check import LawCheck, check_laws
+from profilefit.shader.check.law_cost import Cost, law_costs
+from profilefit.shader.check.map_check import MapCheck, check_map
+from profilefit.shader.check.shader_law import half_extension, no_half
 from profilefit.shader.context import opened, renderer
 
 REGENERATED = "regenerated"

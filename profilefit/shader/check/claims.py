@@ -13,7 +13,7 @@ from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.recipes.inventory import Named, profile_laws
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, Bound
-from profilefit.shader.check.grid import ULP
+from profilefit.shader.check.dense_grid import ULP
 
 Floats = NDArray[np.float64]
 SHARES = np.linspace(0.0, 1.0, 2**12, endpoint=False)

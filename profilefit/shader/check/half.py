@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check.bounds import ALBEDOS
-from profilefit.shader.check.evaluate import ShaderLaw, Values, half_extension
+from profilefit.shader.check.shader_law import ShaderLaw, Values, half_extension
 
 Floats = NDArray[np.float64]
 FARTHEST, RADII = 100.0, 200

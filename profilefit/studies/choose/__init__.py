@@ -6,8 +6,8 @@ TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked
 if TYPE_CHECKING:
     from profilefit.studies.choose.choice import choose
     from profilefit.studies.choose.cost import shipped
-    from profilefit.studies.choose.scene import read
+    from profilefit.studies.choose.requirements import read
 else:
-    __getattr__ = attributes(__name__, {"choose": "choice", "shipped": "cost", "read": "scene"})
+    __getattr__ = attributes(__name__, {"choose": "choice", "shipped": "cost", "read": "requirements"})
 
 __all__ = ["choose", "read", "shipped"]

@@ -18,8 +18,8 @@ from profilefit.recipes.record_folder import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
 from profilefit.studies.choose.error import Error, error
-from profilefit.studies.choose.response import truth
-from profilefit.studies.choose.scene import Range, Scene
+from profilefit.studies.choose.requirements import Range, Requirements
+from profilefit.studies.choose.response import reference_light
 
 STRIDE = 4.0  # largest step of a mean free path in pixels from one case to the next
 SEEN = 4.0  # pixels of a radius from which its shape is seen: below, an outline is
@@ -53,7 +53,7 @@ class Choice:
                none
     """
 
-    scene: Scene
+    scene: Requirements
     predicted: tuple[Predicted, ...]
     chosen: Predicted | None
     nearest: Predicted
@@ -69,7 +69,7 @@ class Choice:
         return affordable(self.nearest, self.scene)
 
 
-def affordable(one: Predicted, scene: Scene) -> bool:
+def affordable(one: Predicted, scene: Requirements) -> bool:
     """Whether its frame, as estimated, is within the budget."""
     return scene.budget.ms is None or one.ms <= scene.budget.ms
 
@@ -91,7 +91,7 @@ def options(setting: Setting) -> list[Option]:
     return [*filters(), *of_laws]
 
 
-def cases(scene: Scene) -> Iterator[Case]:
+def cases(scene: Requirements) -> Iterator[Case]:
     """The ends of all ranges: dark and light skin, far and near, flat and as curved as it gets.
 
     From the shortest mean free path in the largest pixel to the longest in the smallest in steps of STRIDE at most.
@@ -110,23 +110,23 @@ def cases(scene: Scene) -> Iterator[Case]:
                 yield Case(reflectance, mfp, pixel, scene.radius, kernel, window)
 
 
-def middle(scene: Scene) -> Case:
+def middle(scene: Requirements) -> Case:
     """The middle of all ranges, on a plane: what one filter for the whole picture is made for."""
     reflectance = _three(tuple(0.5 * (low + high) for low, high in scene.reflectance))
     return Case(reflectance, _three(tuple(_between(one, 0.5) for one in scene.mfp)), _between(scene.pixel, 0.5))
 
 
-def worst(option: Option, scene: Scene) -> Error:
+def worst(option: Option, scene: Requirements) -> Error:
     """The option's error in the scene's worst case."""
-    light = truth(scene.setting)
+    light = reference_light(scene.setting)
     return max((error(option, case, light, scene.within) for case in cases(scene)), key=lambda one: one.total)
 
 
-def choose(scene: Scene, ratios: Ratios, track: Track = iter) -> Choice:
+def choose(scene: Requirements, ratios: Ratios, track: Track = iter) -> Choice:
     """Predict all options whose cost was measured, and choose."""
     budget = scene.budget
     priced = {
-        option: milliseconds(option, ratios, budget.gpu, budget.coverage, math.prod(scene.resolution))
+        option: milliseconds(option, ratios, budget.gpu, budget.screen_share, math.prod(scene.resolution))
         for option in options(scene.setting)
         if ratios.knows(option)
     }
@@ -144,7 +144,7 @@ def _is_settled(found: list[Predicted], tolerance: float) -> bool:
     return serving is not None and found[-1].error.total < serving.error.total
 
 
-def chosen(scene: Scene, predicted: Iterable[Predicted]) -> Choice:
+def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
     """The choice among options, cheapest first."""
     every = tuple(predicted)
     good = [one for one in every if one.error.total <= scene.tolerance]

@@ -1,6 +1,6 @@
 """What a frame costs, in milliseconds: an estimate from a published frame, measured ratios and stated speeds of GPUs.
 
-    ms = published(coverage) x pixels / 1080p x ratio(option) x 1.862 / TFLOPS
+    ms = published(screen_share) x pixels / 1080p x ratio(option) x 1.862 / TFLOPS
 
 published  a frame with the separable filter on a GTX 1050 (Liang et al., Table 2): 3.5, 5.9, 8.6 ms where the face
            covers 25, 50 and 75 % of 1920 x 1080, here the straight line through them
@@ -100,13 +100,13 @@ class Milliseconds:
 
 
 def milliseconds(
-    option: Option, ratios: Ratios, gpu: str = YARDSTICK, coverage: float = 0.5, pixels: int = PUBLISHED_PIXELS
+    option: Option, ratios: Ratios, gpu: str = YARDSTICK, screen_share: float = 0.5, pixels: int = PUBLISHED_PIXELS
 ) -> Milliseconds:
     """A frame by an option."""
     if gpu not in GPUS:
         raise InputError(f"gpu must be one of {', '.join(GPUS)}, got {gpu!r}")
     slope, base = np.polyfit(COVERED, PUBLISHED["separable"], 1)
-    whole = float(base + slope * coverage) * pixels / PUBLISHED_PIXELS
+    whole = float(base + slope * screen_share) * pixels / PUBLISHED_PIXELS
     arithmetic, memory = (whole * old / new for old, new in zip(GPUS[YARDSTICK], GPUS[gpu], strict=True))
     ratio = ratios.of(option)
     low, high = sorted(max(1.0 + (ratio - 1.0) * by, 0.0) for by in (ratios.spread, 1.0 / ratios.spread))

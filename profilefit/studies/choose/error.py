@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.studies.choose.case import Case, Option, Within, is_filter
 from profilefit.studies.choose.predicted import estimates, filtered
-from profilefit.studies.choose.response import Truth, averaged, beyond, response
+from profilefit.studies.choose.response import ReferenceLight, averaged, beyond, response
 
 Floats = NDArray[np.float64]
 CHANNELS = ("red", "green", "blue")
@@ -35,12 +35,12 @@ class Error:
     case: Case
 
 
-def error(option: Option, case: Case, light: Truth, within: Within) -> Error:
+def error(option: Option, case: Case, light: ReferenceLight, within: Within) -> Error:
     """Of the worst channel."""
     return max((_of_channel(option, case, light, within, c) for c in range(3)), key=lambda one: one.total)
 
 
-def _of_channel(option: Option, case: Case, light: Truth, within: Within, channel: int) -> Error:
+def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Within, channel: int) -> Error:
     reflectance, mfp, plane = case.reflectance[channel], case.mfp[channel], case.flat()
     x = case.places(channel, within)
     share = light.beyond(reflectance)
@@ -68,7 +68,7 @@ def _of_channel(option: Option, case: Case, light: Truth, within: Within, channe
     )
 
 
-def _found(option: Option, case: Case, light: Truth, channel: int, x: Floats) -> Floats:
+def _found(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
     """L / A at places (m,), (m, trials)."""
     if option.law is None:
         return _mean(option, case, light, channel, x)[:, None]
@@ -77,7 +77,7 @@ def _found(option: Option, case: Case, light: Truth, channel: int, x: Floats) ->
     return estimates(law, (red, green, blue), option.number, case, channel, x)
 
 
-def _mean(option: Option, case: Case, light: Truth, channel: int, x: Floats) -> Floats:
+def _mean(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
     """The same without noise (m,)."""
     if option.law is not None:
         share = beyond(_alpha(option.law, case.reflectance[channel]), option.law.setting, option.law)

@@ -54,7 +54,7 @@ class OneLayer:
 
 
 @dataclass(frozen=True)
-class Rings:
+class RingShares:
     """Shares of the light that leaves (rings,) in each ring of the radii, with their standard errors [-]."""
 
     radius: Floats
@@ -94,12 +94,12 @@ def one_layer(
     return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number)
 
 
-def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> Rings:
+def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:
     """With one ring more, at the last edge, for the light beyond it."""
     middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
     value = np.append(energy.value, overflow.value)
     spread = np.append(energy.standard_error, overflow.standard_error)
-    return Rings(middle, value / value.sum(), spread / value.sum())
+    return RingShares(middle, value / value.sum(), spread / value.sum())
 
 
 def _alpha(white: Orders, reflectance: float) -> float:
@@ -114,10 +114,10 @@ def _places(mfp: float, within: Within) -> Floats:
     return within.mfp * mfp * (np.arange(PLACES) + 0.5) / PLACES
 
 
-def _length(stack: Rings, one: Rings, within: Within) -> float:
+def _length(stack: RingShares, one: RingShares, within: Within) -> float:
     """The mean free path that makes the difference least."""
 
-    def quartile(rings: Rings) -> float:
+    def quartile(rings: RingShares) -> float:
         return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
 
     first = quartile(stack) - quartile(one)
@@ -129,12 +129,12 @@ def _length(stack: Rings, one: Rings, within: Within) -> float:
     return float(np.exp(minimize_scalar(missed, bounds=(first - SPAN, first + SPAN), method="bounded").x))
 
 
-def _difference(stack: Rings, one: Rings, mfp: float, within: Within) -> tuple[float, float]:
+def _difference(stack: RingShares, one: RingShares, mfp: float, within: Within) -> tuple[float, float]:
     """Root mean square difference, and its standard error, over replicates of both by their rings' own errors."""
     random, d = np.random.default_rng(SEED), _places(mfp, within)
     apart = stack.beyond(d) - one.beyond(d / mfp)
 
-    def drawn(rings: Rings, at: Floats) -> Floats:
+    def drawn(rings: RingShares, at: Floats) -> Floats:
         noise = rings.error * random.standard_normal((REPLICATES, rings.error.size))
         return rings.beyond(at, noise - noise.sum(axis=1, keepdims=True) * rings.share)
 

@@ -24,7 +24,7 @@ from profilefit.scenes.skin.law import FOLLOW, Separable, kernel_quartile
 from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points
 from profilefit.scenes.stage.world import Rgb
 from profilefit.studies.choose.case import Case, Option
-from profilefit.studies.choose.response import Beyond, Truth
+from profilefit.studies.choose.response import Beyond, ReferenceLight
 
 Floats = NDArray[np.float64]
 FITTED = 6.0 * ((np.arange(60) + 0.5) / 60) ** 2  # distances [mfp], closer together at the edge
@@ -69,7 +69,7 @@ def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
     return split(found.x)
 
 
-def passes(option: Option, case: Case, light: Truth) -> list[tuple[Floats, Separable, Floats]]:
+def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floats, Separable, Floats]]:
     """Each filter of an option: its share of each channel (3,), itself, and its stretches (3,) in the case's unit."""
     shares = [light.beyond(a) for a in case.filter_reflectance]
     mfp = np.array(case.mfp)
@@ -87,7 +87,7 @@ def passes(option: Option, case: Case, light: Truth) -> list[tuple[Floats, Separ
     return found
 
 
-def filtered(option: Option, case: Case, light: Truth, channel: int, x: Floats) -> Floats:
+def filtered(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
     """L / A of a channel at places x (m,) on the lit side."""
     total = np.zeros(x.shape)
     for share, kernel, stretches in passes(option, case, light):

@@ -116,7 +116,7 @@ STAND_IN = "hazard"
 
 
 @dataclass(frozen=True)
-class Truth:
+class ReferenceLight:
     """The light of a setting.
 
     law    None where the half space has an exact solution;  albedo  its map, where there is a law
@@ -146,10 +146,10 @@ class Truth:
 
 
 @lru_cache(maxsize=16)
-def truth(setting: Setting) -> Truth:
+def reference_light(setting: Setting) -> ReferenceLight:
     """Of a setting that has a record; InputError that lists them."""
     if setting.is_matched_isotropic:
-        return Truth(setting)
+        return ReferenceLight(setting)
     records = Records(fits_folder())
     known = [one for one in records.settings(STAND_IN) if one.illumination == setting.illumination]
     if setting not in known:
@@ -157,4 +157,4 @@ def truth(setting: Setting) -> Truth:
         raise InputError(f"index must be one of {accepted} under {setting.illumination} light, got {setting.n:g}")
     measured = records.read(records.path(STAND_IN, setting))["quality"]["regenerated"]["ks"]
     law = catalogue.load(STAND_IN, setting=setting, folder=records)
-    return Truth(setting, law, catalogue.normalisation(setting, records), 0.5 * float(max(measured)))
+    return ReferenceLight(setting, law, catalogue.normalisation(setting, records), 0.5 * float(max(measured)))

@@ -14,9 +14,9 @@ from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
-from profilefit.studies.stability import fits, gradients, halfspace, laws, maps, misuse, model
+from profilefit.studies.stability import fit_cases, gradients, halfspace, law_cells, map_cells, misuse, model_cells
 from profilefit.studies.stability.cells import Cells
-from profilefit.studies.stability.fits import FitCase
+from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.regions import Region, regions_of
 
@@ -44,7 +44,7 @@ QUICK = ("liang, published", "hazard", "albedo-rational", "map liang, published"
 
 
 @dataclass(frozen=True)
-class Part:
+class Findings:
     """What was found of one subject: its cells, their red regions, and fits."""
 
     name: str
@@ -58,29 +58,29 @@ class Part:
         return sum(one.is_failure for one in self.regions) + sum(one.is_failure for one in self.fits)
 
 
-Job = tuple[str, Callable[[], Part]]
+Job = tuple[str, Callable[[], Findings]]
 
 
 def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
     """What there is to do, a job a subject: all of it, or what is named; InputError for a name that there is not."""
-    asked, records = list(names), Records.of(folder)
+    requested, records = list(names), Records.of(folder)
     profiles, albedos = _known(records)
     found: list[Job] = []
     for one in profiles:
-        if _is_asked(one, one.label, asked, quick):
-            also = DERIVED_IF_NAMED.get(one.label, ()) if asked else ()
+        if _is_requested(one, one.label, requested, quick):
+            also = DERIVED_IF_NAMED.get(one.label, ()) if requested else ()
             found.append((one.label, _of_law(one, records, quick, also)))
     for one in albedos:
-        if _is_asked(one, _map_label(one), asked, quick):
+        if _is_requested(one, _map_label(one), requested, quick):
             found.append((_map_label(one), _of_map(one, records, quick)))
     for name, job in _functions(records, quick).items():
-        if name in asked or not (asked or quick):
+        if name in requested or not (requested or quick):
             found.append((name, job))
-    _require_known(asked, [name for name, _ in found], profiles, albedos)
+    _require_known(requested, [name for name, _ in found], profiles, albedos)
     return found
 
 
-def run(todo: list[Job]) -> Iterator[Part]:
+def run(todo: list[Job]) -> Iterator[Findings]:
     """The parts, in order, several at a time, what takes longest first."""
     with ThreadPoolExecutor(WORKERS) as pool:
         started = {name: pool.submit(job) for name, job in sorted(todo, key=lambda one: one[0] not in LONGEST)}
@@ -101,26 +101,26 @@ def _map_label(one: Named) -> str:
     return one.label if one.records else f"map {one.label}"
 
 
-def _is_asked(one: Named, label: str, asked: list[str], quick: bool) -> bool:
-    if asked:
-        return bool({label, one.name, *one.records} & set(asked))
+def _is_requested(one: Named, label: str, requested: list[str], quick: bool) -> bool:
+    if requested:
+        return bool({label, one.name, *one.records} & set(requested))
     return not quick or label in QUICK
 
 
-def _require_known(asked: list[str], found: list[str], profiles: list[Named], albedos: list[Named]) -> None:
+def _require_known(requested: list[str], found: list[str], profiles: list[Named], albedos: list[Named]) -> None:
     known = {*found, *FUNCTIONS, *(n for one in (*profiles, *albedos) for n in (one.name, *one.records))}
-    unknown = [name for name in asked if name not in known]
+    unknown = [name for name in requested if name not in known]
     if unknown or not found:
         names = sorted({one.name for one in (*profiles, *albedos)})
         got = repr(unknown[0]) if unknown else "none"
         raise InputError(f"name must be a law, map or record ({', '.join(names)}) or {', '.join(FUNCTIONS)}, got {got}")
 
 
-def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> Callable[[], Part]:
-    def job() -> Part:
-        limits = laws.limits_of(one, folder)
-        arithmetics = QUICK_ARITHMETICS if quick else laws.COMPUTED
-        cells = [*laws.cells_of(one, limits, arithmetics), *model.cells_of(one, limits), *misuse.of_law(one)]
+def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> Callable[[], Findings]:
+    def job() -> Findings:
+        limits = law_cells.limits_of(one, folder)
+        arithmetics = QUICK_ARITHMETICS if quick else law_cells.COMPUTED
+        cells = [*law_cells.cells_of(one, limits, arithmetics), *model_cells.cells_of(one, limits), *misuse.of_law(one)]
         if one.label in DERIVED and not quick:
             cells += gradients.of_law(one, (*DERIVED[one.label], *also), limits.valid.alpha or EVERYWHERE)
         return _part(one.label, cells)
@@ -128,9 +128,9 @@ def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> 
     return job
 
 
-def _of_map(one: Named, folder: Records, quick: bool) -> Callable[[], Part]:
-    def job() -> Part:
-        cells = [*maps.cells_of(one, folder), *misuse.of_map(one)]
+def _of_map(one: Named, folder: Records, quick: bool) -> Callable[[], Findings]:
+    def job() -> Findings:
+        cells = [*map_cells.cells_of(one, folder), *misuse.of_map(one)]
         if one.label in DERIVED_MAPS and not quick:
             cells += gradients.of_map(one, validity.of_map(one, folder))
         return _part(_map_label(one), cells)
@@ -138,27 +138,27 @@ def _of_map(one: Named, folder: Records, quick: bool) -> Callable[[], Part]:
     return job
 
 
-def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Part]]:
-    def of_exact() -> Part:
+def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]]:
+    def of_exact() -> Findings:
         settings = SETTINGS[:1] if quick else SETTINGS
         cells = [each for s in settings for each in halfspace.cells_of(s, catalogue.normalisation(s, folder))]
         return _part(EXACT, [*cells, *misuse.of_exact()])
 
-    def of_solver() -> Part:
-        told: list[FitCase] = []
+    def of_solver() -> Findings:
+        cases: list[FitCase] = []
         for name, objective, lanes in FITTED[:2] if quick else FITTED:
             of_map = name in MAPS
             law = (catalogue.albedo_law if of_map else catalogue.load)(name, folder=folder)
-            told += fits.fits_of(law, objective, name, lanes)
+            cases += fit_cases.fits_of(law, objective, name, lanes)
         start = catalogue.load("liang", "corrected", folder=folder)
-        return Part(SOLVER, (), (), (*told, *fits.trimmed_fits(start)))  # type: ignore[arg-type]
+        return Findings(SOLVER, (), (), (*cases, *fit_cases.trimmed_fits(start)))  # type: ignore[arg-type]
 
     return {
         EXACT: of_exact,
-        CONVERT: lambda: _part(CONVERT, [*maps.conversion_cells(), *misuse.of_convert()]),
+        CONVERT: lambda: _part(CONVERT, [*map_cells.conversion_cells(), *misuse.of_convert()]),
         SOLVER: of_solver,
     }
 
 
-def _part(name: str, cells: list[Cells]) -> Part:
-    return Part(name, tuple(cells), tuple(region for each in cells for region in regions_of(each)))
+def _part(name: str, cells: list[Cells]) -> Findings:
+    return Findings(name, tuple(cells), tuple(region for each in cells for region in regions_of(each)))

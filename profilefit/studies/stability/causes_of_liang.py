@@ -15,7 +15,7 @@ from profilefit.laws.liang_albedo import LiangAlbedo
 from profilefit.studies.stability.cause import Cause, as_stated, near_stated, unseen
 from profilefit.studies.stability.cells import Cells, Mask, Verdict, absolute, relative
 from profilefit.studies.stability.layout import ALPHA_OF, CDF, MODEL, PDF, PROFILE, REFLECTANCE_OF, SAMPLE
-from profilefit.studies.stability.model import ENERGY, INVERSE
+from profilefit.studies.stability.model_cells import ENERGY, INVERSE
 
 Floats = NDArray[np.float64]
 PRINTED_B0, MENDED_B0 = 0.461, 0.0641

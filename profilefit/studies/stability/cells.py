@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.shader import emit
-from profilefit.studies.stability.layout import Axis
+from profilefit.studies.stability.layout import ArgumentAxis
 
 Codes = NDArray[np.int8]
 Mask = NDArray[np.bool_]
@@ -93,7 +93,7 @@ class Cells:
     own: bool
     quantity: str
     arithmetic: str
-    axes: tuple[Axis, ...]
+    axes: tuple[ArgumentAxis, ...]
     value: Floats
     reference: Floats
     error: Floats
@@ -237,7 +237,7 @@ class Rounded:
         return call
 
 
-class Text:
+class RoundedText:
     """The functions of a law's or map's shader text, computed in one type throughout."""
 
     def __init__(self, law: AlbedoLaw | ProfileLaw, dtype: type) -> None:

@@ -19,7 +19,16 @@ from numpy.typing import NDArray
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability.cells import Cells, judged
-from profilefit.studies.stability.layout import ALPHA_OF, CDF, FLOAT64, PDF, PROFILE, REFLECTANCE_OF, SAMPLE, Axis
+from profilefit.studies.stability.layout import (
+    ALPHA_OF,
+    CDF,
+    FLOAT64,
+    PDF,
+    PROFILE,
+    REFLECTANCE_OF,
+    SAMPLE,
+    ArgumentAxis,
+)
 
 Floats = NDArray[np.float64]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)
@@ -50,9 +59,11 @@ MAPS: dict[str, Function] = {
 
 def of_law(one: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
     """The derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
-    alpha = Axis("α", "-", np.array(ALPHA))
+    alpha = ArgumentAxis("α", "-", np.array(ALPHA))
     for name in names:
-        first = Axis("ξ", "-", np.array(SHARE)) if name == SAMPLE else Axis("r/l", "-", np.array(RADIUS))
+        first = (
+            ArgumentAxis("ξ", "-", np.array(SHARE)) if name == SAMPLE else ArgumentAxis("r/l", "-", np.array(RADIUS))
+        )
         symbol = "ξ" if name == SAMPLE else "r"
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
@@ -78,7 +89,7 @@ def of_map(one: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
     """The derivatives of both directions of a map."""
     ways = ((ALPHA_OF, "A", REFLECTANCE), (REFLECTANCE_OF, "α", ALPHA))
     for (name, symbol, values), span in zip(ways, spans, strict=True):
-        axis = Axis(symbol, "-", np.array(values))
+        axis = ArgumentAxis(symbol, "-", np.array(values))
         u = axis.values
         found = _derivatives(MAPS[name], one.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)

@@ -21,7 +21,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.laws.rational import Rational
 from profilefit.studies.stability import layout
 from profilefit.studies.stability.cells import DIMMEST, Cells, absolute, judged, relative, steps_down, steps_up
-from profilefit.studies.stability.layout import CDF, FLOAT64, LENGTHS, PROFILE, REFLECTANCE_OF, SAMPLE, Axis
+from profilefit.studies.stability.layout import CDF, FLOAT64, LENGTHS, PROFILE, REFLECTANCE_OF, SAMPLE, ArgumentAxis
 
 Floats = NDArray[np.float64]
 DECAY = "κ(α)"
@@ -36,7 +36,7 @@ def cells_of(setting: Setting, normalisation: Rational) -> Iterator[Cells]:
     """Every function, over all arguments. Errors are those that more nodes show, or those of an identity."""
     alpha, x, xi = layout.alpha(np.float64), layout.radius(np.float64), layout.share(np.float64)
     low, high = LENGTHS[np.float64]
-    mfp = Axis("l", "length", np.array([low, 1.0, high]))
+    mfp = ArgumentAxis("l", "length", np.array([low, 1.0, high]))
     a = alpha.values[:, None, None]
     with np.errstate(all="ignore"):
         r = x.values[:, None] * mfp.values
@@ -60,7 +60,7 @@ def _share_within(transform: Transform, alpha: Array, x: Array) -> Array:
     return hankel.cdf(transform, x)
 
 
-def _profile(setting: Setting, places: tuple[Axis, ...], value: Floats) -> Cells:
+def _profile(setting: Setting, places: tuple[ArgumentAxis, ...], value: Floats) -> Cells:
     """Against its own limit next to the source; beyond, what more nodes change.
 
     Where nothing is promised of it, for dark media and beyond 100 mfp, what they change is outside its range.
@@ -72,9 +72,9 @@ def _profile(setting: Setting, places: tuple[Axis, ...], value: Floats) -> Cells
     )
     limit = np.where((near == 0) & (a > 0), np.inf, limit)
     with np.errstate(all="ignore"):
-        told = np.asarray(exact.error_estimate(x.values, alpha.values[:, None], setting=setting))[..., None]
+        stated = np.asarray(exact.error_estimate(x.values, alpha.values[:, None], setting=setting))[..., None]
     at_limit = near < SURE_X[0]
-    error = np.where(at_limit, relative(value, limit) * BOUNDS[PROFILE] / NEAR_SOURCE, told)
+    error = np.where(at_limit, relative(value, limit) * BOUNDS[PROFILE] / NEAR_SOURCE, stated)
     promised = at_limit | ((a >= SURE_ALPHA) & (near <= SURE_X[1]))
     inside = promised | ~(error > BOUNDS[PROFILE])
     reference = np.where(at_limit, limit, value)
@@ -90,7 +90,7 @@ def _profile(setting: Setting, places: tuple[Axis, ...], value: Floats) -> Cells
     )  # fmt: skip
 
 
-def _of_alpha(setting: Setting, alpha: Axis, normalisation: Rational) -> Iterator[Cells]:
+def _of_alpha(setting: Setting, alpha: ArgumentAxis, normalisation: Rational) -> Iterator[Cells]:
     value, near = (
         np.asarray(exact.reflectance(alpha.values, setting)),
         np.asarray(normalisation.reflectance(alpha.values)),
@@ -105,7 +105,7 @@ def _of_alpha(setting: Setting, alpha: Axis, normalisation: Rational) -> Iterato
     yield _cells(setting, DECAY, (alpha,), kappa, kappa, left, steps_up(kappa, 0, np.float64))
 
 
-def _cells(setting: Setting, name: str, places: tuple[Axis, ...], value, reference, error, wrong_way) -> Cells:
+def _cells(setting: Setting, name: str, places: tuple[ArgumentAxis, ...], value, reference, error, wrong_way) -> Cells:
     value, reference, error = (np.asarray(each) for each in np.broadcast_arrays(value, reference, error))
     inside = np.ones(value.shape, bool)
     if name == SAMPLE:

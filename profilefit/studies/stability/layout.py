@@ -54,7 +54,7 @@ NEIGHBOURS = (0.1, 0.5, 1.0, 10.0)
 
 
 @dataclass(frozen=True)
-class Axis:
+class ArgumentAxis:
     """An argument's cells: `name` as in formulas, `unit` without brackets, `values` rising; `labels` if no number."""
 
     name: str
@@ -79,34 +79,36 @@ class Axis:
         return int(np.argmin(np.abs(self.values - value)))
 
 
-def alpha(dtype: type) -> Axis:
+def alpha(dtype: type) -> ArgumentAxis:
     """Single-scattering albedos in [0, 1]."""
-    return Axis("α", "-", _cells(dtype, (*ALPHA, *_ends(dtype), *_around_one(dtype))))
+    return ArgumentAxis("α", "-", _cells(dtype, (*ALPHA, *_ends(dtype), *_around_one(dtype))))
 
 
-def reflectance(dtype: type) -> Axis:
+def reflectance(dtype: type) -> ArgumentAxis:
     """Total reflectances in [0, 1]."""
-    return Axis("A", "-", _cells(dtype, (*REFLECTANCE, *_ends(dtype), *_around_one(dtype))))
+    return ArgumentAxis("A", "-", _cells(dtype, (*REFLECTANCE, *_ends(dtype), *_around_one(dtype))))
 
 
-def share(dtype: type) -> Axis:
+def share(dtype: type) -> ArgumentAxis:
     """Uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
-    return Axis("ξ", "-", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(dtype), *_pairs(dtype, (0.1, 0.5)))))
+    return ArgumentAxis(
+        "ξ", "-", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(dtype), *_pairs(dtype, (0.1, 0.5))))
+    )
 
 
-def radius(dtype: type) -> Axis:
+def radius(dtype: type) -> ArgumentAxis:
     """Radii r/l from 0 to infinity."""
     largest = float(np.finfo(dtype).max)
     far = (*FARTHER, largest**0.5, 0.1 * largest, largest, np.inf)
-    return Axis("r/l", "-", _cells(dtype, (*RADIUS, *far, *_ends(dtype), *_pairs(dtype, NEIGHBOURS))))
+    return ArgumentAxis("r/l", "-", _cells(dtype, (*RADIUS, *far, *_ends(dtype), *_pairs(dtype, NEIGHBOURS))))
 
 
-def length(dtype: type, accepted: tuple[float, float], beyond: bool) -> Axis:
+def length(dtype: type, accepted: tuple[float, float], beyond: bool) -> ArgumentAxis:
     """Mean free paths > 0 in any length unit: both ends of what is accepted, and `beyond` them those of the format."""
     limits = np.finfo(dtype)
     ends = (float(limits.tiny), float(limits.max)) if beyond else ()
     inside = [float(one) for one in np.clip(np.asarray(accepted).astype(dtype), limits.tiny, limits.max)]
-    return Axis("l", "length", _cells(dtype, (*LENGTH, *inside, *ends)))
+    return ArgumentAxis("l", "length", _cells(dtype, (*LENGTH, *inside, *ends)))
 
 
 def shown(value: float) -> str:
@@ -178,17 +180,17 @@ def accepted(length: Floats, dtype: type) -> NDArray[np.bool_]:
 
 
 @dataclass(frozen=True)
-class Grid:
+class ArgumentGrid:
     """Arguments of one format: r and l as rounded."""
 
     dtype: type
-    alpha: Axis
-    x: Axis
-    xi: Axis
-    mfp: Axis
+    alpha: ArgumentAxis
+    x: ArgumentAxis
+    xi: ArgumentAxis
+    mfp: ArgumentAxis
 
     @classmethod
-    def of(cls, dtype: type, beyond: bool = True) -> Grid:
+    def of(cls, dtype: type, beyond: bool = True) -> ArgumentGrid:
         """`beyond` takes in lengths that the law does not accept."""
         return cls(dtype, alpha(dtype), radius(dtype), share(dtype), length(dtype, LENGTHS[dtype], beyond))
 

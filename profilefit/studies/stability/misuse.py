@@ -14,7 +14,7 @@ from profilefit.convert import BY_NAME, Optical, alpha_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.recipes.inventory import Named
-from profilefit.studies.stability.cells import Cells, Text, Verdict
+from profilefit.studies.stability.cells import Cells, RoundedText, Verdict
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     CDF,
@@ -24,7 +24,7 @@ from profilefit.studies.stability.layout import (
     REFLECTANCE_OF,
     SAMPLE,
     TEXT32,
-    Axis,
+    ArgumentAxis,
 )
 
 NAN, INF = float("nan"), float("inf")
@@ -47,7 +47,7 @@ def of_law(one: Named) -> Iterator[Cells]:
         PDF: law.sampler.pdf,
     }
     own = law.entry.own
-    text = Text(law, np.float32)
+    text = RoundedText(law, np.float32)
     for name, call in calls.items():
         in_python = _refused(one.label, own, name, _cases(name), partial(_called, call, name))
         yield in_python
@@ -108,9 +108,9 @@ def _given(name: str, key: str, value: float) -> dict[str, float]:
     return {word: ORDINARY[word] for word in (FIRST[name][1], "alpha", "mfp")} | {key: value}
 
 
-def _axis(cases: list[Case]) -> Axis:
+def _axis(cases: list[Case]) -> ArgumentAxis:
     labels = tuple(f"{symbol} = {value:g}" for symbol, _, value in cases)
-    return Axis("of", "-", np.arange(len(cases), dtype=float), labels)
+    return ArgumentAxis("of", "-", np.arange(len(cases), dtype=float), labels)
 
 
 def _refused(subject: str, own: bool, name: str, cases: list[Case], call: Callable[[str, float], Any]) -> Cells:
@@ -129,14 +129,14 @@ def _outcome(call: Callable[[str, float], Any], key: str, value: float) -> Verdi
     return Verdict.INACCURATE
 
 
-def _clamped(subject: str, own: bool, name: str, cases: list[Case], text: Text) -> Cells:
+def _clamped(subject: str, own: bool, name: str, cases: list[Case], text: RoundedText) -> Cells:
     """A text cannot refuse: a number is what it owes, but for NaN, which comes back as such."""
     function = "profile" if name == PROFILE else name
     given = [np.array(list(_given(name, key, value).values()))[:, None] for _, key, value in cases]
     found = np.array([float(text.call(function, *each)[0]) for each in given])
-    asked = np.array([value for _, _, value in cases])
+    values = np.array([value for _, _, value in cases])
     codes = np.where(np.isfinite(found), Verdict.OUTSIDE, Verdict.NOT_FINITE).astype(np.int8)
-    codes[np.isnan(asked) & np.isnan(found)] = Verdict.OUTSIDE
+    codes[np.isnan(values) & np.isnan(found)] = Verdict.OUTSIDE
     return _cells(subject, own, name, TEXT32, cases, codes, found)
 
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
-from profilefit.shader.check import grid
-from profilefit.studies.stability.cells import DIMMEST, EXTENDED, Mask, Text
-from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, Grid
+from profilefit.shader.check import dense_grid
+from profilefit.studies.stability.cells import DIMMEST, EXTENDED, Mask, RoundedText
+from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, ArgumentGrid
 
 Floats = NDArray[np.float64]
 HALVINGS = 70  # of a bracket of 90 in ln t
@@ -25,10 +25,10 @@ class Right:
     nearest  r/l at which R_d is taken where r/l is less, as shader texts do; 0 if it is not
     """
 
-    def __init__(self, law: ProfileLaw, at: Grid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
+    def __init__(self, law: ProfileLaw, at: ArgumentGrid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
         self.at, self._nearest = at, nearest
         self._finite_source = law.is_finite_at_source
-        self._text = Text(law, EXTENDED)
+        self._text = RoundedText(law, EXTENDED)
         if isinstance(law, Quantile):  # its few steps do not settle for albedos that only float64 has
             self._text.replace("depth", self._depth)
         r, xi, alpha, mfp = (each.astype(EXTENDED) for each in at.arguments)
@@ -94,4 +94,4 @@ class Right:
         return np.asarray(self._text.call("radius", self._xi, self._shape))
 
 
-LEAST_X = grid.LEAST_X
+LEAST_X = dense_grid.LEAST_X

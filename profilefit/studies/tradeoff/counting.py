@@ -26,7 +26,7 @@ ROOTS = ("sqrt", "rsqrt")
 
 
 @dataclass(frozen=True)
-class Counts:
+class FunctionCounts:
     """Functions by name: `point` for each point, `material` for each albedo, whatever the number of points."""
 
     point: Counter[str]
@@ -38,7 +38,7 @@ class Counts:
         return sum(self.point.values()) - sum(self.point[name] for name in ROOTS)
 
 
-def count(function: Callable[[Array, Array], object], alpha: float = 0.8) -> Counts:
+def count(function: Callable[[Array, Array], object], alpha: float = 0.8) -> FunctionCounts:
     """Count in `function(x, alpha)`, of an array and a scalar, all that its answer needs.
 
     What has no axis of points depends on alpha only, and counts for the material; steps of a loop count as often as
@@ -46,12 +46,12 @@ def count(function: Callable[[Array, Array], object], alpha: float = 0.8) -> Cou
     """
     closed = jax.make_jaxpr(function)(jnp.zeros(POINTS, jnp.float32), jnp.float32(alpha))
     needed, _ = partial_eval.dce_jaxpr(closed.jaxpr, [True] * len(closed.jaxpr.outvars))
-    counts = Counts(Counter(), Counter())
+    counts = FunctionCounts(Counter(), Counter())
     _add(needed, 1, counts)
     return counts
 
 
-def _add(jaxpr: core.Jaxpr, times: int, counts: Counts) -> None:
+def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
     for equation in jaxpr.eqns:
         name = equation.primitive.name
         if name in COUNTED:
@@ -64,7 +64,7 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: Counts) -> None:
             _add(nested, inner, counts)
 
 
-def _add_one(name: str, shape: tuple[int, ...], times: int, counts: Counts) -> None:
+def _add_one(name: str, shape: tuple[int, ...], times: int, counts: FunctionCounts) -> None:
     size = int(np.prod(shape, dtype=int))
     if POINTS in shape:
         counts.point[name] += times * (size // POINTS)

@@ -32,7 +32,7 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
 Floats = NDArray[np.float64]
@@ -45,7 +45,7 @@ ALL_AT_ONCE, TWO_STAGES, EMCEE = "Levenberg-Marquardt", "two stages", "emcee"
 
 
 @dataclass(frozen=True)
-class Sizes:
+class FitSizes:
     """Photons of a run, those that emcee gets too, seeds, and the longest chain [steps]."""
 
     photons: tuple[int, ...] = (100_000, 1_000_000, 10_000_000)
@@ -54,11 +54,11 @@ class Sizes:
     max_chain: int = 16_000
 
 
-FULL, QUICK = Sizes(), Sizes((100_000,), (), 3)
+FULL, QUICK = FitSizes(), FitSizes((100_000,), (), 3)
 
 
 @dataclass(frozen=True)
-class Estimate:
+class FittedConstants:
     """What a way ended at: constants by name, their standard errors where there are any, and what the solver said."""
 
     constants: Mapping[str, float]
@@ -78,11 +78,11 @@ class Trial:
     converged: bool
 
 
-Way = Callable[[Profiles, int], Estimate]
-"""Profiles, seed -> estimate."""
+Way = Callable[[Profiles, int], FittedConstants]
+"""Profiles, seed -> constants."""
 
 
-def measure(sizes: Sizes = FULL, track: Track = silent) -> Part:
+def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     """Fit every run in every way, and compare with the fits to the exact profiles."""
     start = catalogue.load("liang", "corrected")
     ways = _ways(start, sizes.max_chain)
@@ -113,10 +113,10 @@ def measure(sizes: Sizes = FULL, track: Track = silent) -> Part:
             ("whole", "with the order-resolved run it is fitted to", "light and fit"),
         )
     )
-    return Part("fits", "Fits: time against what noise does to the law", panels, _notes(trials, compiling))
+    return TradeoffPart("fits", "Fits: time against what noise does to the law", panels, _notes(trials, compiling))
 
 
-def _named(ways: Mapping[str, Way], photons: int, sizes: Sizes) -> list[str]:
+def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:
     return [name for name in ways if name != EMCEE or photons in sizes.chained]
 
 
@@ -135,12 +135,12 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
         used, _ = staged.trimmed(profiles, TRIMMED, EPSILON)
         return fit(profiles, start, "radial", free, used, jackknife=False)
 
-    def all_at_once(profiles: Profiles, _: int) -> Estimate:
+    def all_at_once(profiles: Profiles, _: int) -> FittedConstants:
         found = fitted(profiles)
         errors = {} if found.statistical is None else _errors(free, found.statistical)
-        return Estimate(found.constants, errors, found.result)
+        return FittedConstants(found.constants, errors, found.result)
 
-    def two_stages(profiles: Profiles, _: int) -> Estimate:
+    def two_stages(profiles: Profiles, _: int) -> FittedConstants:
         points = staged.fit_per_albedo(profiles, start, 1.0, TRIMMED, EPSILON)
         laws = staged.fit_coefficient_laws(points, start, HELD).values()
         constants = {n: float(v) for law in laws for n, v in zip(law.names, law.solution.parameters, strict=True)}
@@ -148,13 +148,13 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
             n: e for law in laws if law.covariance is not None for n, e in _errors(law.names, law.covariance).items()
         }
         results = {*points.results, *(law.solution.result for law in laws)} - {"converged"}
-        return Estimate(constants, errors, next(iter(sorted(results)), "converged"))
+        return FittedConstants(constants, errors, next(iter(sorted(results)), "converged"))
 
-    def emcee(profiles: Profiles, seed: int) -> Estimate:
+    def emcee(profiles: Profiles, seed: int) -> FittedConstants:
         chain = posterior(fitted(profiles), "statistical", seed, max_chain)
         mean = dict(zip(chain.names, map(float, chain.samples.mean(axis=0)), strict=True))
         spread = dict(zip(chain.names, map(float, chain.standard_deviation), strict=True))
-        return Estimate(mean, spread, chain.result)
+        return FittedConstants(mean, spread, chain.result)
 
     return {ALL_AT_ONCE: all_at_once, TWO_STAGES: two_stages, EMCEE: emcee}
 
@@ -163,7 +163,7 @@ def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
     return dict(zip(names, np.sqrt(np.diag(covariance)).tolist(), strict=True))
 
 
-def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: Estimate, start: Any) -> Trial:
+def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: FittedConstants, start: Any) -> Trial:
     begin = time.perf_counter()
     found = way(profiles, seed)
     seconds = time.perf_counter() - begin
@@ -198,7 +198,7 @@ def _within(law: ProfileLaw) -> Floats:
         return np.asarray(law.unscaled_energy(jnp.asarray(RINGS), jnp.asarray(ALPHAS)[:, None]))
 
 
-def standardised(found: Estimate, limit: Estimate) -> float:
+def standardised(found: FittedConstants, limit: FittedConstants) -> float:
     """Root mean square distance of the constants from their limits, in standard errors [-]; NaN if there are none."""
     if not found.errors:
         return float("nan")
@@ -218,7 +218,7 @@ def _point(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Poin
     }
     seconds = of_fit if panel == "fit" else of_fit + light
     label = f"{photons:.0e}".replace("e+0", "e") + " photons"
-    return Point(panel, name, label, Measured.of(seconds), Measured.of(rms), Measured.of(worst), facts)
+    return Point(panel, name, label, WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst), facts)
 
 
 def _notes(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
@@ -227,5 +227,5 @@ def _notes(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping
         for (name, photons), found in trials.items()
         if not all(t.converged for t in found)
     ]
-    told = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
-    return (*failed, f"first fits, which compile, not in the times [s]: {told}")
+    compiled = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
+    return (*failed, f"first fits, which compile, not in the times [s]: {compiled}")

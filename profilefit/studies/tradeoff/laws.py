@@ -20,8 +20,8 @@ from jax import Array
 from profilefit.fitting.quality import profile_quality
 from profilefit.studies.tradeoff import stopwatch
 from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders, table_contender
-from profilefit.studies.tradeoff.counting import Counts, count
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.counting import FunctionCounts, count
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
 
 # Of one call. A law that computes more functions a point than these takes fewer points, or is not timed at all.
@@ -35,7 +35,7 @@ QUICKLY = (YARDSTICK, "Liang, corrected", "hazard")
 
 
 @dataclass(frozen=True)
-class Sizes:
+class LawSizes:
     """Points of one call, and of one call of a costly law; albedos of a setup; turns; albedos of the errors."""
 
     points: int = 1_000_000
@@ -45,11 +45,11 @@ class Sizes:
     judged: int = 60
 
 
-FULL, QUICK = Sizes(), Sizes(100_000, 1000, 10_000, 5, 4)
+FULL, QUICK = LawSizes(), LawSizes(100_000, 1000, 10_000, 5, 4)
 
 
 @dataclass(frozen=True)
-class Row:
+class ContenderResult:
     """All that is known of one contender.
 
     counts  by part: profile, sample and both, one after the other;  times [ns] of a point, by part and turn
@@ -58,15 +58,15 @@ class Row:
     """
 
     contender: Contender
-    counts: dict[str, Counts]
-    times: dict[str, Measured]
+    counts: dict[str, FunctionCounts]
+    times: dict[str, WithSpread]
     ratios: dict[str, Ratio]
     setup: float | None
     rel: np.ndarray
     ks: np.ndarray
 
 
-def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> Part:
+def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
     found, left_out = contenders(folder, [one for one in WANTED if not quick or one[0] in QUICKLY])
@@ -75,7 +75,7 @@ def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stop
     rows = measured(found, sizes, track)
     panels = tuple(Panel(part, title, *_axes(part), _points(rows, part)) for part, title in TITLES.items())
     notes = [f"left out: {line}" for line in left_out]
-    return Part("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
+    return TradeoffPart("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
 
 
 def judged_albedos(number: int) -> np.ndarray:
@@ -83,13 +83,13 @@ def judged_albedos(number: int) -> np.ndarray:
     return 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), number) ** 2
 
 
-def counts(contender: Contender) -> dict[str, Counts]:
+def counts(contender: Contender) -> dict[str, FunctionCounts]:
     """Functions of each part that there is."""
     functions = {**contender.parts, **({"profile": contender.profile} if contender.another else {})}
     return {part: count(functions[part]) for part in PARTS if part in functions}
 
 
-def works(contender: Contender, counted: dict[str, Counts], sizes: Sizes) -> dict[str, stopwatch.Work]:
+def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, stopwatch.Work]:
     """What to time of a contender, by part."""
     found = {}
     for part, function in contender.parts.items():
@@ -113,7 +113,7 @@ def timed(function: Callable[[Array, Array], object], radii: bool, points: int) 
     return work
 
 
-def measured(found: Sequence[Contender], sizes: Sizes, track: Track = stopwatch.silent) -> list[Row]:
+def measured(found: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent) -> list[ContenderResult]:
     """Count, time and judge every contender; the yardstick must be one of them."""
     counted = {contender.name: counts(contender) for contender in found}
     jobs: dict[tuple[str, str], stopwatch.Work] = {}
@@ -128,9 +128,9 @@ def measured(found: Sequence[Contender], sizes: Sizes, track: Track = stopwatch.
     return [_row(found[i], counted[found[i].name], rates, sizes) for i in rows]
 
 
-def nanoseconds(rates: Rates, name: str, yardstick: str) -> Measured:
+def nanoseconds(rates: Rates, name: str, yardstick: str) -> WithSpread:
     """Time of a point: that over the yardstick's in each turn, in units of its median [ns]."""
-    return Measured.of(NANO * float(np.median(rates.seconds(yardstick))) * rates.times(name, yardstick))
+    return WithSpread.of(NANO * float(np.median(rates.seconds(yardstick))) * rates.times(name, yardstick))
 
 
 def _setup_work(contender: Contender, albedos: int) -> stopwatch.Work | None:
@@ -146,7 +146,7 @@ def _setup_work(contender: Contender, albedos: int) -> stopwatch.Work | None:
     return work
 
 
-def _row(contender: Contender, counted: dict[str, Counts], rates: Rates, sizes: Sizes) -> Row:
+def _row(contender: Contender, counted: dict[str, FunctionCounts], rates: Rates, sizes: LawSizes) -> ContenderResult:
     names = {part: f"{part} of {contender.name}" for part in PARTS}
     there = {part: name for part, name in names.items() if name in rates.by_name}
     times = {part: nanoseconds(rates, name, f"{part} of {YARDSTICK}") for part, name in there.items()}
@@ -154,18 +154,18 @@ def _row(contender: Contender, counted: dict[str, Counts], rates: Rates, sizes: 
     setup = f"setup of {contender.name}"
     of_material = NANO / rates.best(setup) if setup in rates.by_name else None
     quality = profile_quality(contender.law, judged_albedos(sizes.judged))
-    return Row(contender, counted, times, ratios, of_material, quality.rel, quality.ks)
+    return ContenderResult(contender, counted, times, ratios, of_material, quality.rel, quality.ks)
 
 
-def _points(rows: Sequence[Row], part: str) -> tuple[Point, ...]:
+def _points(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
     return tuple(
         Point(
             part,
             row.contender.name,
             "",
             row.times[part],
-            Measured.exactly(row.rel.mean()),
-            Measured.exactly(row.rel.max()),
+            WithSpread.exactly(row.rel.mean()),
+            WithSpread.exactly(row.rel.max()),
             {
                 "times_yardstick": row.ratios[part].median,
                 "constants": sum(row.contender.constants),

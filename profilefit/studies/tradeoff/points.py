@@ -13,7 +13,7 @@ FRONT, TIED, BEATEN = "front", "tied", "beaten"
 
 
 @dataclass(frozen=True)
-class Measured:
+class WithSpread:
     """A number and the ends of its spread; all three equal where it is known without error."""
 
     value: float
@@ -21,17 +21,17 @@ class Measured:
     high: float
 
     @classmethod
-    def of(cls, values: ArrayLike) -> Measured:
+    def of(cls, values: ArrayLike) -> WithSpread:
         """Median of repeats, and where the middle 68 % of them lie."""
         low, middle, high = np.percentile(np.asarray(values, float), [SPREAD[0], 50.0, SPREAD[1]])
         return cls(float(middle), float(low), float(high))
 
     @classmethod
-    def exactly(cls, value: float) -> Measured:
+    def exactly(cls, value: float) -> WithSpread:
         """Without error."""
         return cls(float(value), float(value), float(value))
 
-    def is_below(self, other: Measured) -> bool:
+    def is_below(self, other: WithSpread) -> bool:
         """By more than the spread of both."""
         return self.high < other.low
 
@@ -50,13 +50,13 @@ class Point:
     panel: str
     method: str
     label: str
-    cost: Measured
-    error: Measured
-    worst: Measured | None = None
+    cost: WithSpread
+    error: WithSpread
+    worst: WithSpread | None = None
     facts: Mapping[str, float | int | str] = field(default_factory=dict)
 
     @property
-    def errors(self) -> tuple[Measured, ...]:
+    def errors(self) -> tuple[WithSpread, ...]:
         return (self.error,) if self.worst is None else (self.error, self.worst)
 
 
@@ -74,7 +74,7 @@ class Panel:
 
 
 @dataclass(frozen=True)
-class Part:
+class TradeoffPart:
     """All that one part of the measurement found; `notes` say what was left out, and what is not in the times."""
 
     name: str

@@ -28,7 +28,7 @@ from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
 from profilefit.scenes.stage.step_edge import (
     UNIFORM_SHARE,
-    Gather,
+    EdgeGather,
     by_law,
     by_quantile,
     edge_estimate,
@@ -37,7 +37,7 @@ from profilefit.scenes.stage.step_edge import (
 from profilefit.studies.tradeoff import laws, stopwatch
 from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders
 from profilefit.studies.tradeoff.counting import count
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ LIKE_OTHERS = (
 
 
 @dataclass(frozen=True)
-class Sizes:
+class SamplerSizes:
     """Albedos, distances of the edges [mfp], trials of a block; points of one timed call, of a costly law; turns."""
 
     alphas: tuple[float, ...] = (0.3, 0.8, 0.97)
@@ -68,7 +68,7 @@ class Sizes:
     turns: int = 15
 
 
-FULL, QUICK = Sizes(), Sizes((0.8,), (1.0,), 40, 100_000, 1000, 5)
+FULL, QUICK = SamplerSizes(), SamplerSizes((0.8,), (1.0,), 40, 100_000, 1000, 5)
 
 
 class UniformSampler(Sampler):
@@ -89,7 +89,7 @@ class UniformSampler(Sampler):
 
 
 @dataclass(frozen=True)
-class Found:
+class WeighedSampler:
     """Of one way to weigh: ratios of square error and of variance (2, albedos, blocks), biases (albedos, edges) [A].
 
     searched  whether the weight takes a density that is not the law's
@@ -107,7 +107,7 @@ class Found:
         return (x, value, self.owner.sampler.scaled_pdf(x, alpha)) if self.searched else (x, value)
 
 
-def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> Part:
+def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time every sampler, and judge it both ways."""
     quick = sizes.trials <= QUICK.trials
     wanted = [one for one in WANTED if (one[0] in QUICKLY if quick else one[0] not in LIKE_OTHERS)]
@@ -134,7 +134,7 @@ def measure(sizes: Sizes = FULL, folder: Path | None = None, track: Track = stop
         )
     )
     notes = tuple([*(f"left out: {line}" for line in left_out), *dear])
-    return Part("samplers", "Samplers: time of a radius against noise and bias", panels, notes)
+    return TradeoffPart("samplers", "Samplers: time of a radius against noise and bias", panels, notes)
 
 
 def _uniform(hazard: Contender) -> Contender:
@@ -145,20 +145,20 @@ def _uniform(hazard: Contender) -> Contender:
     return Contender("uniform radii, hazard", law, sampler, hazard.constants, law.shape, sampler, another=True)
 
 
-def _calls(way: Found, sizes: Sizes) -> int:
+def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:
     """Points of one timed call."""
     return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
 
 
-def _ways(one: Contender, sizes: Sizes) -> list[Found]:
+def _ways(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
     """A sampler weighed by its own density; and by its law's, where that is another."""
     sampler = one.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
-    own = Found(one.name, one, _noise(by_law, sampler, sizes), biases[..., 0], apart)
+    own = WeighedSampler(one.name, one, _noise(by_law, sampler, sizes), biases[..., 0], apart)
     if not apart or isinstance(sampler, UniformSampler):
         return [own]
-    return [own, Found(f"{one.name}, law's density", one, _noise(_unweighted, sampler, sizes), biases[..., 1])]
+    return [own, WeighedSampler(f"{one.name}, law's density", one, _noise(_unweighted, sampler, sizes), biases[..., 1])]
 
 
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
@@ -174,13 +174,13 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
     return float(own - truth), float(by_law_density - truth)
 
 
-def _unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> Gather:
+def _unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
     """Weights by the law's own density are all 1."""
     drawn = by_law(law, alpha, sampler)
-    return Gather(drawn.sample, np.ones_like)
+    return EdgeGather(drawn.sample, np.ones_like)
 
 
-def _noise(gathered, sampler: Sampler, sizes: Sizes) -> Floats:
+def _noise(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
     rows = []
     for alpha in sizes.alphas:
@@ -189,23 +189,25 @@ def _noise(gathered, sampler: Sampler, sizes: Sizes) -> Floats:
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def _ratios(way: Gather, over: Gather, alpha: float, law: ProfileLaw, block: int, trials: int) -> tuple[float, float]:
+def _ratios(
+    way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
+) -> tuple[float, float]:
     points = random_points(SAMPLES, trials, seed=block + 1)
     mine, best = (edge_estimate(g, points, PLACES, alpha, law.setting) for g in (way, over))
     square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
     return float(square), float(mine.variance.mean() / best.variance.mean())
 
 
-def _points(one: Found, cost: Measured) -> Sequence[Point]:
+def _points(one: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
     square, variance = one.noise
     worst = square[np.argmax(np.median(square, axis=1))]
     middle = np.exp(np.log(square).mean(axis=0))
     facts = {"samples": SAMPLES, "variance": float(np.exp(np.log(variance).mean()))}
     rms, largest = (
-        Measured(float(value), max(float(value) - ROUNDING, 0.1 * ROUNDING), float(value) + ROUNDING)
+        WithSpread(float(value), max(float(value) - ROUNDING, 0.1 * ROUNDING), float(value) + ROUNDING)
         for value in (np.sqrt(np.mean(one.bias**2)), np.max(np.abs(one.bias)))
     )
     return (
-        Point("noise", one.name, "", cost, Measured.of(middle), Measured.of(worst), facts),
+        Point("noise", one.name, "", cost, WithSpread.of(middle), WithSpread.of(worst), facts),
         Point("bias", one.name, "", cost, rms, largest, facts),
     )

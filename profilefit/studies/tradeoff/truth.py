@@ -22,7 +22,7 @@ from mcml_sim.exact.by_albedo import by_alpha, forget
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.studies.tradeoff import scalar, stopwatch
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
 Floats = NDArray[np.float64]
@@ -34,37 +34,40 @@ EDGES = RINGS * WIDTH
 AS_IS = "standard nodes"
 RULES = {"half the nodes": 0.5, AS_IS: 1.0, "twice the nodes": 2.0}
 FINEST = 3.0  # times the standard nodes: what all errors are against
-SCALAR, TRACER, ORDERS, EXACT = "scalar tracer", "simulate", "simulate_orders", "exact"
+SCALAR, SIMULATE, ORDERS, EXACT = "scalar tracer", "simulate", "simulate_orders", "exact"
 AXES = f"time for all {ALPHAS.size} albedos, one core [s]", "relative error of ring energies [-]"
 MIDDLES = 0.5 * (EDGES[1:] + EDGES[:-1])
 
 
 @dataclass(frozen=True)
-class Sizes:
+class TruthSizes:
     """Photons of a run of the scalar tracer, of `simulate` and of `simulate_orders`; turns; numbers of nodes; and
     whether the exact solution's own estimate of its error is told, for which it compiles anew."""
 
     scalar: tuple[int, ...] = (10_000, 100_000, 300_000)
-    tracer: tuple[int, ...] = (100_000, 1_000_000, 3_000_000)
+    simulate: tuple[int, ...] = (100_000, 1_000_000, 3_000_000)
     orders: tuple[int, ...] = (100_000, 1_000_000, 10_000_000)
     turns: int = 5
     rules: tuple[str, ...] = tuple(RULES)
     estimate: bool = True
 
 
-FULL, QUICK = Sizes(), Sizes((2_000, 20_000), (50_000, 500_000), (50_000, 500_000), 3, (AS_IS,), estimate=False)
+FULL, QUICK = (
+    TruthSizes(),
+    TruthSizes((2_000, 20_000), (50_000, 500_000), (50_000, 500_000), 3, (AS_IS,), estimate=False),
+)
 
 
 @dataclass(frozen=True)
-class Answer:
+class RingEnergies:
     """Ring energies (albedos, rings) [-], and the relative error (albedos, rings) that the method states itself."""
 
     energy: Floats
     stated: Floats | None
 
 
-Method = Callable[[int], Answer]
-"""Seed -> answer."""
+Method = Callable[[int], RingEnergies]
+"""Seed -> ring energies."""
 
 
 @dataclass(frozen=True)
@@ -81,20 +84,20 @@ class Contestant:
         return f"{self.method}, {self.label}"
 
 
-def measure(sizes: Sizes = FULL, track: Track = stopwatch.silent) -> Part:
+def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> TradeoffPart:
     """Run every truth in turns, and judge what it answers."""
     found, notes = contestants(sizes)
-    answers: dict[str, list[Answer]] = {one.key: [] for one in found}
+    energies: dict[str, list[RingEnergies]] = {one.key: [] for one in found}
 
     def work(one: Contestant) -> stopwatch.Work:
         def run(seed: int) -> int:
-            answers[one.key].append(one.run(seed))
+            energies[one.key].append(one.run(seed))
             return 1
 
         return run
 
     rates = stopwatch.take_turns({one.key: work(one) for one in found}, sizes.turns, track, "truths")
-    points = tuple(_point(one, rates, answers[one.key][1:], sizes.estimate) for one in found)
+    points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in found)
     compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(found, rates).items())
     title = f"Ring energies at {ALPHAS.size} albedos: seconds against error"
     traced = tuple(replace(point, panel="tracers") for point in points if point.method != EXACT)
@@ -104,10 +107,10 @@ def measure(sizes: Sizes = FULL, track: Track = stopwatch.silent) -> Part:
             "tracers", "the same without the exact solution, which no other n and g have", *AXES, traced, joined=True
         ),
     )
-    return Part("truth", title, panels, (*notes, f"compiling, not in the times [s]: {compiling}"))
+    return TradeoffPart("truth", title, panels, (*notes, f"compiling, not in the times [s]: {compiling}"))
 
 
-def contestants(sizes: Sizes) -> tuple[list[Contestant], list[str]]:
+def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     """Every method at every effort; and a line for what is left out."""
     found, notes = [], []
     trace = scalar.compiled()
@@ -115,7 +118,7 @@ def contestants(sizes: Sizes) -> tuple[list[Contestant], list[str]]:
         notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
     else:
         found += [Contestant(SCALAR, _photons(n), _scalar(trace, n), n * ALPHAS.size) for n in sizes.scalar]
-    found += [Contestant(TRACER, _photons(n), _tracer(n), n * ALPHAS.size) for n in sizes.tracer]
+    found += [Contestant(SIMULATE, _photons(n), _simulated(n), n * ALPHAS.size) for n in sizes.simulate]
     found += [Contestant(ORDERS, _photons(n), _orders(n), n) for n in sizes.orders]
     found += [Contestant(EXACT, label, _exact(STANDARD.scaled(RULES[label])), 0) for label in sizes.rules]
     return found, notes
@@ -140,9 +143,9 @@ def errors(energy: Floats) -> tuple[float, float]:
     return float(np.sqrt(np.mean(relative**2))), float(relative.max())
 
 
-def _point(one: Contestant, rates: Rates, answers: list[Answer], estimate: bool) -> Point:
-    middle, worst = zip(*(errors(answer.energy) for answer in answers), strict=True)
-    stated = [answer.stated[judged()] for answer in answers if answer.stated is not None]
+def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
+    middle, worst = zip(*(errors(each.energy) for each in energies), strict=True)
+    stated = [each.stated[judged()] for each in energies if each.stated is not None]
     if estimate and (one.method, one.label) == (EXACT, AS_IS):
         stated = [np.asarray(exact.error_estimate(MIDDLES, ALPHAS[:, None]))[judged()]]
     facts: dict[str, float | int | str] = {
@@ -150,8 +153,8 @@ def _point(one: Contestant, rates: Rates, answers: list[Answer], estimate: bool)
         "first_call": rates.first[one.key],
         "stated": float(np.sqrt(np.mean(np.square(stated)))) if stated else "",
     }
-    seconds = Measured.of(rates.seconds(one.key))
-    return Point("rings", one.method, one.label, seconds, Measured.of(middle), Measured.of(worst), facts)
+    seconds = WithSpread.of(rates.seconds(one.key))
+    return Point("rings", one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
 
 
 def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
@@ -164,28 +167,28 @@ def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
 
 
 def _scalar(trace: Callable, photons: int) -> Method:
-    def run(seed: int) -> Answer:
+    def run(seed: int) -> RingEnergies:
         rows = []
         for i, alpha in enumerate(ALPHAS):
             reflected = np.zeros(EVEN + 1)
             trace(1000 * seed + i, photons, 1.0 - alpha, alpha, WIDTH, reflected)
             rows.append(np.add.reduceat(reflected[:-1], RINGS[:-1]) / photons)
-        return Answer(np.array(rows), None)
+        return RingEnergies(np.array(rows), None)
 
     return run
 
 
-def _tracer(photons: int) -> Method:
+def _simulated(photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
-    def run(seed: int) -> Answer:
+    def run(seed: int) -> RingEnergies:
         runs = [
             simulate(half_space(float(alpha)), grid, photons, 1000 * seed + i, workers=1, progress=False).reflectance_r
             for i, alpha in enumerate(ALPHAS)
         ]
         energy = np.array([np.asarray(one.value) for one in runs]) * grid.r_areas
         error = np.array([np.asarray(one.standard_error) for one in runs]) * grid.r_areas
-        return Answer(energy, error / reference())
+        return RingEnergies(energy, error / reference())
 
     return run
 
@@ -193,16 +196,16 @@ def _tracer(photons: int) -> Method:
 def _orders(photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
-    def run(seed: int) -> Answer:
+    def run(seed: int) -> RingEnergies:
         found = simulate_orders(grid, photons, 1000 * seed + 500, workers=1, progress=False).energy(ALPHAS)
-        return Answer(np.asarray(found.value), np.asarray(found.standard_error) / reference())
+        return RingEnergies(np.asarray(found.value), np.asarray(found.standard_error) / reference())
 
     return run
 
 
 def _exact(rule: Rule) -> Method:
-    def run(_: int) -> Answer:
-        return Answer(_solved(rule), None)
+    def run(_: int) -> RingEnergies:
+        return RingEnergies(_solved(rule), None)
 
     return run
 

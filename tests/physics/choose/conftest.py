@@ -5,8 +5,8 @@ import pytest
 import profilefit
 from mcml_sim import Setting
 from profilefit.studies.choose.case import Case, Within
-from profilefit.studies.choose.response import Truth
-from profilefit.studies.choose.scene import Budget, Scene
+from profilefit.studies.choose.requirements import Budget, Requirements
+from profilefit.studies.choose.response import ReferenceLight
 
 DIFFUSE = Setting("diffuse")
 COLOUR, MFP = (0.6, 0.4, 0.2), (1.0, 0.7, 0.5)
@@ -20,7 +20,7 @@ def hazard():
 @pytest.fixture(scope="session")
 def light(hazard):
     """Where the truth is the hazard law, so that it has no error of its own."""
-    return Truth(DIFFUSE, hazard, hazard.albedo)
+    return ReferenceLight(DIFFUSE, hazard, hazard.albedo)
 
 
 @pytest.fixture(scope="session")
@@ -31,4 +31,4 @@ def case():
 @pytest.fixture(scope="session")
 def scene():
     reflectance, mfp = (tuple((value, value) for value in values) for values in (COLOUR, MFP))
-    return Scene("mm", DIFFUSE, reflectance, mfp, (0.25, 0.25), 5.0, 0.02, Within(), Budget(ms=5.0))
+    return Requirements("mm", DIFFUSE, reflectance, mfp, (0.25, 0.25), 5.0, 0.02, Within(), Budget(ms=5.0))

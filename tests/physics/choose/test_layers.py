@@ -8,14 +8,14 @@ import pytest
 from mcml_sim import Layer, Medium
 from profilefit.errors import InputError
 from profilefit.studies.choose.case import Within
-from profilefit.studies.choose.layers import OneLayer, Rings, one_layer
+from profilefit.studies.choose.layers import OneLayer, RingShares, one_layer
 
 WITHIN = Within()
 
 
 def test_rings_beyond_an_edge():
     """One ring: the share of its circle beyond the edge."""
-    ring = Rings(np.array([2.0]), np.array([1.0]), np.array([0.0]))
+    ring = RingShares(np.array([2.0]), np.array([1.0]), np.array([0.0]))
     np.testing.assert_allclose(ring.beyond(np.array([0.0, 1.0, 3.0])), [0.5, 1.0 / 3.0, 0.0])
 
 

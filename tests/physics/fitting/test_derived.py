@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import InputError, exact
 from profilefit.fitting import derived
-from profilefit.fitting.derived import AtAlbedo, Known, Quantity
+from profilefit.fitting.derived import AtAlbedo, LawWithErrors, Quantity
 from profilefit.fitting.discrepancy import discrepancy
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
@@ -26,7 +26,7 @@ def known(truth, burley):
     """Normalized diffusion fitted to the exact half space, with a made-up photon noise of its constants."""
     one = fit(truth, burley, "energy", FREE, jackknife=False)
     noise = np.diag((0.01 * one.solution.parameters) ** 2)
-    return Known(one.law, one.free, "energy", noise, discrepancy(one, truth))
+    return LawWithErrors(one.law, one.free, "energy", noise, discrepancy(one, truth))
 
 
 def test_radius_is_the_law_s_own(known):
@@ -84,7 +84,7 @@ def test_reflectance_of_a_map(normalisation):
     truth = Profiles.from_exact(alpha, [0.0, 1000.0])
     one = fit(truth, normalisation, "reflectance", jackknife=False)
     off = discrepancy(one, truth)
-    known = Known.of_fit(one, off)
+    known = LawWithErrors.of_fit(one, off)
     found = derived.reflectance(known, [0.3, 0.85, 0.97])
     np.testing.assert_allclose(found.value, one.law.reflectance([0.3, 0.85, 0.97]), rtol=1e-12)
     z = (found.value - exact.reflectance(np.array([0.3, 0.85, 0.97]))) / found.model
@@ -101,10 +101,10 @@ def test_a_record_says_it_again(known, truth):
         "covariance": {"names": FREE, "statistical": known.statistical, "model": known.off.covariance},
         "discrepancy": known.off.content(),
     }
-    again = Known.of_record(known.law, plain(content), known.off.arrays())
+    again = LawWithErrors.of_record(known.law, plain(content), known.off.arrays())
     np.testing.assert_allclose(derived.radius(again, 0.8).error, derived.radius(known, 0.8).error, rtol=1e-9)
     old = {key: value for key, value in content.items() if key != "discrepancy"}
-    silent = Known.of_record(known.law, plain(old), {})
+    silent = LawWithErrors.of_record(known.law, plain(old), {})
     assert silent.off is None
     assert np.isnan(derived.radius(silent, 0.8).model[0])
 

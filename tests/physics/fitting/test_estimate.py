@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
-from profilefit.fitting.estimate import Problem, fit, misfit_covariance, residual_structure, sensitivity
+from profilefit.fitting.estimate import ResidualFunction, fit, misfit_covariance, residual_structure, sensitivity
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.fitting.solver import solve, solve_batch
@@ -37,7 +37,9 @@ def refits(tallies, law, free, seed=5):
     start = fit(tallies.profiles(tallies.draw(0, 1)[0]), law, free=free)
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (REPLICATES, *np.shape(leaf))), (law, start.rings))
     data = eqx.tree_at(lambda tree: tree[1].energy, data, energy)
-    found = solve_batch(Problem("energy", start.free), np.tile(start.solution.parameters, (REPLICATES, 1)), data)
+    found = solve_batch(
+        ResidualFunction("energy", start.free), np.tile(start.solution.parameters, (REPLICATES, 1)), data
+    )
     assert all(one.converged for one in found)
     return start, np.stack([one.parameters for one in found])
 
@@ -91,7 +93,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     free = ("s0", "s1", "s2")
     one = fit(profiles, burley, "energy", free)
-    problem = Problem("energy", free)
+    problem = ResidualFunction("energy", free)
     found = sensitivity(problem, one.solution, burley, one.rings)
     assert found.shape == (3, 5, profiles.energy.shape[1] + 1)  # and the light beyond the last ring
     for a, i in ((0, 0), (2, 5), (4, 9)):
@@ -110,7 +112,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
 def test_sensitivity_without_the_residuals_curvature_would_be_wrong(tallies, burley):
     """Negative control for the one above: Gauss and Newton's (J^T J)^-1 in place of the full Hessian."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))
-    problem = Problem("energy", one.free)
+    problem = ResidualFunction("energy", one.free)
     full = sensitivity(problem, one.solution, burley, one.rings)
     hessian = _hessian(problem, one, burley)
     short = np.einsum("pq,qai->pai", np.linalg.inv(one.solution.jacobian.T @ one.solution.jacobian) @ hessian, full)

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import Problem
+from profilefit.fitting.estimate import ResidualFunction
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import solve
@@ -108,6 +108,6 @@ def test_a_fit_from_the_start_converges(normalisation):
     law = kind(Setting(), normalisation, **kind.start())
     names = kind.constant_names()
     data = law, rings_of(profiles, None, (0.0, 0.0), ())
-    solution = solve(Problem("energy", names), law.vector(names), data)
+    solution = solve(ResidualFunction("energy", names), law.vector(names), data)
     assert solution.converged
     assert np.sqrt(np.mean(solution.residuals**2)) < 0.12

@@ -10,12 +10,12 @@ from scipy import stats
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import fitted
-from profilefit.measured.identifiability import told
+from profilefit.measured.identifiability import identifiability
 from profilefit.measured.law_error import origin
 from profilefit.measured.problem import Question
 from profilefit.measured.reading import read
 from profilefit.measured.replicates import steadied
-from profilefit.measured.result import Answer, answered, posterior
+from profilefit.measured.result import Answer, judged, posterior
 from profilefit.recipes import catalogue
 
 pytestmark = pytest.mark.slow
@@ -199,15 +199,15 @@ def test_a_white_medium_has_an_upper_limit_of_absorption():
     """No absorption at all: in half of the replicates alpha runs to 1, and mu_a has an upper limit and no value."""
     light = np.asarray(exact.profile(R, 1.0, MFP)) * (1 + 0.02 * np.random.default_rng(3).standard_normal(R.size))
     for part in (light, 1.03 * light):
-        answer = answered(fitted(points(part, 0.02 * light), Question(LAW, {"scale": 1.0}), source()))
-        assert answer.walk is not None
-        low, high = answer.interval("mu_a")
+        result = judged(fitted(points(part, 0.02 * light), Question(LAW, {"scale": 1.0}), source()))
+        assert result.walk is not None
+        low, high = result.interval("mu_a")
         assert low is None
         assert 0 < high < 2e-3, "per mm: a five-hundredth of mu_s'"
-    assert answer.found.minimum.at_edge
-    assert answer.told == ()
-    assert [answer.value(name) for name in ("A", "alpha", "mu_a")] == [None] * 3
-    assert answer.value("l") == pytest.approx(MFP, rel=0.05)
+    assert result.found.minimum.at_edge
+    assert result.identified == ()
+    assert [result.value(name) for name in ("A", "alpha", "mu_a")] == [None] * 3
+    assert result.value("l") == pytest.approx(MFP, rel=0.05)
 
 
 @pytest.mark.timeout(1800)
@@ -224,15 +224,15 @@ def test_limits_at_the_white_end_cover(alpha):
     for _ in range(count):
         value = light * (1 + 0.02 * generator.standard_normal(R.size))
         found = fitted(points(value, 0.02 * light), Question(LAW, {"scale": 1.0}), None)
-        answer = Answer(found, told(found), None, posterior(found, max_steps=1000))
-        truth, limit = (1 - alpha) / MFP, np.quantile(answer.draws["mu_a"], 0.95)
+        result = Answer(found, identifiability(found), None, posterior(found, max_steps=1000))
+        truth, limit = (1 - alpha) / MFP, np.quantile(result.draws["mu_a"], 0.95)
         held += truth <= limit
         too_low += truth > limit / 4
-        low, high = answer.interval("mu_a")
+        low, high = result.interval("mu_a")
         stated += (low or 0.0) <= truth <= high
-        at_end = answer.ends("mu_a")[0]
+        at_end = result.ends("mu_a")[0]
         assert (low is None) == at_end
-        assert (answer.value("mu_a") is None) == at_end
+        assert (result.value("mu_a") is None) == at_end
         if at_end:
             assert high == pytest.approx(limit)
     tail = 1e-3 / 2  # two albedos

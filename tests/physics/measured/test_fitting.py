@@ -11,14 +11,14 @@ import pytest
 from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.measured.data import Measured
-from profilefit.measured.fitting import Found, fitted
-from profilefit.measured.identifiability import relative_errors, told
+from profilefit.measured.fitting import MediumFit, fitted
+from profilefit.measured.identifiability import identifiability, relative_errors
 from profilefit.measured.law_error import origin, relative_error
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.optimal_design import advised
 from profilefit.measured.problem import Known, Question
 from profilefit.measured.reading import read
-from profilefit.measured.result import Answer, answered, posterior
+from profilefit.measured.result import Answer, judged, posterior
 from profilefit.measured.solving import FARTHEST_LN, LONGEST
 from profilefit.recipes import catalogue
 
@@ -46,7 +46,7 @@ def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
     return Measured("made up", "", inner, outer, value, sigma, np.full(value.size, np.inf), "as given", "mm")
 
 
-def fit(data, total=None, scale_error=None, **held) -> Found:
+def fit(data, total=None, scale_error=None, **held) -> MediumFit:
     known = None if scale_error is None else Known(1.0, scale_error)
     return fitted(data, Question(LAW, held, total, known), SOURCE)
 
@@ -157,26 +157,26 @@ def test_two_layers_are_no_half_space():
 
 def test_near_the_beam_colour_length_and_scale_are_one():
     near = fit(rings(seed=2, most=0.3 * MFP))
-    judged = told(near)
-    assert not judged.told
-    assert judged.trades
-    assert abs(judged.correlation) > 0.99
-    assert any(one.is_open for one in judged.intervals)
-    assert set(judged.loose) == {"mu_s'", "mu_a", "scale"}
-    whole = told(fit(rings(seed=2), scale=1.0))
-    assert whole.told
+    near_to = identifiability(near)
+    assert not near_to.all_identified
+    assert near_to.trades
+    assert abs(near_to.correlation) > 0.99
+    assert any(one.is_open for one in near_to.intervals)
+    assert set(near_to.loose) == {"mu_s'", "mu_a", "scale"}
+    whole = identifiability(fit(rings(seed=2), scale=1.0))
+    assert whole.all_identified
     assert whole.loose == {}
 
 
 def test_intervals_are_where_chi_square_rises(plain):
     """Where the problem is nearly linear the profile likelihood has the width of the covariance."""
-    for one in told(plain).intervals:
+    for one in identifiability(plain).intervals:
         half = 1.96 * plain.errors(plain.statistical)[one.name]
         assert (one.high - one.low) / 2 == pytest.approx(half, rel=0.05)
         assert one.low < plain.values[one.name] < one.high
 
 
-def small(generator) -> Found:
+def small(generator) -> MediumFit:
     """A fit to a few radii of some medium, often too near, too few or too noisy to tell white from grey."""
     first, noise = generator.choice([0.05, 0.2, 1.0]), generator.choice([0.01, 0.1, 0.3])
     r = np.geomspace(first, first * generator.choice([1.5, 4.0, 20.0]), int(generator.integers(4, 8)))
@@ -193,21 +193,21 @@ def test_no_value_lies_outside_its_own_interval():
         found = small(np.random.default_rng(seed))
         if not (found.minimum.converged or found.minimum.at_edge):
             continue
-        told_of = told(found)
-        endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in told_of.intervals)
-        answer = Answer(found, told_of, None, None if endless else posterior(found, max_steps=100))
-        for name in answer.moving:
-            value, shown = answer.value(name), [answer.interval(name), answer.whole_interval(name)]
-            if any(answer.ends(name)):
+        judgement = identifiability(found)
+        endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
+        result = Answer(found, judgement, None, None if endless else posterior(found, max_steps=100))
+        for name in result.moving:
+            value, shown = result.value(name), [result.interval(name), result.whole_interval(name)]
+            if any(result.ends(name)):
                 at_edge += 1
                 assert value is None
-                assert name not in answer.told
+                assert name not in result.identified
                 assert all(one is None or None in one for one in shown)
             elif value is not None:
                 given += 1
                 assert all(low <= value <= high for low, high in filter(None, shown))
         outside = found.values["alpha"] > 0.9999
-        assert not outside or answer.value("alpha") is None, "nothing here tells alpha from 1 so well"
+        assert not outside or result.value("alpha") is None, "nothing here tells alpha from 1 so well"
     assert at_edge >= 3
     assert given >= 3
 
@@ -253,7 +253,7 @@ def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
     value = np.array([-2.4e-11, -2.5e-3, 9.3e18, -8.1e15, 5e-5, 1.2e7, 2.7e-18])
     sigma = np.array([1.6e-15, 1.6e-7, 6.1e14, 5.3e11, 3.3e-9, 770.0, 1.8e-22])
     data = Measured("made up", "", r, r, value, sigma, np.full(r.size, np.inf), "as given", "mm")
-    answer = answered(fit(data))
-    assert answer.found.minimum.result != "converged"
-    assert (answer.telling, answer.told, answer.draws) == (None, (), {})
-    assert {answer.value(name) for name in answer.moving} == {None}
+    result = judged(fit(data))
+    assert result.found.minimum.result != "converged"
+    assert (result.identifiability, result.identified, result.draws) == (None, (), {})
+    assert {result.value(name) for name in result.moving} == {None}

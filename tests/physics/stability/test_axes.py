@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 
 from profilefit.studies.stability import layout
-from profilefit.studies.stability.layout import LENGTHS, Grid
+from profilefit.studies.stability.layout import LENGTHS, ArgumentGrid
 
 DTYPES = (np.float16, np.float32, np.float64)
 
 
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_every_cell_is_a_number_of_its_format(dtype):
-    grid = Grid.of(dtype)
+    grid = ArgumentGrid.of(dtype)
     for axis in (grid.alpha, grid.x, grid.xi, grid.mfp):
         np.testing.assert_array_equal(axis.values.astype(dtype).astype(float), axis.values)
         assert np.all(np.diff(axis.values) > 0)
@@ -26,11 +26,11 @@ def test_every_cell_is_a_number_of_its_format(dtype):
 @pytest.mark.parametrize("dtype", DTYPES)
 def test_lengths_reach_both_ends_of_what_is_accepted_and_beyond(dtype):
     low, high = LENGTHS[dtype]
-    grid = Grid.of(dtype)
+    grid = ArgumentGrid.of(dtype)
     assert np.min(grid.mfp.values[grid.accepted]) == dtype(low)
     assert np.max(grid.mfp.values[grid.accepted]) == dtype(high)
     assert not np.all(grid.accepted)
-    assert np.all(Grid.of(dtype, beyond=False).mfp.values <= max(high, 1e3))
+    assert np.all(ArgumentGrid.of(dtype, beyond=False).mfp.values <= max(high, 1e3))
 
 
 @pytest.mark.parametrize(
@@ -42,8 +42,8 @@ def test_numbers_as_a_person_writes_them(value, text):
 
 
 def test_a_span_says_all_where_it_is_all():
-    axis = layout.Axis("α", "-", np.array([0.0, 0.5, 1.0]))
+    axis = layout.ArgumentAxis("α", "-", np.array([0.0, 0.5, 1.0]))
     assert axis.span(0, 2) == "all α"
     assert axis.span(1, 2) == "α 0.5 … 1"
     assert axis.span(1, 1) == "α 0.5"
-    assert layout.Axis("of", "-", np.arange(2.0), ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"
+    assert layout.ArgumentAxis("of", "-", np.arange(2.0), ("r = -1", "l = 0")).span(0, 1) == "r = -1, l = 0"

@@ -8,9 +8,9 @@ import pytest
 
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import find
-from profilefit.studies.stability import layout, maps, misuse, model
+from profilefit.studies.stability import layout, map_cells, misuse, model_cells
 from profilefit.studies.stability.cells import Cells, Verdict
-from profilefit.studies.stability.laws import limits_of
+from profilefit.studies.stability.law_cells import limits_of
 from profilefit.studies.stability.layout import ALPHA_OF, CDF, FLOAT64, MODEL, REFLECTANCE_OF, SAMPLE, TEXT16
 from profilefit.studies.stability.regions import CAUSES, UNEXPLAINED, explained, regions_of
 
@@ -22,7 +22,7 @@ def printed():
     """The printed laws of Liang et al.: g as it is, and the energy of (17)."""
     one = next(one for one in inventory.profile_laws(FITS) if one.label == "liang, published")
     limits = limits_of(one, FITS)
-    return [model._unclipped(one, limits), model._energy(one, limits)]
+    return [model_cells._unclipped(one, limits), model_cells._energy(one, limits)]
 
 
 @pytest.fixture(scope="module")
@@ -30,7 +30,7 @@ def of_maps():
     """All regions of the printed map (8) and of the rational one."""
     wanted = {"liang, published", "albedo-rational"}
     found = [one for one in inventory.albedo_laws(FITS) if one.label in wanted]
-    return [region for one in found for cells in maps.cells_of(one, FITS) for region in regions_of(cells)]
+    return [region for one in found for cells in map_cells.cells_of(one, FITS) for region in regions_of(cells)]
 
 
 def keys(regions):
@@ -39,11 +39,11 @@ def keys(regions):
 
 def test_g_is_negative_below_eps_and_the_energy_is_a_misprint(printed):
     inverse, energy = (regions_of(cells) for cells in printed)
-    assert (model.INVERSE, Verdict.NEGATIVE, "g < 0 for xi < eps") in keys(inverse)
+    assert (model_cells.INVERSE, Verdict.NEGATIVE, "g < 0 for xi < eps") in keys(inverse)
     assert keys(energy) == {
-        (model.ENERGY, Verdict.NOT_FINITE, "r_max is 0/0"),
-        (model.ENERGY, Verdict.INACCURATE, "misprint of b0"),
-        (model.ENERGY, Verdict.INACCURATE, "shape of (7)"),  # darker than any fit
+        (model_cells.ENERGY, Verdict.NOT_FINITE, "r_max is 0/0"),
+        (model_cells.ENERGY, Verdict.INACCURATE, "misprint of b0"),
+        (model_cells.ENERGY, Verdict.INACCURATE, "shape of (7)"),  # darker than any fit
     }
 
 
@@ -71,7 +71,7 @@ def burley():
 
     def regions(factor):
         law = eqx.tree_at(lambda law: law.s0, one.law, factor * one.law.s0)
-        return [each for cells in model.cells_of(replace(one, law=law), limits) for each in regions_of(cells)]
+        return [each for cells in model_cells.cells_of(replace(one, law=law), limits) for each in regions_of(cells)]
 
     return regions
 
@@ -89,7 +89,7 @@ def test_a_wrong_constant_of_our_own_map_is_a_failure():
     law = eqx.tree_at(lambda law: law.b, one.law, 1.3 * one.law.b)
     found = [
         each
-        for cells in maps.cells_of(replace(one, law=law), FITS)
+        for cells in map_cells.cells_of(replace(one, law=law), FITS)
         if cells.arithmetic == MODEL
         for each in regions_of(cells)
     ]
@@ -99,7 +99,10 @@ def test_a_wrong_constant_of_our_own_map_is_a_failure():
 
 def red_cells(**changed):
     """A tensor of half precision, red where l is 1 and where it is not accepted; the text in float32 is right."""
-    alpha, length = layout.Axis("α", "-", np.array([0.5])), layout.Axis("l", "length", np.array([1.0, 2.0**-14]))
+    alpha, length = (
+        layout.ArgumentAxis("α", "-", np.array([0.5])),
+        layout.ArgumentAxis("l", "length", np.array([1.0, 2.0**-14])),
+    )
     one = np.ones((1, 2))
     codes = np.array([[Verdict.RIGHT, Verdict.INACCURATE]], np.int8)
     cells = Cells(
@@ -135,7 +138,7 @@ def test_what_is_not_judged_is_a_region_that_says_why():
 def test_a_failure_of_another_kind_is_unexplained():
     """Negative control: a red cell in the middle of a law that is right there, where no cause holds."""
     one = next(one for one in inventory.albedo_laws(FITS) if one.label == "albedo-rational")
-    cells = next(cells for cells in maps.cells_of(one, FITS) if cells.arithmetic == FLOAT64)
+    cells = next(cells for cells in map_cells.cells_of(one, FITS) if cells.arithmetic == FLOAT64)
     middle = cells.axes[0].nearest(0.5)
     codes = cells.codes.copy()
     codes[middle] = Verdict.INACCURATE

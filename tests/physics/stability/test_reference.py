@@ -9,21 +9,21 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
-from profilefit.studies.stability.cells import EXTENDED, Text, Verdict
-from profilefit.studies.stability.laws import MEASURED, _computed, limits_of
-from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, Grid
+from profilefit.studies.stability.cells import EXTENDED, RoundedText, Verdict
+from profilefit.studies.stability.law_cells import MEASURED, _computed, limits_of
+from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, ArgumentGrid
 from profilefit.studies.stability.reference import Right
 
 FITS = catalogue.fits_folder()
 
 
 def small(dtype, x=(0.01, 1.0, 10.0), alpha=(0.3, 0.9), xi=(0.1, 0.5, 0.9)):
-    grid = Grid.of(dtype)
+    grid = ArgumentGrid.of(dtype)
 
     def cut(axis, values):
         return replace(axis, values=np.asarray(values, dtype).astype(float))
 
-    return Grid(dtype, cut(grid.alpha, alpha), cut(grid.x, x), cut(grid.xi, xi), cut(grid.mfp, (1.0, 2.0)))
+    return ArgumentGrid(dtype, cut(grid.alpha, alpha), cut(grid.x, x), cut(grid.xi, xi), cut(grid.mfp, (1.0, 2.0)))
 
 
 @pytest.mark.slow
@@ -70,5 +70,5 @@ def test_single_precision_is_right_and_half_is_not():
 def test_a_text_keeps_its_type():
     law = catalogue.load("quantile")
     for dtype in (np.float16, np.float32, EXTENDED):
-        text = Text(law, dtype)
+        text = RoundedText(law, dtype)
         assert text.call("profile", np.array([1.0]), np.array([0.5]), np.array([1.0])).dtype == dtype

@@ -5,7 +5,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.studies.tradeoff import fits
-from profilefit.studies.tradeoff.fits import Estimate, Trial
+from profilefit.studies.tradeoff.fits import FittedConstants, Trial
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +25,8 @@ def test_change_is_that_of_the_energies(law):
 
 
 def test_standardised_is_in_standard_errors():
-    limit = Estimate({"a": 1.0, "b": 2.0}, {}, "converged")
-    found = Estimate({"a": 1.3, "b": 1.2}, {"a": 0.1, "b": 0.2}, "converged")
+    limit = FittedConstants({"a": 1.0, "b": 2.0}, {}, "converged")
+    found = FittedConstants({"a": 1.3, "b": 1.2}, {"a": 0.1, "b": 0.2}, "converged")
     assert fits.standardised(found, limit) == pytest.approx(np.sqrt((9.0 + 16.0) / 2.0))
     assert np.isnan(fits.standardised(limit, limit))
 
@@ -49,7 +49,7 @@ def test_points_have_the_spread_of_the_seeds_and_failures_are_told():
 
 @pytest.mark.slow
 def test_more_photons_move_the_law_less():
-    part = fits.measure(fits.Sizes((1_000_000, 20_000_000), (), 3))
+    part = fits.measure(fits.FitSizes((1_000_000, 20_000_000), (), 3))
     alone = {(point.method, point.facts["photons"]): point for point in part.panels[0].points}
     for method in (fits.ALL_AT_ONCE, fits.TWO_STAGES):
         few, many = alone[method, 1_000_000], alone[method, 20_000_000]

@@ -7,7 +7,7 @@ import profilefit
 from profilefit.studies.tradeoff import contenders, laws
 from profilefit.studies.tradeoff.stopwatch import Rates
 
-SMALL = laws.Sizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
+SMALL = laws.LawSizes(points=2000, costly=200, albedos=1000, turns=3, judged=1)
 
 
 def test_costly_samplers_are_not_timed():

@@ -3,24 +3,24 @@
 import numpy as np
 import pytest
 
-from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Measured, Point, front, standings
+from profilefit.studies.tradeoff.points import BEATEN, FRONT, TIED, Point, WithSpread, front, standings
 
 
 def point(cost, error, worst=None, spread=0.0):
     """Known to a share `spread` on either side."""
 
     def known(value):
-        return Measured(value, value * (1 - spread), value * (1 + spread))
+        return WithSpread(value, value * (1 - spread), value * (1 + spread))
 
     return Point("panel", "method", "", known(cost), known(error), None if worst is None else known(worst))
 
 
 def test_measured_is_the_median_between_its_percentiles():
-    found = Measured.of(np.arange(101.0))
+    found = WithSpread.of(np.arange(101.0))
     assert (found.value, found.low, found.high) == (50.0, 16.0, 84.0)
-    assert Measured.exactly(2) == Measured(2.0, 2.0, 2.0)
-    assert Measured(1.0, 0.9, 1.1).is_below(Measured(1.3, 1.2, 1.4))
-    assert not Measured(1.0, 0.9, 1.2).is_below(Measured(1.3, 1.2, 1.4))
+    assert WithSpread.exactly(2) == WithSpread(2.0, 2.0, 2.0)
+    assert WithSpread(1.0, 0.9, 1.1).is_below(WithSpread(1.3, 1.2, 1.4))
+    assert not WithSpread(1.0, 0.9, 1.2).is_below(WithSpread(1.3, 1.2, 1.4))
 
 
 def test_front_of_what_is_known_without_error():
@@ -57,7 +57,7 @@ def test_there_is_always_a_front():
     for _ in range(3000):
         middles, spreads = generator.random((2, generator.integers(1, 9), 2))
         ends = np.stack([middles, middles - 0.4 * spreads, middles + 0.4 * spreads], axis=-1)
-        points = [Point("", "", "", Measured(*cost), Measured(*error)) for cost, error in ends.tolist()]
+        points = [Point("", "", "", WithSpread(*cost), WithSpread(*error)) for cost, error in ends.tolist()]
         assert front(points)
 
 

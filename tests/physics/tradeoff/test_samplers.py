@@ -9,7 +9,7 @@ from profilefit.studies.tradeoff import samplers
 from profilefit.studies.tradeoff.contenders import YARDSTICK, made
 
 ALPHA, EDGE = 0.8, 1.0
-SMALL = samplers.Sizes((ALPHA,), (EDGE,), 40)
+SMALL = samplers.SamplerSizes((ALPHA,), (EDGE,), 40)
 
 
 @pytest.fixture(scope="module")

@@ -53,7 +53,7 @@ def test_order_resolved_error_is_what_it_states(sidak):
 
 @pytest.mark.slow
 def test_all_of_them_small():
-    sizes = dataclasses.replace(truth.QUICK, scalar=(1000,), tracer=(20_000,), orders=(20_000,), turns=2)
+    sizes = dataclasses.replace(truth.QUICK, scalar=(1000,), simulate=(20_000,), orders=(20_000,), turns=2)
     part = truth.measure(sizes)
     by_method = {point.method: point for point in part.panels[0].points}
     exactly = by_method.pop(truth.EXACT)
@@ -62,7 +62,7 @@ def test_all_of_them_small():
     for point in by_method.values():
         assert 1e-3 < point.error.value < point.worst.value < 10.0
         assert point.cost.low <= point.cost.value <= point.cost.high
-    ours = by_method[truth.TRACER]
+    ours = by_method[truth.SIMULATE]
     assert ours.error.value == pytest.approx(ours.facts["stated"], rel=0.5)
     assert "compiling" in part.notes[-1]
     assert {p.panel for p in part.points} == {"rings", "tracers"}

@@ -7,9 +7,9 @@ import pytest
 from benchmarks import forms, laws
 from benchmarks.survival import FORMS, HAZARD
 from profilefit.studies.tradeoff import contenders
-from profilefit.studies.tradeoff.laws import Sizes
+from profilefit.studies.tradeoff.laws import LawSizes
 
-SMALL = Sizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
+SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 
 
 @pytest.mark.slow

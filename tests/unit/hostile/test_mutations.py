@@ -39,7 +39,7 @@ from profilefit.report.page.document import write_page
 from profilefit.scenes.skin import scene as skin
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
-from profilefit.studies.choose import scene
+from profilefit.studies.choose import requirements
 from tests.unit.hostile import mutations, processes
 
 # A record alone in its folder is normalised with the shipped map, and the command says so.
@@ -83,7 +83,7 @@ def read_samples(path: Path) -> object:
 # Kind -> the ending of its files, what mutates it, and all that reads it.
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
     "record": (".json", lambda seed: mutations.record(seed)[1], (lambda path: record.read(path, whole=True),)),
-    "scene": (".toml", mutations.scene, (scene.read,)),
+    "scene": (".toml", mutations.scene, (requirements.read,)),
     "head": (".toml", mutations.head, (lambda path: skin.read(str(path), read_toml(path)),)),
     "recipe": (".toml", mutations.recipe, (recipe.read,)),
     "table": (".csv", mutations.table, (read_profile,)),

@@ -22,7 +22,7 @@ def test_what_can_be_worked_with_passes():
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         ({"value": 1e300}, "made up: expected value between 1e-40 and 1e\\+40 in size, got 1e\\+302 in the row of r"),
         ({"value": 1e-200}, "expected value between"),
@@ -32,9 +32,9 @@ def test_what_can_be_worked_with_passes():
         ({"sigma": np.nan}, "expected sigma between"),
     ],
 )
-def test_numbers_whose_squares_are_no_floats(change, told):
+def test_numbers_whose_squares_are_no_floats(change, message):
     data = points(20)
-    with pytest.raises(InputError, match=told):
+    with pytest.raises(InputError, match=message):
         require_workable(replace(data, **{name: getattr(data, name) * times for name, times in change.items()}))
 
 

@@ -8,7 +8,7 @@ import pytest
 from mcml_sim import Setting
 from profilefit.errors import RecipeError
 from profilefit.recipes import catalogue, recipe, regenerate
-from profilefit.recipes.run import Run
+from profilefit.recipes.run import RecipeRun
 
 FITS = catalogue.fits_folder()
 
@@ -17,7 +17,7 @@ def test_recipes_are_checked_before_any_photon_is_traced(tmp_path):
     bad = tmp_path / "bad.toml"
     bad.write_text((FITS / "liang-whole.toml").read_text().replace('"corrected"', '"improved"'))
     said: list[str] = []
-    run = Run("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
+    run = RecipeRun("quick", 0, tmp_path / "out", tmp_path / "store", 1000, said.append, False)
     with pytest.raises(RecipeError, match="start must be one of published, corrected, got 'improved'"):
         regenerate.regenerate((recipe.find("albedo-liang", FITS), recipe.read(bad)), run)
     assert not said
@@ -32,7 +32,7 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
         return {"constants": {}}, {}
 
     said: list[str] = []
-    run = Run("quick", 0, tmp_path / "out", None, 1000, said.append, False)
+    run = RecipeRun("quick", 0, tmp_path / "out", None, 1000, said.append, False)
     refracted, diffuse = Setting(n=1.4), Setting("diffuse")
     profile = recipe.find("burley-whole", FITS)
     exactly = replace(recipe.find("albedo-rational", FITS), check="")

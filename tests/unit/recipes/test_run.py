@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.recipes.run import PHOTONS, REFRACTED_PHOTONS, Run
+from profilefit.recipes.run import PHOTONS, REFRACTED_PHOTONS, RecipeRun
 
 SETTINGS = {
     Setting(): "",
@@ -17,7 +17,7 @@ SETTINGS = {
 @pytest.fixture
 def run(tmp_path):
     said: list[str] = []
-    return Run("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
+    return RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
 
 
 def test_every_setting_has_its_own_store_and_resumes(run):
@@ -34,7 +34,7 @@ def test_every_setting_has_its_own_store_and_resumes(run):
 
 def test_presets_give_surfaces_that_refract_fewer_photons(tmp_path):
     for preset in ("quick", "full"):
-        traced = [Run(preset, 0, tmp_path, None, None, print).number(setting) for setting in SETTINGS]
+        traced = [RecipeRun(preset, 0, tmp_path, None, None, print).number(setting) for setting in SETTINGS]
         assert traced == [PHOTONS[preset]] * 2 + [REFRACTED_PHOTONS[preset]] * 2
         assert REFRACTED_PHOTONS[preset] < PHOTONS[preset]
-    assert Run("full", 0, tmp_path, None, 7, print).number(Setting(n=1.4)) == 7
+    assert RecipeRun("full", 0, tmp_path, None, 7, print).number(Setting(n=1.4)) == 7

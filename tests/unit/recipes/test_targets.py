@@ -8,7 +8,7 @@ import pytest
 from mcml_sim import Grid, exact, simulate_orders
 from profilefit.errors import RecipeError
 from profilefit.recipes import catalogue, recipe
-from profilefit.recipes.recipe import Albedos, Rings
+from profilefit.recipes.recipe import Albedos, RingLayout
 from profilefit.recipes.targets import RUN_EDGES, albedo_values, ring_edges, truth_of
 
 FITS = catalogue.fits_folder()
@@ -31,16 +31,16 @@ def test_albedos_are_even_in_their_spacing(spacing, even):
 
 
 def test_rings_are_edges_of_the_run():
-    for rings in (Rings(last=20.0, dr=0.05), Rings(last=100.0, first=0.01, count=34)):
+    for rings in (RingLayout(last=20.0, dr=0.05), RingLayout(last=100.0, first=0.01, count=34)):
         edges = ring_edges(rings)
         assert set(edges) <= set(RUN_EDGES)
         assert edges[0] == 0.0
         assert edges[-1] == pytest.approx(rings.last, rel=0.05)
-    assert np.diff(ring_edges(Rings(last=20.0, dr=0.05), mfp=0.5)) == pytest.approx(0.1)
-    assert np.diff(ring_edges(Rings(last=20.0, dr=0.05), mfp=5.0)) == pytest.approx(0.01)
+    assert np.diff(ring_edges(RingLayout(last=20.0, dr=0.05), mfp=0.5)) == pytest.approx(0.1)
+    assert np.diff(ring_edges(RingLayout(last=20.0, dr=0.05), mfp=5.0)) == pytest.approx(0.01)
 
 
-@pytest.mark.parametrize("rings", [Rings(last=20.0, dr=0.013), Rings(last=60.0, dr=0.05)])
+@pytest.mark.parametrize("rings", [RingLayout(last=20.0, dr=0.013), RingLayout(last=60.0, dr=0.05)])
 def test_rings_that_the_run_cannot_make_are_refused(rings):
     with pytest.raises(RecipeError, match=r"rings.dr / mfp must be a multiple of 0.01 up to 40 mfp, got 0.0"):
         ring_edges(rings)

@@ -7,10 +7,10 @@ from rich.console import Console
 from profilefit.recipes import catalogue, inventory
 from profilefit.report.tables import check_tables
 from profilefit.shader.check.bounds import Bound, ModelError
-from profilefit.shader.check.cost import WORKS, Cost
-from profilefit.shader.check.grid import Count, Spread
-from profilefit.shader.check.laws import CDF, OWN, PROFILE, SAMPLE, LawCheck
-from profilefit.shader.check.maps import MapCheck
+from profilefit.shader.check.dense_grid import Count, Spread
+from profilefit.shader.check.law_check import CDF, OWN, PROFILE, SAMPLE, LawCheck
+from profilefit.shader.check.law_cost import WORKS, Cost
+from profilefit.shader.check.map_check import MapCheck
 
 FITS = catalogue.fits_folder()
 NONE = Count(0, 0, 0, 0)

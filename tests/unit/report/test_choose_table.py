@@ -13,10 +13,10 @@ from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
 from profilefit.studies.choose.layers import OneLayer
-from profilefit.studies.choose.scene import Budget, Scene
+from profilefit.studies.choose.requirements import Budget, Requirements
 
 ONE = ((0.5, 0.5),) * 3
-SCENE = Scene("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
+SCENE = Requirements("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
 CURVED = Case((0.5, 0.5, 0.5), (0.5, 0.5, 0.5), 0.1, 5.0)
 SAMPLED = Option("sampled", 64, name="hazard-diffuse")
 LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6)
@@ -74,11 +74,11 @@ def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
 
 
 def test_says_when_nothing_serves(choice):
-    scarce = chosen(Scene(**{**vars(SCENE), "budget": Budget(ms=1.0)}), choice.predicted)
+    scarce = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=1.0)}), choice.predicted)
     assert headline(scarce).startswith(
         "Nothing serves for 2.0 % within 1 ms: the cheapest within the tolerance is separable"
     )
-    strict = chosen(Scene(**{**vars(SCENE), "tolerance": 0.001, "budget": Budget()}), choice.predicted)
+    strict = chosen(Requirements(**{**vars(SCENE), "tolerance": 0.001, "budget": Budget()}), choice.predicted)
     assert headline(strict) == "Nothing serves for 0.10 %: the most accurate is hazard-diffuse, 64 samples"
 
 

@@ -9,14 +9,20 @@ from profilefit.report.figures import tradeoff_figure as figure
 from profilefit.report.figures.canvas import canvas
 from profilefit.report.figures.tradeoff_figure import Label, box_of, place_labels, renderer_of
 from profilefit.report.tables.tradeoff_tables import tradeoff_tables
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 
 NUMBERS = {"a": (1.0, 0.5), "b": (2.0, 0.1), "normalized diffusion": (2.1, 0.11), "slow": (40.0, 0.8)}
 POINTS = tuple(
-    Point("p", name, "1e5 photons" if name == "a" else "", Measured(x, 0.9 * x, 1.1 * x), Measured(y, 0.8 * y, 1.2 * y))
+    Point(
+        "p",
+        name,
+        "1e5 photons" if name == "a" else "",
+        WithSpread(x, 0.9 * x, 1.1 * x),
+        WithSpread(y, 0.8 * y, 1.2 * y),
+    )
     for name, (x, y) in NUMBERS.items()
 )
-PART = Part("demo", "Demo", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",))
+PART = TradeoffPart("demo", "Demo", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",))
 
 
 def test_labels_keep_off_each_other_and_inside():
@@ -65,7 +71,7 @@ def test_marks_say_where_points_stand():
     [("1e5 photons", True, "a: 10$^5$ photons"), ("2e4 photons", False, "2·10$^4$ photons"), ("", True, "a")],
 )
 def test_efforts_are_powers_of_ten(label, first, text):
-    assert figure._text(Point("p", "a", label, *[Measured.exactly(1.0)] * 2), first) == text
+    assert figure._text(Point("p", "a", label, *[WithSpread.exactly(1.0)] * 2), first) == text
 
 
 def test_figure_and_table(tmp_path):

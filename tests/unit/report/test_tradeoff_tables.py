@@ -9,13 +9,17 @@ import pytest
 from profilefit.errors import InputError
 from profilefit.report.tables import tradeoff_tables
 from profilefit.studies.tradeoff import parts, stopwatch
-from profilefit.studies.tradeoff.points import Measured, Panel, Part, Point
+from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 
 POINTS = (
-    Point("p", "one", "few", Measured(1.0, 0.9, 1.1), Measured(0.5, 0.4, 0.6), Measured.exactly(0.7), {"photons": 3}),
-    Point("p", 'two, "quoted"', "", Measured.exactly(2.0), Measured.exactly(1 / 3), None, {"stated": 0.25}),
+    Point(
+        "p", "one", "few", WithSpread(1.0, 0.9, 1.1), WithSpread(0.5, 0.4, 0.6), WithSpread.exactly(0.7), {"photons": 3}
+    ),
+    Point("p", 'two, "quoted"', "", WithSpread.exactly(2.0), WithSpread.exactly(1 / 3), None, {"stated": 0.25}),
 )
-PART = Part("demo", "A title", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",))
+PART = TradeoffPart(
+    "demo", "A title", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",)
+)
 
 
 def test_csv_reads_back_with_its_comments():

@@ -32,9 +32,7 @@ def lanes(direction=(0.0, 0.0, 1.0), z=0.5, layer=1, weight=1.0, event=0):
 
 @jax.jit
 def scatter(pool, event=0):
-    return layered_event.scatter(
-        GO, KEY, pool, pool.event + jnp.uint32(event), layered_event.material(STACK, pool.layer)
-    )
+    return layered_event.scatter(GO, KEY, pool, pool.event + jnp.uint32(event), layered_event.optics(STACK, pool.layer))
 
 
 @jax.jit
@@ -69,7 +67,7 @@ def test_scattering_turns_by_g_and_evenly_around(direction, layer, g):
     # From deep inside an endless layer nobody waits.
     endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e6, layer=layer)
-    after, _ = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.material(endless, pool.layer))
+    after, _ = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(endless, pool.layer))
     turned = direction_of(after)
     np.testing.assert_allclose(np.linalg.norm(turned, axis=0), 1, atol=2e-6)
     along = turned.T @ np.asarray(direction, float)
@@ -86,7 +84,7 @@ def test_free_paths_are_exponential_and_end_where_the_photon_is():
     direction = unit(1, 2, -2)
     endless = STACK._replace(thickness=np.full(3, np.inf, np.float32))
     pool = lanes(direction, z=1e3, layer=2)
-    after, left = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.material(endless, pool.layer))
+    after, left = layered_event.scatter(GO, KEY, pool, pool.event, layered_event.optics(endless, pool.layer))
     assert not np.any(left)
     paths = np.abs(np.asarray(after.place, complex)) / np.hypot(*direction[:2])
     assert kstest(paths, "expon", (0, 0.5)).pvalue > 1e-3
@@ -206,7 +204,7 @@ def test_directions_keep_their_length_over_a_thousand_turns():
     @partial(jax.jit, static_argnames="turns")
     def walk(pool, turns):
         def turn(_, pool):
-            here = layered_event.material(endless, pool.layer)
+            here = layered_event.optics(endless, pool.layer)
             for number in range(EVENTS_PER_TURN - 1):
                 pool, _ = layered_event.scatter(GO, KEY, pool, pool.event + number, here)
             pool = layered_event.settle(GO, KEY, endless, pool, pool.event + EVENTS_PER_TURN - 1)

@@ -10,7 +10,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.stage import pattern
 from profilefit.scenes.stage.pattern import WRAPS
 from profilefit.scenes.stage.step_edge import (
-    Gather,
+    EdgeGather,
     by_law,
     by_quantile,
     by_uniform,
@@ -97,7 +97,7 @@ def test_lattice_beats_random_points():
 
 
 def test_nothing_to_gather_leaves_the_point_its_own_light():
-    empty = Gather(lambda xi: xi, np.zeros_like)
+    empty = EdgeGather(lambda xi: xi, np.zeros_like)
     found = edge_estimate(empty, random_points(4, 3, seed=1), [-1.0, 1.0], 0.5, SEARCHLIGHT)
     np.testing.assert_array_equal(found.mean, [0.0, 1.0])
 

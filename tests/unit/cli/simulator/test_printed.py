@@ -26,7 +26,7 @@ from mcml_sim.results.tally_file import Results
     ],
 )
 def test_a_value_with_two_digits_of_its_error(value, error, samples, text):
-    assert printed.told(Estimate(value, error, samples)) == text
+    assert printed.with_error(Estimate(value, error, samples)) == text
 
 
 @pytest.mark.parametrize(

@@ -13,13 +13,13 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
-from profilefit.shader.check import bounds, grid, validity
+from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability.cells import (
     Cells,
     Codes,
     Mask,
-    Text,
+    RoundedText,
     absolute,
     judged,
     relative,
@@ -42,7 +42,7 @@ from profilefit.studies.stability.layout import (
     STORED16,
     TEXT16,
     TEXT32,
-    Grid,
+    ArgumentGrid,
 )
 from profilefit.studies.stability.reference import LEAST_X, Right
 
@@ -89,10 +89,10 @@ def limits_of(one: Named, folder: Folder) -> Limits:
 def cells_of(one: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
     """All quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
-        yield from _computed(one, limits, arithmetic, Grid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
+        yield from _computed(one, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
-def _computed(one: Named, limits: Limits, arithmetic: str, at: Grid) -> Iterator[Cells]:
+def _computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
     found, right = _values(one.law, arithmetic, at), _right(one.law, arithmetic, at)
     single = _values(one.law, TEXT32, at) if arithmetic == TEXT16 else {}
     for name, value in found.items():
@@ -133,7 +133,7 @@ def _classed(
     return error, judged(value, reference, error, bound, inside, dtype, right.dim(name, reference), wrong_way)
 
 
-def _inside(name: str, valid: validity.Validity, at: Grid) -> Mask:
+def _inside(name: str, valid: validity.Validity, at: ArgumentGrid) -> Mask:
     """Where the law says that the quantity holds; a uniform number is below 1."""
     albedos, shares = at.alpha.values, at.xi.values
     profiled, drawn = validity.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
@@ -148,7 +148,7 @@ def _error(name: str, value: Floats, reference: Floats, right: Right) -> Floats:
     return absolute(value, reference) if name == CDF else relative(value, reference)
 
 
-def _wrong_way(name: str, value: Floats, at: Grid) -> Mask | None:
+def _wrong_way(name: str, value: Floats, at: ArgumentGrid) -> Mask | None:
     """R_d falls with r, the cdf and radii rise. e^-t has as many roundings as t."""
     with np.errstate(all="ignore"):
         if name == PROFILE:
@@ -161,13 +161,13 @@ def _wrong_way(name: str, value: Floats, at: Grid) -> Mask | None:
     return None
 
 
-def _right(law: ProfileLaw, arithmetic: str, at: Grid) -> Right:
+def _right(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> Right:
     nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else LEAST_X
-    albedo = _stored_albedo(Text(law, np.float32), at.arguments[2]) if arithmetic == STORED16 else None
+    albedo = _stored_albedo(RoundedText(law, np.float32), at.arguments[2]) if arithmetic == STORED16 else None
     return Right(law, at, albedo, nearest)
 
 
-def _values(law: ProfileLaw, arithmetic: str, at: Grid) -> Values:
+def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> Values:
     if arithmetic == FLOAT64:
         found = _of_law(law, *at.arguments)
     elif arithmetic == FLOAT32:
@@ -180,13 +180,13 @@ def _values(law: ProfileLaw, arithmetic: str, at: Grid) -> Values:
 
 
 def _of_law(law: ProfileLaw, r, xi, alpha, mfp) -> tuple:
-    sampler = grid.drawn_by(law)
+    sampler = dense_grid.drawn_by(law)
     profile, cdf = law.profile(r, alpha, mfp), law.cdf(r, alpha, mfp)
     return profile, cdf, sampler.sample(xi, alpha, mfp), sampler.pdf(r, alpha, mfp)
 
 
 def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
-    text = Text(law, np.float16 if arithmetic == TEXT16 else np.float32)
+    text = RoundedText(law, np.float16 if arithmetic == TEXT16 else np.float32)
     if arithmetic == STORED16:
         alpha = _stored_albedo(text, alpha)
     calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
@@ -197,7 +197,7 @@ def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
         return tuple(each.astype(np.float16) for each in found)
 
 
-def _stored_albedo(text: Text, alpha: Floats) -> Floats:
+def _stored_albedo(text: RoundedText, alpha: Floats) -> Floats:
     """alpha by way of the law's own A kept in half, as a texture keeps it."""
     reflectance = np.asarray(text.call("reflectance", text.call("shape", alpha)))
     return np.asarray(text.call("alpha", reflectance.astype(np.float16).astype(np.float32)))

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.studies.choose.scene import read
+from profilefit.studies.choose.requirements import read
 
 SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
 SMALL = """\

@@ -17,7 +17,7 @@ from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import GPUS, YARDSTICK
-from profilefit.studies.choose.response import truth
+from profilefit.studies.choose.response import reference_light
 
 Range = tuple[float, float]
 TABLES = {
@@ -36,15 +36,15 @@ MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pe
 
 @dataclass(frozen=True)
 class Budget:
-    """ms of a frame, None if there is no limit; gpu a class of `cost.GPUS`; coverage, share of the screen [-]."""
+    """ms of a frame, None if there is no limit; gpu a class of `cost.GPUS`; screen_share of skin and the like [-]."""
 
     ms: float | None = None
     gpu: str = YARDSTICK
-    coverage: float = 0.5
+    screen_share: float = 0.5
 
 
 @dataclass(frozen=True)
-class Scene:
+class Requirements:
     """Ranges of what is to be drawn.
 
     unit         of all lengths, for show
@@ -69,7 +69,7 @@ class Scene:
     layers: Medium | None = None
 
 
-def read(path: Path) -> Scene:
+def read(path: Path) -> Requirements:
     """A scene from its file; InputError that names file, table and key, what was got and what is accepted."""
     return _Reader(str(path), TABLES).scene(read_toml(path))
 
@@ -82,7 +82,7 @@ def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
 class _Reader(Tables):
     """The tables of one file, whose name every message begins with."""
 
-    def scene(self, content: Table) -> Scene:
+    def scene(self, content: Table) -> Requirements:
         self.known("", content)
         view, material = (self.table(content, name) for name in ("view", "material"))
         tolerance, budget = self.table(content, "tolerance"), self.table(content, "budget", {})
@@ -101,7 +101,7 @@ class _Reader(Tables):
         if radius < LEAST_RADIUS * longest:
             least = f"at least {LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest / world:.3g}"
             raise self.bad("view", "radius", least, view["radius"])
-        return Scene(
+        return Requirements(
             unit=self.text("", "unit", content, "mm"),
             setting=setting,
             reflectance=_three(reflectance),
@@ -125,7 +125,7 @@ class _Reader(Tables):
     def setting(self, material: Table) -> Setting:
         light = self.text("material", "light", material, "diffuse", ILLUMINATIONS)
         index = self.number("material", "index", material, 1.0)
-        return self.made("material", lambda: truth(Setting(light, index)).setting)
+        return self.made("material", lambda: reference_light(Setting(light, index)).setting)
 
     def channels(self, material: Table, setting: Setting) -> tuple[tuple[Range, ...], tuple[Range, ...]]:
         """Ranges of A and of the mean free path, three each."""
@@ -133,7 +133,7 @@ class _Reader(Tables):
             if given := [name for name in CHANNELS if name in material]:
                 raise self.bad("material", "name", f"left out where {', '.join(given)} are given", material["name"])
             known = BY_NAME[self.text("material", "name", material, accepted=tuple(BY_NAME))]
-            light = truth(setting)
+            light = reference_light(setting)
             colours = [light.reflectance(alpha) for alpha in known.alpha]
             return tuple((a, a) for a in colours), tuple((length, length) for length in known.mfp)
         found: list[tuple[Range, Range]] = []

@@ -21,7 +21,17 @@ from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.check.validity import Range
 from profilefit.studies.stability import layout
-from profilefit.studies.stability.cells import EXTENDED, Cells, Codes, Mask, Text, Verdict, absolute, judged, steps_down
+from profilefit.studies.stability.cells import (
+    EXTENDED,
+    Cells,
+    Codes,
+    Mask,
+    RoundedText,
+    Verdict,
+    absolute,
+    judged,
+    steps_down,
+)
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     DTYPES,
@@ -34,7 +44,7 @@ from profilefit.studies.stability.layout import (
     STORED16,
     TEXT16,
     TEXT32,
-    Axis,
+    ArgumentAxis,
 )
 
 Floats = NDArray[np.float64]
@@ -68,8 +78,8 @@ def _computed(one: Named, name: str, arithmetic: str, limit: float, span: Range)
 
 
 def _cells(
-    one: Named, name: str, arithmetic: str, axis: Axis, value: Floats, reference: Floats, limit: float, span: Range,
-    stated: float = np.nan, beside: Floats | None = None,
+    one: Named, name: str, arithmetic: str, axis: ArgumentAxis, value: Floats, reference: Floats, limit: float,
+    span: Range, stated: float = np.nan, beside: Floats | None = None,
 ) -> Cells:  # fmt: skip
     """`beside`: what the same text makes of the same arguments in float32."""
     dtype = DTYPES[arithmetic]
@@ -101,10 +111,10 @@ def _classed(value: Floats, reference: Floats, limit: float, inside: Mask, dtype
     return error, judged(value, reference, error, limit, inside, dtype, wrong_way=wrong_way)
 
 
-def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: Axis) -> Floats:
+def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: ArgumentAxis) -> Floats:
     given: Any = axis.values
     if arithmetic in (TEXT32, TEXT16):
-        return np.asarray(Text(law, DTYPES[arithmetic]).call(WAYS[name][1], given), float)
+        return np.asarray(RoundedText(law, DTYPES[arithmetic]).call(WAYS[name][1], given), float)
     if arithmetic == FLOAT32:
         law = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law)
         given = jnp.asarray(given, jnp.float32)
@@ -112,14 +122,14 @@ def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: Axis) -> Floats:
         return np.asarray(law.alpha(given) if name == ALPHA_OF else law.reflectance(given), float)
 
 
-def _right(law: AlbedoLaw, name: str, axis: Axis) -> Floats:
-    return np.asarray(Text(law, EXTENDED).call(WAYS[name][1], axis.values), float)
+def _right(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
+    return np.asarray(RoundedText(law, EXTENDED).call(WAYS[name][1], axis.values), float)
 
 
 def _kept_in_half(one: Named, span: Range) -> Iterator[Cells]:
     """A where alpha, or its root, is kept in half and the map is computed in single precision."""
     axis = layout.alpha(np.float32)
-    text, right = Text(one.law, np.float32), _right(one.law, REFLECTANCE_OF, axis)
+    text, right = RoundedText(one.law, np.float32), _right(one.law, REFLECTANCE_OF, axis)
     half = axis.values.astype(np.float16).astype(np.float32)
     root = np.sqrt(1.0 - axis.values).astype(np.float16).astype(np.float32)
     for name, alpha in ((REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
@@ -130,8 +140,8 @@ def _kept_in_half(one: Named, span: Range) -> Iterator[Cells]:
 def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
     """In A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
-    alpha = Axis("α", "-", 1.0 - root**2)
-    reflectance = Axis("A", "-", np.asarray(exact.reflectance(alpha.values, setting=one.setting)))
+    alpha = ArgumentAxis("α", "-", 1.0 - root**2)
+    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(alpha.values, setting=one.setting)))
     with np.errstate(all="ignore"):
         back = np.asarray(one.law.alpha(reflectance.values))
         there = np.asarray(one.law.reflectance(alpha.values))

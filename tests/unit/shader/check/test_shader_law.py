@@ -10,8 +10,8 @@ import profilefit
 from profilefit.errors import ShaderError
 from profilefit.recipes import catalogue
 from profilefit.shader import emit
-from profilefit.shader.check.cost import costs
-from profilefit.shader.check.evaluate import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half
+from profilefit.shader.check.law_cost import costs
+from profilefit.shader.check.shader_law import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half
 
 BURLEY = profilefit.load("burley", "published")
 RATIONAL = catalogue.albedo_law("rational")

@@ -21,7 +21,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader import emit
-from profilefit.shader.check.evaluate import Board
+from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import check_errors, full_screen, program
 
 Floats = NDArray[np.float64]

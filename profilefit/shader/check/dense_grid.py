@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check.bounds import Bound, ModelError
-from profilefit.shader.check.evaluate import Values
+from profilefit.shader.check.shader_law import Values
 
 Floats = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -183,7 +183,7 @@ def _faults(name: str, value: Floats, at: Arguments) -> list[Mask]:
 
 
 @dataclass(frozen=True)
-class Verdict:
+class ShaderCheck:
     """One law or map, judged.
 
     rounding  errors that float32 makes, worst, by the names of `quality` [-]; measured of the GPU against the exact

@@ -29,11 +29,11 @@ def test_it_reads_files():
 def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
     parts = fitted(near, Question(law, {"scale": 1.0}))
-    answer = fit(near, walk=False)
-    assert answer.found.values == parts.values
-    assert answer.walk is None
-    assert answer.telling.told
-    assert answer.found.rel is not None, "the law's record was found"
+    result = fit(near, walk=False)
+    assert result.found.values == parts.values
+    assert result.walk is None
+    assert result.identifiability.all_identified
+    assert result.found.rel is not None, "the law's record was found"
 
 
 def test_what_is_known_goes_in(near):
@@ -56,7 +56,7 @@ def test_a_simulation_brings_its_own_surface():
 
 
 @pytest.mark.parametrize(
-    ("given", "told"),
+    ("given", "message"),
     [
         ({"held": {"mu_a": 1.0}}, "held must name some of alpha, A, l, got 'mu_a'"),
         ({"held": {"alpha": 0.9, "A": 0.5}}, "held must have one of alpha and A, which say the same, got both"),
@@ -65,6 +65,6 @@ def test_a_simulation_brings_its_own_surface():
         ({"law": "hazzard"}, "law must be one of .*, got 'hazzard'"),
     ],
 )
-def test_what_cannot_be_asked_is_named(near, given, told):
-    with pytest.raises(InputError, match=told):
+def test_what_cannot_be_asked_is_named(near, given, message):
+    with pytest.raises(InputError, match=message):
         fit(near, **given)

@@ -17,7 +17,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.estimate import Problem, judged
+from profilefit.fitting.estimate import ResidualFunction, judged
 from profilefit.fitting.objectives import NO_LIMITS, Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import Solution, solve_batch
@@ -68,36 +68,36 @@ class FitCase:
     def is_failure(self) -> bool:
         """Whether a fit ended without a word, or said that it converged to what is no number."""
         accepted = self.case == NONSENSE and self.converged > 0
-        return accepted or any(not told for told, _ in self.results) or not np.isfinite(self.spread)
+        return accepted or any(not result for result, _ in self.results) or not np.isfinite(self.spread)
 
 
 def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[FitCase]:
     """All cases of one law."""
     names = law.seen_by(objective)
-    problem, own = Problem(objective, names), law.vector(names)
+    problem, own = ResidualFunction(objective, names), law.vector(names)
     label = f"{name}, {objective}"
 
     def solved(begins: Floats, data: list[Rings]) -> list[Solution]:
         return [judged(one, names) for one in solve_batch(problem, begins, _stacked(law, data))]
 
-    def told(case: str, value: str, begins: Floats, data: list[Rings], start: Floats | None = None) -> FitCase:
+    def case_of(case: str, value: str, begins: Floats, data: list[Rings], start: Floats | None = None) -> FitCase:
         return _case(label, case, value, names, solved(begins, data), start)
 
     alone, usual = np.tile(own, (lanes, 1)), _rings(ORDINARY, LAST)
     random = spread_out(own, lanes, SEED)
-    yield told(STARTS, "× e^(0.69 normal)", random, [usual] * lanes)
-    yield told(STARTS, "× e^(2.1 normal)", random * (random / own) ** 2, [usual] * lanes)
+    yield case_of(STARTS, "× e^(0.69 normal)", random, [usual] * lanes)
+    yield case_of(STARTS, "× e^(2.1 normal)", random * (random / own) ** 2, [usual] * lanes)
     if isinstance(law, ProfileLaw):
         best = solved(alone, [usual] * lanes)[0].parameters
         for merged in (2, 4, 8):
             data = _merged(usual, merged)
-            yield told(BINS, f"dr {merged * LAST / RINGS:g} l", alone, [data] * lanes, best)
+            yield case_of(BINS, f"dr {merged * LAST / RINGS:g} l", alone, [data] * lanes, best)
     for photons in (1e4, 1e6, 1e8):
-        yield told(NOISE, f"{photons:.0e} photons", alone, [_noisy(usual, photons, lane) for lane in range(lanes)])
-    yield told(ALBEDO, "α 1e-4 … 0.02", random, [_rings(DARK, LAST)] * lanes)
-    yield told(ALBEDO, "α 0.999 … 1 − 1e-6", random, [_rings(WHITE, LAST)] * lanes)
+        yield case_of(NOISE, f"{photons:.0e} photons", alone, [_noisy(usual, photons, lane) for lane in range(lanes)])
+    yield case_of(ALBEDO, "α 1e-4 … 0.02", random, [_rings(DARK, LAST)] * lanes)
+    yield case_of(ALBEDO, "α 0.999 … 1 − 1e-6", random, [_rings(WHITE, LAST)] * lanes)
     for value, change in NONSENSES.items():
-        yield told(NONSENSE, value, alone, [change(usual)] * lanes)
+        yield case_of(NONSENSE, value, alone, [change(usual)] * lanes)
 
 
 def trimmed_fits(start: Liang) -> Iterator[FitCase]:

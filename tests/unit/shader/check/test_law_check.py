@@ -6,14 +6,14 @@ import pytest
 from profilefit.errors import InputError, RecordError
 from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
-from profilefit.shader.check import bounds, grid, validity
+from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import Bound
 from profilefit.shader.check.chosen import chosen, printed, regenerated
-from profilefit.shader.check.cost import WORKS, costs
-from profilefit.shader.check.evaluate import Values
 from profilefit.shader.check.half import ALPHA, REFLECTANCE, check_half
-from profilefit.shader.check.laws import OWN, check_law, check_laws
-from profilefit.shader.check.maps import check_map
+from profilefit.shader.check.law_check import OWN, check_law, check_laws
+from profilefit.shader.check.law_cost import WORKS, costs
+from profilefit.shader.check.map_check import check_map
+from profilefit.shader.check.shader_law import Values
 
 FITS = catalogue.fits_folder()
 HAZARD = inventory.find("hazard-n1.4", FITS)  # photons judge it: no exact profile is computed
@@ -23,7 +23,7 @@ RATIONAL = inventory.find("albedo-rational-n1.4", FITS)
 @pytest.fixture(scope="module")
 def exact():
     """The law in float64 on the whole grid."""
-    return grid.reference(HAZARD.law, grid.arguments())
+    return dense_grid.reference(HAZARD.law, dense_grid.arguments())
 
 
 def names(found):
@@ -109,7 +109,7 @@ def test_names_choose_laws_and_maps():
 
 def test_bad_numbers_are_counted_by_kind():
     """On a grid of two albedos, four radii and shares, one length."""
-    at = grid.Arguments(
+    at = dense_grid.Arguments(
         np.array([0.2, 0.8])[:, None, None],
         np.array([0.0, 1.0, 2.0, 3.0])[None, :, None],
         np.array([0.0, 0.2, 0.4, 0.6])[None, :, None],
@@ -120,37 +120,37 @@ def test_bad_numbers_are_counted_by_kind():
     profile, cdf, sample = falling.copy(), rising / 4.0, rising.copy()
     profile[0, 2, 0] = 3.5  # up by a half
     profile[1, 3, 0] = np.inf  # not a step up besides
-    cdf[0, 1, 0] = cdf[0, 0, 0] - 2.0 * grid.ULP  # rounding
+    cdf[0, 1, 0] = cdf[0, 0, 0] - 2.0 * dense_grid.ULP  # rounding
     cdf[1, 2, 0] = np.nan
     sample[0, 0, 0] = -1.0
     everywhere = np.ones((2, 4, 1), bool)
-    found = grid.counted(Values(profile, cdf, sample, rising), at, everywhere, everywhere)
+    found = dense_grid.counted(Values(profile, cdf, sample, rising), at, everywhere, everywhere)
     assert (found.nan, found.infinite, found.negative, found.wrong_way) == (1, 1, 1, 2)
     assert found.where == "profile, r/l 2, α 0.2"
     bright = everywhere & (at.alpha > 0.5)
-    inside = grid.counted(Values(profile, cdf, sample, rising), at, bright, bright)
+    inside = dense_grid.counted(Values(profile, cdf, sample, rising), at, bright, bright)
     assert (inside.nan, inside.infinite, inside.negative) == (1, 1, 0)
     assert found.less(inside).negative == 1
 
 
 def test_errors_that_are_no_number_are_the_largest():
-    at = grid.Arguments(np.full((3, 1, 1), 0.5), np.array([[[1.0]]]), np.array([[[0.5]]]), np.array([1.0]))
+    at = dense_grid.Arguments(np.full((3, 1, 1), 0.5), np.array([[[1.0]]]), np.array([[[0.5]]]), np.array([1.0]))
     error = np.array([0.1, np.nan, 0.2]).reshape(3, 1, 1)
-    found = grid.spread(error, np.ones((3, 1, 1), bool), at)
+    found = dense_grid.spread(error, np.ones((3, 1, 1), bool), at)
     assert found.largest == np.inf
     assert found.half == 0.2
-    assert grid.spread(error, np.zeros((3, 1, 1), bool), at) is None
+    assert dense_grid.spread(error, np.zeros((3, 1, 1), bool), at) is None
     assert Bound("x", float("nan"), 1.0).broken
     assert not Bound("x", 1.0, 1.0).broken
     assert str(Bound("x", 3.0, 1.5, "r 2")) == "x: 3 at r 2; bound 1.5, 2 times that"
 
 
 def test_the_grid_has_both_ends():
-    assert (grid.ALPHA[0], grid.ALPHA[-1]) == (0.0, 1.0)
-    assert (grid.X[0], grid.XI[0], grid.XI[-1]) == (0.0, 0.0, 1.0)
-    assert grid.X[-1] >= 1e29
-    assert grid.X.size == grid.XI.size
-    for values in (grid.ALPHA, grid.X, grid.XI):
+    assert (dense_grid.ALPHA[0], dense_grid.ALPHA[-1]) == (0.0, 1.0)
+    assert (dense_grid.X[0], dense_grid.XI[0], dense_grid.XI[-1]) == (0.0, 0.0, 1.0)
+    assert dense_grid.X[-1] >= 1e29
+    assert dense_grid.X.size == dense_grid.XI.size
+    for values in (dense_grid.ALPHA, dense_grid.X, dense_grid.XI):
         assert np.all(np.diff(values) > 0)
         assert np.array_equal(values, values.astype(np.float32))
 

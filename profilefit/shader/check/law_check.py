@@ -24,10 +24,10 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record_folder import Folder
-from profilefit.shader.check import bounds, claims, grid, validity
+from profilefit.shader.check import bounds, claims, dense_grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
-from profilefit.shader.check.evaluate import ShaderLaw, Values
-from profilefit.shader.check.grid import XI, Arguments, Spread, Verdict, bad_numbers
+from profilefit.shader.check.dense_grid import XI, Arguments, ShaderCheck, Spread, bad_numbers
+from profilefit.shader.check.shader_law import ShaderLaw, Values
 from profilefit.shader.languages import translated
 
 Floats = NDArray[np.float64]
@@ -66,7 +66,7 @@ class Twin:
         single[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
         error = np.abs(shader.values(x, xi, albedo).pdf * slope - 1.0)
         at = Arguments(albedo, x, xi, np.array(1.0))
-        return grid.spread(error, single & inner, at, of_share=True)
+        return dense_grid.spread(error, single & inner, at, of_share=True)
 
 
 Mask = NDArray[np.bool_]
@@ -75,7 +75,7 @@ JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 
 
 @dataclass(frozen=True)
-class LawCheck(Verdict):
+class LawCheck(ShaderCheck):
     """What was found of one law: `rel`, `ks` and `inversion_error`, and
 
     spreads  float32 errors by name: R_d and pdf relative, over the range of `rel` or wherever a float32 holds them;
@@ -88,7 +88,7 @@ class LawCheck(Verdict):
 def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        references = pool.map(lambda one: grid.reference(one.law, grid.arguments()), laws)
+        references = pool.map(lambda one: dense_grid.reference(one.law, dense_grid.arguments()), laws)
         for one, exact in zip(laws, references, strict=True):
             yield check_law(context, one, folder, exact=exact)
 
@@ -101,19 +101,21 @@ def check_law(
     text   in place of its own; exact  the law in float64 on the grid, where that is known already
     """
     model, valid = bounds.of_profile(one, folder), validity.of_profile(one, folder)
-    shader, at = ShaderLaw(context, one.law, text), grid.arguments()
+    shader, at = ShaderLaw(context, one.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        exact = exact or grid.reference(one.law, at)
-        profiled, drawn = (np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, grid.ALPHA, grid.XI))
+        exact = exact or dense_grid.reference(one.law, at)
+        profiled, drawn = (
+            np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, dense_grid.ALPHA, dense_grid.XI)
+        )
         spreads, rounding = _rounding(one.law, found, exact, at, profiled, drawn)
-        judged = grid.ALPHA[drawn.any(axis=(1, 2))]
+        judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:
         spreads[OWN] = own
-    inside = grid.counted(found, at, profiled, drawn)
+    inside = dense_grid.counted(found, at, profiled, drawn)
     everywhere = np.ones(at.shape, bool)
-    outside = grid.counted(found, at, everywhere, everywhere).less(inside)
+    outside = dense_grid.counted(found, at, everywhere, everywhere).less(inside)
     measured = _measured(shader, one, model)
     limits = _limits(model, rounding, measured, spreads)
     limits += [bad_numbers(inside), *claims.of_profile(one, folder)]
@@ -125,17 +127,17 @@ def _rounding(
 ) -> tuple[dict[str, Spread], dict[str, float]]:
     """Errors that float32 alone makes: of all that is judged, and as `rel`, `ks` and `inversion_error`, at worst."""
     seen = _of_quality(exact, at)
-    tells = profiled & (exact.profile * at.mfp**2 > grid.DIMMEST) & np.isfinite(exact.profile)
-    dense = drawn.any(axis=1, keepdims=True) & (exact.pdf * at.mfp > grid.DIMMEST) & np.isfinite(exact.pdf)
+    tells = profiled & (exact.profile * at.mfp**2 > dense_grid.DIMMEST) & np.isfinite(exact.profile)
+    dense = drawn.any(axis=1, keepdims=True) & (exact.pdf * at.mfp > dense_grid.DIMMEST) & np.isfinite(exact.pdf)
     profile = np.abs(found.profile / exact.profile - 1.0)
     cdf = np.abs(found.cdf - exact.cdf)
     sample = _misplaced(law, found, exact, at)
     spreads = {
-        PROFILE: grid.spread(profile, tells & seen, at),
-        EVERYWHERE: grid.spread(profile, tells, at),
-        CDF: grid.spread(cdf, profiled, at),
-        SAMPLE: grid.spread(sample, drawn, at, of_share=True),
-        PDF: grid.spread(np.abs(found.pdf / exact.pdf - 1.0), dense & seen, at),
+        PROFILE: dense_grid.spread(profile, tells & seen, at),
+        EVERYWHERE: dense_grid.spread(profile, tells, at),
+        CDF: dense_grid.spread(cdf, profiled, at),
+        SAMPLE: dense_grid.spread(sample, drawn, at, of_share=True),
+        PDF: dense_grid.spread(np.abs(found.pdf / exact.pdf - 1.0), dense & seen, at),
     }
     used = tells & seen
     means = np.sum(np.where(used, profile, 0.0), axis=1) / np.maximum(np.sum(used, axis=1), 1)

@@ -13,8 +13,8 @@ from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, claims, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
-from profilefit.shader.check.evaluate import ShaderMap
-from profilefit.shader.check.grid import ULP, Count, Verdict, bad_numbers
+from profilefit.shader.check.dense_grid import ULP, Count, ShaderCheck, bad_numbers
+from profilefit.shader.check.shader_law import ShaderMap
 from profilefit.shader.check.validity import Range
 
 Floats = NDArray[np.float64]
@@ -25,7 +25,7 @@ STEPS = 4  # of ULP that a falling alpha or A may be rounding
 
 
 @dataclass(frozen=True)
-class MapCheck(Verdict):
+class MapCheck(ShaderCheck):
     """What was found of one map: `delta_A` and `delta_alpha`, and where their rounding is largest, in words."""
 
     places: dict[str, str]

@@ -12,8 +12,8 @@ from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.liang import Liang
 from profilefit.recipes.inventory import Named
 from profilefit.studies.stability.cells import Cells, absolute, judged, relative
-from profilefit.studies.stability.laws import Limits
-from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PROFILE, SAMPLE, Axis
+from profilefit.studies.stability.law_cells import Limits
+from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PROFILE, SAMPLE, ArgumentAxis
 
 Floats = NDArray[np.float64]
 # What a picture shows at once: R_d off by a third, three hundredths of the light in the wrong place.
@@ -35,7 +35,7 @@ def cells_of(one: Named, limits: Limits) -> Iterator[Cells]:
 
 
 def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
-    alpha, x, xi = (Axis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
+    alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
     law, setting = one.law, one.setting
     within = np.asarray(exact.cdf(r, albedo, setting=setting))
@@ -57,7 +57,7 @@ def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
 
 
 def _cells(
-    one: Named, stated: dict[str, float], name: str, places: tuple[Axis, ...], value, reference, error, inside
+    one: Named, stated: dict[str, float], name: str, places: tuple[ArgumentAxis, ...], value, reference, error, inside
 ) -> Cells:
     codes = judged(value, reference, error, BOUNDS[name], inside, np.float64)
     return Cells(
@@ -68,7 +68,10 @@ def _cells(
 
 def _unclipped(one: Named, limits: Limits) -> Cells:
     """g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
-    alpha, xi = Axis("α", "-", np.array((0.0, *ALPHA))), Axis("ξ", "-", np.array((0.0, 1e-6, 1e-4, *SHARE)))
+    alpha, xi = (
+        ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
+        ArgumentAxis("ξ", "-", np.array((0.0, 1e-6, 1e-4, *SHARE))),
+    )
     with np.errstate(all="ignore"):
         value = np.asarray(one.law.sampler.unclipped(xi.values[None], alpha.values[:, None]))
     inside = (
@@ -82,7 +85,7 @@ def _unclipped(one: Named, limits: Limits) -> Cells:
 
 def _energy(one: Named, limits: Limits) -> Cells:
     """cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
-    alpha = Axis("α", "-", np.array((0.0, *ALPHA)))
+    alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
     with np.errstate(all="ignore"):
         whole = np.asarray(one.law.unscaled_energy(np.inf, alpha.values))
         value = whole / np.asarray(one.law.albedo.reflectance(alpha.values))
