@@ -121,8 +121,8 @@ Pipeline = Callable[[Recipe, RecipeRun, Orders | None], Made]
 PIPELINES: dict[str, Pipeline] = {
     "albedo": _albedo,
     "profile": _profile,
-    "inverse": _inverse,
     "as-published": _as_published,
+    "inverse": _inverse,
     "evidence": _evidence,
 }
 

@@ -251,8 +251,8 @@ EVIDENCE: Kinds = {
 PIPELINES: dict[str, tuple[tuple[str, ...], Kinds]] = {
     "albedo": (("albedo", "reflectance"), ALBEDO),
     "profile": (("energy", "relative"), PROFILE),
-    "inverse": (("radius", "relative_radius", "share"), INVERSE),
     "as-published": (("radial",), STAGED),
+    "inverse": (("radius", "relative_radius", "share"), INVERSE),
     "evidence": ((), EVIDENCE),
 }
 ABSENT = object()

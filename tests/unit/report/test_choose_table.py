@@ -84,7 +84,7 @@ def test_says_when_nothing_serves(choice):
 
 def test_a_budget_within_the_range_is_likely_kept(choice):
     """3.0 ms, but 3.5 at worst."""
-    tight = chosen(Scene(**{**vars(SCENE), "budget": Budget(ms=3.2)}), choice.predicted)
+    tight = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=3.2)}), choice.predicted)
     text = printed(choose_table(tight, shipped()))
     assert "likely" in next(line for line in text.splitlines() if line.startswith("chosen"))
     assert "likely: the estimate is within the budget" in " ".join(text.split())
