@@ -239,7 +239,7 @@ def fit_laws(laws: Sequence[CoefficientLaw], free: Floats, truth: Truth, starts:
         bases = law.bases(truth)
         solve = Solver(partial(_law_residual, law))
         found.append(solve([law.start(shapes, bases) for shapes in known], (truth, bases)))
-        known.append(_law_shapes(law, found[-1], truth)[..., 0])
+        known.append(law_shapes(law, found[-1], truth)[..., 0])
     return found
 
 
@@ -248,7 +248,7 @@ def _law_residual(law: CoefficientLaw, constants: Array, data: tuple[Truth, list
     return residuals(*HAZARD.curve(truth.x, law.shapes(constants, bases), truth.near, truth.far), truth)
 
 
-def _law_shapes(law: CoefficientLaw, constants: Floats, truth: Truth) -> Floats:
+def law_shapes(law: CoefficientLaw, constants: Floats, truth: Truth) -> Floats:
     """(4, m, 1)."""
     with jax.enable_x64(True):
         return np.asarray(law.shapes(jnp.asarray(constants), [jnp.asarray(basis) for basis in law.bases(truth)]))
@@ -256,7 +256,7 @@ def _law_shapes(law: CoefficientLaw, constants: Floats, truth: Truth) -> Floats:
 
 def judge_law(law: CoefficientLaw, constants: Floats, truth: Truth) -> Errors:
     """Errors of constants at any albedos."""
-    shapes = _law_shapes(law, constants, truth)
+    shapes = law_shapes(law, constants, truth)
     with jax.enable_x64(True):
         left, density = HAZARD.curve(jnp.asarray(truth.x), jnp.asarray(shapes), truth.near, truth.far)
         return errors(left, density, truth)

@@ -101,11 +101,11 @@ def _plain(law: ProfileLaw, mfp: Floats, alpha: Sequence[float], x: Floats, samp
 
 
 def _row(label: str, samples: Sequence[int], drawn: Sequence[Floats], truth: Floats) -> Row:
-    parts = [_of(estimates, truth) for estimates in drawn]
+    parts = [parts_of(estimates, truth) for estimates in drawn]
     return Row(label, tuple(samples), *(np.array(values) for values in zip(*parts, strict=True)))
 
 
-def _of(estimates: Floats, truth: Floats) -> tuple[Floats, Floats, Floats]:
+def parts_of(estimates: Floats, truth: Floats) -> tuple[Floats, Floats, Floats]:
     """bias2, its standard error, variance, by channel (3,).
 
     Of a place with the mean error m, known to s: m^2 - s^2 is right on average, its variance 4 M^2 s^2 + 2 s^4, where

@@ -92,7 +92,7 @@ def traced(alpha: float, illumination: str, at: Floats, rays: int, seed: int) ->
     places = at[:-1, None] + np.diff(at)[:, None] * draws[..., 0]
     found = np.empty(places.shape)
     for index in np.ndindex(found.shape):
-        direction = _down(*draws[index][1:]) if illumination == "diffuse" else [0.0, 0.0, -1.0]
+        direction = downward_cosine(*draws[index][1:]) if illumination == "diffuse" else [0.0, 0.0, -1.0]
         ray = mitsuba.RayDifferential3f(o=[places[index], 0.0, EYE], d=direction)
         found[index] = integrator.sample(scene, sampler, ray)[0][0]
     return found.mean(axis=1), found.std(axis=1, ddof=1) / np.sqrt(rays)
@@ -109,7 +109,7 @@ def compared(
     return Comparison(alpha, illumination, mean, error, solved(alpha, illumination, at), seconds)
 
 
-def _down(a: float, b: float) -> list[float]:
+def downward_cosine(a: float, b: float) -> list[float]:
     """A cosine-weighted direction into the slab."""
     sine, angle = np.sqrt(a), 2.0 * np.pi * b
     return [sine * np.cos(angle), sine * np.sin(angle), -np.sqrt(1.0 - a)]

@@ -56,7 +56,7 @@ def ring_shares(r_edges: ArrayLike, setting: Setting = SEARCHLIGHT) -> Floats:
     n from 0.5 to 3; shares below 1e-290 may be 0.
     """
     edges = Grid.from_edges(r=r_edges).r_edges
-    k, weighted = _density(setting)
+    k, weighted = transform_density(setting)
     decay = np.exp(-np.multiply.outer(edges, k))
     within = -np.expm1(-np.multiply.outer(np.diff(edges), k))
     return np.append((decay[:-1] * within) @ weighted, decay[-1] @ weighted)
@@ -66,7 +66,7 @@ def entered(setting: Setting = SEARCHLIGHT) -> float:
     """Share of the light that arrives at the surface and enters [-]."""
     if setting.illumination == "searchlight":
         return 4 * setting.n / (setting.n + 1) ** 2
-    return setting.n**2 * _mean_transmittance(setting.n)
+    return setting.n**2 * mean_transmittance(setting.n)
 
 
 @lru_cache(maxsize=64)
@@ -75,12 +75,12 @@ def source_strength(setting: Setting = SEARCHLIGHT) -> float:
 
     1/2 where n = 1 and g = 0, under either light. Light scattered more than once adds nothing there.
     """
-    k, weighted = _density(setting)
+    k, weighted = transform_density(setting)
     return float(entered(setting) * (k @ weighted))
 
 
 @lru_cache(maxsize=64)
-def _density(setting: Setting) -> tuple[Floats, Floats]:
+def transform_density(setting: Setting) -> tuple[Floats, Floats]:
     """Nodes k, and f(k) dk on them."""
     n, phase = setting.n, HenyeyGreenstein(setting.g)
     sine = min(1 / n, 1.0)  # of the critical angle
@@ -136,7 +136,7 @@ def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float
     integrand = height**2 * _passes(mu_1, n) * _passes(mu_2, n) * range_psi
     spread = (above + flat)[:, 0]  # k^2 - eta^2
     outer = phase.pdf(1 - 2 * above / spread) / spread**2 * largest * weights
-    return float(16 / k / _mean_transmittance(n) * (outer @ integrand @ weights))
+    return float(16 / k / mean_transmittance(n) * (outer @ integrand @ weights))
 
 
 def _passes(mu: Floats, n: float) -> Floats:
@@ -152,7 +152,7 @@ def _unit_nodes() -> tuple[Floats, Floats, Floats]:
 
 
 @lru_cache(maxsize=64)
-def _mean_transmittance(n: float) -> float:
+def mean_transmittance(n: float) -> float:
     """Fresnel's transmittance from inside, averaged over cosine-weighted directions [-]."""
     x, _, weights = _unit_nodes()
     cosine = np.sqrt(max(1 - 1 / n**2, 0.0))

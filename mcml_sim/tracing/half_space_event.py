@@ -73,7 +73,7 @@ def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpac
     """Photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
-    cosine = _entering(rng.uniform(entry_word), where.entry)
+    cosine = entering_cosine(rng.uniform(entry_word), where.entry)
     sine = jnp.sqrt((1 - cosine) * (1 + cosine))
     path = rng.exponential(path_word)
     place = lax.complex(path * sine, path * cosine)
@@ -145,7 +145,7 @@ def _deflected(
     return outwards, around, down
 
 
-def _entering(xi: Array, entry: Array) -> Array:
+def entering_cosine(xi: Array, entry: Array) -> Array:
     """Cosine of the light that has entered, at the share xi in (0, 1) of it."""
     at = jnp.cbrt(xi) * jnp.float32(STEPS)
     step = jnp.minimum(at.astype(jnp.int32), STEPS - 1)

@@ -267,7 +267,7 @@ def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits
     passes = waits & (rng.uniform(toss) >= reflectance)
     uz_after = jnp.where(passes, jnp.copysign(cosine, uz), jnp.where(waits, -uz, uz))
     weight = jnp.abs(lanes.weight)
-    limit = jnp.where(weight < THRESHOLD, CHANCE_IN_256, 256) >> _is_late(event).astype(jnp.int32)
+    limit = jnp.where(weight < THRESHOLD, CHANCE_IN_256, 256) >> is_late(event).astype(jnp.int32)
     loses = ((coin & 255).astype(jnp.int32) >= limit) | (weight == 0)
     bend = jnp.where(passes, n1 / n2, 0)
     return lax.complex(uz_after, jnp.where(loses, jnp.where(passes, ON, BACK), bend).astype(jnp.float32))
@@ -286,10 +286,10 @@ def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array
 def _odds(weight: Array, event: Array) -> Array:
     """How many photons one that survived roulette stands for."""
     small = jnp.where(weight < THRESHOLD, jnp.float32(256 / CHANCE_IN_256), 1)
-    return small * jnp.where(_is_late(event), jnp.float32(2), 1)
+    return small * jnp.where(is_late(event), jnp.float32(2), 1)
 
 
-def _is_late(event: Array) -> Array:
+def is_late(event: Array) -> Array:
     """True in the turn in which the number of events passes a power of two from FIRST_TOSS on, before MAX_EVENTS."""
     before = event - EVENTS_PER_TURN
     return (event >= FIRST_TOSS) & (event < MAX_EVENTS) & (event ^ before > before)

@@ -108,7 +108,7 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
         visited = [np.zeros(shape) for shape in ((0, 0), (0, 0), (0,), (0,))]
     with jax.enable_x64(True):
         exits, orders = _counted(key, ends, jnp.asarray(values.leaving), bins)
-    return _deposits(np.asarray(exits), np.asarray(orders), values, photons, 1 - layer.alpha, visited)
+    return deposited(np.asarray(exits), np.asarray(orders), values, photons, 1 - layer.alpha, visited)
 
 
 class MatchedBins(NamedTuple):
@@ -200,7 +200,7 @@ def _counted(key: Array, ends: Ends, leaving: Array, bins: MatchedBins) -> tuple
     return exits.reshape(-1, angles), orders
 
 
-def _deposits(
+def deposited(
     exits: NDArray, orders: NDArray, values: Weights, photons: int, share: float, visited: list[NDArray]
 ) -> Deposits:
     """All sums of a batch; whatever does not depend on the place follows from the numbers of photons by order."""

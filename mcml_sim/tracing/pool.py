@@ -40,7 +40,7 @@ def follow(enter: Enter, turn: Turn[Results], results: Results, photons: Array, 
 
     def fill(pool: Lanes, started: Array) -> tuple[Lanes, Array]:
         """Give each ended lane the next photon, in the order of lanes, while there are any."""
-        rank = _rank(pool.ended)
+        rank = ranks(pool.ended)
         photon = started + rank - 1
         takes = pool.ended & (photon < photons)
         fresh, idle = enter(photon.astype(jnp.uint32)), _emptied(pool)
@@ -87,7 +87,7 @@ def _shrunk(pool: Lanes, idle: Lanes, lanes: int) -> Lanes:
     return jax.tree.map(lambda leaf, none: jnp.append(leaf, none)[places], pool, idle)
 
 
-def _rank(flags: Array) -> Array:
+def ranks(flags: Array) -> Array:
     """Inclusive count of set flags, int32: along rows, then down columns, as products with triangles of ones.
 
     `cumsum` takes so much longer that a third of all time would go into it.

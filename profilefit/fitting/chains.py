@@ -199,7 +199,7 @@ class _Density(eqx.Module):
     @classmethod
     def of(cls, fit: Fit, kind: str, covariance: Floats) -> _Density:
         if kind == "statistical":
-            adjust, variance = _curvature_adjustment(_positive_curvature(fit), covariance)
+            adjust, variance = curvature_adjustment(_positive_curvature(fit), covariance)
         else:
             adjust, variance = np.eye(len(fit.free)), fit.variance
         problem = ResidualFunction(fit.objective, fit.free)
@@ -229,7 +229,7 @@ def _positive_curvature(fit: Fit) -> Floats:
     return fit.solution.jacobian.T @ fit.solution.jacobian
 
 
-def _curvature_adjustment(hessian: Floats, covariance: Floats) -> tuple[Floats, float]:
+def curvature_adjustment(hessian: Floats, covariance: Floats) -> tuple[Floats, float]:
     """C of determinant 1 and s^2 with C^T H C / s^2 = covariance^-1, in scaled constants to keep digits."""
     scale = np.sqrt(np.diag(covariance))
     working = hessian * np.outer(scale, scale)

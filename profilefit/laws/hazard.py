@@ -112,7 +112,7 @@ def _local(x: Array, shape: Shape) -> Local:
         denominator * above * inverse,
         numerator * above * inverse,
     )
-    early, spent = _early(x, q, per_h, rest)
+    early, spent = early_share(x, q, per_h, rest)
     up, down = (shape.a + 2.0 * shape.b * x) * one_over_n, shape.c * one_over_d
     return Local(
         shape.kappa * x + shape.w * shape.h * early,
@@ -122,7 +122,7 @@ def _local(x: Array, shape: Shape) -> Local:
     )
 
 
-def _early(x: Array, q: Array, per_h: Array, rest: Array) -> tuple[Array, Array]:
+def early_share(x: Array, q: Array, per_h: Array, rest: Array) -> tuple[Array, Array]:
     """V and V' at z = x/h: V = z (1 - z ln(1 + q)), q = 1/z, rest = 1/(1 + q)."""
     z = x * per_h
     log = z * jnp.log(1.0 + q)

@@ -66,7 +66,7 @@ def law_text(
     text = _text(law, ProfileLaw)
     map_constants = _map_constants(law) if "rational" in text.parts else {}
     constants = {**map_constants, **law.text_numbers(), **law.constants()}
-    files = [_read(part) for part in ("common", *text.parts, text.file, *text.ends)]
+    files = [read_text(part) for part in ("common", *text.parts, text.file, *text.ends)]
     return _filled(files, name or prefix(law), constants, text.count, lang, told or {})
 
 
@@ -75,7 +75,7 @@ def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: 
     text = _text(law, AlbedoLaw)
     constants = {f"map_{key}": value for key, value in {**law.text_numbers(), **law.constants()}.items()}
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
-    files = [_read(part) for part in ("common", *text.parts, text.file)]
+    files = [read_text(part) for part in ("common", *text.parts, text.file)]
     return _filled(files, name or prefix(law), constants, 0, lang, remarks)
 
 
@@ -105,7 +105,7 @@ def _map_constants(law: Any) -> Numbers:
     return {"map_entered": albedo.entered, **{f"map_{key}": value for key, value in albedo.constants().items()}}
 
 
-def _read(file: str) -> str:
+def read_text(file: str) -> str:
     return text_beside(__name__, f"glsl/{file}.glsl")
 
 

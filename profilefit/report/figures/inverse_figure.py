@@ -144,30 +144,30 @@ def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -
     axes = list(figure.subplots(1, 2, sharey=True))
     for ax, (light, records) in zip(axes, RECORDS.items(), strict=True):
         for record in records:
-            _draw(ax, source, record)
+            draw(ax, source, record)
         ax.axhline(REQUIRED, color=BLACK, linewidth=0.8, linestyle=":", label="one in a thousand")
         albedo_axis(ax)
         ax.set(yscale="log", title=light)
         plain_log(ax.yaxis)
     axes[0].axvspan(*DOUBTED, color=BLACK, alpha=0.07, linewidth=0, label="α that the paper calls worst")
     axes[0].set_ylabel("max |cdf(g(ξ)) − ξ| [-]")
-    if caption := _caption(source):
+    if caption := caption_of(source):
         figure.suptitle(caption, fontsize=9.0)
     legend_below(figure, axes)
     return save(figure, out, name)
 
 
-def _draw(ax: Axes, source: Source, record: str) -> None:
+def draw(ax: Axes, source: Source, record: str) -> None:
     fitted = source.usable(record)
     if fitted is None:
         return
     if printed := _printed(source, record):
         ax.plot(*printed, label="(19)-(21) as printed", marker="x", markersize=3.5, **PUBLISHED)
     label, look = LOOKS[fitted.content["law"]]
-    ax.plot(*_points(fitted), label=label, markersize=3.5, **look)
+    ax.plot(*points_of(fitted), label=label, markersize=3.5, **look)
 
 
-def _points(fitted: Fitted) -> Points:
+def points_of(fitted: Fitted) -> Points:
     """alpha and the error of the regenerated law: as its record says, or measured now."""
     quality = fitted.content["quality"]
     alpha = np.asarray(quality["alpha"], float)
@@ -183,7 +183,7 @@ def _printed(source: Source, record: str) -> Points | None:
     return None if found is None else (np.asarray(quality["alpha"], float), np.asarray(found, float))
 
 
-def _caption(source: Source) -> str:
+def caption_of(source: Source) -> str:
     """How bad the printed inverse is where its authors doubt it, and on either side of that."""
     name = "liang-inverse-whole"
     printed = _printed(source, name) if name in source.paths else None

@@ -164,7 +164,7 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     figure.set_dpi(DPI)  # labels are placed for the pixels that they are saved with
     all_axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, part.panels, strict=True):
-        _draw(axes, panel)
+        draw(axes, panel)
     _feet(figure, part, caption)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
@@ -173,7 +173,7 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     return save(figure, out, f"tradeoff-{part.name}")
 
 
-def _draw(axes: Axes, panel: Panel) -> None:
+def draw(axes: Axes, panel: Panel) -> None:
     axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
     axes.set_title(panel.title)
     colours = _colours(panel)
@@ -210,12 +210,12 @@ def _label(axes: Axes, panel: Panel) -> None:
     named: set[str] = set()
     labels = []
     for point in panel.points:
-        labels.append(Label(_text(point, point.method not in named), point.cost.value, point.error.value))
+        labels.append(Label(text_of(point, point.method not in named), point.cost.value, point.error.value))
         named.add(point.method)
     place_labels(axes, labels, taken)
 
 
-def _text(point: Point, first: bool) -> str:
+def text_of(point: Point, first: bool) -> str:
     """The method, and what tells it from others of its line; of the later ones only that."""
     effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: _power(m[1], m[2]), point.label)
     method = point.method.replace("normalized diffusion, Xie", "Xie").replace("normalized diffusion", "norm. diffusion")

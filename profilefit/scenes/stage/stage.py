@@ -50,7 +50,7 @@ class Stage:
             checked_whole("height", size[1], 1, MOST_PIXELS),
         )
         self.compile_milliseconds: dict[str, float] = {}
-        self._targets = Targets(context, self.size)
+        self.targets = Targets(context, self.size)
         self._geometry = Geometry(context, side)
         self._passes: dict[str, FullScreen] = {}  # by their sources
         self._released = False
@@ -61,7 +61,7 @@ class Stage:
     def draw(self, scene: Scene) -> None:
         """Passes 1 and 2: the G-buffer of a scene."""
         self._alive()
-        self._geometry.draw(scene, self._targets.surface)
+        self._geometry.draw(scene, self.targets.surface)
         camera = scene.camera
         self._seen(camera.pixel(self.size[1]), camera.is_perspective, scene)
 
@@ -70,12 +70,12 @@ class Stage:
         self._alive()
         if buffers.size != self.size:
             raise InputError(f"buffers must be {self.size} pixels, as the stage is, got {buffers.size}")
-        self._targets.upload(buffers)
+        self.targets.upload(buffers)
         self._seen(buffers.pixel, buffers.is_perspective, None)
 
     def buffers(self) -> Buffers:
         """The G-buffer as numpy arrays."""
-        return self._targets.read(*self._ready())
+        return self.targets.read(*self._ready())
 
     def scatter(
         self,
@@ -93,20 +93,20 @@ class Stage:
         rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
         """
         first, last = rows or (0, self.size[1])
-        target = self._targets.into(EXITANCE)
+        target = self.targets.into(EXITANCE)
         target.scissor = (0, first, self.size[0], last - first)
         try:
             self._scatter(law, mfp, sampling, fixed_alpha)
         finally:
             target.scissor = (0, 0, *self.size)
-        return pixels(self._targets.map(EXITANCE))[first:last, :, :3]
+        return pixels(self.targets.map(EXITANCE))[first:last, :, :3]
 
     def render(
         self, law: By, mfp: ArrayLike, sampling: Sampling = DEFAULT, fixed_alpha: ArrayLike | None = None
     ) -> Singles:
         """(h, w, 3) linear radiance to the camera [light's unit / sr]; arguments as for `scatter`. Passes 3 and 4."""
         self._combine(*self._scatter(law, mfp, sampling, fixed_alpha))
-        return pixels(self._targets.map(RADIANCE))[..., :3]
+        return pixels(self.targets.map(RADIANCE))[..., :3]
 
     def time(
         self, law: By, mfp: ArrayLike, sampling: Sampling = DEFAULT, repeats: int = 5, passes: str = "scatter"
@@ -127,7 +127,7 @@ class Stage:
         for one in self._passes.values():
             one.release()
         self._geometry.release()
-        self._targets.release()
+        self.targets.release()
         self._passes.clear()
         self._released = True
 
@@ -164,7 +164,7 @@ class Stage:
 
     def _frame(self, law: By, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
         if passes == "frame" and self._scene is not None:
-            self._geometry.draw(self._scene, self._targets.surface)
+            self._geometry.draw(self._scene, self.targets.surface)
         drawn = self._scatter(law, mfp, sampling, None)
         if passes == "frame":
             self._combine(*drawn)
@@ -191,7 +191,7 @@ class Stage:
         if one.source not in self._passes:
             self._passes[one.source] = made = FullScreen(self.context, one)
             self.compile_milliseconds[one.name] = made.program.milliseconds
-        self._passes[one.source].run(one, self._targets)
+        self._passes[one.source].run(one, self.targets)
 
 
 def _lengths(mfp: ArrayLike) -> Floats:

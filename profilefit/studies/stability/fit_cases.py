@@ -83,19 +83,19 @@ def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[F
     def case_of(case: str, value: str, begins: Floats, data: list[Rings], start: Floats | None = None) -> FitCase:
         return _case(label, case, value, names, solved(begins, data), start)
 
-    alone, usual = np.tile(own, (lanes, 1)), _rings(ORDINARY, LAST)
+    alone, usual = np.tile(own, (lanes, 1)), even_rings(ORDINARY, LAST)
     random = spread_out(own, lanes, SEED)
     yield case_of(STARTS, "× e^(0.69 normal)", random, [usual] * lanes)
     yield case_of(STARTS, "× e^(2.1 normal)", random * (random / own) ** 2, [usual] * lanes)
     if isinstance(law, ProfileLaw):
         best = solved(alone, [usual] * lanes)[0].parameters
         for merged in (2, 4, 8):
-            data = _merged(usual, merged)
+            data = merged_rings(usual, merged)
             yield case_of(BINS, f"dr {merged * LAST / RINGS:g} l", alone, [data] * lanes, best)
     for photons in (1e4, 1e6, 1e8):
         yield case_of(NOISE, f"{photons:.0e} photons", alone, [_noisy(usual, photons, lane) for lane in range(lanes)])
-    yield case_of(ALBEDO, "α 1e-4 … 0.02", random, [_rings(DARK, LAST)] * lanes)
-    yield case_of(ALBEDO, "α 0.999 … 1 − 1e-6", random, [_rings(WHITE, LAST)] * lanes)
+    yield case_of(ALBEDO, "α 1e-4 … 0.02", random, [even_rings(DARK, LAST)] * lanes)
+    yield case_of(ALBEDO, "α 0.999 … 1 − 1e-6", random, [even_rings(WHITE, LAST)] * lanes)
     for value, change in NONSENSES.items():
         yield case_of(NONSENSE, value, alone, [change(usual)] * lanes)
 
@@ -115,7 +115,7 @@ def trimmed_fits(start: Liang) -> Iterator[FitCase]:
         yield FitCase("liang, (7) an albedo", TRIMMING, f"ε {epsilon:g}", done, done, spread, letter, results)
 
 
-def _rings(alpha: tuple[float, ...], last: float) -> Rings:
+def even_rings(alpha: tuple[float, ...], last: float) -> Rings:
     profiles = Profiles.from_exact(alpha, np.linspace(0.0, last, RINGS + 1))
     ones = np.ones_like(profiles.energy)
     return Rings(
@@ -124,7 +124,7 @@ def _rings(alpha: tuple[float, ...], last: float) -> Rings:
     )  # fmt: skip
 
 
-def _merged(rings: Rings, count: int) -> Rings:
+def merged_rings(rings: Rings, count: int) -> Rings:
     """Rings so many times as wide up to the same last radius, each beside rings of no width that do not count.
 
     So their number, and with it the compiled fit, stays; and every edge weighs the same in what counts edges.

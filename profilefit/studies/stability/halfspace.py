@@ -44,14 +44,14 @@ def cells_of(setting: Setting, normalisation: Rational) -> Iterator[Cells]:
         drawn = np.asarray(exact.quantile(xi.values[None, :, None], a, mfp.values, setting))
         within = exact.cdf(drawn, a, mfp.values, setting)
         yield _profile(setting, (alpha, x, mfp), profile)
-    finer = _finer_cdf(x.values, alpha.values, setting)
+    finer = finer_cdf(x.values, alpha.values, setting)
     yield _cells(setting, CDF, (alpha, x, mfp), cdf, finer, absolute(cdf, finer), steps_down(cdf, 1, np.float64, 1.0))
     missed = absolute(np.asarray(within), np.broadcast_to(xi.values[None, :, None], drawn.shape))
     yield _cells(setting, SAMPLE, (alpha, xi, mfp), drawn, drawn, missed, steps_down(drawn, 1, np.float64, drawn))
     yield from _of_alpha(setting, alpha, normalisation)
 
 
-def _finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
+def finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
     """(alphas, radii, 1)."""
     return np.asarray(by_alpha(_share_within, x, alpha[:, None], setting.illumination, FINER))[..., None]
 

@@ -89,10 +89,10 @@ def limits_of(one: Named, folder: Folder) -> Limits:
 def cells_of(one: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
     """All quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
-        yield from _computed(one, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
+        yield from computed(one, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
-def _computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
+def computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
     found, right = _values(one.law, arithmetic, at), _right(one.law, arithmetic, at)
     single = _values(one.law, TEXT32, at) if arithmetic == TEXT16 else {}
     for name, value in found.items():

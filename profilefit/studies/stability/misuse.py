@@ -49,10 +49,10 @@ def of_law(one: Named) -> Iterator[Cells]:
     own = law.entry.own
     text = RoundedText(law, np.float32)
     for name, call in calls.items():
-        in_python = _refused(one.label, own, name, _cases(name), partial(_called, call, name))
+        in_python = refusals(one.label, own, name, cases_of(name), partial(_called, call, name))
         yield in_python
         refused = in_python.codes == Verdict.OUTSIDE
-        yield replace(_clamped(one.label, own, name, _cases(name), text), refused=refused)
+        yield replace(_clamped(one.label, own, name, cases_of(name), text), refused=refused)
 
 
 def of_map(one: Named) -> Iterator[Cells]:
@@ -65,28 +65,28 @@ def of_map(one: Named) -> Iterator[Cells]:
     )
     for name, (symbol, key, _), call in ways:
         cases = [(symbol, key, value) for value in SHARES]
-        yield _refused(label, law.entry.own, name, cases, partial(_alone, call))
+        yield refusals(label, law.entry.own, name, cases, partial(_alone, call))
 
 
 def of_exact() -> Iterator[Cells]:
     """Each function of the exact half space."""
     calls: dict[str, Callable[..., Any]] = {PROFILE: exact.profile, CDF: exact.cdf, SAMPLE: exact.quantile}
     for name, call in calls.items():
-        yield _refused("exact", True, name, _cases(name), partial(_called, call, name))
+        yield refusals("exact", True, name, cases_of(name), partial(_called, call, name))
     cases = [("α", "alpha", value) for value in SHARES]
-    yield _refused("exact", True, REFLECTANCE_OF, cases, partial(_alone, exact.reflectance))
+    yield refusals("exact", True, REFLECTANCE_OF, cases, partial(_alone, exact.reflectance))
 
 
 def of_convert() -> Iterator[Cells]:
     """Media from albedo, length, coefficients and colour."""
     shares, lengths = ([(s, k, v) for v in values] for s, k, values in (("α", "alpha", SHARES), ("l", "mfp", LENGTHS)))
-    yield _refused("convert", False, "medium", shares, lambda _, value: Optical(np.array(value), np.array(1.0)))
-    yield _refused("convert", False, "medium of l", lengths, lambda _, value: Optical(np.array(0.5), np.array(value)))
+    yield refusals("convert", False, "medium", shares, lambda _, value: Optical(np.array(value), np.array(1.0)))
+    yield refusals("convert", False, "medium of l", lengths, lambda _, value: Optical(np.array(0.5), np.array(value)))
     cases = [("A", "reflectance", value) for value in SHARES]
-    yield _refused("convert", False, ALPHA_OF, cases, lambda _, value: alpha_of(value, "diffuse"))
+    yield refusals("convert", False, ALPHA_OF, cases, lambda _, value: alpha_of(value, "diffuse"))
     for name in BY_NAME:
         given = [(name, name, value) for value in LENGTHS]
-        yield _refused("convert", False, name, given, lambda key, value: Optical.from_length(key, value, 0.5))
+        yield refusals("convert", False, name, given, lambda key, value: Optical.from_length(key, value, 0.5))
 
 
 def _called(call: Callable[..., Any], name: str, key: str, value: float) -> Any:
@@ -98,7 +98,7 @@ def _alone(call: Callable[..., Any], key: str, value: float) -> Any:
     return call(value)
 
 
-def _cases(name: str) -> list[Case]:
+def cases_of(name: str) -> list[Case]:
     symbol, key, values = FIRST[name]
     arguments = ((symbol, key, values), ("α", "alpha", SHARES), ("l", "mfp", LENGTHS))
     return [(mark, word, value) for mark, word, group in arguments for value in group]
@@ -113,7 +113,7 @@ def _axis(cases: list[Case]) -> ArgumentAxis:
     return ArgumentAxis("of", "-", np.arange(len(cases), dtype=float), labels)
 
 
-def _refused(subject: str, own: bool, name: str, cases: list[Case], call: Callable[[str, float], Any]) -> Cells:
+def refusals(subject: str, own: bool, name: str, cases: list[Case], call: Callable[[str, float], Any]) -> Cells:
     """Red where no error comes, or another than InputError that names the argument."""
     codes = np.array([_outcome(call, key, value) for _, key, value in cases], np.int8)
     return _cells(subject, own, name, FLOAT64, cases, codes, np.full(len(cases), np.nan))

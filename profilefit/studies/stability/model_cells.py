@@ -30,8 +30,8 @@ def cells_of(one: Named, limits: Limits) -> Iterator[Cells]:
     if one.setting.is_matched_isotropic:
         yield from _against_exact(one, limits)
     if isinstance(one.law, Liang):
-        yield _unclipped(one, limits)
-        yield _energy(one, limits)
+        yield unclipped(one, limits)
+        yield own_energy(one, limits)
 
 
 def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
@@ -66,7 +66,7 @@ def _cells(
     )  # fmt: skip
 
 
-def _unclipped(one: Named, limits: Limits) -> Cells:
+def unclipped(one: Named, limits: Limits) -> Cells:
     """g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
     alpha, xi = (
         ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
@@ -83,7 +83,7 @@ def _unclipped(one: Named, limits: Limits) -> Cells:
     return Cells(one.label, False, INVERSE, FLOAT64, (alpha, xi), value, value, error, 0.0, inside, codes, one.law)
 
 
-def _energy(one: Named, limits: Limits) -> Cells:
+def own_energy(one: Named, limits: Limits) -> Cells:
     """cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
     alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
     with np.errstate(all="ignore"):

@@ -105,7 +105,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             title,
             f"time of {what}, one core [s]",
             "relative change of ring energies by noise [-]",
-            tuple(_point(name, *key, found) for key, found in trials.items()),
+            tuple(point_of(name, *key, found) for key, found in trials.items()),
             joined=True,
         )
         for name, title, what in (
@@ -113,7 +113,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             ("whole", "with the order-resolved run it is fitted to", "light and fit"),
         )
     )
-    return TradeoffPart("fits", "Fits: time against what noise does to the law", panels, _notes(trials, compiling))
+    return TradeoffPart("fits", "Fits: time against what noise does to the law", panels, notes_of(trials, compiling))
 
 
 def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:
@@ -179,7 +179,7 @@ def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
 def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:
     """Root mean square and worst change of ring energies, before any scaling to A, over the exact energies [-]."""
     energy, counts = judged()
-    ours, theirs = (np.diff(_within(one), axis=1) for one in (law, limit))
+    ours, theirs = (np.diff(energy_within(one), axis=1) for one in (law, limit))
     relative = np.abs(ours - theirs)[counts] / energy[counts]
     return float(np.sqrt(np.mean(relative**2))), float(relative.max())
 
@@ -192,7 +192,7 @@ def judged() -> tuple[Floats, NDArray[np.bool_]]:
     return energy, share[:, 1:] <= ENERGY_WITHIN
 
 
-def _within(law: ProfileLaw) -> Floats:
+def energy_within(law: ProfileLaw) -> Floats:
     """Energy within each edge of the rings (albedos, rings + 1) [-]."""
     with jax.enable_x64(True):
         return np.asarray(law.unscaled_energy(jnp.asarray(RINGS), jnp.asarray(ALPHAS)[:, None]))
@@ -206,7 +206,7 @@ def standardised(found: FittedConstants, limit: FittedConstants) -> float:
     return float(np.sqrt(np.mean(np.square(distances))))
 
 
-def _point(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Point:
+def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Point:
     rows = np.array([(t.fit_seconds, t.light_seconds, t.rms, t.worst, t.standardised) for t in trials])
     of_fit, light, rms, worst, away = rows.T
     facts: dict[str, float | int | str] = {
@@ -221,7 +221,7 @@ def _point(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Poin
     return Point(panel, name, label, WithSpread.of(seconds), WithSpread.of(rms), WithSpread.of(worst), facts)
 
 
-def _notes(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
+def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
     failed = [
         f"{sum(not t.converged for t in found)} of {len(found)} did not converge: {name}, {photons:.0e} photons"
         for (name, photons), found in trials.items()

@@ -73,7 +73,7 @@ def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = s
     if not quick:
         found.append(table_contender(MATERIAL))
     rows = measured(found, sizes, track)
-    panels = tuple(Panel(part, title, *_axes(part), _points(rows, part)) for part, title in TITLES.items())
+    panels = tuple(Panel(part, title, *_axes(part), points_of(rows, part)) for part, title in TITLES.items())
     notes = [f"left out: {line}" for line in left_out]
     return TradeoffPart("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
 
@@ -157,7 +157,7 @@ def _row(contender: Contender, counted: dict[str, FunctionCounts], rates: Rates,
     return ContenderResult(contender, counted, times, ratios, of_material, quality.rel, quality.ks)
 
 
-def _points(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
+def points_of(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
     return tuple(
         Point(
             part,

@@ -116,10 +116,10 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
     counted = {one.name: laws.counts(one)["both"].transcendental for one in found}
     timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
     dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in found if one not in timed]
-    judged = [way for i in track(range(len(timed)), "noise and bias") for way in _ways(timed[i], sizes)]
+    judged = [way for i in track(range(len(timed)), "noise and bias") for way in ways_of(timed[i], sizes)]
     works = {one.name: laws.timed(one.weighed, False, _calls(one, sizes)) for one in judged}
     rates = stopwatch.take_turns(works, sizes.turns, track, "samplers")
-    points = [point for one in judged for point in _points(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
+    points = [point for one in judged for point in points_of(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
     panels = tuple(
         Panel(
             name,
@@ -150,15 +150,18 @@ def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:
     return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
 
 
-def _ways(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
+def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
     """A sampler weighed by its own density; and by its law's, where that is another."""
     sampler = one.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
-    own = WeighedSampler(one.name, one, _noise(by_law, sampler, sizes), biases[..., 0], apart)
+    own = WeighedSampler(one.name, one, noise_ratios(by_law, sampler, sizes), biases[..., 0], apart)
     if not apart or isinstance(sampler, UniformSampler):
         return [own]
-    return [own, WeighedSampler(f"{one.name}, law's density", one, _noise(_unweighted, sampler, sizes), biases[..., 1])]
+    return [
+        own,
+        WeighedSampler(f"{one.name}, law's density", one, noise_ratios(unweighted, sampler, sizes), biases[..., 1]),
+    ]
 
 
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
@@ -174,22 +177,22 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
     return float(own - truth), float(by_law_density - truth)
 
 
-def _unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
+def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
     """Weights by the law's own density are all 1."""
     drawn = by_law(law, alpha, sampler)
     return EdgeGather(drawn.sample, np.ones_like)
 
 
-def _noise(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
+def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
     rows = []
     for alpha in sizes.alphas:
         ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)
-        rows.append([_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
+        rows.append([error_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
     return np.moveaxis(np.array(rows), 2, 0)
 
 
-def _ratios(
+def error_ratios(
     way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
 ) -> tuple[float, float]:
     points = random_points(SAMPLES, trials, seed=block + 1)
@@ -198,7 +201,7 @@ def _ratios(
     return float(square), float(mine.variance.mean() / best.variance.mean())
 
 
-def _points(one: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
+def points_of(one: WeighedSampler, cost: WithSpread) -> Sequence[Point]:
     square, variance = one.noise
     worst = square[np.argmax(np.median(square, axis=1))]
     middle = np.exp(np.log(square).mean(axis=0))

@@ -117,9 +117,9 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     if trace is None:
         notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
     else:
-        found += [Contestant(SCALAR, _photons(n), _scalar(trace, n), n * ALPHAS.size) for n in sizes.scalar]
+        found += [Contestant(SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size) for n in sizes.scalar]
     found += [Contestant(SIMULATE, _photons(n), _simulated(n), n * ALPHAS.size) for n in sizes.simulate]
-    found += [Contestant(ORDERS, _photons(n), _orders(n), n) for n in sizes.orders]
+    found += [Contestant(ORDERS, _photons(n), by_orders(n), n) for n in sizes.orders]
     found += [Contestant(EXACT, label, _exact(STANDARD.scaled(RULES[label])), 0) for label in sizes.rules]
     return found, notes
 
@@ -166,7 +166,7 @@ def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
     return first
 
 
-def _scalar(trace: Callable, photons: int) -> Method:
+def scalar_tracer(trace: Callable, photons: int) -> Method:
     def run(seed: int) -> RingEnergies:
         rows = []
         for i, alpha in enumerate(ALPHAS):
@@ -193,7 +193,7 @@ def _simulated(photons: int) -> Method:
     return run
 
 
-def _orders(photons: int) -> Method:
+def by_orders(photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:

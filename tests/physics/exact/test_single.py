@@ -140,7 +140,7 @@ def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):
 
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_finer_quadrature_changes_nothing(setting, monkeypatch):
-    single_scattering._density.cache_clear()
+    single_scattering.transform_density.cache_clear()
     coarse, entered = single_scattering.ring_shares(EDGES, setting), single_scattering.entered(setting)
     monkeypatch.setattr(single_scattering, "K_STEP", single_scattering.K_STEP / 1.7)
     monkeypatch.setattr(single_scattering, "BEYOND_CRITICAL", np.exp(np.arange(-38.0, 45.0, single_scattering.K_STEP)))
@@ -153,8 +153,8 @@ def test_finer_quadrature_changes_nothing(setting, monkeypatch):
 
 
 def _clear_caches():
-    single_scattering._density.cache_clear()
-    single_scattering._mean_transmittance.cache_clear()
+    single_scattering.transform_density.cache_clear()
+    single_scattering.mean_transmittance.cache_clear()
 
 
 def test_narrow_and_far_rings_add_up_to_wide_ones():

@@ -12,7 +12,7 @@ import pytest
 from mcml_sim import Setting
 from mcml_sim.runs.input_runs import Compiling
 from profilefit.errors import InputError
-from profilefit.fitting.chains import _curvature_adjustment, posterior
+from profilefit.fitting.chains import curvature_adjustment, posterior
 from profilefit.fitting.estimate import ResidualFunction, curvature, fit
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.laws.base import AlbedoLaw
@@ -106,7 +106,7 @@ def test_curvature_adjustment_is_the_identity_it_claims():
         jacobian = rng.standard_normal((40, size)) / scale
         root = rng.standard_normal((size, size)) * scale[:, None]
         covariance = root @ root.T
-        adjust, variance = _curvature_adjustment(jacobian.T @ jacobian, covariance)
+        adjust, variance = curvature_adjustment(jacobian.T @ jacobian, covariance)
         identity = adjust.T @ jacobian.T @ jacobian @ adjust / variance @ covariance
         # In scaled constants, where rounding is alike everywhere.
         np.testing.assert_allclose(identity * scale[:, None] / scale, np.eye(size), atol=1e-6)
@@ -203,7 +203,7 @@ def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
     np.testing.assert_allclose(chain.standard_deviation / expected, 1.0, atol=0.11)
     # A negative control: with J^T J for the curvature the width is wrong by more than that.
     jacobian = one.solution.jacobian
-    short, variance = _curvature_adjustment(jacobian.T @ jacobian, one.statistical)
+    short, variance = curvature_adjustment(jacobian.T @ jacobian, one.statistical)
     full = curvature(ResidualFunction(one.objective, one.free), one.solution, one.law, one.rings)
     width = np.sqrt(np.diag(np.linalg.inv(short.T @ full @ short / variance)))
     assert np.max(np.abs(width / expected - 1.0)) > 0.02

@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit import load, profile_quality
-from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, _early, density, radius
+from profilefit.laws.hazard import SERIES, Hazard, HazardSampler, Shape, density, early_share, radius
 from profilefit.laws.rational import Rational
 
 SETTINGS = [Setting(), Setting("diffuse")]
@@ -159,10 +159,10 @@ def test_series_takes_over_where_the_logarithm_cancels(x64):
     """V and V' on both sides of the switch, against the plain formula in float64 and the limit 1/2 far away."""
     q = np.concatenate([np.geomspace(1e-3, 10, 50), SERIES * np.array([1 - 1e-12, 1 + 1e-12])])
     z = 1 / q
-    value, slope = _early(jnp.asarray(z), jnp.asarray(q), 1.0, jnp.asarray(1 / (1 + q)))
+    value, slope = early_share(jnp.asarray(z), jnp.asarray(q), 1.0, jnp.asarray(1 / (1 + q)))
     np.testing.assert_allclose(value, z - z**2 * np.log1p(q), rtol=0, atol=3e-7)
     np.testing.assert_allclose(slope, 1 - 2 * z * np.log1p(q) + 1 / (1 + q), rtol=0, atol=1e-6)
-    assert float(_early(jnp.array(1e6), jnp.array(1e-6), 1.0, jnp.array(1.0))[0]) == pytest.approx(0.5, abs=1e-6)
+    assert float(early_share(jnp.array(1e6), jnp.array(1e-6), 1.0, jnp.array(1.0))[0]) == pytest.approx(0.5, abs=1e-6)
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ def printed():
     """The printed laws of Liang et al.: g as it is, and the energy of (17)."""
     one = next(one for one in inventory.profile_laws(FITS) if one.label == "liang, published")
     limits = limits_of(one, FITS)
-    return [model_cells._unclipped(one, limits), model_cells._energy(one, limits)]
+    return [model_cells.unclipped(one, limits), model_cells.own_energy(one, limits)]
 
 
 @pytest.fixture(scope="module")

@@ -26,8 +26,8 @@ def test_the_rational_map_is_found_from_anywhere():
 
 
 def test_wider_rings_keep_the_last_radius_and_the_light():
-    usual = fit_cases._rings(fit_cases.ORDINARY, fit_cases.LAST)
-    wide = fit_cases._merged(usual, 8)
+    usual = fit_cases.even_rings(fit_cases.ORDINARY, fit_cases.LAST)
+    wide = fit_cases.merged_rings(usual, 8)
     assert wide.r_edges[-1] == usual.r_edges[-1] == fit_cases.LAST
     np.testing.assert_allclose(np.unique(wide.r_edges), usual.r_edges[::8])
     np.testing.assert_allclose(wide.cdf[:, -1], usual.cdf[:, -1], rtol=1e-6)

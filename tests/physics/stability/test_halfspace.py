@@ -11,7 +11,7 @@ X, ALPHA = np.array([0.0, 1e-3, 0.1, 1.0, 10.0, 1e3, np.inf]), np.array([0.0, 1e
 
 
 def classes(cdf):
-    finer = halfspace._finer_cdf(X, ALPHA, Setting())[..., 0]
+    finer = halfspace.finer_cdf(X, ALPHA, Setting())[..., 0]
     bound = halfspace.BOUNDS[CDF]
     return judged(cdf, finer, absolute(cdf, finer), bound, np.ones(cdf.shape, bool), np.float64)
 

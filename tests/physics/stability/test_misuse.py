@@ -26,6 +26,6 @@ def test_what_passes_or_raises_otherwise_is_red():
             raise ZeroDivisionError
         return value
 
-    cells = misuse._refused("f", True, "cdf", misuse._cases("cdf"), careless)
+    cells = misuse.refusals("f", True, "cdf", misuse.cases_of("cdf"), careless)
     assert cells.verdicts == {Verdict.INACCURATE, Verdict.RAISES}
     assert np.all(cells.failures)

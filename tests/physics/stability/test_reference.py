@@ -10,7 +10,7 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.studies.stability.cells import EXTENDED, RoundedText, Verdict
-from profilefit.studies.stability.law_cells import MEASURED, _computed, limits_of
+from profilefit.studies.stability.law_cells import MEASURED, computed, limits_of
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, ArgumentGrid
 from profilefit.studies.stability.reference import Right
 
@@ -60,9 +60,9 @@ def test_single_precision_is_right_and_half_is_not():
     """A text in half far out, and next to the source, is no number."""
     one, x = find("hazard", FITS), (0.0, 1.0, 60000.0)
     limits = limits_of(one, FITS)
-    for cells in _computed(one, limits, TEXT32, small(np.float32, x)):
+    for cells in computed(one, limits, TEXT32, small(np.float32, x)):
         assert np.all(cells.codes <= Verdict.BEYOND), cells.quantity
-    half = {cells.quantity: cells for cells in _computed(one, limits, TEXT16, small(np.float16, x))}
+    half = {cells.quantity: cells for cells in computed(one, limits, TEXT16, small(np.float16, x))}
     assert any(Verdict.NOT_FINITE in cells.verdicts for cells in half.values())
     assert not any(cells.failures.any() for cells in half.values())  # half is measured, nothing is held to it
 

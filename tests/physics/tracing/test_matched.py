@@ -10,6 +10,7 @@ import pytest
 
 from mcml_sim import Grid, exact
 from mcml_sim.media.medium import half_space
+from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import matched_batch, orders_batch, rng
 from mcml_sim.tracing.deposits import Deposits, shapes
 from mcml_sim.tracing.isotropic_event import DOUBLINGS
@@ -180,9 +181,9 @@ def test_shapes_are_those_of_the_grid(grid):
 
 def test_another_albedo_or_mean_free_path_compiles_nothing():
     traced(0.9)
-    compiled = [f._cache_size() for f in (matched_batch._trace_visits, matched_batch._counted)]
-    matched_batch.trace_batch(half_space(0.123, 0.7), GRID, 0, 0, PHOTONS)
-    assert [f._cache_size() for f in (matched_batch._trace_visits, matched_batch._counted)] == compiled
+    with Compiling() as again:
+        matched_batch.trace_batch(half_space(0.123, 0.7), GRID, 0, 0, PHOTONS)
+    assert again.seconds == 0
 
 
 @pytest.mark.parametrize("alpha", [0.0, 1e-6, 0.1, 0.5, 0.9, 0.999, 1.0])
@@ -218,7 +219,7 @@ def test_fixed_point_sums_hold_the_longest_batch():
 def test_a_lost_photon_is_noticed():
     orders = np.zeros(2 * matched_batch.MAX_ORDER + 1, np.int32)
     with pytest.raises(RuntimeError, match="photons were lost or made: 5 started and 0 ended"):
-        matched_batch._deposits(
+        matched_batch.deposited(
             np.zeros((2, 1), complex), orders, matched_batch.weights(0.5), 5, 0.5, [np.zeros(0)] * 4
         )
 

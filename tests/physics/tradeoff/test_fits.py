@@ -18,7 +18,7 @@ def test_change_is_that_of_the_energies(law):
     assert fits.change(law, law) == (0.0, 0.0)
     larger = fits.with_constants(law, {name: 1.01 * getattr(law, name) for name in ("a1", "a2", "b0")})
     energy, counts = fits.judged()
-    share = np.diff(fits._within(law), axis=1)[counts] / energy[counts]
+    share = np.diff(fits.energy_within(law), axis=1)[counts] / energy[counts]
     rms, worst = fits.change(larger, law)
     assert rms == pytest.approx(0.01 * np.sqrt(np.mean(share**2)), rel=1e-9)
     assert worst == pytest.approx(0.01 * share.max(), rel=1e-9)
@@ -33,14 +33,14 @@ def test_standardised_is_in_standard_errors():
 
 def test_points_have_the_spread_of_the_seeds_and_failures_are_told():
     trials = [Trial(0.1 * k, 1.0, 0.01 * k, 0.1 * k, 1.0, k != 2) for k in (1, 2, 3)]
-    alone, whole = (fits._point(panel, "way", 10**6, trials) for panel in ("fit", "whole"))
+    alone, whole = (fits.point_of(panel, "way", 10**6, trials) for panel in ("fit", "whole"))
     assert alone.cost.value == pytest.approx(0.2)
     assert whole.cost.value == pytest.approx(1.2)
     assert alone.error.value == pytest.approx(0.02)
     assert alone.error.low < alone.error.value < alone.error.high
     assert alone.label == "1e6 photons"
     assert alone.facts["converged"] == 2
-    notes = fits._notes({("way", 10**6): trials}, {"way": 3.0})
+    notes = fits.notes_of({("way", 10**6): trials}, {"way": 3.0})
     assert notes == (
         "1 of 3 did not converge: way, 1e+06 photons",
         "first fits, which compile, not in the times [s]: way 3.0",

@@ -31,7 +31,7 @@ def test_rows_become_points():
     wanted = [one for one in contenders.WANTED if one[0] in (contenders.YARDSTICK, "Liang, corrected")]
     found, _ = contenders.contenders(wanted=wanted)
     rows = laws.measured(found, SMALL)
-    profile, both = (laws._points(rows, part) for part in laws.TITLES)
+    profile, both = (laws.points_of(rows, part) for part in laws.TITLES)
     assert [point.method for point in profile] == [one.name for one in found if not one.another]
     assert [point.method for point in both] == [one.name for one in found]
     assert profile[0].facts["times_yardstick"] == 1.0

@@ -27,7 +27,7 @@ def test_bias_is_what_drawing_finds(uniform):
     """With the right density and with a wrong one, which shows: radii are uniform, and the law's are not."""
     law = uniform.law
     own, by_law_density = samplers.asymptotic_bias(uniform, ALPHA, EDGE)
-    for bias, gather in ((own, by_law), (by_law_density, samplers._unweighted)):
+    for bias, gather in ((own, by_law), (by_law_density, samplers.unweighted)):
         found, error = drawn(gather(law, ALPHA, uniform), law)
         assert abs(found - bias) < 3.3 * error  # 1e-3 two-sided
     assert abs(own) < 0.01 < 0.1 < abs(by_law_density)
@@ -45,8 +45,8 @@ def test_an_exact_inverse_has_its_laws_bias_only():
 def test_noise_is_over_that_of_the_exact_quantile(uniform):
     law = uniform.law
     best = by_quantile(ALPHA)
-    assert samplers._ratios(best, best, ALPHA, law, 0, 20) == (1.0, 1.0)
-    ratios = samplers._noise(by_law, uniform, SMALL)
+    assert samplers.error_ratios(best, best, ALPHA, law, 0, 20) == (1.0, 1.0)
+    ratios = samplers.noise_ratios(by_law, uniform, SMALL)
     assert ratios.shape == (2, 1, samplers.BLOCKS)
     assert ratios.min() > 1.3
     assert np.ptp(ratios) > 0.0
@@ -55,9 +55,9 @@ def test_noise_is_over_that_of_the_exact_quantile(uniform):
 @pytest.mark.slow
 def test_wrong_densities_come_twice(uniform):
     exactly, _ = made(YARDSTICK, uniform.law)
-    (found,) = samplers._ways(exactly, SMALL)
+    (found,) = samplers.ways_of(exactly, SMALL)
     assert found.name == YARDSTICK
-    noise, bias = samplers._points(found, samplers.Measured.exactly(2.0))
+    noise, bias = samplers.points_of(found, samplers.Measured.exactly(2.0))
     assert (noise.panel, bias.panel) == ("noise", "bias")
     assert noise.error.low < noise.error.value < noise.error.high
     assert bias.error.value == pytest.approx(abs(found.bias[0, 0]))

@@ -35,7 +35,7 @@ def test_scalar_rings_are_unions_of_even_ones():
     def trace(seed, photons, mu_a, mu_s, dr, reflected):
         reflected += np.arange(reflected.size) * photons  # a ring's weight is its index
 
-    energy = truth._scalar(trace, 10)(1).energy
+    energy = truth.scalar_tracer(trace, 10)(1).energy
     assert energy.shape == truth.reference().shape
     first, last = truth.RINGS[-2], truth.RINGS[-1]
     assert energy[0, -1] == pytest.approx(sum(range(first, last)))
@@ -43,7 +43,7 @@ def test_scalar_rings_are_unions_of_even_ones():
 
 def test_order_resolved_error_is_what_it_states(sidak):
     """Each ring within its own error; with the error stated ten times too small some are not."""
-    answer = truth._orders(20_000)(1)
+    answer = truth.by_orders(20_000)(1)
     z = (answer.energy / truth.reference() - 1.0) / answer.stated
     judged = np.abs(z[truth.judged()])
     limit = sidak(judged.size)

@@ -75,6 +75,6 @@ def test_a_coefficient_law_starts_from_those_before_it():
     small, large = (forms.CoefficientLaw("lambda_0", (0, 1, 0, 0), with_kappa=kappa) for kappa in ("", "h"))
     constants = np.array([0.5, 0.6, 0.1, 0.2, 0.7])
     truth = made_truth(small, constants)
-    start = large.start(forms._law_shapes(small, constants, truth)[..., 0], large.bases(truth))
-    np.testing.assert_allclose(forms._law_shapes(large, start, truth), forms._law_shapes(small, constants, truth))
+    start = large.start(forms.law_shapes(small, constants, truth)[..., 0], large.bases(truth))
+    np.testing.assert_allclose(forms.law_shapes(large, start, truth), forms.law_shapes(small, constants, truth))
     np.testing.assert_allclose(start[2:], constants[1:])

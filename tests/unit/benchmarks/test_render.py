@@ -100,7 +100,7 @@ def test_table_2_covers_what_it_says(context, scene, few, capsys):
 def test_bias_is_told_from_noise():
     """Estimates of known bias and variance; without taking the noise of the mean away, bias^2 would be 0.0625 more."""
     noise = np.random.default_rng(2).standard_normal((3, 4000, 16))
-    bias2, spread, variance = render_variance._of(0.5 + noise, np.zeros((3, 4000)))
+    bias2, spread, variance = render_variance.parts_of(0.5 + noise, np.zeros((3, 4000)))
     np.testing.assert_allclose(bias2, 0.25, atol=4 * spread.max())
     np.testing.assert_allclose(spread, np.sqrt((4 * 0.25 / 16 + 2 / 256) / 4000), rtol=0.1)
     np.testing.assert_allclose(variance, 1.0, rtol=0.03)  # 4000 x 15 degrees of freedom: 0.6 %

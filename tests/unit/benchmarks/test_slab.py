@@ -22,7 +22,7 @@ def test_paths_agree_with_the_integral(illumination):
 
 def test_directions_are_cosine_weighted():
     """Of u uniform on [0, 1], sin^2 of the angle to the normal is u."""
-    down = np.array([slab._down(a, 0.3) for a in (0.0, 0.25, 1.0)])
+    down = np.array([slab.downward_cosine(a, 0.3) for a in (0.0, 0.25, 1.0)])
     np.testing.assert_allclose(down[:, 2], -np.sqrt([1.0, 0.75, 0.0]))
     np.testing.assert_allclose(np.sum(down**2, axis=1), 1.0)
 

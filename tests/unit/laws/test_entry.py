@@ -162,8 +162,8 @@ def toy(monkeypatch, tmp_path):
     """A folder with the recipe of a law that is in the table; its file and its text are there, too."""
     monkeypatch.setitem(sys.modules, "toys.toy", SimpleNamespace(Toy=Toy))
     monkeypatch.setitem(laws.PROFILES, "toy", "toys.toy.Toy")
-    shipped = emit._read
-    monkeypatch.setattr(emit, "_read", lambda file: TOY_TEXT if file == "toy" else shipped(file))
+    shipped = emit.read_text
+    monkeypatch.setattr(emit, "read_text", lambda file: TOY_TEXT if file == "toy" else shipped(file))
     (tmp_path / "toy.toml").write_text(TOY_RECIPE)
     return tmp_path
 

@@ -8,7 +8,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.report.figures.canvas import canvas
-from profilefit.report.figures.inverse_figure import _caption, _draw, _points, inversion_figure
+from profilefit.report.figures.inverse_figure import caption_of, draw, inversion_figure, points_of
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
@@ -31,7 +31,7 @@ def folder(tmp_path_factory):
 
 
 def test_caption_says_where_the_printed_inverse_is_worst(folder):
-    caption = _caption(Source(folder))
+    caption = caption_of(Source(folder))
     assert "up to 0.07 for α in [0.4, 0.6]" in caption
     assert caption.endswith("0.04 at α = 0.1, 0.083 at α = 0.9")
 
@@ -40,11 +40,11 @@ def test_lines_are_the_records_own_numbers(folder):
     source = Source(folder)
     ax = canvas(2.0).subplots()
     for name in ("liang-inverse-whole", "quantile", "hazard-diffuse"):
-        _draw(ax, source, name)
+        draw(ax, source, name)
     labels = [line.get_label() for line in ax.get_lines()]
     assert labels == ["(19)-(21) as printed", "(19)-(21) regenerated", "rational in −ln(1 − ξ)"]
     np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), [0.04, 0.02, 0.07, 0.05, 0.083])
-    alpha, error = _points(source.fitted("quantile"))
+    alpha, error = points_of(source.fitted("quantile"))
     np.testing.assert_array_equal(ax.get_lines()[2].get_xydata(), np.column_stack([alpha, error]))
     assert np.all(error <= 1e-3)
 

@@ -53,7 +53,7 @@ def test_crowded_labels_say_so():
 
 def test_marks_say_where_points_stand():
     axes = canvas(4.0).subplots()
-    figure._draw(axes, PART.panels[0])
+    figure.draw(axes, PART.panels[0])
     faces = {
         line.get_xdata()[0]: (line.get_marker(), line.get_markerfacecolor())
         for line in axes.get_lines()
@@ -71,7 +71,7 @@ def test_marks_say_where_points_stand():
     [("1e5 photons", True, "a: 10$^5$ photons"), ("2e4 photons", False, "2·10$^4$ photons"), ("", True, "a")],
 )
 def test_efforts_are_powers_of_ten(label, first, text):
-    assert figure._text(Point("p", "a", label, *[WithSpread.exactly(1.0)] * 2), first) == text
+    assert figure.text_of(Point("p", "a", label, *[WithSpread.exactly(1.0)] * 2), first) == text
 
 
 def test_figure_and_table(tmp_path):

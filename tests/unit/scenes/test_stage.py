@@ -9,10 +9,11 @@ import pytest
 from profilefit.errors import InputError
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.scene import head_scene
-from profilefit.scenes.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.buffers import SURFACE, flat, step_edge
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.picture import srgb_codes, to_srgb
 from profilefit.scenes.stage.stage import Stage, covered, covering
+from profilefit.scenes.stage.technique import EXITANCE, RADIANCE
 from profilefit.scenes.stage.world import Camera
 from tests.unit.scenes.scenes import RADIUS, ball, scene
 
@@ -211,7 +212,7 @@ def test_release_frees_the_gpu(context, burley):
     np.testing.assert_array_equal(
         unlit, stage.scatter(burley, 2.0, Sampling(4)) / np.float32(np.pi)
     )  # no scene, no light
-    textures = list(stage._targets._maps.values())
+    textures = [stage.targets.map(name) for name in (*SURFACE, EXITANCE, RADIANCE)]
     stage.release()
     assert all(isinstance(texture.mglo, moderngl.InvalidObject) for texture in textures)
     for use in (

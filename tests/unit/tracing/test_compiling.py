@@ -45,8 +45,8 @@ def test_threads_that_compile_at_once_count_once():
 
 
 def test_what_lies_apart_adds_up(monkeypatch):
-    compiling = Compiling()
-    for now, duration in ((10.0, 2.0), (9.5, 1.0), (13.0, 2.0), (12.5, 2.0)):  # 8-10 with 8.5-9.5; 10.5-13
-        monkeypatch.setattr(time, "perf_counter", lambda now=now: now)
-        compiling._note(EVENTS, duration)
+    with Compiling() as compiling:
+        for now, duration in ((10.0, 2.0), (9.5, 1.0), (13.0, 2.0), (12.5, 2.0)):  # 8-10 with 8.5-9.5; 10.5-13
+            monkeypatch.setattr(time, "perf_counter", lambda now=now: now)
+            jax.monitoring.record_event_duration_secs(EVENTS, duration)
     assert compiling.seconds == pytest.approx(4.5)

@@ -177,7 +177,7 @@ def test_roulette_keeps_the_weight_of_all(weight, event, chance):
 
 def test_long_paths_toss_once_an_octave_and_not_where_they_are_cut():
     events = np.arange(0, MAX_EVENTS + EVENTS_PER_TURN, EVENTS_PER_TURN, dtype=np.uint32) + EVENTS_PER_TURN - 1
-    late = np.asarray(layered_event._is_late(jnp.asarray(events)))
+    late = np.asarray(layered_event.is_late(jnp.asarray(events)))
     assert np.sum(late) == np.log2(MAX_EVENTS // FIRST_TOSS)
 
 

@@ -67,5 +67,5 @@ def test_an_end_is_seen_once():
 
 def test_rank_is_the_cumulative_sum():
     flags = np.random.default_rng(0).random(4096) < 0.3
-    np.testing.assert_array_equal(pool._rank(jnp.asarray(flags)), np.cumsum(flags))
-    np.testing.assert_array_equal(pool._rank(jnp.ones(16384, bool)), np.arange(1, 16385))
+    np.testing.assert_array_equal(pool.ranks(jnp.asarray(flags)), np.cumsum(flags))
+    np.testing.assert_array_equal(pool.ranks(jnp.ones(16384, bool)), np.arange(1, 16385))
