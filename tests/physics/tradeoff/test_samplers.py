@@ -57,7 +57,7 @@ def test_wrong_densities_come_twice(uniform):
     exactly, _ = made(YARDSTICK, uniform.law)
     (found,) = samplers.ways_of(exactly, SMALL)
     assert found.name == YARDSTICK
-    noise, bias = samplers.points_of(found, samplers.Measured.exactly(2.0))
+    noise, bias = samplers.points_of(found, samplers.WithSpread.exactly(2.0))
     assert (noise.panel, bias.panel) == ("noise", "bias")
     assert noise.error.low < noise.error.value < noise.error.high
     assert bias.error.value == pytest.approx(abs(found.bias[0, 0]))
