@@ -1,4 +1,4 @@
-"""A scene chosen for: the cheapest way to scatter light within its tolerance and its budget.
+"""A choice for a scene: the cheapest way to scatter light within its tolerance and its budget.
 
 python examples/05_choose_for_a_scene.py [skin.toml]
 """
@@ -12,4 +12,4 @@ scene = read(Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent /
 choice = choose(scene, shipped())  # with costs as they were measured for this release
 
 one = choice.chosen
-print("nothing serves" if one is None else f"{one.option.label}: error {one.error.total:.3g}, {one.ms:.2g} ms")
+print("no option meets both" if one is None else f"{one.option.label}: error {one.error.total:.3g}, {one.ms:.2g} ms")

@@ -1,4 +1,4 @@
-"""profilefit choose: the least model that a scene needs."""
+"""profilefit choose: the cheapest way to render scattering within a scene's tolerance and budget."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def choose(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the least that a scene needs to scatter light.
+    """Find the cheapest option within a scene's limits.
 
-    From nothing at all through filters to samples of a law, each with its predicted error against the scene's tolerance
-    and budget; and whether one layer is enough for a stack of layers, by tracing both. Half a minute. --json prints
-    every option and its constants. Exit status 1 if nothing serves.
+    The limits are its error tolerance and its time budget. Options range from no scattering through filters to samples
+    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by tracing both.
+    Half a minute. --json prints every option and its constants. Exit status 1 if no option is within the limits.
 
     \b
     Example, on a file of profilefit examples:
@@ -49,12 +49,12 @@ def choose(
         from profilefit.studies.choose.layers import one_layer
         from profilefit.studies.choose.scene import read
 
-    asked = read(scene)
-    ratios = _measured(asked, quiet) if measure else cost.shipped()
-    choice = chosen(asked, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
+    requested = read(scene)
+    ratios = _measured(requested, quiet) if measure else cost.shipped()
+    choice = chosen(requested, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
     layer = None
-    if asked.layers is not None:
-        layer = one_layer(asked.layers, asked.tolerance, asked.within, progress=False if quiet else None)
+    if requested.layers is not None:
+        layer = one_layer(requested.layers, requested.tolerance, requested.within, progress=False if quiet else None)
     if as_json:
         print_json(content(choice, ratios, layer))
     else:
