@@ -152,7 +152,7 @@ COLUMNS = (
     "material",
     "l, pixels",
     "radius, l",
-    "asked, %",
+    "requested, %",
     "chosen",
     "predicted, %",
     "measured, %",

@@ -1,4 +1,4 @@
-"""Your own data: the medium that a measured profile tells of, and what it cannot tell.
+"""Your own data: the medium that explains a measured profile, with intervals.
 
 python examples/04_own_data.py [phantom.csv]
 """

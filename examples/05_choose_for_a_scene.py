@@ -1,4 +1,4 @@
-"""A scene chosen for: the cheapest way to scatter light within its tolerance and its budget.
+"""A choice for a scene: the cheapest way to scatter light within its tolerance and its budget.
 
 python examples/05_choose_for_a_scene.py [skin.toml]
 """
@@ -13,6 +13,6 @@ choice = choose(scene, shipped())  # with costs as they were measured for this r
 
 one = choice.chosen
 if one is None:
-    print("nothing serves")
+    print("no option meets both")
 else:
     print(f"{one.option.label}: error {one.error.total:.3g}, {one.frame.least:.2g} to {one.frame.most:.2g} ms")

@@ -1,6 +1,6 @@
 """What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
 
-# What errors tell to do about them; a command line has other words for it.
+# Remedies that errors name; a command line has other words for them.
 ELSEWHERE = "use another folder"
 NAMED = "a folder to write into"
 RESUMES = "the same run with its store resumes"

@@ -43,5 +43,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that nobody has asked for yet, too."""
+    """What an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

@@ -1,7 +1,8 @@
 """One medium in everybody's units: mean free paths, falloff lengths, coefficients, and the "radius" of each engine.
 
 The hub is `Optical(alpha, mfp)`, an isotropic medium under an index-matched surface. A colour is a function of alpha
-alone, and every length is the mean free path times a function of alpha alone, so each converts to and from the hub.
+alone, and every length is the transport mean free path times a function of alpha alone, so each converts to and from
+the hub.
 
 Three different lengths are called the diffuse mean free path (l the mean free path):
 
@@ -166,10 +167,10 @@ def dipole_reflectance(alpha: ArrayLike, index: float) -> Floats:
 
 @dataclass(frozen=True)
 class Length:
-    """A length that stands for a medium: its mean free path times `factor(alpha)` [-].
+    """A length that stands for a medium: its transport mean free path times `factor(alpha)` [-].
 
     colour   the A that an engine or a parametrisation pairs it with: "searchlight", "diffuse" or "" for none
-    formula  how it comes from l, the mean free path
+    formula  how it follows from l, the transport mean free path
     source   what defines it
     """
 
@@ -194,7 +195,7 @@ CYCLES = "blender/cycles src/kernel/closure/bssrdf.h, subsurface_random_walk.h"
 HDRP = "Unity-Technologies/Graphics DiffusionProfileSettings.cs, PathTracingBSDF.hlsl"
 UNREAL = "Unreal Engine SubsurfaceProfile.cpp, BurleyNormalizedSSSCommon.ush"
 LENGTHS = (
-    Length("mfp", "mean free path l", "", "1 / (mu_s' + mu_a)", "", _times(1.0)),
+    Length("mfp", "transport mean free path l", "", "1 / (mu_s' + mu_a)", "", _times(1.0)),
     Length("dmfp", "diffuse mean free path", "", "Grosjean's", "d'Eon and Irving 2011", _grosjean),
     Length("dmfp_classical", "  classical", "", "1 / sqrt(3 mu_a (mu_a + mu_s'))", "Jensen et al. 2001", _classical),
     Length("decay_length", "  exact", "", "far away R_d ~ exp(-r / it)", "", _decay),

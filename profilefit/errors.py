@@ -17,7 +17,7 @@ __all__ = [
 
 
 class RecipeError(InputError):
-    """A recipe that is missing, malformed or asks for the impossible."""
+    """A recipe that is missing, malformed or requires the impossible."""
 
 
 class RecordError(InputError):

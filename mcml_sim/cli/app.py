@@ -13,7 +13,7 @@ from mcml_sim.errors import ELSEWHERE, NAMED, RESUMES, ClusterError, InputError,
 
 __all__ = ["app", "main"]
 
-# What the library tells to do about an error, as the command line says it.
+# The library's remedies for errors, in the command line's words.
 REMEDIES = {
     ELSEWHERE: "use --out elsewhere",
     NAMED: "--out FOLDER",

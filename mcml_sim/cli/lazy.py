@@ -1,4 +1,4 @@
-"""What is imported only when it is asked for: names of a package (PEP 562), a command, and what a subcommand needs.
+"""What is imported only on first use: names of a package (PEP 562), a command, and what a subcommand needs.
 
 JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
 """
@@ -50,7 +50,7 @@ def command(module: str) -> None:
 def interruptible(module: str) -> Iterator[None]:
     """For the imports of a command in `module`: Ctrl-C ends the process at once, in one line and with its status.
 
-    An exception that falls into imports may be dropped, or told as another.
+    An exception that falls into imports may be dropped, or turned into another.
     """
     before = signal.getsignal(signal.SIGINT)
     if before in (signal.SIG_IGN, None) or not _on_interrupt(lambda *_: _quit(module)):

@@ -1,4 +1,4 @@
-"""The lines that mcml-sim prints of a run: its totals with errors, its speed, and what its precision asks for."""
+"""The lines that mcml-sim prints of a run: its totals with errors, its speed, and what its precision needs."""
 
 from __future__ import annotations
 
@@ -78,18 +78,19 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
     value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
     if not (np.all(value > 0) and np.all(np.isfinite(error))):
         return (
-            f"{goal.quantity}: {goal.relative_error:g} not reached; some bins saw too little light to tell what would"
+            f"{goal.quantity}: {goal.relative_error:g} not reached; some bins hold too few photons to predict how many "
+            "would reach it"
         )
     found = float(np.max(error / value))
     needed = photons * (found / goal.relative_error) ** 2
     return (
         f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
-        "photons in all would reach it, and these are kept: ask for more --photons"
+        "photons in all would reach it, and these are kept: request more --photons"
     )
 
 
 def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
-    """Lines that tell of a run that is done."""
+    """The report of a run that is done."""
     kept = done.results
     yield f"{kept.photons} photons, seed {options.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)

@@ -90,7 +90,7 @@ BAD_INPUT = 2
 FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
 AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
 LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
-NOBODY_READS = 141  # exit status, as a shell tells of any program that SIGPIPE ended: 128 + 13
+NOBODY_READS = 141  # exit status, as a shell reports any program that SIGPIPE ended: 128 + 13
 
 
 def accepted() -> str:
@@ -142,7 +142,7 @@ class Program:
             status = INTERRUPTED if lost else status
             if status == INTERRUPTED:
                 self.say(self.stopped())
-            # What libraries tell their callers is not shown; and an error is one line.
+            # Warnings of libraries are not shown; and an error is one line.
             notices = dict.fromkeys(str(one) for one in found if isinstance(one, Notice))
             for text in notices if status in ANSWERS else ():
                 self.say(text)
@@ -157,7 +157,7 @@ class Program:
     def _status(self) -> int:
         """Do the subcommand, and say what went wrong."""
         try:
-            # Standalone, typer would end the process itself on Ctrl-C, and tell usage errors in a box of many lines.
+            # Standalone, typer would end the process itself on Ctrl-C, and print usage errors in a box of many lines.
             status = int(self.app(prog_name=self.name, standalone_mode=False) or 0)
             sys.stdout.flush()
             return status

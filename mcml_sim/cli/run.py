@@ -1,4 +1,4 @@
-"""mcml-sim run: every run of an MCML input file, its results kept and told."""
+"""mcml-sim run: every run of an MCML input file, its results written and printed."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ QUANTITIES = (
 PRECISION = (
     "Stop a run early at this relative standard error, for example 1e-3. It is looked at after 8, 16, 32, ... batches, "
     f"first at {FIRST_LOOKS[0]} photons ({FIRST_LOOKS[1]} in a matched isotropic half space), and no run goes beyond "
-    "the photons asked for."
+    "the photons requested."
 )
 REPEATS = (
     "More photons or more repeats? Errors fall as 1/sqrt(photons) either way: k runs of N photons with k seeds are "

@@ -20,7 +20,7 @@ from mcml_sim.exact.transform import STANDARD, Rule, Transform, solve
 Floats = NDArray[np.float64]
 
 Kernel = Callable[[Transform, jax.Array, jax.Array], jax.Array]
-"""(transform, alpha, x) -> what is asked, at radii or shares x of any shape, of one albedo."""
+"""(transform, alpha, x) -> the quantity wanted, at radii or shares x of any shape, of one albedo."""
 
 BLOCK = 64
 

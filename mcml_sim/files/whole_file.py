@@ -67,7 +67,7 @@ def require_target(path: Path) -> None:
 
 
 def require_writable(path: Path) -> None:
-    """OutputError unless `write_whole(path)` can work, as far as one can tell before. Makes its folder."""
+    """OutputError unless `write_whole(path)` can work, as far as can be known before. Makes its folder."""
     with _named(path):
         target = _target(path)
     if target is not None:

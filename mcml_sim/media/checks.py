@@ -1,4 +1,4 @@
-"""What media and simulations ask of their arguments alike."""
+"""Checks of arguments that media and simulations share."""
 
 from __future__ import annotations
 

@@ -106,7 +106,7 @@ class Grid:
     def __repr__(self) -> str:
         z = "" if self.z_edges is None else f", {self.depths} depths to z = {self.z_edges[-1]:g}"
         a = "" if self.a_edges is None else f", {self.angles} angles"
-        return f"Grid({self.rings} rings to r = {self.r_edges[-1]:g}{z}{a}, {self.digest[:8]})"
+        return f"Grid({self.rings} annuli to r = {self.r_edges[-1]:g}{z}{a}, {self.digest[:8]})"
 
     def _set_edges(
         self,
@@ -165,8 +165,8 @@ def require_resolved(grid: Grid) -> None:
         raise InputError(f"grid must be a mcml_sim.Grid, got {grid!r}")
     for across, number in (("depths", grid.depths), ("angles", grid.angles)):
         if grid.rings * number > MAX_CELLS:
-            raise InputError(f"grid must have at most {MAX_CELLS} bins, got {grid.rings} rings x {number} {across}")
-    for name, edges in (("rings", grid.r_edges), ("depths", grid.z_edges)):
+            raise InputError(f"grid must have at most {MAX_CELLS} bins, got {grid.rings} annuli x {number} {across}")
+    for name, edges in (("annuli", grid.r_edges), ("depths", grid.z_edges)):
         if edges is not None:
             _require_resolved(name, edges)
 

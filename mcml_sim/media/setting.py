@@ -1,4 +1,4 @@
-"""Which light falls on which surface: a half-space profile means nothing without it."""
+"""Illumination and surface: a half-space profile means nothing without them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ ILLUMINATIONS = ("searchlight", "diffuse")
 class Setting:
     """The light and the surface that a half-space profile belongs to.
 
-    illumination  "searchlight", a normally incident pencil beam (MCML's), or "diffuse", cosine-weighted light
+    illumination  "searchlight", a pencil beam (normal, collimated; MCML's), or "diffuse", cosine-weighted light
     n             refractive index of the half space over that outside [-], > 0
     g             mean cosine of the scattering angle [-], -1 < g < 1
 

@@ -13,7 +13,7 @@ number of runs, and for each run
     1.0                     n below
 
 A # starts a comment, blank lines may stand anywhere, and words after the values of a line are not read, as in V1; nor
-is what follows the last run. Comments may have any bytes. Unlike V1, a number too many is an error, since it tells of
+is what follows the last run. Comments may have any bytes. Unlike V1, a number too many is an error, a sign of
 a line too many, and so is a word that is not quite a number, of which V1 reads what it can: 1 photon of 1e6. V1 wrote
 text for B as for A, so B is read and makes no difference. Beyond V1, g may be negative, and the last thickness may be
 `inf`; the 1E8 that V1's users write for that stays a length.
@@ -34,7 +34,7 @@ from mcml_sim.media.checks import MAX_PHOTONS
 from mcml_sim.media.grid import MAX_BINS, MAX_CELLS, Grid
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
 
-# Bounds of a file and of what it asks for: far beyond any use, near enough that a slip of the pen fails at once and
+# Bounds of a file and of what it requests: far beyond any use, near enough that a slip of the pen fails at once and
 # not after hours or gigabytes.
 MAX_BYTES = 2**21
 MAX_LINES = 2**20
@@ -76,7 +76,7 @@ class Run:
 
     @property
     def grid(self) -> Grid:
-        """The bins, in cm. Made when asked for: thousands of runs with fine grids would fill the memory."""
+        """The bins, in cm. Made on first use: thousands of runs with fine grids would fill the memory."""
         return Grid(self.dr, self.nr, self.dz, self.nz, na=self.na)
 
 

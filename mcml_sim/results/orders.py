@@ -93,7 +93,7 @@ class Orders:
         grid = Grid.from_edges(r=r_edges)
         index = np.searchsorted(self.grid.r_edges, grid.r_edges)
         if index[-1] >= self.grid.r_edges.size or np.any(self.grid.r_edges[index] != grid.r_edges):
-            raise InputError(f"r_edges must be edges of the run's own grid, got {grid.rings} rings that are not")
+            raise InputError(f"r_edges must be edges of the run's own grid, got {grid.rings} annuli that are not")
         exits = np.add.reduceat(self.counts.exits, index, axis=0)  # the last piece gathers all beyond the last edge
         return replace(self, grid=grid, counts=replace(self.counts, exits=exits))
 

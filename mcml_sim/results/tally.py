@@ -77,7 +77,7 @@ class Tally:
     Every quantity is an Estimate: value, standard error, effective samples. Bins hold means over themselves, never
     values at their middles. Those of radius leave out what fell beyond the last ring (`..._overflow`); what was
     transmitted without scattering is a ray, not a profile, and kept apart. InputError where the grid does not
-    resolve what is asked.
+    resolve what is requested.
     """
 
     medium: Medium

@@ -41,11 +41,11 @@ def run_batches(
     store      batches it holds in the size needed are read, the others traced and saved
     progress   show a bar on stderr; by default only if that is a terminal
     scheduler  address of a Dask scheduler whose workers trace, instead of threads; `trace` must pickle
-    enough     asked of the sum after 8, 16, 32, ... batches; True ends the run with that sum
+    enough     called with the sum after 8, 16, 32, ... batches; True ends the run with that sum
 
     Results are added in the order of their numbers, so the same bits come out whatever the workers. That `enough`
     sees few sums, the same ones in every run, keeps small the bias of stopping by an error estimated from the photons
-    themselves: it vanishes as the precision asked for grows (Glynn and Whitt, "The asymptotic validity of sequential
+    themselves: it vanishes as the precision requested grows (Glynn and Whitt, "The asymptotic validity of sequential
     stopping rules for stochastic simulations", Ann. Appl. Probab. 2, 1992). Batches beyond the last look stay in the
     store and do not count.
 

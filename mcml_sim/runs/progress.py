@@ -88,7 +88,7 @@ class _Remaining(ProgressColumn):
 
 
 def _speed(task: Task) -> float | None:
-    """Units a second, lately; or since the start, before there are two steps to tell by."""
+    """Units a second, lately; or since the start, before there are two steps."""
     since = task.completed / task.elapsed if task.elapsed else None
     return task.finished_speed or task.speed or since
 

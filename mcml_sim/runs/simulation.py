@@ -87,7 +87,7 @@ def is_store_of(folder: Path, medium: Medium, grid: Grid, seed: int) -> bool:
 
 
 class _Enough:
-    """Whether a run's sums so far are as precise as was asked."""
+    """Whether a run's sums so far are as precise as requested."""
 
     def __init__(self, precision: Precision, medium: Medium, grid: Grid, seed: int) -> None:
         self._precision, self._medium, self._grid, self._seed = precision, medium, grid, seed

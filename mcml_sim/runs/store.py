@@ -2,7 +2,7 @@
 
 run.json says what made the batches; batch-00000000.npz, ... hold one each: the arrays of its result and the digest of
 run.json's contents, sealed with a digest of the whole file. A file is written under another name and renamed, so it is
-whole or absent; should the disk damage it later, the seal tells.
+whole or absent; should the disk damage it later, the seal shows it.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def require_ours(folder: Path, made_by: dict[str, object]) -> None:
     found = manifest(folder)
     if found is None:
         return
-    # What kind of run it is tells most, and explains other differences.
+    # The kind of run is compared first, since it explains other differences.
     for name in sorted(here.keys() | found.keys(), key=lambda name: (name != "kind", name)):
         if found.get(name) != here.get(name):
             one, other = _apart(found.get(name), here.get(name))

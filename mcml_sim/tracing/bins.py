@@ -54,7 +54,7 @@ def rounded_up(values: Floats) -> NDArray[np.float32]:
 def groups(grid: Grid, photons: int, most: int) -> int:
     """Into how many groups photons are divided, whose spread gives the errors of what is absorbed by ring and depth.
 
-    Fewer than `most` if their tables would take more than 64 MiB, or if there are few photons; one tells no spread.
+    Fewer than `most` if their tables would take more than 64 MiB, or if there are few photons; one has no spread.
     """
     table = 8 * (grid.rings + 1) * (grid.depths + 1)
     return min(max(photons // FEWEST_IN_GROUP, 1), max(FEWEST_GROUPS, min(most, TABLE_BYTES // table)))

@@ -69,7 +69,7 @@ class KernelShape(NamedTuple):
 
 
 class PhotonFates(NamedTuple):
-    """What became of the photons of a batch; by photon, with one more place for what nobody asks for."""
+    """What became of the photons of a batch; by photon, with one more place for what is not needed."""
 
     exits: Array
     """rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 if roulette ended it,

@@ -171,7 +171,7 @@ def _trace_visits(
 
 
 def _summed(by_group: Array) -> tuple[Array, Array]:
-    """Sum over groups, and its variance as their spread tells."""
+    """Sum over groups, and its variance from their spread."""
     groups = len(by_group)
     if groups == 1:
         return by_group[0], jnp.full_like(by_group[0], jnp.inf)

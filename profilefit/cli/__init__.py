@@ -25,12 +25,12 @@ __all__ = ["app", "main"]
 
 # The first line is empty: typer takes the margin of all others off them.
 HELP = """
-Closed-form profiles of subsurface scattering, fitted to light with error bars.
+Closed-form profiles of subsurface scattering, fitted with error bars.
 
   profilefit regenerate hazard --out mine  simulate, and fit anew: two minutes
-  profilefit report --fits mine            what came out, and how good it is
-  profilefit export hazard --lang hlsl     the best law, for your shader
-  profilefit fit FILE.csv                  alpha and l of what you measured"""
+  profilefit report --fits mine            constants, errors and quality
+  profilefit export hazard --lang hlsl     the most accurate law, as a shader
+  profilefit fit FILE.csv                  alpha and l of a measured profile"""
 PANELS = {
     "Make laws": (regenerate, report),
     "Use laws": (export, choose, convert, scene),

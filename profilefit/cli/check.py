@@ -1,4 +1,4 @@
-"""profilefit check: run the shader texts of laws on this machine's OpenGL, and judge them by their own bounds."""
+"""profilefit check: run the shader sources of laws on this machine's OpenGL, and judge them by their own bounds."""
 
 from __future__ import annotations
 
@@ -49,10 +49,10 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Judge shader texts on this machine's GPU (a minute).
+    """Judge shader sources on this machine's GPU (a minute).
 
-    Every text is evaluated, ends included, and compared with float64 and with the exact half space. Exit status 1 if a
-    bound is broken: float32 errors below a tenth of the model's own, and no number that must not be.
+    Every source is evaluated, ends of its range included, and compared with float64 and with the exact half space. Exit
+    status 1 if a bound is broken: float32 errors below a tenth of the model's own; no NaN, infinity or negative value.
 
     \b
     Examples:

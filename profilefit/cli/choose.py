@@ -1,4 +1,4 @@
-"""profilefit choose: the least model that a scene needs."""
+"""profilefit choose: the cheapest way to render scattering within a scene's tolerance and budget."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def choose(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find the least that a scene needs to scatter light.
+    """Find the cheapest option within a scene's limits.
 
-    From nothing at all through filters to samples of a law, each with its predicted error against the scene's tolerance
-    and budget; and whether one layer is enough for a stack of layers, by tracing both. Half a minute. --json prints
-    every option and its constants. Exit status 1 if nothing serves.
+    The limits are its error tolerance and its time budget. Options range from no scattering through filters to samples
+    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by tracing both.
+    Half a minute. --json prints every option and its constants. Exit status 1 if no option is within the limits.
 
     \b
     Example, on a file of profilefit examples:

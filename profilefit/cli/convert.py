@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import LIGHTS, AsJson
+from profilefit.cli.options import LIGHTS, LIGHTS_HELP, AsJson
 from profilefit.errors import InputError
 
 if TYPE_CHECKING:
@@ -28,14 +28,14 @@ LENGTH = "Length"  # the panel of --help
 def convert(
     alpha: Annotated[str | None, typer.Option(help="Single-scattering albedo mu_s' / (mu_s' + mu_a).")] = None,
     reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
-    illumination: Annotated[
-        str | None, typer.Option(help="Light of --reflectance, and of --falloff: searchlight or diffuse.")
-    ] = None,
+    illumination: Annotated[str | None, typer.Option(help=f"Of --reflectance and --falloff: {LIGHTS_HELP}.")] = None,
     mu_a: Annotated[
         str | None, typer.Option(help="Absorption coefficient, with --mu-s; colour and length in one.")
     ] = None,
     mu_s: Annotated[str | None, typer.Option(help="Reduced scattering coefficient mu_s'.")] = None,
-    mfp: Annotated[str | None, typer.Option(help="Mean free path.", rich_help_panel=LENGTH)] = None,
+    mfp: Annotated[
+        str | None, typer.Option(help="Transport mean free path 1 / (mu_s' + mu_a).", rich_help_panel=LENGTH)
+    ] = None,
     dmfp: Annotated[
         str | None, typer.Option(help="Diffuse mean free path (Grosjean's).", rich_help_panel=LENGTH)
     ] = None,
@@ -83,7 +83,7 @@ def convert(
         "dmfp": dmfp,
         "dmfp_classical": dmfp_classical,
         "decay_length": decay_length,
-        # The falloff depends on the light whose A it is paired with.
+        # The falloff depends on the illumination whose A it is paired with.
         f"falloff_{illumination or LIGHTS[0]}": falloff,
         "falloff_dmfp": falloff_dmfp,
         "cycles_radius": cycles_radius,

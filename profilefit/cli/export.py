@@ -1,4 +1,4 @@
-"""profilefit export: a law as text for a shader, a program or a reader."""
+"""profilefit export: a law as source for a shader or a program, or as JSON."""
 
 from __future__ import annotations
 
@@ -37,13 +37,13 @@ def export(
         str | None,
         typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
     ] = None,
-    out: Annotated[Path | None, typer.Option(help="File to write; without it the text is printed.")] = None,
+    out: Annotated[Path | None, typer.Option(help="File to write; without it the source is printed.")] = None,
     fits: Fits = None,
 ) -> None:
     """Write a law as one file for a shader or a program.
 
-    Its functions, every constant with its errors, units, light, range and digests. Without --constants a law or map
-    that was not regenerated has its printed ones.
+    Its functions, every constant with its errors, units, illumination, range and digests. Without --constants a law or
+    map that was not regenerated has its printed ones.
 
     \b
     Example:

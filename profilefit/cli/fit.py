@@ -1,4 +1,4 @@
-"""profilefit fit: one's own data, and the medium that they tell of."""
+"""profilefit fit: one's own data, and the medium that explains them."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def fit(
     total: Annotated[
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
     ] = None,
-    light: Annotated[str, typer.Option(help=f"{' or '.join(options.LIGHTS)}.")] = options.LIGHTS[0],
+    light: Annotated[str, typer.Option(help=f"{options.LIGHTS_HELP}.")] = options.LIGHTS[0],
     n: Annotated[
         float | None, typer.Option(help="Refractive index of the medium.", show_default="the file's, else 1")
     ] = None,
@@ -63,9 +63,10 @@ def fit(
 ) -> None:
     """Fit A, alpha and l to your own data, with errors.
 
-    That is mu_s' and mu_a, from a measured or simulated profile; and what it cannot tell. A table has columns r, value,
-    sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over rings. Values
-    are light per area and per incident light, unless the scale is free. Exit status 1 if they give no medium.
+    That is mu_s' and mu_a, from a measured or simulated profile; and what the data do not identify. A table has columns
+    r, value, sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over
+    annuli. Values are reflected light per area and per incident light, unless the scale is free. Exit status 1 if the
+    fit fails.
 
     \b
     Examples, on the files of profilefit examples:
@@ -102,7 +103,7 @@ def fit(
     if as_json:
         print_json(body)
     else:
-        points = f"{measured.value.size} {'rings' if measured.rings else 'points'}"
+        points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
         _show(result, f"{one_line(data.name)}: {points}, law {law}, {result.found.question.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
@@ -139,7 +140,7 @@ def _radius(option: str, text: str | None, unit: str) -> float | None:
 
 
 def _setting(measured: Measured, light: str, n: float | None) -> Setting:
-    """The light and the surface: of a simulation its own, where no option says otherwise."""
+    """Illumination and surface: of a simulation its own, where no option says otherwise."""
     with interruptible(__name__):
         from mcml_sim import Setting
 
@@ -170,7 +171,7 @@ def _held(fix: list[str], unit: str) -> dict[str, float]:
 
 
 def _scale(text: str) -> float | Known | None:
-    """What `--scale` says: nothing of a free one, a number, or one with its error."""
+    """The value of `--scale`: None if free, a number, or one with its error."""
     if text == FREE:
         return None
     known = _known("--scale", text)

@@ -11,10 +11,10 @@ from profilefit.recipes.folder import EVIDENCE, LOCAL, fits_folder
 
 
 def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
-    """The folder that was asked for, or ./fits if it has records, or the one shipped.
+    """The folder requested, or ./fits if it has records, or the one shipped.
 
-    One that is not the shipped one is told of by an OtherRecords warning, since constants of a strange folder look like
-    ours; of one that was asked for, not if `quiet`. InputError if it is no folder.
+    One that is not the shipped one is named by an OtherRecords warning, since constants of a strange folder look like
+    ours; one that was requested is not, if `quiet`. InputError if it is no folder.
     """
     if requested is not None and not requested.is_dir():
         raise InputError(f"--fits must be a folder of records, got {str(requested)!r}, which is none")
@@ -34,9 +34,9 @@ def known_folder(requested: Path | None = None) -> Path:
 
 
 def evidence_folder(records: Path, requested: Path | None = None) -> Path:
-    """The folder that was asked for, or ./evidence if it is there, or the one beside the records.
+    """The folder requested, or ./evidence if it is there, or the one beside the records.
 
-    One that nobody named is told of by an OtherRecords warning. InputError if it was asked for and is no folder.
+    One that was not requested is named by an OtherRecords warning. InputError if one was requested and is no folder.
     """
     if requested is not None and not requested.is_dir():
         raise InputError(f"--evidence must be a folder, got {str(requested)!r}, which is none")

@@ -25,6 +25,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no n
 
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
+LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
 PARTS = ("truth", "laws", "samplers", "fits")
 FUNCTIONS = ("exact", "convert", "solver")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
@@ -42,7 +43,7 @@ ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
 
 
 def in_options(text: Any) -> Any:
-    """What the library says, a text or content with texts in it, with options in place of arguments."""
+    """A text of the library, or content with such texts, with options in place of arguments."""
     if isinstance(text, str):
         return ARGUMENT.sub(lambda found: OPTIONS.get(found[1] or found[2], found[0]), text)
     if isinstance(text, Mapping):

@@ -21,7 +21,7 @@ PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting who
 
 
 class Preset(StrEnum):
-    """How much light: quick is enough for four digits of most constants, full for five."""
+    """How many photons: quick is enough for four digits of most constants, full for five."""
 
     QUICK = "quick"
     FULL = "full"

@@ -25,8 +25,8 @@ def scene(
 ) -> None:
     """Draw a scene beside its truth (a minute).
 
-    NAME.png of FILE NAME.toml is the picture by the technique that the file names, NAME-truth.png what it should be,
-    NAME-error.png where and by how much it is not; NAME.json has error and cost in numbers, which are printed, too.
+    NAME.png of FILE NAME.toml is the picture by the technique that the file names, NAME-truth.png the
+    reference, NAME-error.png the error of each pixel; NAME.json has error and cost in numbers, which are printed, too.
     Times are of this machine's OpenGL, a GPU or a software rasteriser.
 
     \b

@@ -33,7 +33,7 @@ def stability(
             help="Folder for the atlas: figures (PNG, SVG), every region as CSV, stability.json (as --json prints)."
         ),
     ] = None,
-    quick: Annotated[bool, typer.Option("--quick", help="Seconds: what the paper prints and one of ours.")] = False,
+    quick: Annotated[bool, typer.Option("--quick", help="Seconds: the paper's laws and one of this project.")] = False,
     fits: Fits = None,
     as_json: AsJson = False,
     quiet: Quiet = False,

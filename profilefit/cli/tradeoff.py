@@ -40,8 +40,8 @@ def tradeoff(
 ) -> None:
     """Measure and chart speed against accuracy (5 minutes).
 
-    Truths, laws, samplers and fits, with the spread of both and the front; all on one core, in turns. Times mean
-    something on an idle machine only; each CSV says how idle it was. Every part is written as soon as it is measured;
+    Truths, laws, samplers and fits, with the spread of both and the Pareto front; all on one core, in turns. Times are
+    meaningful on an idle machine only; each CSV says how idle it was. Every part is written as soon as it is measured;
     tradeoff.json keeps those it has of the same records, version and machine. --json prints what was measured now.
 
     \b

@@ -1,4 +1,4 @@
-"""Posteriors: emcee walks over a law's constants, once for the photon noise and once for the law's misfit.
+"""Posteriors: emcee samples a law's constants, once for the photon noise and once for the law's misfit.
 
 statistical   exp(-Q(theta*) / 2 s^2) with theta* = theta^ + C (theta - theta^): the working misfit Q with its curvature
               adjusted to the sandwich covariance (Chandler and Bate, Biometrika 94, 2007), which is the spread that
@@ -75,7 +75,7 @@ def walk(
     kept: int,
     moves: Moves | None = None,
 ) -> Walk:
-    """Walk from `start` (walkers, p) until the chain is 50 autocorrelation times long, or `max_steps`.
+    """Sample from `start` (walkers, p) until the chain is 50 autocorrelation times long, or `max_steps`.
 
     log_density  of points (m, p), (m,), vectorised; -inf where there is none. A walker that starts there moves towards
                  `centre` (p,), by halves

@@ -1,4 +1,4 @@
-"""Derived quantities with their errors: reflectance, radius of a share of the energy, profile, from what a fit knows.
+"""Derived quantities with their errors: reflectance, radius of a share of the energy, profile, by a fit's covariances.
 
 Two errors each. Statistical: the photons' covariance of the constants, carried over by the derivative. Model: how far
 the law that was fitted is from the truth, by the process that its residuals are a draw of (`discrepancy`).
@@ -153,8 +153,8 @@ class AtAlbedo:
 def radius(known: LawWithErrors, alpha: ArrayLike, share: float = ENERGY_WITHIN) -> Quantity:
     """Radius (k,) [mfp] within which `share` of the reflected light leaves, at albedos `alpha` (k,).
 
-    Its model error knows nothing of light beyond 99.5 % of the energy, where the discrepancy is not looked at: for
-    shares near that, `tail_error` says how far such radii are off.
+    Its model error does not include light beyond 99.5 % of the energy, where the discrepancy is not fitted: for
+    shares near that, `tail_error` states the error of such radii.
     """
     if known.is_map or not 0 < share < 1:
         raise InputError(f"share must be in (0, 1), of a profile law, got {share!r} of {type(known.law).__name__}")

@@ -1,4 +1,4 @@
-"""Model discrepancy: what a law gets wrong, as a random function of radius and albedo, and what that does to a fit.
+"""Model discrepancy: the error of a law as a random function of radius and albedo, and its effect on a fit.
 
 A law is not the truth: truth = law (1 + delta), delta small. Its residuals are smooth and repeat each other, so they
 are no independent noise. Here delta is a Gaussian process of mean zero over ln r and sqrt(1 - alpha) (Kennedy and
@@ -44,7 +44,7 @@ LEFT_OUT = 1e-3  # share of a variance that the rank of the photons' covariance 
 SEEN = 3.9  # gain in log likelihood that three parameters exceed by chance in one of twenty (chi^2 / 2)
 SHARES = 400  # nodes of an inverse cdf between which it is a straight line
 MAX_STEPS = 300
-TOLERANCE = 1e-3  # of ln amplitude and of the lengths: a hundredth of what data can tell
+TOLERANCE = 1e-3  # of ln amplitude and of the lengths: a hundredth of what data resolve
 FOUND, NOT_SEEN = "found", "not seen: noise alone explains the residuals"
 FAILED = f"no convergence in {MAX_STEPS} steps: amplitude and lengths are where they stopped"
 

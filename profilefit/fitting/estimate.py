@@ -1,4 +1,4 @@
-"""Estimates: the constants of a law that fit profiles best, and four answers to how far they can be trusted.
+"""Estimates: the constants of a law that fit profiles best, with errors of four kinds.
 
 statistical   what another run's photons would change: the closed-form covariance of the ring energies carried to the
               constants through the exact derivative of the optimum (implicit function theorem, full Hessian), so it
@@ -46,7 +46,7 @@ class Fit:
     statistical  (p, p) covariance from photon noise; None where the truth has none
     misfit       (p, p) covariance from the law's misfit, taken for independent noise
     jackknife    (p,) standard errors from leaving out one group of neighbouring albedos after the other; NaN with fewer
-                 than six albedos, where a refit fails, or where none was asked for
+                 than six albedos, where a refit fails, or where none was requested
     Covariances are NaN where the fit failed.
     structure    measures of what is left in the residuals
     """
@@ -83,7 +83,7 @@ class Structure:
     rms           root mean square residual, in the objective's own weight
     largest       the largest |residual|
     along_r       lag-1 autocorrelation along the rings (or xi), along_alpha along the albedos: 0 if only noise is left
-    half_waves    number of stretches of one sign, along r times along alpha: the residuals that stand for themselves
+    half_waves    number of sign runs, along r times along alpha: the effective number of independent residuals
     """
 
     rms: float
@@ -186,7 +186,7 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 
 def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
-    """A solution whose constants the data cannot tell apart has failed, however small its misfit."""
+    """A solution whose constants are not separately identifiable has failed, however small its misfit."""
     if not solution.converged or (condition := solution.condition_number) <= DEGENERATE:
         return solution
     blind = [name for name, column in zip(names, solution.jacobian.T, strict=True) if not np.any(column)]
@@ -263,7 +263,7 @@ def _second_derivatives(residual, vector, law, rings):
 
 
 def _half_waves(table: Floats) -> float:
-    """Mean number of stretches of one sign along the rows of a table; zeros (rings that do not count) are skipped."""
+    """Mean number of sign runs along the rows of a table; zeros (rings that do not count) are skipped."""
     signs = [np.sign(row[row != 0]) for row in table]
     counts = [1 + np.count_nonzero(np.diff(row)) for row in signs if row.size]
     return float(np.mean(counts)) if counts else 0.0

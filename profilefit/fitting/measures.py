@@ -65,6 +65,6 @@ _ALL = (
     Measure("fold", "A where it turns"),
 )
 MEASURES: dict[str, Measure] = {one.name: one for one in _ALL}
-# Of what records tell: errors by albedo, and those of a map as a whole.
+# Measures in records: errors by albedo, and those of a map as a whole.
 OF_PROFILE = ("rel", "ks", "inversion_error")
 OF_MAP = ("delta_A", "delta_alpha", "largest_s", "monotone", "at_one", "fold")

@@ -1,4 +1,4 @@
-"""What a fit makes small: one function an objective, from a law and ring energies to residuals, a row an albedo.
+"""Objectives, which a fit minimises: a function each, from a law and ring energies to residuals, a row for each albedo.
 
 Every objective is a differentiable function of the law **and** of the ring energies, weights included, so that the
 photon noise of the energies propagates to the constants without another formula. The weighting decides the constants of

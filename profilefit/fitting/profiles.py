@@ -1,6 +1,6 @@
-"""Profiles: reflectance profiles of several albedos on rings, with their errors. What every fit sees.
+"""Profiles: reflectance profiles of several albedos, averaged over rings (annuli), with errors: the data of every fit.
 
-Where the paper cuts a profile off before fitting it is the walk of equation (6).
+The radius at which the paper trims a profile before fitting is found by the search (6), called walk here.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Reflectance profiles in units of the mean free path (l = 1).
+    """Reflectance profiles in units of the transport mean free path (l = 1).
 
     alpha              (m,) single-scattering albedos [-]
     r_edges            (n + 1,) ring edges from 0 [mfp]
@@ -89,7 +89,7 @@ class Profiles:
     standard_error     (m, n) of `energy`; zero where the truth has no noise
     effective_samples  (m, n) photons that the estimate really rests on; infinite where it has no noise
     beyond             (m,) energy reflected beyond the last edge [-]
-    covariance         between all rings and albedos; None where the truth has no noise, or where nobody asked for it
+    covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
     """
 

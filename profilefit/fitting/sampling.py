@@ -1,4 +1,4 @@
-"""How good a sampler is: judged by the density that it has itself, against the light that it should carry.
+"""Quality of samplers: judged by the density that they have themselves, against the exact profile.
 
 A point gathers light with radii r = sample(xi) and the weights w = f(r) / pdf(r), f the density in r of the light that
 leaves (2 pi r R_d / A). Then, xi uniform:

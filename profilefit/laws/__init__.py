@@ -1,4 +1,4 @@
-"""The laws and maps by name, each with its home: module and class. Nothing is imported until somebody asks for it."""
+"""The laws and maps by name, each with its home: module and class. Nothing is imported before its first use."""
 
 from importlib import import_module
 

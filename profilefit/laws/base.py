@@ -47,7 +47,7 @@ class Constants(eqx.Module):
         return {name: float(getattr(self, name)) for name in self.constant_names()}
 
     def text_numbers(self) -> dict[str, float]:
-        """Numbers that its shader text needs beside its constants."""
+        """Numbers that its shader source needs beside its constants."""
         return {}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:

@@ -76,7 +76,7 @@ class NormalizedDiffusion(ProfileLaw):
 
 
 class Burley(NormalizedDiffusion):
-    """Normalized diffusion with q = s(A) = s0 - s1 A + s2 |A - s3|^p, in units of the mean free path.
+    """Normalized diffusion with q = s(A) = s0 - s1 A + s2 |A - s3|^p, in units of the transport mean free path.
 
     searchlight  p = 3   (memo, eq. 5: 1.85, 1, 7, 0.8; 5.5 % mean error reported)
     diffuse      p = 2   (memo, eq. 6: 1.9, 1, 3.5, 0.8; 3.9 %)

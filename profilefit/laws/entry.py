@@ -30,7 +30,7 @@ class Range:
 
 EVERYWHERE = Range()
 MATCHED, ANY_INDEX = Range(1.0, 1.0), Range(0.0, np.inf, open_low=True, open_high=True)
-# What a text takes for another number than was given, in words.
+# Arguments that a shader source replaces by others, in words.
 NEAR_CLAMPS = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; xi to 1 - 2^-24"
 CLAMPS = f"{NEAR_CLAMPS}; r to 1e8 mfp"
 RATIONAL, WRAPPERS = ("rational",), ("wrappers",)
@@ -38,11 +38,11 @@ RATIONAL, WRAPPERS = ("rational",), ("wrappers",)
 
 @dataclass(frozen=True)
 class Text:
-    """The shader text of a law, in files of `profilefit/shader/glsl/`, by their names less .glsl.
+    """The shader source of a law, in files of `profilefit/shader/glsl/`, by their names less .glsl.
 
     file    its own; `profilefit.shader.emit.prefix` is its name, too
-    parts   files that it rests on, before it in order; ends files that rest on it
-    clamps  what the text takes for another number than was given, in words
+    parts   files that it needs, before it in order; ends files that need it
+    clamps  arguments that the source replaces by others, in words
     count   how often its `//% for` blocks stand
     """
 
@@ -65,8 +65,8 @@ class Entry:
     xi       shares [-] that its sampler holds for; of fitted constants: print promises all
     n        refractive indices [-] that it is made for
     as_fitted  whether a fitted inverse of it holds only for the albedos of its record
-    own      whether it is this project's own, and has to hold wherever it says
-    text     its shader text, or why there is none
+    own      whether it is this project's own, and must hold wherever it claims to
+    text     its shader source, or why there is none
     """
 
     name: str = ""
@@ -84,7 +84,7 @@ class Entry:
 
     @property
     def key(self) -> str:
-        """The name that tells it from all other laws and maps: "albedo liang" is the map beside the profile law."""
+        """A name that no other law or map has: "albedo liang" is the map beside the profile law."""
         return f"albedo {self.name}" if self.is_map else self.name
 
     @property
@@ -94,5 +94,5 @@ class Entry:
 
     @property
     def has_text(self) -> bool:
-        """Whether it has a shader text."""
+        """Whether it has a shader source."""
         return isinstance(self.text, Text)

@@ -1,8 +1,8 @@
-"""One's own data: a measured or simulated profile, the medium that it tells of, and what it cannot tell."""
+"""One's own data: a measured or simulated profile, the medium that explains it, and what it does not identify."""
 
 from mcml_sim.cli.lazy import attributes
 
-TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported on first use
 if TYPE_CHECKING:
     from profilefit.measured.data import Measured
     from profilefit.measured.problem import Known

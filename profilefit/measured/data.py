@@ -1,4 +1,4 @@
-"""What was measured: light at radii or on rings, its errors, where it comes from, and what a fit can work with."""
+"""A measured profile: reflectance at radii or averaged over annuli, with its errors and source; what a fit accepts."""
 
 from __future__ import annotations
 
@@ -16,19 +16,20 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """Reflected light per area at n radii, or averaged over n rings.
+    """Reflected light per area at n radii, or averaged over n annuli (rings).
 
     source     where it comes from, for messages; digest the SHA-256 of that file
     inner      (n,) inner radii of the rings [unit]; outer (n,) outer ones. A point is a ring without width
     value      (n,) reflected light per area and per incident light [1/unit^2]; in any other measure with a free scale
     sigma      (n,) standard errors of `value`
     freedom    (n,) degrees of freedom that each sigma rests on; infinite where it is known. pooled those of what all
-               sigmas have in common, the trend of replicates
+               sigmas share, the trend of replicates
     errors     what the sigmas are, in words
     unit       of length; "" where nobody named one
-    counted    True of photon counts: the variance of a ring goes with the light expected there, which the model knows
-               better than the ring itself. bounded: True if the sigmas are upper bounds
-    photons    of the run whose rings these are: they share them (see `noise`); infinite where rows are independent
+    counted    True of photon counts: the variance of a ring is proportional to the light expected there, for which the
+               model is a better estimate than the ring's own count. bounded: True if the sigmas are upper bounds
+    photons    of the run that the rings come from, which correlates them (see `noise`); infinite if rows are
+               independent
     medium     what a simulation was of, lengths in `unit`; None of what was measured
     notes      what was left out or merged, for the reader
     """
@@ -70,7 +71,7 @@ class Measured:
         return None if self.medium is None else self.medium.layers[0].n / self.medium.n_above
 
     def within(self, r_min: float | None, r_max: float | None) -> Measured:
-        """Only what lies wholly between two radii [unit]; InputError if nothing does."""
+        """Only the rows that lie wholly between two radii [unit]; InputError if none does."""
         keep = np.ones(self.value.size, bool)
         if r_min is not None:
             keep &= self.inner >= r_min
@@ -111,7 +112,7 @@ def require_workable(data: Measured) -> None:
     """InputError, in one line, for data that no fit in double precision and in memory can work with."""
     if data.value.size > MOST_ROWS:
         raise InputError(
-            f"{data.source}: expected at most {MOST_ROWS} rows, got {data.value.size}: average neighbours over rings "
+            f"{data.source}: expected at most {MOST_ROWS} rows, got {data.value.size}: average neighbours over annuli "
             "(r_in, r_out), or choose a range by `r_min` and `r_max`"
         )
     lit = np.where(data.value == 0, 1.0, data.value)  # no light is a value like any other

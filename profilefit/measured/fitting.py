@@ -1,4 +1,4 @@
-"""A fit of one's own data: the medium, its errors of three kinds, and how well it explains what was measured."""
+"""A fit of one's own data: the medium, its statistical, model and lack-of-fit errors, and the goodness of fit."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ class MediumFit:
     def gain(self) -> Floats:
         """(3, m) how the coordinates follow errors of the rows, in standard errors."""
         full = np.zeros((3, self.minimum.residuals.size))
-        if np.all(np.isfinite(self.jacobian)):  # else the fit has failed, and nothing is told of errors
+        if np.all(np.isfinite(self.jacobian)):  # else the fit has failed and has no errors
             full[list(self.question.free)] = np.linalg.pinv(self.jacobian)
         return full
 
@@ -107,7 +107,7 @@ class MediumFit:
 
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
-        """(n,) rows farther out than the radii that `rel` looks at."""
+        """(n,) rows farther out than the radii that `rel` covers."""
         return self.problem.model.shares(self.point, self.data.inner) > law_error.WITHIN
 
     @cached_property

@@ -1,4 +1,4 @@
-"""What the data can tell, and what they cannot: intervals by profile likelihood, and pairs that trade."""
+"""Identifiability: which quantities the data determine, by profile likelihood, and which pairs are correlated."""
 
 from __future__ import annotations
 
@@ -12,9 +12,9 @@ from profilefit.measured.model import NAMES, STRENGTHS, U, alpha_of
 from profilefit.measured.solving import BLACK, FARTHEST_LN, FARTHEST_U, WHITE, descended
 
 Floats = NDArray[np.float64]
-# A quantity is not told if its standard error is more than half of itself: it may as well be twice as much.
+# A quantity is not identified if its standard error is more than half of its value: it may as well be twice as much.
 LOOSE = 0.5
-# A pair trades if all but a tenth of one's variance goes with the other.
+# Two coordinates are not separately identifiable if all but a tenth of the variance of one is shared with the other.
 TRADING = 0.95
 STRIDES = 14  # doublings of a step outwards
 HALVINGS = 7  # of the last one: to a hundredth
@@ -22,7 +22,7 @@ HALVINGS = 7  # of the last one: to a hundredth
 
 @dataclass(frozen=True)
 class Interval:
-    """What a coordinate may be at 95 %, all others free: low and high, as values; an end is open if nothing ends it."""
+    """95 % profile-likelihood interval of a coordinate, low and high, as values; an end without a bound is open."""
 
     name: str
     low: float
@@ -37,10 +37,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class Identifiability:
-    """What a fit can tell.
+    """What a fit identifies.
 
-    intervals  of the free coordinates; loose the quantities that are not told, with their relative errors
-    pair       the two free coordinates that trade most; correlation of theirs (0 with fewer than two)
+    intervals  of the free coordinates; loose the quantities that are not identified, with their relative errors
+    pair       the two most correlated free coordinates; correlation theirs (0 with fewer than two)
     """
 
     intervals: tuple[Interval, ...]
@@ -50,7 +50,7 @@ class Identifiability:
 
     @property
     def all_identified(self) -> bool:
-        """True if the data tell every quantity."""
+        """True if the data identify every quantity."""
         return not self.loose and not any(one.is_open for one in self.intervals)
 
     @property
@@ -59,7 +59,7 @@ class Identifiability:
 
 
 def identifiability(found: MediumFit) -> Identifiability:
-    """Judge a fit by what is left of it when one coordinate is moved and the others follow."""
+    """Identifiability by profile likelihood: chi-square as one coordinate is moved and the others are fitted again."""
     intervals = tuple(_interval(found, at) for at in found.question.free)
     relative = relative_errors(found, found.statistical)
     if found.minimum.at_edge:  # mu_a is anything down to, or up to, where alpha ends
@@ -100,7 +100,7 @@ def _interval(found: MediumFit, at: int) -> Interval:
 def _end(found: MediumFit, at: int, side: float) -> tuple[float, bool]:
     """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does.
 
-    Nor does it where alpha is 0 or 1 for all that data can say.
+    It never does where alpha cannot be distinguished from 0 or 1.
     """
     best, others = found.minimum, tuple(one for one in found.question.free if one != at)
     limit = side * FARTHEST_U if at == U else best.point[at] + side * FARTHEST_LN

@@ -1,4 +1,4 @@
-"""The error of the law itself: how far its own distance from the truth can move what is fitted with it.
+"""Model error: how far the law's own distance from the exact profile can move what is fitted with it.
 
 A law misses the exact profile by `rel` on average (see `quality`), in waves along ln r. Its error at the radii of the
 data is taken for a Gaussian process: standard deviation RMS x rel of the light, correlation e^-1/2 at WAVE in ln r.
@@ -28,8 +28,8 @@ from profilefit.recipes.record_folder import Folder, Records
 Floats = NDArray[np.float64]
 RMS = 1.5
 WAVE = 0.5
-# `rel` looks at radii within 99.5 % of the energy. Beyond, a quarter farther out, the error of the hazard law is ten
-# times its `rel`; nothing better is known of the others.
+# `rel` covers radii within 99.5 % of the energy. A quarter farther out the error of the hazard law is ten times its
+# `rel`; for the other laws no better number is known.
 WITHIN, BEYOND = ENERGY_WITHIN, 10.0
 DARKEST, WHITEST = 0.02, 0.9995  # albedos between which a law can be held against the exact profile
 

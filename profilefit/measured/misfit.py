@@ -1,15 +1,15 @@
-"""Whether one layer and one law can have made the data, and if not, by how much they miss.
+"""Goodness of fit: whether one layer under one law explains the data, and if not, how large the misfit is.
 
 The residuals R of n rows, in standard errors, are projected onto what the p fitted coordinates cannot take up: n - p
-numbers z whose covariance is known, S = N^T (1 + B) N, B being the law's own error. Two questions are put to them:
+numbers z whose covariance is known, S = N^T (1 + B) N, B being the law's own error. Two tests are made of them:
 
 scatter  chi-square z^T S^-1 z, of n - p degrees of freedom
-waves    the score z^T S^-1 D S^-1 z of a relative error that comes in waves along ln r (D): what a layer underneath, a
-         wrong unit or a wrong law leave is no noise, its neighbours repeat each other. Its distribution, a weighted sum
-         of chi-squares, is drawn
+waves    the score z^T S^-1 D S^-1 z of a relative error that is correlated along ln r (D): a layer underneath, a wrong
+         unit or a wrong law leave residuals that are no independent noise. Its distribution, a weighted sum of
+         chi-squares, is sampled
 Errors made from replicates share the error of their trend: with `pooled` degrees of freedom behind it chi-square is an
-F, and the waves' draws are divided likewise. Both chances are joined by Sidak's rule. The misfit is the relative error,
-row by row, that brings chi-square to n - p.
+F, and the waves' draws are divided likewise. Both p-values are combined by Sidak's rule. The misfit is the relative
+error, row by row, that brings chi-square to n - p.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from scipy import special, stats
 from scipy.optimize import brentq
 
 Floats = NDArray[np.float64]
-DETECTED = 1e-3  # chance below which a misfit counts as one
+DETECTED = 1e-3  # p-value below which a misfit counts as one
 DRAWS = 10_000
 TINY = float(np.finfo(float).tiny)
 LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
@@ -32,9 +32,9 @@ LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
 class Misfit:
     """How well a fit explains its data.
 
-    chi2, freedom    in the data's errors alone; chance of a larger one if these were all
-    scatter, waves   chances of a larger statistic if data and law err as stated; joined the chance of both
-    along_r          lag-1 autocorrelation of the residuals, runs the stretches of one sign and what noise would have
+    chi2, freedom    by the data's errors alone; chance its p-value
+    scatter, waves   p-values where data and law have the errors stated; joined that of both
+    along_r          lag-1 autocorrelation of the residuals; runs the number of sign runs, and that expected of noise
     relative         relative error [-] that brings chi-square to its degrees of freedom; 0 if nothing is left
     """
 
@@ -54,7 +54,7 @@ class Misfit:
 
     @property
     def within_law(self) -> bool:
-        """True where the data alone would have it, but the law's own error explains it."""
+        """True where a misfit by the data's errors alone is explained by the law's own error."""
         return self.chance < DETECTED and not self.detected
 
 
@@ -71,7 +71,7 @@ def misfit(
 
     law    (m, m) covariance of the law's own error, shape (m, m) that of a relative error 1 in waves, uneven (m, m)
            that of one which differs from row to row (by default, shape without its correlations); all in errors
-    pooled degrees of freedom of what the rows' errors have in common
+    pooled degrees of freedom of what the rows' errors share
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     z = free.T @ residuals
@@ -95,14 +95,14 @@ def misfit(
 
 
 def scatter_chance(square: float, freedom: int, pooled: float) -> float:
-    """Chance of a larger chi-square whose errors share a scale of `pooled` degrees of freedom."""
+    """p-value of a chi-square whose errors share a scale of `pooled` degrees of freedom."""
     if np.isinf(pooled):
         return float(stats.chi2.sf(square, freedom))
     return float(stats.f.sf(square / freedom, freedom, pooled))
 
 
 def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float = np.inf, seed: int = 0) -> float:
-    """Chance of a larger score z^T S^-1 D S^-1 z if z has covariance S = `own` and nothing else."""
+    """p-value of the score z^T S^-1 D S^-1 z under the covariance S = `own` of z."""
     there = np.linalg.solve(own, z)
     root = np.linalg.cholesky(own)
     inner = np.linalg.solve(root, np.linalg.solve(root, shape).T)

@@ -1,14 +1,14 @@
-"""What a law says would be measured: light at radii or on rings, of a medium with a length and a scale.
+"""What a law predicts of a measurement: reflectance at radii or over annuli, given alpha, a length and a scale.
 
-Three coordinates without bounds stand for the medium and the instrument, in this order:
+Three coordinates without bounds describe the medium and the instrument, in this order:
 
 u     s = sqrt(1 - alpha) = 1 / (1 + e^-u): laws are smooth in s, and both ends of alpha lie at infinity
-ln l  of the mean free path [ln unit]
-ln k  of the scale: the value column holds k times the light
+ln l  of the transport mean free path [ln unit]
+ln k  of the scale: the value column is k times the reflectance per area
 
-Radii are worked off in blocks of one size, so that data of any length share one compiled function.
+Radii are evaluated in blocks of one size, so that data of any length share one compiled function.
 
-What people call a medium by (A, alpha, l, mu_s', mu_a) follows from the coordinates, with errors.
+The quantities A, alpha, l, mu_s' and mu_a follow from the coordinates, with errors.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ FLOCK = 32  # points of the three coordinates that are evaluated at once
 
 @dataclass(frozen=True)
 class Model:
-    """A law whose constants stand; rings says whether it is averaged over rings."""
+    """A law with fixed constants; rings says whether it is averaged over annuli."""
 
     law: ProfileLaw
     rings: bool
@@ -130,7 +130,7 @@ def _shares(law, rings, point, r):
 
 QUANTITIES = ("A", "alpha", "l", "mu_s'", "mu_a", "scale")
 POWERS = {"A": 0, "alpha": 0, "l": 1, "mu_s'": -1, "mu_a": -1, "scale": 0}  # of the unit of length
-# What a fit can be asked to know well: each is zero or infinite only where there is no medium.
+# Quantities whose relative error is judged: each is zero or infinite only where there is no medium.
 STRENGTHS = ("mu_s'", "mu_a", "scale")
 
 

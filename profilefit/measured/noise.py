@@ -1,9 +1,9 @@
-"""The errors of the rows together: which weight each has, and what the rings of one simulation share.
+"""The covariance of the rows: the weight of each, and the correlation of the rings of one simulation.
 
-A photon that leaves through one ring leaves through no other, and what N photons leave nowhere was absorbed: ring
-energies E of one run have the covariance -E_i E_j / (N - 1), as counts of a multinomial have, light lost or absorbed
-being the complement. Values per area v keep it: C = diag(sigma^2 + v^2 / (N - 1)) - v v^T / (N - 1). With the first
-term's root S and b = S^-1 v / sqrt(N - 1) this is S (1 - b b^T) S, whose inverse root is (Sherman and Morrison)
+A photon that leaves through one ring leaves through no other: ring energies E of one run of N photons have the
+covariance -E_i E_j / (N - 1), as multinomial counts have, lost or absorbed photons being the complement. Values per
+area v keep it: C = diag(sigma^2 + v^2 / (N - 1)) - v v^T / (N - 1). With the first term's root S and
+b = S^-1 v / sqrt(N - 1) this is S (1 - b b^T) S, whose inverse root is (Sherman and Morrison)
 
     C^-1/2 = (1 + c b b^T) S^-1,   c = (1 / sqrt(1 - b^T b) - 1) / b^T b.
 
@@ -50,7 +50,7 @@ class Noise:
 
 
 def noise(data: Measured, light: Floats | None = None, widening: float = 1.0) -> Noise:
-    """The errors of the data; of counts those of `light` (n,), where a fit knows it better than the rings themselves.
+    """The errors of the data; of counts those of `light` (n,), where a fit predicts it better than the counts.
 
     widening    factor on every variance
     """

@@ -1,4 +1,4 @@
-"""Which further measurement would tell most: predicted errors of the worst-known quantity, by the Fisher information.
+"""The most informative additional measurement: predicted errors of the least certain quantity, by Fisher information.
 
 A measurement with derivatives g by the coordinates and standard error sigma adds g g^T / sigma^2 to the information.
 """
@@ -27,7 +27,7 @@ class Candidate:
     """A measurement that could be made.
 
     kind      "point", "reflectance", "scale" or "repeats"; inner, outer radii of a point or ring [unit], else NaN
-    value     what it would find; error the standard error that it would have
+    value     predicted value; error its assumed standard error
     relative  predicted relative errors of mu_s', mu_a and a free scale with it [-]
     """
 
@@ -46,7 +46,7 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Advice:
-    """The worst-known quantity with its relative error, and the best candidate of each kind, best first."""
+    """The least certain quantity with its relative error, and the best candidate of each kind, best first."""
 
     name: str
     now: float
@@ -54,7 +54,7 @@ class Advice:
 
 
 def advised(found: MediumFit) -> Advice:
-    """Rank what could be measured besides by the largest relative error that it would leave."""
+    """Rank additional measurements by the largest relative error that would remain."""
     now = relative_errors(found, found.statistical)
     name = max(now, key=lambda one: now[one])
     best: dict[str, Candidate] = {}
@@ -82,7 +82,7 @@ def _others(found: MediumFit) -> list[Candidate]:
     scale = found.values["scale"]
     four = {name: one / np.sqrt(REPEATS) for name, one in relative_errors(found, found.statistical).items()}
     out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
-    if found.question.total is None and found.data.medium is None:  # a simulation has told it already
+    if found.question.total is None and found.data.medium is None:  # a simulation states it already
         error = REFERENCE_ERROR * reflectance
         out.append(_candidate(found, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
     if SCALE in found.question.free and found.question.scale is None:

@@ -1,4 +1,4 @@
-"""What is asked of the data: which law, what is held, what else is known."""
+"""What is fitted to the data: which law, what is held, what else is known."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Known:
 
 @dataclass(frozen=True)
 class Question:
-    """A law to fit, by the medium's albedo, its mean free path and the scale of the values.
+    """A law to fit, by the medium's albedo, its transport mean free path and the scale of the values.
 
     held    coordinates that stay where they are, by name: alpha, l, scale, as values (not logarithms)
     total   the total reflectance A [-], if that was measured as well; scale known to within an error
@@ -53,7 +53,7 @@ class Question:
 
 
 def held_albedo(law: ProfileLaw, name: str, value: float) -> float:
-    """The albedo that holding `alpha` or `A` at `value` means; InputError where the law has none such."""
+    """The albedo at which `alpha` or `A` is `value`; InputError where the law has none."""
     if name == "alpha":
         if not LEAST <= value <= MOST:
             raise InputError(f"held alpha must be a single-scattering albedo in (0, 1), got {value:g}")

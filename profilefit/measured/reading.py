@@ -7,9 +7,9 @@ over a ring of energy E is at most E (1 - R_specular): the fit uses that bound, 
 chi-square is at most what it should be. The .npz has the errors. The last ring of an .mco, which holds all light beyond
 it, is left out.
 
-Rings share the photons of their run (see `noise`): their covariance -E_i E_j / (N - 1) is exact for both kinds where a
-photon leaves once and as a whole, as in `mcml-sim` and in MCML as it is distributed. With it, the .mco's bound on the
-squares bounds the whole covariance, so errors of whatever is fitted stay upper bounds.
+Rings share the photons of their run, which correlates them (see `noise`): their covariance -E_i E_j / (N - 1) is exact
+for both kinds where a photon leaves once and as a whole, as in `mcml-sim` and in MCML as it is distributed. With it,
+the .mco's bound on the squares bounds the whole covariance, so errors of whatever is fitted stay upper bounds.
 
 Far rings hold few photons or none, and leaving out empty ones would leave out the absence of light: neighbouring rings
 are merged until each holds enough photons, the empty tail included.
@@ -32,7 +32,7 @@ from profilefit.measured.table_file import read_table
 UNIT = "cm"
 # At a hundred photons the standard error of a ring is known to 10 %, and near enough to a normal one.
 FEWEST_PHOTONS = 100.0
-# Narrower rings, relative to their radius, tell nothing more of a smooth profile.
+# Narrower rings, relative to their radius, add no information about a smooth profile.
 NARROWEST = 0.03
 FEWEST_RINGS = 3
 ALL_LIGHT = 1.0 + 1e-3  # files are rounded
@@ -48,7 +48,7 @@ def read_mco_profile(path: Path) -> Measured:
         raise InputError(f"{path}: expected a specular reflectance below 1, got {found.specular_reflectance:g}")
     energy = (found.reflectance_r * grid.r_areas)[:-1]
     each = entered / photons
-    notes = (f"the last of {grid.rings} rings, which holds the light beyond, is left out",)
+    notes = (f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",)
     return _counted(
         path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
         "bounds: no photon weighs more than it entered with", True, found.run.medium, notes,
@@ -60,10 +60,10 @@ def read_npz_profile(path: Path) -> Measured:
     content = read_whole(path, tally_file.MAX_BYTES)
     found = tally_file.parse_results(content, str(path))
     if found.photons < 2:
-        raise InputError(f"{path}: expected two photons or more, since one says nothing of its error, got 1")
+        raise InputError(f"{path}: expected two photons or more, since one has no standard error, got 1")
     estimate = found.estimates["reflectance_r"]
     areas = found.grid.r_areas
-    with np.errstate(over="ignore"):  # what no light can be is refused below
+    with np.errstate(over="ignore"):  # impossible reflectances are refused below
         energy, error = np.asarray(estimate.value) * areas, np.asarray(estimate.standard_error) * areas
     if not np.all(error <= ALL_LIGHT):
         raise InputError(f"{path}: expected standard errors of no more than all of the light")
@@ -88,17 +88,17 @@ def _counted(
     medium: Medium,
     notes: tuple[str, ...],
 ) -> Measured:
-    """Rings merged until each is known, from (n,) rings.
+    """Rings merged until each holds enough photons, from (n,) rings.
 
     energy      E of each; squares the sum of w^2 of its photons over N (N - 1), whose excess over E^2 / (N - 1) is the
-                variance of E; seen the photons that it rests on
+                variance of E; seen the photons that it is estimated from
     photons     N, of the whole run
     """
     _require_light(path, energy)
     starts = merged(edges, seen)
     if starts.size < FEWEST_RINGS:
         raise InputError(
-            f"{path}: expected light in at least {FEWEST_RINGS} rings of {FEWEST_PHOTONS:.0f} photons each, "
+            f"{path}: expected at least {FEWEST_RINGS} annuli of {FEWEST_PHOTONS:.0f} photons each, "
             f"got {float(seen.sum()):.0f} in all"
         )
     inner, outer = edges[starts], np.append(edges[starts[1:]], edges[-1])
@@ -110,7 +110,8 @@ def _counted(
         raise InputError(f"{path}: expected a standard error > 0 of the light from r = {inner[at]:g} to {outer[at]:g}")
     spread = np.sqrt(variance)
     if starts.size < energy.size:
-        notes = (*notes, f"{energy.size} rings merged into {starts.size}, of {FEWEST_PHOTONS:.0f} photons or more each")
+        merging = f"{energy.size} annuli merged into {starts.size}, of at least {FEWEST_PHOTONS:.0f} photons each"
+        notes = (*notes, merging)
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), inner, outer, whole / areas, spread / areas,
         np.full(whole.size, np.inf), errors, UNIT, True, bounded, photons=photons, medium=medium, notes=notes,
@@ -119,7 +120,7 @@ def _counted(
 
 def _require_light(path: Path, energy: Floats) -> None:
     if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
-        raise InputError(f"{path}: expected rings of no less than 0 and, in all, no more than 1 of the light")
+        raise InputError(f"{path}: expected annuli of reflectance >= 0 that add up to at most 1")
 
 
 def merged(edges: Floats, photons: Floats) -> np.ndarray:

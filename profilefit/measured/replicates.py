@@ -1,8 +1,8 @@
-"""Standard errors from few replicates: each row's own scatter, steadied by what all rows have in common.
+"""Standard errors from few replicates: moderated variances, each row's own shrunk towards the trend of all rows.
 
-The scatter of three replicates is known to a factor of two, and a fit that believes it gives most weight to the rows
-that agreed by accident. Smyth (Stat. Appl. Genet. Mol. Biol. 3, 2004) and Phipson et al. (Ann. Appl. Stat. 10, 2016):
-the true variances of the rows scatter around a trend like a scaled inverse chi-square, whose spread shows in the
+The standard deviation of three replicates is known to a factor of two, and a fit that uses it gives most weight to the
+rows that agree by accident. Smyth (Stat. Appl. Genet. Mol. Biol. 3, 2004) and Phipson et al. (Ann. Appl. Stat. 10,
+2016): the true variances of the rows scatter around a trend like a scaled inverse chi-square, whose spread shows in the
 observed ones; each row's variance is then its own and the trend's, weighted by the degrees of freedom of both.
 
 Errors that are estimates make weights that are estimates, and the inverse of the summed weights is too small an error
@@ -40,7 +40,7 @@ class Steadied:
     pooled: float
 
 
-def steadied(samples: Floats) -> Steadied:
+def moderated_variances(samples: Floats) -> Steadied:
     """Mean and standard error of each row, from samples (n, k), k >= 3.
 
     The trend is a straight line of ln variance over ln |mean|: gain noise (slope 2), counts (1) and a floor (0) alike.
@@ -62,7 +62,7 @@ def steadied(samples: Floats) -> Steadied:
     spread = float(left @ left) / max(left.size - 2, 1) - float(polygamma(1, own / 2))
     prior = _freedom(spread)
     # The mean of ln sigma^2 over the rows stands for s0^2 by the same rule.
-    with np.errstate(over="ignore"):  # of a row far outside of the others, which tell nothing of it then
+    with np.errstate(over="ignore"):  # of a row far outside of the others, which do not inform it then
         centre = np.exp(trend + digamma(prior / 2) - np.log(prior / 2))
     both = (prior * centre + own * variance) / (prior + own)
     return Steadied(mean, np.sqrt(both / count), np.full(mean.size, min(prior, pooled) + own), pooled)

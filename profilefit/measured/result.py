@@ -1,8 +1,8 @@
-"""All that a fit has to say: what it found, what it can tell, what would tell more; and the same as plain content.
+"""The result of a fit: estimates, identifiability, the most informative additional measurement; and its JSON content.
 
-The posterior of the fit's coordinates is walked by emcee over the compiled model. Priors are flat in
-s = sqrt(1 - alpha), in ln l and in ln k: nothing is known of the units, and alpha may be 1. Errors made from replicates
-share a scale that is itself an estimate: with that unknown the likelihood is Student's.
+emcee samples the posterior of the fit's coordinates. Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k:
+nothing is known of the units, and alpha may be 1. Errors estimated from replicates share a scale that is itself an
+estimate: with that unknown the likelihood is Student's t.
 """
 
 from __future__ import annotations
@@ -28,11 +28,11 @@ Floats = NDArray[np.float64]
 KEPT = 4000
 MAX_STEPS = 20_000
 ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
-WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not hold
+WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not constrain
 
 
 def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
-    """Walk over the free coordinates of a fit: samples (k, p)."""
+    """Posterior of the free coordinates of a fit, by emcee: samples (k, p)."""
     free, centre = list(found.question.free), found.point
     reach = np.full(centre.size, FARTHEST_LN)
 
@@ -69,20 +69,22 @@ def points(found: MediumFit, samples: Floats) -> Floats:
 
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
-GREY = 0.9  # albedo that advice is given for where the data leave it open altogether
+GREY = 0.9  # albedo assumed for the advice where the data do not bound it at all
 
 
 @dataclass(frozen=True)
 class Answer:
-    """A fit judged. identifiability, advice, walk are None where the fit failed, walk also where a chain has no bounds.
+    """A judged fit: how identifiable its quantities are, the most informative additional measurements, the chain.
 
-    Where the data do not exclude the end of what a coordinate may be (alpha = 1, say: chi-square there is within the
-    square of the 95 % quantile, 3.84 of known errors, of the least), the optimum is no estimate and the derivatives
-    there are no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
+    The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded.
+
+    Where the data do not exclude the end of a coordinate's range (alpha = 1, say: chi-square there is within the
+    square of the 95 % quantile, 3.84 of known errors, of the minimum), the optimum is no estimate and the derivatives
+    there give no errors. A quantity that ends there (A, alpha and mu_a at alpha = 1) has a one-sided limit of 95 % and
     no value; the others keep their interval, and a value if it lies inside. No value lies outside its own interval.
     The limit is a quantile of the posterior, whose prior is flat in sqrt(1 - alpha) >= 0: it covers at 95 % or more.
     Without a chain it is the end of the two-sided interval of the profile likelihood: 97.5 %. At an end no interval
-    knows of the law's own error.
+    includes the law's own error.
     """
 
     found: MediumFit
@@ -99,9 +101,9 @@ class Answer:
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """The same, each moved by an error of the law and, where one is seen, of the misfit.
+        """The same, each moved by a model error and, where a misfit is detected, by a lack-of-fit error.
 
-        Empty if none is known, or where derivatives, which carry them over, are no errors: at an end.
+        Empty if neither is known, or at an end, where derivatives, which propagate them, give no errors.
         """
         found = self.found
         if self.walk is None or not self.identified or not (found.misfit.detected or found.rel is not None):
@@ -126,17 +128,17 @@ class Answer:
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """The quantities that the fit decided."""
+        """The quantities that depend on the free coordinates."""
         return tuple(name for name, one in self.found.gradients.items() if np.any(one[list(self.found.question.free)]))
 
     @property
     def identified(self) -> tuple[str, ...]:
-        """Those with symmetric errors: none where an end is not excluded, or where the fit failed."""
+        """Those with symmetric errors: none where an end of a range is not excluded, or where the fit failed."""
         opened = self.identifiability is None or any(one.is_open for one in self._intervals)
         return () if opened or not self.found.minimum.converged else self.moving
 
     def ends(self, name: str) -> tuple[bool, bool]:
-        """Whether the data exclude neither how little nor how much a quantity may be: (low, high)."""
+        """Whether the data fail to exclude the lowest and the highest possible value of a quantity: (low, high)."""
         of = {one.name: (one.open_low, one.open_high) for one in self._intervals}
         (dark, white), (short, long) = of.get("alpha", (False, False)), of.get("l", (False, False))
         return {
@@ -168,7 +170,7 @@ class Answer:
         return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
 
     def whole_interval(self, name: str) -> Ends | None:
-        """95 % by all errors together: data, law, and misfit where one is seen; None where these are not known."""
+        """95 % by all errors: statistical, model, and lack of fit where detected; None where these are unknown."""
         held = name not in self.whole_draws or name not in self.moving
         return None if held else self._middle(name, self.whole_draws[name])
 
@@ -185,9 +187,9 @@ def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
 
 
 def judged(found: MediumFit, seed: int = 0, walk: bool = True) -> Answer:
-    """Judge a fit; with `walk` a chain, which takes longest, is walked where the data hold every coordinate.
+    """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate.
 
-    Where numbers on the way are none, that is the fit's result, and nothing is told of it.
+    Where an intermediate number is not finite, that is the fit's result, and nothing else is reported.
     """
     if not (found.minimum.converged or found.minimum.at_edge):
         return Answer(found, None, None, None)
@@ -200,16 +202,16 @@ def judged(found: MediumFit, seed: int = 0, walk: bool = True) -> Answer:
 
 def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
     judgement = identifiability(found)
-    # The prior ends at alpha = 1; any other open end leaves the walkers nowhere to stop.
+    # The prior ends at alpha = 1; with any other open end the posterior is unbounded.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
     walked = posterior(found, seed) if walk and found.question.free and not endless else None
     result = Answer(found, judgement, advised(_inside(found, judgement)), walked)
-    _ = found.misfit, result.draws, result.whole_draws  # worked out when first asked for: they fail here or never
+    _ = found.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
     return result
 
 
 def _inside(found: MediumFit, judgement: Identifiability) -> MediumFit:
-    """A fit at an edge moved to the other end of what alpha may be: from the edge no measurement seems to help."""
+    """A fit at an edge, moved to the other end of alpha's interval: at the edge no measurement seems to help."""
     if not found.minimum.at_edge:
         return found
     (alpha,) = [one for one in judgement.intervals if one.name == "alpha"]
@@ -230,7 +232,7 @@ def known_medium(data: Measured) -> dict[str, float]:
 
 
 def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
-    """Everything, as JSON takes it; errors of the law are null where they are not known.
+    """Everything, as JSON content; model errors are null where they are not known.
 
     Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
     """

@@ -1,4 +1,4 @@
-"""Least squares in the three coordinates, from where the data themselves point.
+"""Least squares in the three coordinates, from starts that a coarse search of the data finds.
 
 MINPACK's successor in scipy and not `fitting.solver`: that one compiles a whole Levenberg-Marquardt around the law,
 which pays for a batch of fits and makes one fit wait nine seconds for a tenth of a millisecond's work.
@@ -33,11 +33,11 @@ STARTS = 4  # the best of them, no two neighbours, that are followed to their mi
 # where it starts, as far as l may go.
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
 EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has run there
-WHITE, BLACK = -9.0, 6.0  # u beyond which alpha is 1 or 0 for all that data can say
-AT_WHITE = "alpha runs to 1: these data see no absorption; measure farther out, or hold it with `held` alpha=..."
+WHITE, BLACK = -9.0, 6.0  # u beyond which no data distinguish alpha from 1 or 0
+AT_WHITE = "alpha runs to 1: these data show no absorption; measure farther out, or hold it with `held` alpha=..."
 NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
-RAN_AWAY = "a coordinate runs away: the data do not hold it; check unit and scale, or hold one with `held`"
-AT_BLACK = "alpha runs to 0: these data see no multiple scattering; check unit and scale, or use `held` alpha=..."
+RAN_AWAY = "a coordinate diverges: the data do not constrain it; check unit and scale, or hold one with `held`"
+AT_BLACK = "alpha runs to 0: these data show no multiple scattering; check unit and scale, or use `held` alpha=..."
 
 
 @dataclass(frozen=True)
@@ -136,7 +136,7 @@ class Minimum:
 
     @property
     def at_edge(self) -> bool:
-        """True where the best albedo is 0 or 1: no error can be told of it, only how far from there it may be."""
+        """True where the best albedo is 0 or 1: it has no standard error, only a one-sided limit."""
         return self.result in (AT_WHITE, AT_BLACK)
 
 
@@ -204,12 +204,12 @@ def _explained(status: int, point: Floats, slopes: Floats, ran: list[int], free:
         return RAN_AWAY
     if U in free and point[U] < WHITE:
         return AT_WHITE
-    if U in free and point[U] > BLACK:  # there less light and a larger scale are one
+    if U in free and point[U] > BLACK:  # there a lower albedo and a larger scale are equivalent
         return AT_BLACK
     if SCALE in ran:
         return RAN_AWAY
     if not np.all(np.any(slopes != 0, axis=0)):
-        return "the law has no light there that changes with what is free: check the unit and what is held"
+        return "the predicted profile does not depend on what is free there: check the unit and what is held"
     if status <= 0:
         return f"no convergence in {MAX_STEPS} steps: hold one of alpha, l and scale, or measure over a wider range"
     return CONVERGED

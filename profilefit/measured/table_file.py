@@ -1,8 +1,8 @@
-"""Measured profiles as text: a header, then a row a radius or a ring; what is wrong is named by file, line and column.
+"""Measured profiles as text: a header, then one row for each radius or annulus; errors name file, line and column.
 
     r [mm], value [1/mm^2], sigma        a value and its standard error at a radius
-    r, value1, value2, value3            three replicates or more: mean and standard error are made from them
-    r_in, r_out, value, sigma            averages over rings
+    r, value1, value2, value3            three replicates or more, whose mean and standard error are used
+    r_in, r_out, value, sigma            averages over annuli
 
 Cells are separated by tabs, else semicolons, else commas, else spaces, by what the header has. Units stand in brackets,
 in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment. The value's unit, if it is not the one of
@@ -27,7 +27,7 @@ from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
-from profilefit.measured.replicates import FEWEST, Steadied, steadied
+from profilefit.measured.replicates import FEWEST, Steadied, moderated_variances
 
 MAX_BYTES = 2**22  # far beyond any profile, near enough that a wrong file fails at once
 MOST_LINES = 20_000  # a fit takes five hundred rows of them
@@ -39,7 +39,7 @@ HEADING = re.compile(
 )
 WORD = re.compile(r"[^\s\[\](]+(?:\s*\[[^\[\]]*\]|\s*\([^()]*\))?|\S")  # of a header between spaces, with its unit
 LONGEST_HEADING = 100  # characters
-# What people call the columns.
+# Accepted names of the columns.
 NAMES = {
     **dict.fromkeys(("r", "rho", "ρ", "radius", "distance"), "r"),
     **dict.fromkeys(("value", "reflectance", "rd", "r_d"), "value"),
@@ -197,11 +197,11 @@ def _missing(header: _Header) -> Iterator[str]:
     if replicates and ("value" in names or "sigma" in names):
         yield "replicates beside value or sigma"
     if replicates and len(replicates) < FEWEST:
-        yield f"{len(replicates)} replicates: fewer than {FEWEST} have no standard error to speak of"
+        yield f"{len(replicates)} replicates: fewer than {FEWEST} give no useful standard error"
     if not replicates and "value" not in names:
         yield "no column value"
     if not replicates and "sigma" not in names:
-        yield "no column sigma: without errors nothing says how far to trust a fit"
+        yield "no column sigma: a fit needs the standard errors of its data"
 
 
 def _numbers(path: Path, header: _Header, rows: list[_Row]) -> dict[str, Floats]:
@@ -261,8 +261,8 @@ def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Fl
     if header.replicates:
         samples = np.stack([numbers[name] for name in header.replicates], axis=1)
         _require_light(path, samples.mean(axis=1))
-        found = steadied(samples)
-        errors = f"standard errors of the means of {samples.shape[1]} replicates, steadied by their trend"
+        found = moderated_variances(samples)
+        errors = f"standard errors of the means of {samples.shape[1]} replicates, variances moderated by their trend"
         named = header.replicates[0]
     else:
         _require_light(path, numbers["value"])
@@ -279,7 +279,7 @@ def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Fl
 
 def _require_light(path: Path, value: Floats) -> None:
     if not np.any(value > 0):
-        raise InputError(f"{path}: expected some light, got no value above 0")
+        raise InputError(f"{path}: expected a value above 0, got none")
 
 
 def _length_unit(path: Path, header: _Header, unit: str | None) -> str:

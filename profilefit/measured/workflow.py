@@ -1,4 +1,4 @@
-"""The whole way from a file to an answer in one call."""
+"""From a file to a judged fit in one call."""
 
 from __future__ import annotations
 
@@ -37,14 +37,15 @@ def fit(
 
     data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
     law        its name, and which constants, as for `catalogue.load`
-    setting    the light and the surface; by default a pencil beam, on the surface of the medium that was simulated
-    held       what stays where it is: alpha or A [-], l [unit of the data]
+    setting    illumination and surface; by default "searchlight" (a pencil beam, normal, collimated) on the surface of
+               the medium that was simulated
+    held       fixed quantities: alpha or A [-], l [unit of the data]
     total      the total reflectance A [-], if that was measured too
     scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
-    seed       of the posterior's walkers; walk whether to let them: without, intervals are those of the data alone
+    seed       of the posterior's walkers; walk whether to sample it: else intervals are of the statistical error alone
     folder     of the records, by default the ones shipped
 
-    InputError, SettingError or RecordError on what cannot be fitted; a fit that fails is an Answer that says so.
+    InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is an Answer that says so.
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
     records, where = folder or catalogue.fits_folder(), setting or Setting(n=measured.n or 1.0)

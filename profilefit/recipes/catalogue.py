@@ -1,4 +1,4 @@
-"""The laws by name, with the constants that were asked for: published, corrected, regenerated, or from a record."""
+"""The laws by name, with the constants requested: published, corrected, regenerated, or from a record."""
 
 from __future__ import annotations
 

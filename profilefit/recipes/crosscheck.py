@@ -113,7 +113,7 @@ def _problem(exact: Fit, photons: Fit) -> str | None:
         if not one.solution.converged:
             return f"the {name} fit failed: {one.result}"
     if photons.statistical is None or not np.all(np.isfinite(photons.statistical)):
-        return "the photon fit has no finite errors: leave out rings that hold next to no light"
+        return "the photon fit has no finite errors: leave out radial bins that hold next to no light"
     return None
 
 

@@ -1,4 +1,4 @@
-"""What a measured thing says of itself: the command that makes it again, when, where, and from which records.
+"""Provenance of a measurement: the command that repeats it, when, where, and from which records.
 
 Records say nothing of dates or machines, so that the same run writes the same bytes. What is measured on a machine (a
 shader's errors, times, where arithmetic fails) depends on it, and on the records whose constants it took.
@@ -36,7 +36,7 @@ def made(command: str, folder: Path) -> dict[str, Any]:
 
 
 def stale(origin: Mapping[str, Any], folder: Path) -> bool:
-    """Whether what `made` told is of other records than those in `folder`, or of another version."""
+    """Whether `made` was measured of other records than those in `folder`, or by another version."""
     return (origin.get("version"), origin.get("sha256")) != (__version__, digest(folder))
 
 
@@ -59,7 +59,7 @@ def require_apart(out: Path, records: Path) -> None:
 
 
 def processor() -> str:
-    """The processor's name, as the system tells it."""
+    """The processor's name, as the system reports it."""
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines()
     except OSError:  # not Linux

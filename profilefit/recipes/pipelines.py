@@ -178,7 +178,7 @@ def _printed_laws(recipe: Recipe, run: RecipeRun) -> dict[str, Any]:
 
 
 def _compare(recipe: Recipe, run: RecipeRun, law: Any, light: Orders | None) -> dict[str, Any]:
-    """The measures of every set of constants of this law, at albedos that were not fitted."""
+    """The measures of every set of constants of this law, at held-out albedos."""
     alpha = albedo_values(QUALITY_ALBEDOS)
     table: dict[str, Any] = {"alpha": alpha}
     for name, one in {**_printed_laws(recipe, run), "regenerated": law}.items():

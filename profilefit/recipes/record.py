@@ -165,7 +165,7 @@ def _nearest(name: str, known: list[str]) -> str:
 
 
 def digest(*arrays: np.ndarray) -> str:
-    """SHA-256 of the numbers that were fitted, to tell whether two records saw the same data."""
+    """SHA-256 of the numbers that were fitted, which shows whether two records are of the same data."""
     sha = hashlib.sha256()
     for array in arrays:
         sha.update(np.ascontiguousarray(array).tobytes())

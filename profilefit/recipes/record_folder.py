@@ -21,7 +21,7 @@ SEARCHLIGHT = Setting()
 class Records:
     """The records in a folder, or those of them that are named: each is read once, for as long as this lives.
 
-    What is read belongs to all who ask: nobody changes it.
+    What is read is shared by all callers: nobody changes it.
     """
 
     folder: Path

@@ -1,4 +1,4 @@
-"""What all recipes of one command share: how much light, where things go, and whom to tell."""
+"""What all recipes of one command share: number of photons, folders, and progress."""
 
 from __future__ import annotations
 
@@ -52,5 +52,5 @@ class RecipeRun:
 
 
 def preset_photons(preset: str, setting: Setting) -> int:
-    """How many photons a setting gets where nothing else is asked for."""
+    """The default number of photons of a setting."""
     return (PHOTONS if setting.is_matched_isotropic else REFRACTED_PHOTONS)[preset]

@@ -1,4 +1,4 @@
-"""Where fits begin: at the constants that a recipe names, and at random ones around them, to see which end better."""
+"""Starts of fits: the constants that a recipe names, and random ones around them, to find better optima."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ SPREAD = float(np.log(2.0))
 # Two solutions are one optimum if their costs [relative] and their constants are this near: constants as a share of
 # their size, or of their misfit error, which a small one among large ones needs.
 SAME_COST, SAME_CONSTANT, SAME_IN_ERROR = 1e-6, 1e-3, 0.1
-ROUNDING = 1e-20  # a cost that float64 residuals cannot tell from none
+ROUNDING = 1e-20  # a cost that float64 residuals cannot distinguish from zero
 MOST_OUTCOMES = 12
 OWN_IS_BEST = "no random start found a better optimum than the recipe's own start"
 OWN_IS_BEATEN = "a random start found a better optimum than the recipe's own start: the fit is that one"

@@ -1,4 +1,4 @@
-"""What a record says of a fit: its constants with their errors, its state, its chains and the data behind it.
+"""The content of a record of a fit: its constants with their errors, its state, its chains and the data behind it.
 
 Discretisation is how far constants are from those of infinitely narrow rings. A fit is repeated with rings two to six
 times as wide, made of the same photons. What falls with the square of the width (a ring's middle in place of its

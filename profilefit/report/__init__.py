@@ -2,7 +2,7 @@
 
 from mcml_sim.cli.lazy import attributes
 
-TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported on first use
 if TYPE_CHECKING:
     from profilefit.report.figures.fit_figures import posterior_figure, residual_figure
     from profilefit.report.figures.record_figures import draw_all

@@ -23,7 +23,7 @@ from profilefit.recipes.schema import ERRORS, SETS
 
 Content = Mapping[str, Any]
 ADDED = ("statistical", "discretisation", "model", "jackknife")  # errors, of which the larger of the last two counts
-TOTAL = "photons, rings, and the larger of model and jackknife"
+TOTAL = "photons, dr, and the larger of model and jackknife"
 
 
 def converged(content: Content) -> bool:
@@ -54,7 +54,7 @@ def z_score(constant: Content) -> float | None:
 
 
 def known_errors(constants: Content) -> dict[str, str]:
-    """Those of `ERRORS` that a record's constants, by name, tell of."""
+    """Those of `ERRORS` that a record's constants, by name, have."""
     return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from profilefit.report.figures.canvas import BLUE, DPI, canvas, plain_log, styled
 from profilefit.scenes.stage.picture import ChartPoint, Drawn
 
-LAST = 0.99  # share of the pixels that the map's colours tell apart; the rest is as bright as the last of them
+LAST = 0.99  # share of the pixels that the map's colours resolve; the rest is as bright as the last of them
 NOWHERE = "#BBBBBB"  # where no error is measured
 
 
@@ -82,7 +82,7 @@ def _written(figure: Figure) -> bytes:
 
 
 def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
-    """What is printed: a line for each number of samples, then a whole frame, and how right the truth is."""
+    """What is printed: a line for each number of samples, then a whole frame, and the truth's own error."""
     for point in drawn.chart:
         what = f"{point.label}, {point.samples} samples"
         yield f"{what}: error {point.rmse:.3g}, {_times(point.milliseconds)} for its passes"

@@ -1,4 +1,4 @@
-"""Calibrated closed forms on a stage, each beside its truth; what is here is imported when it is asked for.
+"""Calibrated closed forms on a stage, each beside its truth; what is here is imported on first use.
 
 with profilefit.scenes.Stage(context, (512, 512)) as stage:
     stage.draw(profilefit.scenes.head_scene())
@@ -65,5 +65,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that nobody has asked for yet, too."""
+    """What an interactive shell completes: names that were not used yet, too."""
     return [*globals(), *__all__]

@@ -1,8 +1,8 @@
-"""The text of a law for a shader: written, run on a GPU, and held against the law that it was made of."""
+"""The shader source of a law: written, run on a GPU, and compared with the law that it was made of."""
 
 from mcml_sim.cli.lazy import attributes
 
-TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported on first use
 if TYPE_CHECKING:
     from profilefit.shader.check.law_check import check_law
     from profilefit.shader.check.shader_law import ShaderLaw

@@ -67,7 +67,7 @@ def full_screen(context: moderngl.Context, program: moderngl.Program) -> moderng
 
 
 def check_errors(context: moderngl.Context, where: str) -> None:
-    """ShaderError if OpenGL has an error to tell; asking forgets it."""
+    """ShaderError if OpenGL has recorded an error; reading it clears it."""
     error = context.error
     if error != "GL_NO_ERROR":
         raise ShaderError(f"OpenGL error {error} in {where} ({renderer(context)})")

@@ -1,4 +1,4 @@
-"""The shader text of a law: one GLSL file a law, filled with the constants of an instance.
+"""The shader source of a law: one GLSL file a law, filled with the constants of an instance.
 
 The files in `glsl/` keep to what GLSL, HLSL and numpy can all say (see `languages`): floats, structures, straight-line
 code, loops of a fixed length, a choice only as PF_SELECT. LAW_ stands for the law's prefix in each of their names, so
@@ -94,7 +94,7 @@ def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
         raise InputError(text)
     known = [*profile_classes().items(), *map_classes().items()]
     has = ", ".join(name for name, one in known if issubclass(one, kind) and one.entry.has_text and ":" not in name)
-    raise InputError(f"law must be one that has a shader text ({has}), got {type(law).__name__}")
+    raise InputError(f"law must be one that has a shader source ({has}), got {type(law).__name__}")
 
 
 def _map_constants(law: Any) -> Numbers:

@@ -26,7 +26,7 @@ NUMPY = {
     "cos": "np.cos",
     "PF_SELECT": "np.where",
 }
-COMMON = "shader text must keep to what GLSL, HLSL and numpy share"
+COMMON = "shader source must keep to what GLSL, HLSL and numpy share"
 PYTHON_HEAD = "import numpy as np\nfrom types import SimpleNamespace\n"
 CALL = re.compile(r"\b(" + "|".join(NUMPY) + r")\(")
 NAME, TYPE = r"[A-Za-z_]\w*", r"(?:float|bool|int)"

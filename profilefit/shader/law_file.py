@@ -63,7 +63,7 @@ def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = 
     """The whole file of a law or map in one of `LANGUAGES`; `folder` holds the record of the map that normalises it.
 
     name  what the names in it begin with, by default `emit.prefix`: two media in one shader need two
-    InputError for another language, for a name that is none, or for a law that has no shader text; RecordError where a
+    InputError for another language, for a name that is none, or for a law without shader source; RecordError where a
     record behind it is missing or damaged.
     """
     if lang not in LANGUAGES:

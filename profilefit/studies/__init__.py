@@ -1,8 +1,8 @@
-"""Questions asked of every law and scene: the least that serves, where things fail, speed against accuracy."""
+"""Studies of laws and scenes: the cheapest option within tolerance and budget, failures, speed against accuracy."""
 
 from mcml_sim.cli.lazy import attributes
 
-TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported on first use
 if TYPE_CHECKING:
     from profilefit.studies.choose.case import Within
     from profilefit.studies.choose.layers import one_layer

@@ -99,6 +99,24 @@ def test_commands_are_found():
     assert ["profilefit", "check"] in commands_of("docs/howto/shader.md")
 
 
+# Words
+
+
+def test_words_at_which_readers_stopped_stand_nowhere():
+    retired = re.compile(
+        r"shader texts?\b|that serves\b|(do not|cannot|would) tell\b|tells? (more|most)\b|told (apart|as)\b|"
+        r"± (data|law)\b|\d runs \(noise|stretches of one sign|steadied by",
+        re.IGNORECASE,
+    )
+    texts = [*ROOT.glob("*.md"), *(path for one in ("docs/[ghs]*", "notebooks") for path in ROOT.glob(f"{one}/*.*"))]
+    texts += [path for one in ("profilefit", "mcml_sim", "examples") for path in (ROOT / one).rglob("*.*")]
+    read = [path for path in texts if path.suffix in (".md", ".py", ".ipynb", ".toml", ".html", ".js")]
+    assert len(read) > 250
+    lines = [(path, line) for path in read for line in path.read_text("utf-8").splitlines()]
+    assert [(path.name, line) for path, line in lines if retired.search(line)] == []
+    assert retired.search("THE DATA CANNOT TELL alpha FROM scale"), "negative control"
+
+
 # The examples
 
 

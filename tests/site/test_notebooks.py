@@ -132,7 +132,7 @@ def test_repeats_scatter_as_the_error_bars_say_and_sums_do_not():
     assert 0.9 < ratio < 1.1, "thirty repeats of thirty rings know it to a few per cent"
     (scatter,), (squares,) = (
         numbers(r"true scatter .*± (\S+)", text),
-        numbers(r"squares of the rings' bars\s+± (\S+)", text),
+        numbers(r"squares of the annuli's bars\s+± (\S+)", text),
     )
     assert squares > 1.5 * scatter
     assert "of   0 effective photons" in text
@@ -158,8 +158,8 @@ def test_light_and_surface_cost_more_steps_than_a_law():
     text = printed("03-what-errors-mean-on-screen")
     published, refitted, hazard, beam, index = numbers(r"off by at most\s+(\S+) steps", text)
     assert hazard < 0.2 < refitted < published < beam < index
-    (apart,) = numbers(r"± law\s+taken one by one\s+(\S+) steps", text)
-    (together,) = numbers(r"± law .*together\s+(\S+) steps", text)
+    (apart,) = numbers(r"± model\s+taken one by one\s+(\S+) steps", text)
+    (together,) = numbers(r"± model .*together\s+(\S+) steps", text)
     assert apart > 1 > 2 * together
     shows = dict(zip(("b0", "c2"), numbers(r"(?m)^[bc]\d: (\d+) % show as one step", text), strict=True))
     assert shows["b0"] < 5 < 20 < shows["c2"]
@@ -181,12 +181,12 @@ def test_layers_hide_from_the_eye_and_the_index_does_not():
     assert max(numbers(r"g 0.0, .*:\s+(\S+) % too much", text)) < 1
 
 
-def test_fits_say_what_they_cannot_tell():
+def test_fits_report_what_is_not_identifiable():
     text = printed("06-fit-your-own-data")
-    assert "THE DATA CANNOT TELL alpha FROM scale" in text
-    assert "what would tell: the total reflectance A" in text
-    assert "MISFIT (chance below 1e-16)" in text
-    ((data, misfit),) = re.findall(r"two layers: mu_a = \S+ ± (\S+) \(data\) ± (\S+) \(misfit\)", text)
+    assert "alpha AND scale ARE NOT SEPARATELY IDENTIFIABLE" in text
+    assert "most informative additional measurement: the total reflectance A" in text
+    assert "MISFIT (p-value below 1e-16)" in text
+    ((data, misfit),) = re.findall(r"two layers: mu_a = \S+ ± (\S+) \(statistical\) ± (\S+) \(lack of fit\)", text)
     assert float(misfit) > 24 * float(data)
 
 

@@ -18,7 +18,7 @@ class Phase(ABC):
 
     A frozen dataclass, and a pytree whose leaves are its fields: jax carries it into a kernel, differentiates by it
     and maps over it. The fields, and every argument, are numbers, numpy arrays or jax arrays, which broadcast, and
-    keep their precision. A kernel asks for `deflection` alone.
+    keep their precision. A kernel needs `deflection` alone.
     """
 
     def __init_subclass__(cls) -> None:

@@ -170,7 +170,7 @@ def _row(printed, material, channel, model, choice, end, law: Floats, data: Floa
 
 
 def _nearest_range(r: Floats, law: Floats, data: Floats, printed: str) -> float:
-    """The whole number of mm, or half below 5 mm as the walk goes, whose three diffusion MSEs are nearest to print."""
+    """The whole number of mm, or half below 5 mm as in (6), whose three diffusion MSEs are nearest to print."""
     ends = np.concatenate([np.arange(0.5, 5.0, 0.5), np.arange(5.0, 31.0)])
     ends = ends[ends <= r[-1]]
     target = np.log(PRINTED[printed]["diffusion"][0])

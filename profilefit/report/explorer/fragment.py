@@ -106,14 +106,14 @@ def baked(illumination: str, grid: TableGrid = GRID) -> str:
 # In this order: each file uses only what comes before it, but for what runs later.
 SCRIPTS = ("exact", "device", "measure", "letters", "plot", "results", "state", "controls", "ball", "main")
 CHANNELS = ("red", "green", "blue")
-LOWEST, HIGHEST = -2.5, 1.5  # log10 of the mean free path [mm] at the ends of its slider
+LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the ends of its slider
 ABOUT = (
-    "Each law runs here as the text that <code>profilefit export --lang glsl-es</code> writes, in the graphics "
-    "processor at hand, against the exact half space (n = 1, isotropic)."
+    "Each law runs here as the source that <code>profilefit export --lang glsl-es</code> writes, on this machine's "
+    "graphics processor, against the exact half space (n = 1, isotropic)."
 )
 MEASURES = (
-    "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the light; ks: largest error of the "
-    "cdf; edge: largest error within 3.5 l of an edge of light, as a share of A. The exact "
+    "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the reflected light; ks: largest error "
+    "of the cdf; edge: largest error within 3.5 l of an edge of light, as a share of A. The exact "
     "solution is a table, right to 1e-5."
 )
 

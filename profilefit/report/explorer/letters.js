@@ -1,4 +1,4 @@
-// A letter on each curve, R, G or B, so that colour is not all that tells them apart: where it is farthest from the
+// A letter on each curve, R, G or B, so that curves differ not by colour alone: where it is farthest from the
 // curves of the other channels. An exact curve has one of its own only where it leaves its law's.
 const CLEAR = 24, APART = 16, LEAVES = 10; // [pixels]: far enough; between letters; from its law's curve
 const TRIED = 4; // one point of so many

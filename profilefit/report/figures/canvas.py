@@ -1,4 +1,4 @@
-"""What every figure shares: its size, colours that colour-blind readers tell apart, files whole or not at all."""
+"""What every figure shares: its size, colours that colour-blind readers can distinguish, files whole or not at all."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Corner plots: how the constants of one fit trade against each other."""
+"""Corner plots: how the constants of one fit are correlated."""
 
 from __future__ import annotations
 

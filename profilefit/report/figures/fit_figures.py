@@ -1,4 +1,4 @@
-"""Figures of a fit of one's own data: the light with its residuals, and the posterior of what was fitted."""
+"""Figures of a fit of one's own data: the profile with its residuals, and the posterior of what was fitted."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ LABEL_DISTANCE = 0.3  # of an axis name, in panels
 
 @styled
 def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
-    """Light per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
+    """Reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
     found, data = result.found, result.found.data
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -47,9 +47,9 @@ def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> l
     seen = data.value > 0
     top.errorbar(
         r[seen], data.value[seen], yerr=found.sigma[seen], xerr=half[seen] if data.rings else None,
-        label="data, one standard error" + (", width of the ring" if data.rings else ""), **DATA,
+        label="data, one standard error" + (", width of the annulus" if data.rings else ""), **DATA,
     )  # fmt: skip
-    top.set(xscale="log", yscale="log", ylabel=f"light per area [1/{unit}²]")
+    top.set(xscale="log", yscale="log", ylabel=f"reflected light per area [1/{unit}²]")
     residual = (data.value - found.light) / found.sigma
     below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
     below.axhspan(-1, 1, color=GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
@@ -57,7 +57,7 @@ def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> l
     below.plot(r, residual, color=BLACK, marker="o", markersize=3.0, linewidth=0.6)
     if found.rel is not None and result.identifiability is not None:
         band = found.law_size / found.sigma
-        below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="the law's own error")
+        below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="model error")
         below.plot(r, -band, color=VERMILION, linestyle="--", linewidth=0.9)
     span = max(3.0, 1.15 * float(np.max(np.abs(residual))))
     below.set(xlabel=f"r [{unit}]", ylabel="(data − law) / σ [-]", ylim=(-span, span))
@@ -93,7 +93,7 @@ def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> lis
             grid[at, 0].set_ylabel(label)
             grid[at, 0].yaxis.set_label_coords(-LABEL_DISTANCE, 0.5)
     figure.subplots_adjust(left=0.14, right=0.98, bottom=0.12, top=0.94, wspace=0.08, hspace=0.08)
-    figure.suptitle("39 % and 86 % of the posterior, by the data's errors alone; lines: best fit", fontsize=9)
+    figure.suptitle("39 % and 86 % of the posterior, by the statistical error alone; lines: best fit", fontsize=9)
     return save(figure, out, name)
 
 

@@ -127,7 +127,7 @@ RECORDS = {
     "searchlight": ("liang-inverse-whole", "hazard", "quantile"),
     "diffuse light": ("hazard-diffuse", "quantile-diffuse"),
 }
-# Of each form: never told apart by colour alone.
+# Of each form: never distinguished by colour alone.
 LOOKS: dict[str, tuple[str, Any]] = {
     "liang": ("(19)-(21) regenerated", {"color": ORANGE, "marker": "s", "linestyle": "-"}),
     "quantile": ("rational in −ln(1 − ξ)", {"color": BLUE, "marker": "o", "linestyle": "-"}),

@@ -129,7 +129,7 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
 
 
 def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
-    """Where a fitted law says that the truth is; None where it says nothing, as printed ones and old records don't."""
+    """The band in which a fitted law states the exact profile to lie; None of printed laws and of old records."""
     if not isinstance(one, Fitted):
         return None
     known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)

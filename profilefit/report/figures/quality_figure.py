@@ -48,7 +48,7 @@ class Line:
 
 @styled
 def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Path]:
-    """rel and ks [-] of every profile law and set of constants against alpha [-], at albedos that were not fitted.
+    """rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
 
     A row of panels for each light, one for all surfaces that refract.
     """

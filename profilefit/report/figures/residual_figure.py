@@ -1,4 +1,4 @@
-"""What a fit leaves: by ring and albedo for a profile, by share of light for an inverse cdf, by albedo for a map."""
+"""Residuals: of a profile by radial bin and albedo, of an inverse cdf by share of energy, of a map by albedo."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def _of_profile(ax: Axes, fitted: Fitted) -> None:
         middle = np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1:]) * edges[1:])[index]
         left, spread = model[index] / energy[index] - 1.0, error[index] / energy[index]
         ax.errorbar(middle, left, spread, color=colour, linewidth=1.0, elinewidth=0.7, label=f"α = {alpha:.3f}")
-    ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a ring: law / data − 1 [-]")
+    ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
     _legend(ax)
 
 

@@ -95,7 +95,7 @@ def _is_drawn(one: Cells, arithmetic: str) -> bool:
 
 
 def _rows(subjects: Sequence[str]) -> list[str]:
-    """Those of `ROWS`, or all, where few were asked for."""
+    """Those of `ROWS`, or all, where few were requested."""
     distinct = list(dict.fromkeys(subjects))
     return distinct if len(distinct) <= len(ROWS) else [one for one in ROWS if one in distinct]
 

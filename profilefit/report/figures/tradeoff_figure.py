@@ -216,7 +216,7 @@ def _label(axes: Axes, panel: Panel) -> None:
 
 
 def text_of(point: Point, first: bool) -> str:
-    """The method, and what tells it from others of its line; of the later ones only that."""
+    """The method, and what distinguishes it from others of its line; of the later ones only that."""
     effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: _power(m[1], m[2]), point.label)
     method = point.method.replace("normalized diffusion, Xie", "Xie").replace("normalized diffusion", "norm. diffusion")
     return f"{method}: {effort}" if first and effort else effort or method

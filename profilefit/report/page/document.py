@@ -24,11 +24,13 @@ Tracked = Callable[[list[str]], Iterable[str]]
 TITLE = "Reflectance profiles, refitted"
 LEAD = (
     "How much light leaves a translucent surface at distance r from where it entered, R_d(r), as closed forms: fitted "
-    "to simulated or exactly solved light, every constant with its errors, every law with its distance from the truth."
+    "to simulated or exact profiles, every constant with its errors, every law with its distance from the exact "
+    "profile."
 )
 CONVENTIONS = (
-    "alpha: single-scattering albedo; A: total diffuse reflectance; l or mfp: mean free path, the unit of r. Errors "
-    "are one standard error."
+    "alpha: single-scattering albedo; A: total diffuse reflectance; l or mfp: transport mean free path "
+    "1 / (mu_s' + mu_a), the unit of r; searchlight: a pencil beam (normal, collimated); diffuse: cosine-weighted "
+    "light from all sides. Errors are one standard error."
 )
 PARTS = {
     "fits": "What was fitted, from what",
@@ -82,7 +84,7 @@ def write_page(
     """Write the report of the records in `folder` as one HTML file that needs no other and no network.
 
     evidence  folder of what `profilefit check`, `stability` and `tradeoff` wrote with `--out`; what is not there is
-              told, with the command that makes it
+              named, with the command that makes it
     names     of records; all if None
     tracked   wraps the keys of the parts as these are made: in a bar, say
     RecordError, InputError on files that are damaged; OutputError where `path` cannot be written.
@@ -90,7 +92,7 @@ def write_page(
     require_writable(path)
     source = Source(folder, tuple(names) if names else None)
     found = EvidenceFolder(evidence, folder)
-    for file in source.paths.values():  # what is damaged is better said now than after a minute
+    for file in source.paths.values():  # damage is reported now, not after a minute
         record.read(file, whole=True)
     measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
     makers = _makers(source, path.name) | {key: partial(str, text) for key, text in measured.items()}

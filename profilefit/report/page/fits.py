@@ -39,7 +39,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
     for known in sorted(versions):
         yield paragraph("Made with " + ", ".join(f"{name} {number}" for name, number in known) + ".", "dim")
     yield paragraph(f"SHA-256 over all records of the folder: {digest(source.folder)}", "dim")
-    yield paragraph("All of it again; what was measured with the records has its own command where it stands:")
+    yield paragraph("To make all of it again (measurements with the records have their own commands, beside them):")
     shown = shlex.join(["profilefit", "report", *(source.names or ()), "--fits", "fits", "--html", page])
     yield command("\n".join([*again(contents, bool(source.names)), shown]))
 
@@ -81,10 +81,10 @@ CAPTIONS = {
     "liang-13-b": "Coefficient b of (7) over alpha: fits at each albedo, the law (13) printed and regenerated.",
     "liang-15-c": "Coefficient c of (7) over alpha: fits at each albedo, the law (15) printed and regenerated.",
     "liang-19-inverse": "The inverse cdf (19)-(20): printed, regenerated and exact.",
-    "inversion-error": "Largest error of inverse cdfs in the share of the light, by albedo.",
-    "constants": "Printed constants against regenerated ones. z: their distance over the error.",
-    "quality": "Error over the single-scattering albedo, at albedos that were not fitted.",
-    "residuals": "What the fit leaves.",
+    "inversion-error": "Largest error of inverse cdfs in the share of the reflected energy, by albedo.",
+    "constants": "Printed constants against regenerated ones. z: their difference over its error.",
+    "quality": "Error over the single-scattering albedo, at held-out albedos.",
+    "residuals": "Residuals of the fit.",
 }
 
 
@@ -128,14 +128,14 @@ def paper_figures(source: Source) -> Iterator[str]:
 
 
 def record_part(source: Source, name: str, figures: bool = True) -> str:
-    """Everything of one record, folded; without `figures` only what its .json says."""
+    """Everything of one record, folded; without `figures` only what its .json has."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
     plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []
     corner = f"corner-{name}"  # half of a page's bytes, for figures that few look at
     drawings = "\n".join(drawn(plan, source) for plan in plans_of if plan.name != corner)
     draw = f"profilefit report {shlex.quote(name)} --figures figures  # and the posterior, constant against constant"
-    asked = [draw] if any(plan.name == corner for plan in plans_of) else []
-    command_again = command("\n".join([*again({name: content}), *asked]))
+    commands = [draw] if any(plan.name == corner for plan in plans_of) else []
+    command_again = command("\n".join([*again({name: content}), *commands]))
     title = element("b", escape(name)) + " " + element("span", escape(content["title"]), class_="dim")
     return details(title, element("div", tables + drawings + command_again, class_="record"), f"record-{name}")

@@ -1,4 +1,4 @@
-"""What other commands measured on some machine, as far as their files are there."""
+"""Measurements of other commands on some machine, as far as their files are there."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class EvidenceFolder:
             ) from error
 
     def told(self, name: str) -> Told | None:
-        """What `name`.json says; None if it is not there. InputError on a file that is none of ours."""
+        """The content of `name`.json; None if there is none. InputError on a file of another kind."""
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
         if not path.exists():

@@ -16,7 +16,7 @@ from profilefit.studies.stability.cells import Verdict
 RENDERS = {
     "render-laws.png": "A head by the exact profile, four laws and the separable filter, and how far each is off.",
     "render-error.png": "Error of renders over samples a pixel and over time, against the exact picture.",
-    "render-choices.png": "The same head with the ways to sample.",
+    "render-choices.png": "The same head by each way to sample.",
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
 }
 GROUPS = {
@@ -24,8 +24,8 @@ GROUPS = {
     "maps": ("Maps in float32", OF_MAP[:2]),
 }
 MEANING = (
-    "model: the record's error against exact half space or photons, worst albedo; float32: what rounding adds; bad: "
-    "NaN, Inf, negative or not monotone, in and out of where the law holds"
+    "model: the record's error against the exact half space or photons, worst albedo; float32: what rounding adds; "
+    "bad: NaN, Inf, negative or not monotone, in and out of where the law holds"
 )
 COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
 
@@ -51,7 +51,7 @@ def _check(told: Told) -> Iterator[str]:
     if broken := [f"{_label(one)}: {line}" for key in GROUPS for one in told[key] for line in one["broken"]]:
         yield element("ul", "".join(element("li", escape(line)) for line in broken))
     if told["costs"]:
-        yield markup(column_table(COSTS, _costs(told["costs"]), left=("text",)))
+        yield markup(column_table(COSTS, _costs(told["costs"]), left=("source",)))
 
 
 def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[str]]:
@@ -80,7 +80,7 @@ def _count(bad: Told) -> str:
 
 def _costs(costs: Told) -> dict[str, list[str]]:
     works = list(next(iter(costs.values()))["ns"])
-    columns = {"text": list(costs)}
+    columns = {"source": list(costs)}
     for work in works:
         columns[work] = [f"{significant(one['ns'][work])} ({one['ratio'][work]:.2f})" for one in costs.values()]
     return columns
@@ -145,7 +145,7 @@ HOLDS = {
     True: "No law, map or solver of this project has a red cell inside its stated range.",
     False: "A law, map or solver of this project has a red cell inside its stated range.",
 }
-UNKNOWN = "no truth there: NaN, sign and order only"
+UNKNOWN = "no reference there: NaN, sign and order only"
 NOT_JUDGED = Verdict.NOT_JUDGED.words
 ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
@@ -170,7 +170,7 @@ def failures(found: EvidenceFolder) -> Iterator[str]:
 
 def _unjudged(regions: Sequence[Told]) -> str:
     count = sum(int(one["count"]) for one in regions if one["class"] == NOT_JUDGED)
-    return f"{count} cells, of all laws, are not judged: no truth reaches there."
+    return f"{count} cells, of all laws, are not judged: there is no reference value."
 
 
 def _causes(regions: Sequence[Told]) -> dict[str, list[str]]:

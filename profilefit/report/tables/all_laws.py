@@ -22,10 +22,11 @@ Floats = NDArray[np.float64]
 Measured = TypeVar("Measured")
 Track = Callable[[Iterator[Any], str, int], Iterator[Any]]
 """Items as they come, what they are, how many -> the items, as they are shown to come."""
-# Where laws are judged: albedos that were not fitted. Samplers take longer and hardly change with alpha.
+# Where laws are judged: held-out albedos. Samplers take longer and hardly change with alpha.
 ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))
 SAMPLED_ALBEDOS = (0.1, 0.5, 0.9)
-# A law without a text is a quadrature of tens of milliseconds, which its sampler inverts step by step: one will do.
+# A law without a shader source is a quadrature of tens of milliseconds, which its sampler inverts in many steps: one
+# albedo will do.
 SLOW_ALBEDOS = (0.5,)
 SHARES = 256
 
@@ -45,7 +46,7 @@ class MeasuredSampler:
 
 
 def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
-    """Show nobody how far it is."""
+    """The items, without any progress shown."""
     del title, total
     return items
 

@@ -15,6 +15,7 @@ from rich.text import Text
 LEAST_DIGITS = 3
 SMALLEST, LARGEST = 1e-4, 1e6  # beyond these numbers are written with an exponent
 ABSENT = "–"
+SEARCHLIGHT = "searchlight: a pencil beam (normal, collimated)"  # for captions
 
 
 def to_error(value: float | None, error: float | None) -> str:

@@ -1,4 +1,4 @@
-"""What checks of shader texts found: a line a law, where errors are largest, what it costs, which bounds are broken."""
+"""Checks of shader sources: a row for each law, where errors are largest, what an evaluation costs, broken bounds."""
 
 from __future__ import annotations
 
@@ -26,18 +26,16 @@ MAP_COLUMNS = ("A\nmodel", "A\nfloat32", "α\nmodel", "α\nfloat32")
 COUNTS = ("bad\nin", "bad\nout")
 CAPTION = (
     "model: the record's error against the exact half space or photons, worst albedo (of printed constants that of "
-    "the regenerated); float32: what rounding adds, at worst; sample: share of the energy between both radii; pdf: its "
-    "text against the slope of the sampler's own map; bad: NaN, Inf, negative, not monotone, in and out of where the "
-    "law holds"
+    "the regenerated); float32: what rounding adds, at worst; sample: share of the energy between both radii; pdf: the "
+    "density in the source against the slope of the sampler's own map; bad: NaN, Inf, negative, not monotone, in and "
+    "out of where the law holds"
 )
 COST_CAPTION = (
     "ns and, in brackets, times normalized diffusion. profile: R_d; sample: a radius; both: a radius and R_d there; "
     "estimate: a sample of (22), that is a radius, its density and R_d at another distance; material: both, with "
-    "another α at each. The texts as exported; constants do not change it"
+    "another α at each. Of the source as exported; constants do not change it"
 )
-HALF_CAPTION = (
-    "mean relative error of R_d / largest error of the cdf that float16 alone makes, worst of 24 albedos, l = 1"
-)
+HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16 alone, worst of 24 albedos, l = 1"
 
 
 def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
@@ -80,11 +78,11 @@ def _against_exact(one: LawCheck) -> str:
 
 
 def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
-    """A line a text."""
-    columns = {"text": list(costs)}
+    """A row for each source."""
+    columns = {"source": list(costs)}
     for work in WORKS:
         columns[work] = [f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for cost in costs.values()]
-    return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("text",))
+    return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("source",))
 
 
 def half_table(found: Sequence[HalfCheck]) -> RenderableType:
@@ -175,7 +173,7 @@ def _check_content(one: LawCheck | MapCheck) -> dict[str, Any]:
 
 
 def _called(one: LawCheck | MapCheck) -> str:
-    """A map apart from the law of its name."""
+    """A label that distinguishes a map from the law of its name."""
     return f"map {one.of.label}" if isinstance(one, MapCheck) and not one.of.records else one.of.label
 
 

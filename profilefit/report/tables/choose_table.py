@@ -1,4 +1,4 @@
-"""The choice for a scene as one table: the least that serves, what is next to it, and why."""
+"""The choice for a scene as a table: the cheapest option within tolerance and budget, its neighbours, and why."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LAYERS = {
 
 
 def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> RenderableType:
-    """All that is said of a choice."""
+    """The whole report of a choice."""
     shown = {
         "best cheaper": choice.cheaper,
         "chosen" if choice.chosen else "nearest": choice.nearest,
@@ -65,15 +65,15 @@ def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) 
 def headline(choice: Choice) -> str:
     """The answer in a line."""
     scene, one = choice.scene, choice.nearest
-    request = f"{_percent(scene.tolerance)} %"
+    requested, limits = f"{_percent(scene.tolerance)} %", "tolerance"
     if scene.budget.ms is not None:
-        request += f" within {scene.budget.ms:g} ms"
+        requested, limits = f"{requested} within {scene.budget.ms:g} ms", "tolerance and budget"
     if choice.chosen:
-        return f"The least that serves: {one.option.label} (asked: {request})"
+        return f"The cheapest option within {limits}: {one.option.label} (requested: {requested})"
     if choice.meets_tolerance:
-        return f"Nothing serves for {request}: the cheapest within the tolerance is {one.option.label}"
+        return f"No option meets {requested}: the cheapest within the tolerance is {one.option.label}"
     where = " in the budget" if choice.meets_budget and scene.budget.ms is not None else ""
-    return f"Nothing serves for {request}: the most accurate{where} is {one.option.label}"
+    return f"No option meets {requested}: the most accurate{where} is {one.option.label}"
 
 
 def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> dict[str, Any]:
@@ -98,12 +98,12 @@ def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> di
 
 
 def export_hint(choice: Choice) -> str:
-    """How to get the text of what was chosen."""
+    """How to get the shader source of what was chosen."""
     option = choice.nearest.option
     if option.law is not None:
         return f"profilefit export {option.name} --lang glsl"
     if is_filter(option):
-        return "the filter's constants: --json, `filters`; its text: profilefit/scenes/skin/separable.frag"
+        return "the filter's constants: --json, `filters`; its source: profilefit/scenes/skin/separable.frag"
     return "nothing to export: radiance is A E / pi"
 
 
@@ -158,7 +158,7 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
     reasons = {"worst": choice.nearest, "the best cheaper": choice.cheaper}
     lines = [
         *(f"{name}: {_reason(one.error, scene.unit)}." for name, one in reasons.items() if one is not None),
-        f"error: root mean square of radiance within {scene.within.mfp:g} mean free paths (at least "
+        f"error: root mean square of radiance within {scene.within.mfp:g} transport mean free paths (at least "
         f"{scene.within.pixels} pixels) of a step edge of light, worst channel and case, in one frame, as a "
         "share of white; then its parts, which add in squares.",
         f"ms: an estimate of a frame on a {budget.gpu} at {100 * budget.screen_share:.0f} % coverage: Table 2 of Liang "
@@ -184,7 +184,7 @@ def _layer(layer: OneLayer, choice: Choice) -> str:
     together = math.hypot(layer.error, choice.nearest.error.total)
     text = (
         f"Layers, of one colour: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
-        f"mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a searchlight) is off by "
+        f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a pencil beam) is off by "
         f"{_percent(layer.error)} ± {_percent(layer.standard_error)} %; with the choice {_percent(together)} %."
     )
     index = choice.scene.setting.n

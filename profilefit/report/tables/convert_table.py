@@ -11,7 +11,7 @@ from rich.console import RenderableType
 
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.convert import LENGTHS, Optical
-from profilefit.report.tables.cells import column_table, on_the_point, significant
+from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant
 
 Floats = NDArray[np.float64]
 DIGITS = 5
@@ -65,9 +65,10 @@ def convert_table(medium: Optical, unit: str) -> RenderableType:
         "A of": [row.light for row in rows],
         "is": [row.formula for row in rows],
     }
-    caption = ["Sources: " + "; ".join(dict.fromkeys(one.source for one in LENGTHS if one.source)) + "."]
+    sources = dict.fromkeys(one.source for one in LENGTHS if one.source)
+    caption = [f"Sources: {'; '.join(sources)}.", f"{SEARCHLIGHT}."]
     if NONE in cells:
-        caption += [f"{NONE}: light that nothing absorbs (alpha = 1) has no diffuse mean free path."]
+        caption += [f"{NONE}: without absorption (alpha = 1) there is no diffuse mean free path."]
     return column_table("One medium in every convention", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))
 
 

@@ -1,4 +1,4 @@
-"""The record of readings: which choices give the printed constants back, and the paper's table of errors redone.
+"""The record of readings: which choices reproduce the printed constants, and the paper's table of errors redone.
 
 Every key may be absent: this shows what is there.
 """

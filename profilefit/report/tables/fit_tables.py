@@ -1,4 +1,4 @@
-"""A fit of one's own data as tables, and in sentences what it can and cannot tell."""
+"""A fit of one's own data as tables, and its goodness of fit and identifiability in sentences."""
 
 from __future__ import annotations
 
@@ -8,22 +8,34 @@ import numpy as np
 from rich.console import RenderableType
 from rich.text import Text
 
+from mcml_sim.media.setting import Setting
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
 from profilefit.measured.result import Answer, known_medium
-from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
+from profilefit.report.tables.cells import (
+    ABSENT,
+    SEARCHLIGHT,
+    column_table,
+    interval,
+    on_the_point,
+    significant,
+    to_error,
+)
 
 HELD, EDGE = "held", "edge"
 SHARES = ("A", "alpha")  # which end at 1
 # tests/physics/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
-HELD_IN = "tried on made-up replicates, such intervals hold in 93 to 98 %"
-TINIEST = 1e-16  # chance that is worth printing
-CAPTION = "± data: the data's own errors; ± law: the law's distance from the truth, taken for waves along ln r"
+HELD_IN = "checked on simulated replicates, such intervals cover the truth in 93 to 98 %"
+TINIEST = 1e-16  # p-value that is worth printing
+CAPTION = (
+    "± statistical: from the errors of the data; ± model: from the law's own error, taken for a Gaussian process along "
+    "ln r"
+)
 
 
 def fit_tables(result: Answer, title: str) -> list[RenderableType]:
-    """What was found, how well it is told apart, and what would tell more."""
+    """Estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
         if len(result.identified) > 1:
@@ -33,7 +45,7 @@ def fit_tables(result: Answer, title: str) -> list[RenderableType]:
 
 
 def fit_lines(result: Answer) -> list[Text]:
-    """A sentence each on goodness, misfit, what the data cannot tell, and what was done to them."""
+    """A sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
     return [Text(line) for line in _lines(result)]
 
 
@@ -46,22 +58,24 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
     columns = {
         "": list(names),
         "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
-        "± data": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
-        "± law": [significant(law[name]) if name in law and name in moving else ABSENT for name in names],
+        "± statistical": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
+        "± model": [significant(law[name]) if name in law and name in moving else ABSENT for name in names],
     }
     caption = CAPTION
     if result.identifiability is not None and found.misfit.detected:
         misfit = found.errors(found.of_misfit) if moving else {}
-        columns["± misfit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
-        caption += "; ± misfit: what is left unexplained, taken likewise"
+        columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
+        caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
     whole = bool(result.whole_draws)
     columns["95 %"] = [
         interval(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
         for name in names
     ]
-    caption += "; 95 %: " + ("all of these errors together" if whole else "the data's errors alone")
+    caption += "; 95 %: interval by " + ("all of these errors together" if whole else "the statistical error alone")
     if any(any(result.ends(name)) for name in result.moving):
-        caption += f"; {EDGE}: the data do not exclude that it ends there, so a limit at 95 % and no value"
+        caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
+    if found.question.law.setting.illumination == Setting().illumination:
+        caption += f"; {SEARCHLIGHT}"
     columns["unit"] = [unit_of(name, found.data.unit) for name in names]
     if truth:
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
@@ -91,13 +105,14 @@ def _advice_table(result: Answer) -> RenderableType:
         return Text("")
     unit = result.found.data.unit or "units of r"
     columns = {
-        "one more measurement": ["none: as it is", *(described(one, unit) for one in advice.candidates)],
-        "worst known": [advice.name, *(one.worst[0] for one in advice.candidates)],
-        "± data, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
+        "additional measurement": ["none", *(described(one, unit) for one in advice.candidates)],
+        "least certain quantity": [advice.name, *(one.worst[0] for one in advice.candidates)],
+        "± statistical, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
     }
-    place = "from the far end of what alpha may be" if result.found.minimum.at_edge else "from the fit's own place"
-    caption = f"predicted {place}, best first; a point has the median relative error of the data"
-    return column_table("What would tell more", columns, caption, left=("one more measurement", "worst known"))
+    place = "at the far end of the interval of alpha" if result.found.minimum.at_edge else "at the fitted values"
+    caption = f"predicted {place}, best first; a value is given the median relative error of the data"
+    left = "additional measurement", "least certain quantity"
+    return column_table("Most informative additional measurement", columns, caption, left)
 
 
 def described(one: Candidate, unit: str) -> str:
@@ -105,13 +120,13 @@ def described(one: Candidate, unit: str) -> str:
     if one.kind == "point":
         where = f"at r = {0.5 * (one.inner + one.outer):.3g} {unit}"
         if one.outer > one.inner:
-            where = f"on a ring from {one.inner:.3g} to {one.outer:.3g} {unit}"
+            where = f"over the annulus from {one.inner:.3g} to {one.outer:.3g} {unit}"
         return f"a value {where}, to {100 * one.error / one.value:.2g} %"
     if one.kind == "reflectance":
         return f"the total reflectance A, to {100 * REFERENCE_ERROR:g} %"
     if one.kind == "scale":
         return f"the scale, by a reference standard, to {100 * REFERENCE_ERROR:g} %"
-    return f"all of it {REPEATS} times"
+    return f"the whole profile, {REPEATS} times"
 
 
 def _lines(result: Answer) -> Iterator[str]:
@@ -130,11 +145,11 @@ def _lines(result: Answer) -> Iterator[str]:
     yield from _identifiability(result)
     if (g := _forward(result)) is not None:
         yield (
-            f"the medium scatters with g = {g:g}, the law isotropically: nearer than ten mean free paths this is "
-            "off by tens of percent, and seen as a misfit only where rows lie within one"
+            f"the medium scatters with g = {g:g}, the law isotropically: within ten transport mean free paths this is "
+            "off by tens of percent, which shows as a misfit only if rows lie within one"
         )
     if found.rel is None:
-        yield "the error of the law is not known for this surface: nothing exact or recorded to hold it against"
+        yield "the model error is unknown for this surface: there is neither an exact profile nor a record of it"
     elif beyond := int(found.beyond.sum()):
         rows = f"{beyond} row{'s lie' if beyond > 1 else ' lies'}"
         yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
@@ -143,12 +158,12 @@ def _lines(result: Answer) -> Iterator[str]:
 
 
 def _estimated(result: Answer) -> Iterator[str]:
-    """What was done about errors that are estimates."""
+    """How errors that are themselves estimates are allowed for."""
     found = result.found
     yield (
-        f"these are estimates, each of {np.median(found.data.freedom):.2g} degrees of freedom, their trend of "
-        f"{found.data.pooled:.2g}: so ± data is {np.sqrt(found.widening):.2f} times what they make, 95 % is "
-        f"{found.quantile:.2f} times ± data (Student) and the chance below is one of F; {HELD_IN}"
+        f"these are estimates of {np.median(found.data.freedom):.2g} degrees of freedom each, their trend of "
+        f"{found.data.pooled:.2g}: so ± statistical is widened by a factor of {np.sqrt(found.widening):.2f}, 95 % is "
+        f"{found.quantile:.2f} times ± statistical (Student's t) and the p-value below is of an F test; {HELD_IN}"
     )
 
 
@@ -158,7 +173,7 @@ def _forward(result: Answer) -> float | None:
     return None if medium is None or medium.layers[0].g == 0 else medium.layers[0].g
 
 
-def _chance(value: float) -> str:
+def _p_value(value: float) -> str:
     return f"below {TINIEST:g}" if value < TINIEST else f"{value:.2g}"
 
 
@@ -166,20 +181,20 @@ def _goodness(result: Answer) -> Iterator[str]:
     one = result.found.misfit
     at_most = " (at most: the errors are bounds)" if result.found.data.bounded else ""
     yield (
-        f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, chance {_chance(one.chance)}; "
-        f"neighbours correlate {one.along_r:+.2f}, {one.runs[0]} runs (noise: {one.runs[1]:.0f})"
+        f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, p-value {_p_value(one.chance)}; "
+        f"lag-1 autocorrelation {one.along_r:+.2f}, {one.runs[0]} sign runs ({one.runs[1]:.0f} expected)"
     )
     if one.detected:
         yield (
-            f"MISFIT (chance {_chance(one.joined)}): this is not one layer under this law, light and surface; "
-            f"{100 * one.relative:.2g} % of the light of a row is unexplained"
+            f"MISFIT (p-value {_p_value(one.joined)}): one layer does not explain the data under this law, "
+            f"illumination and surface; residuals of {100 * one.relative:.2g} % of a value are unexplained"
         )
     elif one.within_law:
-        yield "the misfit is within the law's own error: a better law, not another medium, is what is missing"
+        yield "the misfit is within the law's own error: what is missing is a better law, not another medium"
     elif not result.found.data.bounded and 1.0 - one.chance < DETECTED:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
-        yield "no misfit is seen: one layer explains the data"
+        yield "no misfit is detected: one layer explains the data"
 
 
 def _identifiability(result: Answer) -> Iterator[str]:
@@ -190,13 +205,13 @@ def _identifiability(result: Answer) -> Iterator[str]:
         return
     if identifiability.trades and identifiability.pair is not None:
         first, second = identifiability.pair
-        yield f"THE DATA CANNOT TELL {first} FROM {second} (correlation {identifiability.correlation:+.4f}):"
+        yield f"{first} AND {second} ARE NOT SEPARATELY IDENTIFIABLE (correlation {identifiability.correlation:+.4f}):"
     else:
-        yield "THE DATA DO NOT TELL ALL:"
+        yield "NOT ALL QUANTITIES ARE IDENTIFIABLE:"
     for one in identifiability.intervals:
         low = "anything less" if one.open_low else f"{one.low:.3g}"
         high = "anything more" if one.open_high else f"{one.high:.3g}"
         yield f"  {one.name} from {low} to {high} {unit_of(one.name, unit)}".rstrip() + " fits as well, at 95 %"
     for name, error in (identifiability.loose if result.identified else {}).items():  # no errors at an edge
         yield f"  {name} is known to {100 * min(error, 99.0):.0f} %" + (" or worse" if error > 99 else "")
-    yield f"  what would tell: {described(advice.candidates[0], unit or 'units of r')}"
+    yield f"  most informative additional measurement: {described(advice.candidates[0], unit or 'units of r')}"

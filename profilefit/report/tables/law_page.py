@@ -28,7 +28,7 @@ from profilefit.report.tables.quality_tables import ROWS, albedo_number
 from profilefit.shader import emit
 
 PROFILE_MEASURES = ("rel", "ks", "l1", "inversion_error")
-# What the table of all laws shows of each.
+# The measures that the table of all laws shows.
 WORST = (*OF_PROFILE, "delta_A")
 MAP = "map-"
 INDEX = "index"
@@ -74,7 +74,7 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
         _shader(page),
     ]
     if figure:
-        caption = "Errors by albedo, at albedos that were not fitted; dashed: as printed."
+        caption = "Errors at held-out albedos; dashed: as printed."
         parts.append(f"## Quality by albedo\n\n![Errors of {page.title} by albedo]({figure})\n\n*{caption}*")
     for one in page.members:
         parts.append(f"## {one.label}\n\n{_loading(one)}")
@@ -89,7 +89,7 @@ def index_text(pages: Sequence[Page], folder: Folder) -> str:
     rows = [_row(page, one, contents) for page in pages for one in page.members]
     caption = (
         "Every law and map between alpha and A, with every set of constants that comes with this version. The errors "
-        "are those at the worst albedo that was not fitted, as the records state them: `rel` the mean relative error "
+        "are those at the worst held-out albedo, as the records state them: `rel` the mean relative error "
         "of R_d, `ks` the largest error of the cumulated energy, `xi` that of the inversion, `A` that of the "
         "reflectance. The pages are made of the records when the documentation is built; "
         "[The laws](../guide/laws.md) measures also those that have no record."
@@ -178,7 +178,7 @@ def _setting(setting: Setting) -> str:
 
 
 def _export(one: Named) -> str:
-    """The command that writes this law's shader text; none where it has none."""
+    """The command that writes this law's shader source; none where it has none."""
     if not one.law.entry.has_text:
         return ""
     if one.records:
@@ -197,7 +197,7 @@ def _ranges(entry: Entry) -> str:
 def _shader(page: Page) -> str:
     text = page.members[0].law.entry.text
     if not isinstance(text, Text):
-        return f"In a shader: no text; {text}."
+        return f"In a shader: no source; {text}."
     prefixes = dict.fromkeys(f"`{emit.prefix(one.law)}_…`" for one in page.members)
     return f"In a shader: `profilefit/shader/glsl/{text.file}.glsl`, its names begin with {', '.join(prefixes)}."
 

@@ -31,7 +31,7 @@ from profilefit.report.tables.all_laws import (
     measured_samplers,
     untracked,
 )
-from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
+from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.report.tables.quality_tables import albedo_number
@@ -213,6 +213,8 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
     columns["worst"] = [_number(measure, MEASURES[measure].worst(row)) for row in values]
     title = f"{measure}: {MEASURES[measure].formula}{SCALES[measure][1]}, by α; {setting}"
     caption = f"mean and worst over {alpha.size} albedos; over α: from the least to the worst here, logarithmic"
+    if setting.illumination == Setting().illumination:
+        caption += f"; {SEARCHLIGHT}"
     return column_table(title, columns, caption if measure == "rel" else "", left=("over α",), fold=("law",))
 
 
@@ -259,5 +261,5 @@ def _number(measure: str, value: float) -> str:
 
 
 def _order(setting: Setting) -> tuple[bool, float, float]:
-    """Searchlight first."""
+    """The searchlight setting first."""
     return setting.illumination != Setting().illumination, setting.n, setting.g

@@ -53,9 +53,7 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
                     *errors,
                 )
             )
-    note = (
-        "Digits end where the largest error does; constants trade against each other, so compute with the record's own."
-    )
+    note = "Digits end where the largest error does; constants are correlated, so compute with the record's own."
     return "\n\n".join([markdown_table(header, rows), *failures, note])
 
 

@@ -81,7 +81,7 @@ def _table(content: Content, group: list[str]) -> RenderableType:
             header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
     caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
-    return column_table("Quality at albedos that were not fitted" + _failed(content), columns, caption, left=("α",))
+    return column_table("Quality at held-out albedos" + _failed(content), columns, caption, left=("α",))
 
 
 def _albedo_table(content: Content) -> RenderableType:

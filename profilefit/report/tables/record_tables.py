@@ -12,6 +12,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from mcml_sim.media.setting import Setting
 from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import TOTAL, Content, converged, known_errors, largest_error, z_score
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
@@ -23,11 +24,11 @@ __all__ = ["constants_table", "record_tables", "summary"]
 
 Line = tuple[str, RenderableType]
 MEANING_OF_ERROR = {
-    "photons": "another run's noise",
-    "dr": "rings of finite width",
-    "model": "what the law cannot follow, were it wrong in another way of the same size and reach",
-    "misfit": "residuals taken for independent noise, which they are not",
-    "jackknife": "what leaving out a sixth of the albedos moves",
+    "photons": "noise of the simulation",
+    "dr": "radial bins of finite width",
+    "model": "the law's misfit, as a random function of the same size and correlation lengths",
+    "misfit": "the misfit taken for independent noise, which it is not",
+    "jackknife": "leaving out a sixth of the albedos",
 }
 DERIVED = {
     "radius": ("r [mfp]", "Radius within which 99.5 % of the light leaves"),
@@ -77,8 +78,8 @@ def constants_table(content: Content) -> RenderableType:
     meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
         columns["\nz"] = [_signed(score) for score in scores]
-        meanings.append(f"z: published less regenerated, over {TOTAL}, together")
-    title = "Constants, lengths in units of the mean free path"
+        meanings.append(f"z: published less regenerated, over the errors of {TOTAL}, combined")
+    title = "Constants, lengths in units of the transport mean free path"
     caption = "; ".join(meanings)
     if not converged(content):
         caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
@@ -93,7 +94,7 @@ def intervals_table(content: Content) -> RenderableType:
     """The 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
     chains = content["posterior"]
     if not chains:
-        return Text("No credible intervals: chains start from a fit that converged.")
+        return Text("No credible intervals: a chain starts from a fit that converged.")
     cells: dict[str, list[str]] = {"": [], "from": [], "68 %": [], "95 %": []}
     for name, constant in content["constants"].items():
         for place, kind in enumerate(kind for kind in KINDS if kind in constant.get("intervals", {})):
@@ -120,7 +121,7 @@ def derived_table(derived: Content) -> RenderableType:
 
 
 def fit_facts(content: Content) -> RenderableType:
-    """What the solver and the chains said."""
+    """The results of the solver and of the chains."""
     fit = content["fit"]
     left = fit["residuals"]
     lines: list[Line] = [
@@ -128,7 +129,7 @@ def fit_facts(content: Content) -> RenderableType:
         ("", f"{fit['steps']} steps, condition number {significant(fit['condition_number'], 3)}"),
         ("residuals", f"rms {significant(left['rms'], 3)}, largest {significant(left['largest'], 3)}"),
         ("", f"autocorrelation {left['along_r']:.2f} along r, {left['along_alpha']:.2f} along α (0: noise only)"),
-        ("", f"{left['half_waves']:.1f} stretches of one sign: so many residuals stand for themselves"),
+        ("", f"{left['half_waves']:.1f} sign runs: the effective number of independent residuals"),
     ]
     for kind, chain in content["posterior"].items():
         facts = f"τ {significant(chain['tau'])} steps, acceptance {chain['acceptance']:.2f}"
@@ -138,18 +139,18 @@ def fit_facts(content: Content) -> RenderableType:
         lines += _discrepancy(off)
     if left := content.get("left_out"):
         facts = (
-            f"{left['rings']} rings and {left['albedos']} albedos left out: too few photons for an error of their own"
+            f"{left['rings']} radial bins and {left['albedos']} albedos left out: too few photons for a standard error"
         )
         lines.append(("data", facts))
     return _facts("Fit", lines + _second_opinions(content))
 
 
 def _discrepancy(off: Content) -> list[Line]:
-    """The process that the residuals are taken for."""
+    """The Gaussian process that the residuals are taken for."""
     if off["amplitude"] is None:
         return [("discrepancy", _verdict(off["result"]))]
     amplitude = to_error(off["amplitude"], off["amplitude_error"])
-    reach = f"reaching {significant(off['length_s'])} in √(1 − α)"
+    reach = f"correlation length {significant(off['length_s'])} in √(1 − α)"
     if off["length_r"] is not None:
         reach += f", {significant(off['length_r'])} in ln r"
     size = f"amplitude {amplitude} ± {significant(off['amplitude_error'])}; residuals {significant(off['rms'])} rms"
@@ -170,7 +171,7 @@ def _second_opinions(content: Content) -> list[Line]:
     if check := content.get("crosscheck"):
         lines.append(("photons", check["result"]))
         facts = (
-            f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions, chance {significant(check['chance'])}"
+            f"χ² {significant(check['chi2'], 3)} in {check['rank']} directions, p-value {significant(check['chance'])}"
         )
         lines.append(("", f"{facts}, {check['photons']:.2g} photons"))
     return lines
@@ -207,7 +208,8 @@ def _title(content: Content) -> RenderableType:
 
 def _provenance(content: Content) -> list[Line]:
     setting = content["setting"]
-    light = f"{setting['illumination']}, n = {setting['n']:g}, g = {setting['g']:g}"
+    beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
+    light = f"{setting['illumination']}{beam}, n = {setting['n']:g}, g = {setting['g']:g}"
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
@@ -218,7 +220,7 @@ def _provenance(content: Content) -> list[Line]:
         a = protocol["albedos"]
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
     if protocol.get("rings"):
-        lines.append(("rings", _rings(protocol["rings"])))
+        lines.append(("bins", _rings(protocol["rings"])))
     if protocol.get("weighting"):
         lines.append(("weighting", _weighting(protocol["weighting"])))
     if protocol.get("held"):
@@ -247,7 +249,7 @@ def _weighting(weighting: Content) -> str:
 
 
 def _verdict(result: str) -> Text:
-    """What a solver or a chain said; anything but success stands out."""
+    """The result of a solver or a chain; anything but success stands out."""
     return Text(result, style="green") if result == "converged" else Text(f"FAILED: {result}", style="bold red")
 
 

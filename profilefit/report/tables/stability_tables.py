@@ -1,4 +1,4 @@
-"""What the atlas says in words: causes with their remedies, what holds of ours, fits, and every region as CSV."""
+"""The atlas of failures as tables: causes with remedies, this project's own laws, fits; every region as CSV."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ SIGNS = {
     Verdict.RAISES: "!",
 }
 LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
-BARE = "no truth there: NaN, sign, order only"
+BARE = "no reference there: NaN, sign, order only"
 LONGEST_NAME, LONGEST_REMEDY = 18, 40  # characters: a line of 100 holds both
 # What a line a law says of its fits: header, case, how its value begins, and whether shares or spreads.
 SUMMARY = (
@@ -48,14 +48,14 @@ SUMMARY = (
     ("from × 8", STARTS, "× e^(2.1", True),
     ("dark", ALBEDO, "α 1e-4", True),
     ("white", ALBEDO, "α 0.999", True),
-    ("rings × 8", BINS, "dr 1.6", False),
+    ("bins × 8", BINS, "dr 1.6", False),
     ("1e6 photons", NOISE, "1e+06", False),
     ("trimmed", TRIMMING, "ε 0.0005", False),
 )
 
 
 def cause_table(parts: Sequence[Findings]) -> RenderableType:
-    """A line a cause: whom it hits, in which classes, and what helps, shortened."""
+    """A row for each cause: the laws it concerns, the classes of failure, and the remedy, shortened."""
     groups: dict[str, list[Region]] = {}
     for region in _regions(parts):
         groups.setdefault(region.cause.key, []).append(region)
@@ -90,7 +90,7 @@ def region_table(part: Findings, most: int = 20) -> RenderableType:
 
 
 def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
-    """A line a law: how many fits converge from where, and how far its constants move with the data."""
+    """A row for each law: how many fits converge from which starts, and how far its constants change with the data."""
     columns: dict[str, list[str]] = {"fit": [], **{header: [] for header, *_ in SUMMARY}}
     for subject in dict.fromkeys(one.subject for one in fits):
         columns["fit"].append(subject)
@@ -100,9 +100,9 @@ def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
     refused = sum(one.case == NONSENSE and one.converged == 0 for one in fits)
     nonsense = sum(one.case == NONSENSE for one in fits)
     caption = (
-        "How many converge from so far off, and on dark or white albedos alone; then how far that constant\n"
-        "moves, over its size, that moves most: on wider rings, under noise, trimmed at 0.0005, not 0.05.\n"
-        f"Nonsense (NaN, no light, one albedo): {refused} of {nonsense} refused by name."
+        "Share that converges from starts so far off, and on dark or white albedos alone; then the largest relative\n"
+        "change of a constant: with wider bins, under noise, trimmed at 0.0005 instead of 0.05.\n"
+        f"Nonsense (NaN, all zeros, one albedo): {refused} of {nonsense} refused by name."
     )
     return column_table("Fits", columns, caption, ("fit",))
 
@@ -125,15 +125,14 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
         "else": [", ".join(f"{count} {kind}" for kind, count in one.results if kind != "converged") for one in shown],
     }
     nonsense = sorted({kind for one in fits if one.case == NONSENSE for kind, _ in one.results})
-    caption = (
-        "spread: of the constant that moves most, over its size. Nonsense (NaN, no light, one albedo): "
-        + "; ".join(nonsense)
+    caption = "spread: the largest relative change of a constant. Nonsense (NaN, all zeros, one albedo): " + "; ".join(
+        nonsense
     )
     return column_table("Fits", columns, caption, ("fit",), ("case", "else"))
 
 
 def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
-    """Each broken promise of our own laws and solvers, and how many hold; each region without a cause."""
+    """Each failure of this project's own laws and solvers, and how many have none; each region without a cause."""
     lines = []
     for part in parts:
         for region in part.regions:
@@ -142,7 +141,7 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
                 lines.append(
                     Text(
                         f"{head} {region.subject}: {region.quantity}, {region.arithmetic}, {region.verdict.words} at "
-                        f"{region.place}: {region.value:.4g}, right {region.reference:.4g}; {region.cause.words}"
+                        f"{region.place}: {region.value:.4g}, reference {region.reference:.4g}; {region.cause.words}"
                     )
                 )
         lines += [
@@ -154,7 +153,7 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
         "none has a red cell inside its range" if not broken else f"{broken} of them with red cells inside their range"
     )
     aside, inside = _unjudged(parts)
-    share = Text(f"of ours {aside} of {inside} cells inside their ranges are not judged: no truth there")
+    share = Text(f"of ours {aside} of {inside} cells inside their ranges are not judged: no reference there")
     return [*lines, Text(f"ours: {len(ours)} laws, maps and functions, {summary}"), *([share] if aside else [])]
 
 

@@ -2,7 +2,7 @@
 
 The CSV of a part has the machine and the meaning of its columns in comment lines before it:
 
-panel, method, label    the chart, the line there, and what tells points of one line apart
+panel, method, label    the chart, the line there, and what distinguishes points of one line
 cost, error, worst      time, error of the middle (mean or root mean square) and the largest error, in the units that
                         the comment of their panel says; `..._low`, `..._high` the ends of the spread of repeats, 16th
                         and 84th percentile, equal to the value where it is known without error
@@ -54,11 +54,11 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
         "worst": [ABSENT if p.worst is None else significant(p.worst.value) for p in points],
     }
     if any("standardised" in p.facts for p in points):
-        columns["away"] = [significant(float(p.facts["standardised"])) for p in points]
+        columns["distance"] = [significant(float(p.facts["standardised"])) for p in points]
     columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
     caption = f"time: {panel.cost}; error: {panel.error}".replace("$", "")
-    if "away" in columns:
-        caption += "; away: distance of the constants from their noise-free limit, in their standard errors"
+    if "distance" in columns:
+        caption += "; distance: of the constants from their noise-free limit, in their standard errors"
     title = f"{part.name}, {panel.title}".replace("$", "")
     return column_table(title, columns, "\n".join(filter(None, (caption, notes))), left=("", "stands"))
 

@@ -15,7 +15,7 @@ from profilefit.scenes.stage.world import Rgb
 
 @dataclass(frozen=True)
 class Translucent:
-    """alpha single-scattering albedo [-], mfp mean free path [mm], reflectance A [-] of red, green and blue."""
+    """alpha single-scattering albedo [-], mfp transport mean free path [mm], reflectance A [-]: red, green, blue."""
 
     name: str
     alpha: Rgb

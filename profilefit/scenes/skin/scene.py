@@ -1,4 +1,4 @@
-"""Liang et al.'s head: what is drawn, and FILE.toml that asks for it."""
+"""Liang et al.'s head: what is drawn, and FILE.toml that configures it."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ EXPOSURE = 1.1  # of the pictures: few of their pixels are clipped by it
 
 @dataclass(frozen=True)
 class SceneRequest:
-    """What a file asks for. chart  other numbers of samples, whose error and cost are measured;  size  [pixels]"""
+    """What a file requests. chart  other numbers of samples, whose error and cost are measured;  size  [pixels]"""
 
     file: str
     label: str

@@ -122,7 +122,7 @@ SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
 
 
 class Targets:
-    """Float textures of one size by name, four channels each: those of `SURFACE`, and all that passes ask for."""
+    """Float textures of one size by name, four channels each: those of `SURFACE`, and all that passes need."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
         self.context, self.size = context, size
@@ -132,7 +132,7 @@ class Targets:
         self._into: dict[str, moderngl.Framebuffer] = {}
 
     def map(self, name: str) -> moderngl.Texture:
-        """The texture of that name, made when it is first asked for."""
+        """The texture of that name, made on first use."""
         if name not in self._maps:
             self._maps[name] = float_texture(self.context, self.size, 4)
         return self._maps[name]

@@ -30,7 +30,7 @@ MOST_ALBEDOS = 16
 class ExactLaw:
     """Exact profiles of some albedos: density, cdf and the radius that a share of the energy leaves within.
 
-    alpha  those that shaders may ask for; one asked for that is none of them gets the nearest
+    alpha  those that shaders may use; for another one the nearest is taken
     """
 
     alpha: tuple[float, ...]

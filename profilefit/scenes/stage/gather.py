@@ -24,7 +24,7 @@ class Gather(Technique):
 
     @classmethod
     def of(cls, law: Law) -> Gather:
-        """By a law with a shader text, or by the exact half space."""
+        """By a law with a shader source, or by the exact half space."""
         if isinstance(law, ExactLaw):
             return cls(LawText(NAME, law.text(LAW), law.textures(LAW)))
         return cls(LawText(prefix(law), law_text(law, name=LAW)))

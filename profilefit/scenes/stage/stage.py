@@ -87,7 +87,7 @@ class Stage:
     ) -> Singles:
         """(h, w, 3) radiant exitance, A times the blurred irradiance, in its unit; radiance is that over pi. Pass 3.
 
-        law  with a shader text, or an `ExactLaw`, which is sampled; or a technique of another kind
+        law  with a shader source, or an `ExactLaw`, which is sampled; or a technique of another kind
         mfp  of red, green and blue, or one for all [mm]
         fixed_alpha  single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
         rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
@@ -181,7 +181,7 @@ class Stage:
         return 1e3 * (by_driver if by_driver > TRUSTED * wall and wall < LONGEST_QUERY else wall)
 
     def _mean(self) -> Floats:
-        """Mean A of what was drawn last, asked for once."""
+        """Mean A of what was drawn last, computed once."""
         if self._mean_reflectance is None:
             self._mean_reflectance = _mean_reflectance(self.buffers())
         return self._mean_reflectance

@@ -1,4 +1,4 @@
-"""What a law in float32 may cost: a tenth of the model's own error, which its record tells."""
+"""What a law in float32 may cost: a tenth of the model's own error, which its record states."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Bound:
 
 @dataclass(frozen=True)
 class ModelError:
-    """A law's errors [-], worst over albedos, by the names of `quality`; `source` says which record tells them."""
+    """A law's errors [-], worst over albedos, by the names of `quality`; `source` says which record states them."""
 
     values: dict[str, float]
     source: str
@@ -55,7 +55,7 @@ class ModelError:
 def of_profile(one: Named, folder: Folder) -> ModelError:
     """The errors of a profile law, from its records, or those of the regenerated law of its name and setting.
 
-    What no record tells is measured on the float64 law, where the setting has an exact profile.
+    What no record states is measured on the float64 law, where the setting has an exact profile.
     """
     records = Records.of(folder)
     owner = one if one.records else _regenerated(one, profile_laws(records, matched=False))
@@ -67,7 +67,7 @@ def of_profile(one: Named, folder: Folder) -> ModelError:
         quality = profile_quality(one.law, ALBEDOS)
         found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
     if not found:
-        raise RecordError(f"{one.label} cannot be judged: no record tells its errors; regenerate it")
+        raise RecordError(f"{one.label} cannot be judged: no record states its errors; regenerate it")
     return ModelError(found, source)
 
 

@@ -111,7 +111,7 @@ def checked(those: Chosen, folder: Path, in_half: bool = False, quiet: bool = Tr
     laws, maps = those
     with opened() as context:
         found = list(tracked(_checks(context, those, folder), "checking", "laws", len(laws) + len(maps), quiet))
-        with working("timing the texts", quiet):
+        with working("timing the sources", quiet):
             costs = law_costs(context, laws, folder)
         halves = (check_half(context, one) for one in laws if in_half)
         return Checked(

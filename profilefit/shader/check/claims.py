@@ -37,12 +37,12 @@ def of_profile(one: Named, folder: Folder) -> list[Bound]:
             f"α {ALBEDOS[worst]:.3g}",
         ),
         Bound(
-            "share of radii min(g, r_max) (21) that are negative; the text takes |g|",
+            "share of radii min(g, r_max) (21) that are negative; the source takes |g|",
             float(np.mean(drawn < 0)),
             0.0,
             f"ξ < {one.law.eps:g}",
         ),
-        Bound("the law is 0/0 (1 if so); the text takes 1e-6 for α", float(empty), 0.0, "α 0"),
+        Bound("the law is 0/0 (1 if so); the source takes 1e-6 for α", float(empty), 0.0, "α 0"),
     ]
 
 

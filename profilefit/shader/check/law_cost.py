@@ -28,7 +28,7 @@ Floats = NDArray[np.float64]
 YARDSTICK = "burley"
 SIZE = 256, 128
 TURNS = 7
-ENOUGH = 0.01  # s that a work takes in one turn, at least: the clock and the driver's calls then tell little
+ENOUGH = 0.01  # s that a work takes in one turn, at least: the clock and the driver's calls are negligible then
 MOST_ROUNDS = 2**16
 # What one evaluation is: x = r/l and xi change at each, s is the law's shape. "estimate" is a sample of (22): a radius
 # r, its density, and the law's at the distance d of a surface that is not flat.

@@ -2,7 +2,7 @@
 
 from mcml_sim.cli.lazy import attributes
 
-TYPE_CHECKING = False  # as in `profilefit`: a name is imported when it is asked for
+TYPE_CHECKING = False  # as in `profilefit`: a name is imported on first use
 if TYPE_CHECKING:
     from profilefit.studies.choose.choice import choose
     from profilefit.studies.choose.cost import shipped

@@ -1,4 +1,4 @@
-"""The least that serves: every option's cost and its error at worst, and which of them the scene asks for."""
+"""The cheapest option within tolerance and budget, by every option's predicted cost and worst error."""
 
 from __future__ import annotations
 
@@ -43,9 +43,9 @@ class Predicted:
 
 @dataclass(frozen=True)
 class Choice:
-    """Options, and which of them serve.
+    """Options with their predictions, and which of them are within the limits.
 
-    predicted  cheapest first, as far as the choice asks for
+    predicted  cheapest first, as far as the choice needs
     chosen     the cheapest within tolerance and budget, or None
     nearest    what is shown: the chosen one, else the cheapest within the tolerance, else the most accurate within the
                budget
@@ -75,7 +75,10 @@ def affordable(one: Predicted, scene: Requirements) -> bool:
 
 
 def laws(setting: Setting) -> dict[str, ProfileLaw]:
-    """Laws with a text and one record under this light, by its name: that of the setting, else of a matched surface."""
+    """Laws with a shader source and one record under this illumination, by the record's name.
+
+    The record is that of the setting, else that of a matched surface.
+    """
     records, found = Records(fits_folder()), {}
     for name, kind in profile_classes().items():
         for base in kind.entry.records if kind.entry.has_text else ():
@@ -86,7 +89,7 @@ def laws(setting: Setting) -> dict[str, ProfileLaw]:
 
 
 def options(setting: Setting) -> list[Option]:
-    """All that is chosen from."""
+    """All options."""
     of_laws = [option for name, law in laws(setting).items() for option in sampled(law, name)]
     return [*filters(), *of_laws]
 
@@ -158,7 +161,7 @@ def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
 
 
 def _most_accurate(some: list[Predicted]) -> Predicted:
-    """The cheapest that is as good as any, to what a prediction can tell."""
+    """The cheapest that is as good as any, within the accuracy of a prediction."""
     least = min(one.error.total for one in some)
     return next(one for one in some if one.error.total <= AS_GOOD * least)
 

@@ -1,4 +1,4 @@
-"""What a scene asks of its translucent material: SCENE.toml, read and checked."""
+"""A scene's requirements of its translucent material: SCENE.toml, read and checked."""
 
 from __future__ import annotations
 

@@ -65,4 +65,4 @@ def nowhere(cells: Cells) -> Mask:
     return np.zeros(cells.shape, bool)
 
 
-UNEXPLAINED = Cause("unexplained", "no known cause fits", "find it", nowhere)
+UNEXPLAINED = Cause("unexplained", "no known cause", "find it", nowhere)

@@ -150,7 +150,7 @@ LIANG = (
     Cause(
         "r_max is 0/0",
         "r_max = -b/a: b underflows and a changes its sign as alpha goes to 0, 0/0 at 0 itself",
-        "take alpha >= 1e-6, as the shader text does; hazard or quantile hold at 0",
+        "take alpha >= 1e-6, as shader sources do; hazard or quantile hold at 0",
         of_liang(_no_reach),
     ),
     Cause(
@@ -194,12 +194,12 @@ LIANG = (
     Cause(
         "shape of (7)",
         "(a r + b) / (r + c) with coefficient laws in alpha is not the profile: (18) scales the energy, not the shape",
-        "hazard; the measures `rel` and `ks` of the record say how far off",
+        "hazard; the measures `rel` and `ks` of the record state the error",
         of_liang(_shape),
     ),
     Cause(
         "form of (19)",
-        "sqrt(xi) ln(1 + eps - xi) rises as xi^1.5 where the truth is linear, and eps fixes the largest radius",
+        "sqrt(xi) ln(1 + eps - xi) rises as xi^1.5 where the exact one is linear, and eps fixes the largest radius",
         "quantile, whose two limits are exact, or the inverse of hazard's cdf",
         of_liang(_inverse),
     ),
@@ -212,7 +212,7 @@ LIANG = (
     Cause(
         "no A above the fold",
         "no A of (8) gives an alpha above that at its fold: the root of a negative number",
-        "clamp as the shader text does, or the rational map",
+        "clamp as the shader source does, or the rational map",
         of_map(_above_largest),
     ),
     Cause(

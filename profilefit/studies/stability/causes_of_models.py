@@ -136,7 +136,7 @@ MODELS = (
     ),
     Cause(
         "too few Gaussians",
-        "e^(-r^2 / 2v) has neither the source's 1/r nor the tail e^(-kappa r), and between N widths it waves",
+        "e^(-r^2 / 2v) has neither the source's 1/r nor the tail e^(-kappa r), and between N widths it oscillates",
         "more Gaussians, up to 8, or another law",
         _too_few,
     ),
@@ -167,7 +167,7 @@ MODELS = (
     Cause(
         "source less image",
         "far out 1/d of the source less 1/d of its image is less than the rounding of either",
-        "the shader text, which sorts the difference; or hazard",
+        "the shader source, which sorts the difference; or hazard",
         _source_less_image,
     ),
     Cause(
@@ -234,7 +234,7 @@ NUMBERS = frozenset({Verdict.NOT_FINITE, Verdict.NEGATIVE})
 ERRORS = frozenset({Verdict.INACCURATE, Verdict.NOT_MONOTONE})
 FORMAT = (
     Cause(
-        "texts do not check",
+        "sources do not check",
         "a shader refuses nothing: an infinite alpha or l = 0 is Inf - Inf or 0/0",
         "check once a material: alpha in [0, 1], l > 0, r >= 0, as the law in Python does",
         _misused,
@@ -261,14 +261,14 @@ FORMAT = (
     ),
     Cause(
         "constants outside half",
-        "1e-25, 1e8 and 1 - 2^-24, which keep the text finite, are 0, Inf and 1 in half; x^2, 1/x and 1/l^2 overflow",
+        "1e-25, 1e8 and 1 - 2^-24, which keep the source finite, are 0, Inf and 1 in half; x^2, 1/x and 1/l^2 overflow",
         "compute in float32; keep only A, radii and results in half",
         _right_in_single,
         NUMBERS,
     ),
     Cause(
         "eleven bits",
-        "differences such as 1 - e^-t and 1 - xi keep few of half's eleven bits: in float32 the same text is right",
+        "differences such as 1 - e^-t and 1 - xi keep few of half's eleven bits: in float32 the same source is right",
         "compute in float32; keep only A, radii and results in half",
         _right_in_single,
         ERRORS,

@@ -25,7 +25,7 @@ Mask = NDArray[np.bool_]
 class Verdict(enum.IntEnum):
     """The class of a cell; of several that hold, the last one here counts.
 
-    NOT_JUDGED  a number, not negative and in order, of which nothing here tells what is right
+    NOT_JUDGED  a number, not negative and in order, without a reference value here
     """
 
     RIGHT = 0
@@ -145,7 +145,7 @@ def judged(
     dim: Mask | bool = False,
     wrong_way: Mask | None = None,
 ) -> Codes:
-    """The class of every cell: where nothing tells what is right, NaN the error or the bound no number, not judged.
+    """The class of every cell: where there is no reference, NaN the error or the bound no number, not judged.
 
     dim        where the right number is too small for the format to reach it, besides where it is itself too small
     wrong_way  where a value went the wrong way from its neighbour
@@ -238,7 +238,7 @@ class Rounded:
 
 
 class RoundedText:
-    """The functions of a law's or map's shader text, computed in one type throughout."""
+    """The functions of a law's or map's shader source, computed in one type throughout."""
 
     def __init__(self, law: AlbedoLaw | ProfileLaw, dtype: type) -> None:
         self.dtype = dtype

@@ -1,8 +1,8 @@
 """Fits: from random starts, on other rings, of noisy data, near black and white, of nonsense; what the solver says.
 
 All problems of a law have one shape, so that one compilation serves them all: `ALBEDOS` albedos, `RINGS` rings and as
-many problems side by side as are asked for. The truth is the exact half space, with the noise of so many photons added
-if asked.
+many problems side by side as are requested. The truth is the exact half space, with the noise of so many photons added
+if requested.
 """
 
 from __future__ import annotations
@@ -183,7 +183,7 @@ def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) ->
 
 NONSENSES: dict[str, Callable[[Rings], Rings]] = {
     "NaN in the data": lambda rings: _replaced(rings, energy=np.full_like(np.asarray(rings.energy), np.nan)),
-    "no light at all": lambda rings: _replaced(
+    "all zeros": lambda rings: _replaced(
         rings, energy=np.zeros_like(np.asarray(rings.energy)), beyond=np.zeros_like(np.asarray(rings.beyond))
     ),
     "one albedo only": lambda rings: _replaced(

@@ -41,7 +41,7 @@ Weights = tuple[tuple[float, float], ...]
 WEIGHTS: Weights = ((-2.0, 1.0 / 12.0), (-1.0, -8.0 / 12.0), (1.0, 8.0 / 12.0), (2.0, -1.0 / 12.0))
 BOUND = 1e-4  # relative; derivatives that are less than a millionth of value over argument count as that
 LEAST = 1e-6
-# Where differences are asked: elsewhere the step, or what is left of the value, is rounding.
+# Where differences are taken: elsewhere the step, or what is left of the value, is rounding.
 SURE = {"r": (1e-3, 30.0), "ξ": (0.005, 0.99), "α": (1e-3, 0.9985), "A": (1e-3, 0.97)}
 UNSURE = "differences are rounding there: only whether the derivative is a number is looked at"
 Function = Callable[[Any, Array, Array, Array], Array]

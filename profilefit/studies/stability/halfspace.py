@@ -28,7 +28,7 @@ DECAY = "κ(α)"
 # What its own docstring promises of profile and cdf, and of a map that is fitted to A.
 BOUNDS = {PROFILE: 1e-6, CDF: 1e-9, SAMPLE: 1e-9, REFLECTANCE_OF: 1e-5, DECAY: 1e-10}
 SURE_ALPHA, SURE_X = 0.05, (1e-6, 100.0)
-NO_LIMIT = "closer than 1e-6 mfp under diffuse light nothing tells R_d's limit"
+NO_LIMIT = "closer than 1e-6 mfp under diffuse light R_d's limit is not known"
 NEAR_SOURCE = 1e-4  # of R_d closer than 1e-6 mfp, where its limit stands for it
 
 

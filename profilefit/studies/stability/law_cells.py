@@ -48,14 +48,14 @@ from profilefit.studies.stability.reference import LEAST_X, Right
 
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]
-# Of laws that no record tells of: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
+# Of laws without a record: `quality.profile_quality` at the records' albedos, the worst; a test measures again.
 MEASURED: dict[str, dict[str, float]] = {
     "burley_diffuse_mfp": {"rel": 0.156, "ks": 0.0658},
     "dipole": {"rel": 0.789, "ks": 0.435},
     "better_dipole": {"rel": 0.953, "ks": 0.491},
 }
-NO_BOUND = "its record tells no error of this quantity"
-BEYOND_TEXT = "beyond the radius at which texts stop, where no light is left"
+NO_BOUND = "its record states no error of this quantity"
+BEYOND_TEXT = "beyond the radius at which shader sources stop, where no energy is left"
 COMPUTED = tuple(one for one in ARITHMETICS if one != MODEL)
 
 
@@ -77,7 +77,7 @@ class Limits:
 
 
 def limits_of(one: Named, folder: Folder) -> Limits:
-    """A tenth of the law's own model error, as its record or `MEASURED` tells it, and its stated range."""
+    """A tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
     model = MEASURED.get(one.name) or bounds.of_profile(one, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks

@@ -2,7 +2,7 @@
 
 float64           the law in Python, as called with numpy
 float32           the same code, run by jax in single precision
-float32 text      the shader text, every operation in single precision
+float32 text      the shader source, every operation in single precision
 float16 stored    the text in single precision, its A, r, l and result kept in half
 float16 text      the text, every operation in half precision
 model             the law in float64 against the exact half space: what no arithmetic can mend
@@ -144,7 +144,7 @@ def _pairs(dtype: type, values: Iterable[float]) -> list[float]:
 
 
 def _cells(dtype: type, values: Iterable[float]) -> Floats:
-    """The values that the format tells apart, rising; what it turns into infinity is left out but for infinity."""
+    """The values that the format distinguishes, rising; what it turns into infinity is left out but for infinity."""
     given = np.asarray(list(values), float)
     with np.errstate(over="ignore", under="ignore"):
         rounded = given.astype(dtype).astype(float)

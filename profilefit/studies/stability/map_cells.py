@@ -102,7 +102,7 @@ def _cells(
         dtype=dtype,
         twin=twin,
         stated=stated,
-        unjudged="no record tells the error of this direction",
+        unjudged="no record states the error of this direction",
     )
 
 

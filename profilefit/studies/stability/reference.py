@@ -22,7 +22,7 @@ class Right:
     """What is right on a grid.
 
     albedo   alphas (m, 1, 1) in place of the grid's, where these are kept in some other form
-    nearest  r/l at which R_d is taken where r/l is less, as shader texts do; 0 if it is not
+    nearest  r/l at which R_d is taken where r/l is less, as shader sources do; 0 if it is not
     """
 
     def __init__(self, law: ProfileLaw, at: ArgumentGrid, albedo: Floats | None = None, nearest: float = 0.0) -> None:

@@ -92,7 +92,7 @@ class Contender:
     """A law with one of its samplers.
 
     constants   fitted, of the profile and besides of the sampler alone; those of A(alpha) not counted
-    setup       what depends on alpha only, where the law tells it
+    setup       what depends on alpha only, where the law separates it
     judged      the sampler in the law's own form, guarded where the fast one is not: errors are of this
     another     whether it is another sampler of the law of the contender before
     """

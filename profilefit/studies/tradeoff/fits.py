@@ -5,8 +5,8 @@ two stages, its form at each albedo and then laws through the coefficients; emce
 Each is compared with what the very same way makes of the exact profiles, since a law that is not the truth ends
 elsewhere under another weighting: misfit is no error here. The error is the change of ring energies over the exact
 ones, from 0.01 mfp to 99.5 % of the energy, at all albedos, as a root mean square and at worst; `standardised` is the
-distance of the constants in their own standard errors, 1 if those tell the truth. They do not where there are few
-photons: rings that rest on too few are left out, the trimming (6) walks a stride more or less with the noise, and a law
+distance of the constants in their own standard errors, 1 if those are right. They do not where there are few
+photons: rings that rest on too few are left out, the trimming (6) ends a stride sooner or later by the noise, and a law
 that is not the truth moves with what it is fitted to. Every seed traces photons of its own, and seconds and errors have
 the spread of the seeds.
 """
@@ -104,16 +104,16 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             name,
             title,
             f"time of {what}, one core [s]",
-            "relative change of ring energies by noise [-]",
+            "relative change of the annuli's energies by noise [-]",
             tuple(point_of(name, *key, found) for key, found in trials.items()),
             joined=True,
         )
         for name, title, what in (
-            ("fit", "the fit alone, light given", "the fit"),
-            ("whole", "with the order-resolved run it is fitted to", "light and fit"),
+            ("fit", "the fit alone, simulation given", "the fit"),
+            ("whole", "with the order-resolved run it is fitted to", "simulation and fit"),
         )
     )
-    return TradeoffPart("fits", "Fits: time against what noise does to the law", panels, notes_of(trials, compiling))
+    return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
 
 
 def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:

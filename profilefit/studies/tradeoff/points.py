@@ -40,7 +40,7 @@ class WithSpread:
 class Point:
     """One method at one setting.
 
-    panel   the chart it belongs to;  method, label  its line there, and what tells it from others of that line
+    panel   the chart it belongs to;  method, label  its line there, and what distinguishes it from others of that line
     cost    of one answer, in the panel's unit
     error   in the panel's unit, of the middle: mean or root mean square;  worst  the largest, None where there is one
             error only

@@ -44,7 +44,7 @@ Floats = NDArray[np.float64]
 SAMPLES = 16  # of one estimate
 BLOCKS = 5  # of trials: how far the variance itself is known
 PLACES = (-3.0, -1.0, -0.3, -0.1)  # on the dark side of the edge [mfp]
-APART = 1e-3  # a bias that tells a sampler's density from its law's
+APART = 1e-3  # a bias that distinguishes a sampler's density from its law's
 ROUNDING = 1e-6  # share of A: what xi beyond 1 - 2^-24, never drawn, and the quadrature leave unknown
 QUICKLY = (YARDSTICK, "quantile")
 # Other constants of a law whose sampler is here already, or a sum of Gaussians between two others.

@@ -35,7 +35,7 @@ AS_IS = "standard nodes"
 RULES = {"half the nodes": 0.5, AS_IS: 1.0, "twice the nodes": 2.0}
 FINEST = 3.0  # times the standard nodes: what all errors are against
 SCALAR, SIMULATE, ORDERS, EXACT = "scalar tracer", "simulate", "simulate_orders", "exact"
-AXES = f"time for all {ALPHAS.size} albedos, one core [s]", "relative error of ring energies [-]"
+AXES = f"time for all {ALPHAS.size} albedos, one core [s]", "relative error of the annuli's energies [-]"
 MIDDLES = 0.5 * (EDGES[1:] + EDGES[:-1])
 
 
@@ -99,10 +99,10 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
     rates = stopwatch.take_turns({one.key: work(one) for one in found}, sizes.turns, track, "truths")
     points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in found)
     compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(found, rates).items())
-    title = f"Ring energies at {ALPHAS.size} albedos: seconds against error"
+    title = f"Energies of annuli at {ALPHAS.size} albedos: seconds against error"
     traced = tuple(replace(point, panel="tracers") for point in points if point.method != EXACT)
     panels = (
-        Panel("rings", f"{len(RINGS) - 1} rings of a half space with n = 1, g = 0", *AXES, points, joined=True),
+        Panel("rings", f"{len(RINGS) - 1} annuli of a half space with n = 1, g = 0", *AXES, points, joined=True),
         Panel(
             "tracers", "the same without the exact solution, which no other n and g have", *AXES, traced, joined=True
         ),

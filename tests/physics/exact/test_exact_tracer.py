@@ -89,7 +89,7 @@ def test_the_derivative_in_albedo_is_that_of_the_order_series(sidak):
 @pytest.mark.slow
 @pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
 def test_a_hundred_million_photons_agree_in_chi_square(illumination):
-    """Over a hundred rings from 0.003 to 40 mfp; an albedo with 0.1 % less loss is told apart."""
+    """Over a hundred rings from 0.003 to 40 mfp; an albedo with 0.1 % less loss is distinguished."""
     setting = Setting(illumination)
     edges = np.concatenate([[0.0], np.geomspace(0.003, 40.0, 100)])
     run = simulate_orders(Grid.from_edges(r=edges), 10**8, seed=6, setting=setting)

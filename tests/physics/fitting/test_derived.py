@@ -60,7 +60,7 @@ def test_statistical_errors_are_those_of_moved_constants(known):
 
 
 def test_the_band_holds_the_exact_profile_and_the_photons_alone_do_not(known):
-    """At albedos and radii that were not fitted: 68 % and 95 % bands, points far enough apart to count as five."""
+    """At held-out albedos and radii: 68 % and 95 % bands, points far enough apart to count as five."""
     inside, alone, number = {0.68: [], 0.95: []}, [], 0
     for alpha in (0.25, 0.55, 0.75, 0.88, 0.95, 0.985):
         r = np.geomspace(0.02, float(exact.quantile(0.99, alpha)), 9)

@@ -89,7 +89,7 @@ def test_monotone_in_radius_and_albedo(law):
 
 
 def test_near_the_exact_profile(law):
-    """Twelve albedos that were not fitted; two hundred of them with the slow tests."""
+    """Twelve held-out albedos; two hundred of them with the slow tests."""
     quality = profile_quality(law, 1 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 12) ** 2)
     assert np.max(quality.rel) < 0.005
     assert np.max(quality.ks) < 0.0011

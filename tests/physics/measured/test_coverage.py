@@ -14,7 +14,7 @@ from profilefit.measured.identifiability import identifiability
 from profilefit.measured.law_error import origin
 from profilefit.measured.problem import Question
 from profilefit.measured.reading import read
-from profilefit.measured.replicates import steadied
+from profilefit.measured.replicates import moderated_variances
 from profilefit.measured.result import Answer, judged, posterior
 from profilefit.recipes import catalogue
 
@@ -94,7 +94,7 @@ def test_replicates_are_not_accused_and_cover(count, uneven):
     found = []
     for _ in range(REPLICATES):
         size = 0.01 * np.sqrt(count) * np.exp(uneven * generator.standard_normal((R.size, 1)))
-        one = steadied(light[:, None] * (1 + size * generator.standard_normal((R.size, count))))
+        one = moderated_variances(light[:, None] * (1 + size * generator.standard_normal((R.size, count))))
         data = points(one.value, one.sigma, one.freedom, pooled=one.pooled)
         found.append(fitted(data, Question(LAW, {"scale": 1.0}), source()))
     low, high = band(0.95, REPLICATES)
@@ -102,7 +102,7 @@ def test_replicates_are_not_accused_and_cover(count, uneven):
     assert sum(one.misfit.detected for one in found) <= 3
     # Negative control: the errors taken for known ones.
     known = stats.norm.ppf(0.975) / found[0].quantile / np.median([np.sqrt(one.widening) for one in found])
-    if uneven:  # of equal scatter 92 % hold even so, which three hundred cannot tell from 95
+    if uneven:  # of equal scatter 92 % hold even so, which three hundred cannot distinguish from 95
         assert min(covered(found, 0.95, known).values()) < low
 
 

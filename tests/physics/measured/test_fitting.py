@@ -1,4 +1,4 @@
-"""Fits of one's own data, whole: what they find, what they cannot tell, what they say would help. One file, since its
+"""Fits of one's own data, whole: what they find, what is not identifiable, what they advise. One file, since its
 tests share one compiled law; those over hundreds of replicates are in test_coverage.
 """
 
@@ -119,7 +119,7 @@ def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
 def test_light_that_rises_outwards_runs_away():
     data = rings()
     rising = replace(data, value=data.r, sigma=0.02 * data.r)
-    assert fit(rising).minimum.result.startswith("a coordinate runs away")
+    assert fit(rising).minimum.result.startswith("a coordinate diverges")
     longest = data.r[-1] * LONGEST * np.exp(FARTHEST_LN)
     assert fit(rising).values["l"] <= longest
 

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from profilefit.measured.misfit import alone, gaussianised, scatter_chance
-from profilefit.measured.replicates import steadied, trend_freedom, widening
+from profilefit.measured.replicates import moderated_variances, trend_freedom, widening
 from profilefit.measured.result import likelihood
 
 ROWS, COUNT = 40, 3
@@ -26,7 +26,7 @@ def held(rows, count, spread, sets, widened=True, seed=0):
     inside = np.zeros(2, int)
     for _ in range(sets):
         sigma = 0.02 * light * np.exp(spread * generator.standard_normal(rows))
-        found = steadied(light[:, None] + sigma[:, None] * generator.standard_normal((rows, count)))
+        found = moderated_variances(light[:, None] + sigma[:, None] * generator.standard_normal((rows, count)))
         gain = np.linalg.pinv(line / found.sigma[:, None])
         error = np.sqrt(np.sum(gain**2, axis=1) * (widening(found.freedom, 2) if widened else 1.0))
         times = stats.t.ppf(0.975, found.pooled if widened else np.inf)
@@ -69,7 +69,7 @@ def test_the_freedom_of_a_trend_is_what_it_rests_on():
     levels = np.log(np.random.default_rng(2).chisquare(2.0, (4000, 22))).mean(axis=1)
     # The standard error of a variance from 4000 is 2.2 %, three of these.
     assert 2 / np.var(levels) == pytest.approx(trend_freedom(24, 2.0), rel=0.07)
-    found = steadied(draws(0.0, sets=1)[2][0])
+    found = moderated_variances(draws(0.0, sets=1)[2][0])
     assert found.pooled == trend_freedom(ROWS, 2.0)
     assert found.freedom.max() <= found.pooled + 2
     assert widening(np.full(9, np.inf), 3) == 1.0
@@ -84,11 +84,11 @@ def test_a_likelihood_of_an_estimated_scale_is_students():
 
 @pytest.mark.parametrize("spread", [0.0, 0.5])
 def test_chi_square_has_its_chance(spread):
-    """Of true means over steadied errors, 400 sums over 40 rows: one in twenty has a chance below 5 %."""
+    """Of true means over moderated errors, 400 sums over 40 rows: one in twenty has a chance below 5 %."""
     mean, _, samples = draws(spread)
     below, too_sure = 0, 0
     for one in samples:
-        found = steadied(one)
+        found = moderated_variances(one)
         residuals = gaussianised((found.value - mean) / found.sigma, alone(found.freedom, found.pooled))
         below += scatter_chance(residuals @ residuals, ROWS, found.pooled) < 0.05
         too_sure += scatter_chance(residuals @ residuals, ROWS, np.inf) < 0.05
@@ -117,7 +117,7 @@ def test_equal_variances_are_pooled_and_unequal_ones_are_not():
     freedom = {}
     for spread in (0.0, 1.5):
         _, sigma, samples = draws(spread, sets=50)
-        found = [steadied(one) for one in samples]
+        found = [moderated_variances(one) for one in samples]
         freedom[spread] = np.median([one.freedom.max() for one in found])
         if spread == 0.0:
             ratio = np.stack([one.sigma for one in found]) * np.sqrt(COUNT) / sigma
@@ -128,7 +128,7 @@ def test_equal_variances_are_pooled_and_unequal_ones_are_not():
 
 
 def test_rows_that_never_differ_keep_their_own():
-    found = steadied(np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [3.0, 3.0, 3.1]]))
+    found = moderated_variances(np.array([[1.0, 1.0, 1.0], [2.0, 2.0, 2.0], [3.0, 3.0, 3.1]]))
     np.testing.assert_allclose(found.value, [1, 2, 3.0333333])
     assert found.sigma[0] == 0
     np.testing.assert_array_equal(found.freedom, 2)

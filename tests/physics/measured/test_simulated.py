@@ -38,8 +38,8 @@ def test_an_mco_has_bounds_for_errors_and_no_last_ring():
     photons = raw.run.photons
     assert found.photons == photons
     np.testing.assert_allclose((found.sigma / found.value) ** 2, 1 / counts - 1 / (photons - 1))
-    assert found.notes[0] == "the last of 120 rings, which holds the light beyond, is left out"
-    assert "119 rings merged into" in found.notes[1]
+    assert found.notes[0] == "the last of 120 annuli, which holds all light beyond it, is left out"
+    assert "119 annuli merged into" in found.notes[1]
 
 
 def test_an_npz_has_its_own_errors_and_keeps_every_ring():
@@ -61,12 +61,12 @@ def test_an_npz_has_its_own_errors_and_keeps_every_ring():
 def test_files_with_too_little_light(tmp_path):
     text = (DATA / "half_space.mco").read_text()
     (tmp_path / "few.mco").write_text(text.replace("2097152 \t", "50 \t"))
-    with pytest.raises(InputError, match=r"few.mco: expected light in at least 3 rings .*, got \d\d in"):
+    with pytest.raises(InputError, match=r"few.mco: expected at least 3 annuli .*, got \d\d in"):
         read(tmp_path / "few.mco")
     head, _, rest = text.partition("\nRd_r #")
     first = rest.split("\n")[1]
     (tmp_path / "bright.mco").write_text(head + "\nRd_r #" + rest.replace(first, "1E+20", 1))
-    with pytest.raises(InputError, match=r"bright.mco: expected rings of no less than 0 and, in all"):
+    with pytest.raises(InputError, match=r"bright.mco: expected annuli of reflectance >= 0 that add up to at most 1"):
         read(tmp_path / "bright.mco")
     (tmp_path / "bad.npz").write_bytes(b"PK")
     with pytest.raises(InputError, match=r"bad.npz: expected results of mcml_sim, got: not a whole .npz file"):
@@ -86,8 +86,8 @@ def test_light_that_no_run_gives_is_one_line(tmp_path):
         return tmp_path / "bad.npz"
 
     for name, times, message in (
-        ("reflectance_r", 1e300, "expected rings of no less than 0 and, in all, no more than 1 of the light"),
-        ("reflectance_r", -1, "expected rings of no less than 0"),
+        ("reflectance_r", 1e300, "expected annuli of reflectance >= 0 that add up to at most 1"),
+        ("reflectance_r", -1, "expected annuli of reflectance >= 0"),
         ("reflectance_r_standard_error", 1e300, "expected standard errors of no more than all of the light"),
         ("reflectance_r_standard_error", 0, r"expected a standard error > 0 of the light from r = [\d.]+ to [\d.]+$"),
     ):

@@ -125,7 +125,7 @@ def test_a_text_may_fail_only_where_the_law_refuses():
     found = [cells for cells in misuse.of_law(find("burley", FITS)) if cells.refused is not None]
     assert all(np.all(cells.refused) for cells in found)
     codes = np.full(found[0].shape, Verdict.NOT_FINITE, np.int8)
-    assert {one.cause.key for one in regions_of(replace(found[0], codes=codes))} == {"texts do not check"}
+    assert {one.cause.key for one in regions_of(replace(found[0], codes=codes))} == {"sources do not check"}
     careless = replace(found[0], codes=codes, refused=np.zeros(found[0].shape, bool))
     assert {one.cause.key for one in regions_of(careless)} == {"unexplained"}
 

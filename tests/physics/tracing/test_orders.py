@@ -210,14 +210,14 @@ def test_setting_must_be_one(setting):
 
 
 def test_grids_too_fine_for_single_precision_are_refused():
-    with pytest.raises(InputError, match=r"rings wider than 1e-05 of their place.*got one from 1\.0 to 1\.0"):
+    with pytest.raises(InputError, match=r"annuli wider than 1e-05 of their place.*got one from 1\.0 to 1\.0"):
         simulate_orders(Grid.from_edges(r=[0, 1, 1 + 1e-12, 2]), 10)
     for edges in ([0, 1e-40, 1], [0, 1e40]):
         with pytest.raises(InputError, match="grid must have edges from 1e-30 to 1e"):
             simulate_orders(Grid.from_edges(r=edges), 10)
     with pytest.raises(InputError, match=r"must be a mcml_sim\.Grid"):
         simulate_orders([0, 1, 2], 10)
-    with pytest.raises(InputError, match="at most 2097152 bins, got 3000 rings x 3000 depths"):
+    with pytest.raises(InputError, match="at most 2097152 bins, got 3000 annuli x 3000 depths"):
         simulate_orders(Grid(0.1, 3000, 0.1, 3000), 10)
 
 

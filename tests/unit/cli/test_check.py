@@ -98,7 +98,7 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     for wrong in (
         "FAIL liang, published: rel against the exact half space",
         "cdf(r_max) is 13.6 to 15.5",
-        "negative; the text takes |g|: 0.009766 at ξ < 0.01",
+        "negative; the source takes |g|: 0.009766 at ξ < 0.01",
         "the law is 0/0",
         "FAIL map liang, published: bad numbers: 164 at A 0.9185 (164 not monotone)",
         "beyond its fold at A = 0.9165",

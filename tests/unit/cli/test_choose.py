@@ -29,7 +29,7 @@ def test_the_example():
     """Skin: chosen within tolerance and budget, one layer enough; the same as data."""
     table = run(SKIN)
     assert table.exit_code == 0
-    assert table.stdout.startswith("The least that serves: ")
+    assert table.stdout.startswith("The cheapest option within tolerance and budget: ")
     assert "one layer is enough" in table.stdout
     made = json.loads(run(SKIN, "--json").stdout)
     assert made["nearest"]["error"] <= 0.02
@@ -46,5 +46,5 @@ def test_nothing_serves(tmp_path):
     path.write_text(text.replace("error = 0.02", "error = 0.002").replace("index = 1.0", "index = 1.4"), "utf-8")
     found = run(path)
     assert found.exit_code == 1
-    assert found.stdout.startswith("Nothing serves for 0.20 % within 5 ms: the most accurate in the budget is ")
+    assert found.stdout.startswith("No option meets 0.20 % within 5 ms: the most accurate in the budget is ")
     assert "law: with what that for n = 1.4 may be off from photons" in found.stdout

@@ -24,7 +24,7 @@ def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_pat
     assert lines[0] == "phantom.csv: 20 points, law hazard, searchlight, n = 1, g = 0"
     (row,) = [line.split() for line in lines if line.startswith("mu_s'  ") and line.endswith("1/mm")]
     assert abs(float(row[1]) - 0.95 / 1.1) < 3 * (float(row[2]) + float(row[3]))
-    assert any(line.startswith("no misfit is seen") for line in lines)
+    assert any(line.startswith("no misfit is detected") for line in lines)
     folder = tmp_path / "out"
     assert {one.name for one in folder.iterdir()} == {
         "fit.json", "fit-residuals.png", "fit-residuals.svg", "fit-corner.png", "fit-corner.svg",
@@ -42,7 +42,7 @@ def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_pat
     joint = 1.96 * math.hypot(length["statistical_error"], length["law_error"])
     assert half(length["interval_95_total"]) == pytest.approx(joint, rel=0.06), "the law's error as well"
     assert half(length["interval_95_total"]) > 1.04 * half(length["interval_95_data"])
-    assert "95 %: all of these errors together" in " ".join(out.split())
+    assert "95 %: interval by all of these errors together" in " ".join(out.split())
 
 
 def half(ends):
@@ -65,18 +65,18 @@ def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path
     assert max(found["data"]["freedom"]) <= found["data"]["pooled_freedom"] + 2
     assert found["widening"] > 1.1
     assert found["quantile_95"] == pytest.approx(2.07, abs=0.01)
-    assert f"95 % is {found['quantile_95']:.2f} times ± data (Student)" in " ".join(out.split())
+    assert f"95 % is {found['quantile_95']:.2f} times ± statistical (Student's t)" in " ".join(out.split())
     length = found["quantities"]["l"]
     assert half(length["interval_95_data"]) == pytest.approx(2.07 * length["statistical_error"], rel=0.1)
 
 
-def test_data_that_cannot_tell_say_so_and_what_would(command):
+def test_what_is_not_identifiable_is_reported_with_a_remedy(command):
     status, out, err = command("fit", PHANTOM, "--scale", "free", "--r-max", "0.5mm")
     assert (status, err) == (0, "")
     assert "AT AN EDGE: alpha runs to " in out
-    assert "THE DATA CANNOT TELL" in out
+    assert "ARE NOT SEPARATELY IDENTIFIABLE" in out
     assert "fits as well, at 95 %" in out
-    assert "what would tell: " in out
+    assert "most informative additional measurement: " in out
     assert "15 of 20 rows left out, by --r-min and --r-max" in out
 
 
@@ -126,7 +126,7 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
     status, out, err = command("fit", PHANTOM, "--scale", "0.2")
     assert (status, err) == (0, "")
     assert "AT AN EDGE: alpha runs to 1" in out
-    assert "MISFIT (chance below 1e-16)" in out
+    assert "MISFIT (p-value below 1e-16)" in out
 
 
 @pytest.mark.parametrize(

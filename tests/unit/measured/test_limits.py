@@ -39,5 +39,5 @@ def test_numbers_whose_squares_are_no_floats(change, message):
 
 
 def test_too_many_rows_name_the_way_out():
-    with pytest.raises(InputError, match=r"at most 500 rows, got 501: average neighbours over rings .* or .* `r_min`"):
+    with pytest.raises(InputError, match=r"at most 500 rows, got 501: average neighbours over annuli .* or .* `r_min`"):
         require_workable(points(MOST_ROWS + 1))

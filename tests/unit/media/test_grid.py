@@ -94,8 +94,8 @@ def test_what_is_not_resolved_is_none_and_said():
 
 
 def test_a_grid_tells_of_itself():
-    assert repr(Grid(0.5, 2)).startswith("Grid(2 rings to r = 1, ")
-    assert repr(Grid(0.5, 2, 0.25, 3, na=4)).startswith("Grid(2 rings to r = 1, 3 depths to z = 0.75, 4 angles, ")
+    assert repr(Grid(0.5, 2)).startswith("Grid(2 annuli to r = 1, ")
+    assert repr(Grid(0.5, 2, 0.25, 3, na=4)).startswith("Grid(2 annuli to r = 1, 3 depths to z = 0.75, 4 angles, ")
 
 
 @pytest.mark.parametrize("width", [0, -1, np.nan, np.inf, "1", None, True])

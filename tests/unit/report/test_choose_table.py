@@ -49,7 +49,8 @@ def printed(part):
 
 def test_says_it_in_one_line_and_why(choice):
     text = printed(choose_table(choice, shipped(), LAYER))
-    assert text.splitlines()[0] == "The least that serves: separable, 17 taps (asked: 2.0 % within 4 ms)"
+    chosen = "The cheapest option within tolerance and budget: separable, 17 taps (requested: 2.0 % within 4 ms)"
+    assert text.splitlines()[0] == chosen
     rows = {line[:12]: line for line in text.splitlines()}
     assert "nothing (Lambert)" in rows["best cheaper"]
     assert "no: error" in rows["best cheaper"]
@@ -76,10 +77,10 @@ def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
 def test_says_when_nothing_serves(choice):
     scarce = chosen(Requirements(**{**vars(SCENE), "budget": Budget(ms=1.0)}), choice.predicted)
     assert headline(scarce).startswith(
-        "Nothing serves for 2.0 % within 1 ms: the cheapest within the tolerance is separable"
+        "No option meets 2.0 % within 1 ms: the cheapest within the tolerance is separable"
     )
     strict = chosen(Requirements(**{**vars(SCENE), "tolerance": 0.001, "budget": Budget()}), choice.predicted)
-    assert headline(strict) == "Nothing serves for 0.10 %: the most accurate is hazard-diffuse, 64 samples"
+    assert headline(strict) == "No option meets 0.10 %: the most accurate is hazard-diffuse, 64 samples"
 
 
 def test_a_budget_within_the_range_is_likely_kept(choice):

@@ -143,7 +143,7 @@ def _stages(content):
     return rendered(record_tables.stage_tables(content["stages"]), 100).splitlines() if "stages" in content else []
 
 
-def test_three_errors_are_told_apart_and_old_records_have_none_of_it():
+def test_three_errors_are_reported_separately_and_old_records_have_none_of_it():
     content = copy.deepcopy(FITS["hazard"])
     content.pop("discrepancy", None)
     for number, constant in enumerate(content["constants"].values()):
@@ -156,7 +156,7 @@ def test_three_errors_are_told_apart_and_old_records_have_none_of_it():
     told = {**content, "discrepancy": {**process, "gain": None, "result": "found"}}
     text = " ".join(rendered([record_tables.fit_facts(told)], 100).split())
     assert "discrepancy amplitude 0.0123 ± 0.0011; residuals 0.0090 rms" in text
-    assert "reaching 0.50 in √(1 − α), 2.0 in ln r; found" in text
+    assert "correlation length 0.50 in √(1 − α), 2.0 in ln r; found" in text
     for constant in content["constants"].values():
         del constant["discretisation_error"], constant["model_error"]
     old = rendered([record_tables.constants_table(content), record_tables.fit_facts(content)], 80)

@@ -63,7 +63,7 @@ def test_marks_say_where_points_stand():
     assert faces[40.0][0] == "o"
     assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
     (steps,) = [line for line in axes.get_lines() if line.get_drawstyle() == "steps-post"]
-    np.testing.assert_allclose(steps.get_xdata(), [1.0, 2.0, 2.1])  # the last two are not told apart
+    np.testing.assert_allclose(steps.get_xdata(), [1.0, 2.0, 2.1])  # the last two are not distinguished
 
 
 @pytest.mark.parametrize(

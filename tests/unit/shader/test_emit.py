@@ -95,10 +95,10 @@ def test_a_law_without_a_closed_form_is_named():
 
 def test_a_map_is_no_profile_law_and_the_other_way_round():
     with pytest.raises(
-        InputError, match=r"law must be one that has a shader text \(liang, burley.*hazard, quantile\), got Rational"
+        InputError, match=r"law must be one that has a shader source \(liang, burley.*hazard, quantile\), got Rational"
     ):
         emit.law_text(BURLEY.albedo)
-    with pytest.raises(InputError, match=r"law must be one that has a shader text \(liang, rational.*got Burley"):
+    with pytest.raises(InputError, match=r"law must be one that has a shader source \(liang, rational.*got Burley"):
         emit.map_text(BURLEY)
 
 
