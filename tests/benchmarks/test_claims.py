@@ -1,0 +1,55 @@
+"""What is promised: quick rows measured, the file of the last measurement, and a promise that is not kept."""
+
+import json
+
+import pytest
+
+from benchmarks import claims
+from profilefit.recipes import record
+from profilefit.report.tables.claims_table import EXACT, FILE, read_claims
+
+EVIDENCE = claims.FITS / "evidence"
+BROKEN = ("broken", "≤ 0.1 %", claims.RECORDS.promises[0][2], "error of R_d by hazard")
+
+
+def of_records() -> dict:
+    return {"records": {name: record.read(path) for name, path in record.available(claims.FITS).items()}}
+
+
+def test_records_keep_what_is_promised_and_are_those_that_were_measured():
+    rows = list(claims.claimed(claims.RECORDS, claims.RECORDS.command, of_records()))
+    assert [one.cells for one in rows if not one.holds] == []
+    assert {one.noise for one in rows} == {EXACT}
+    told = {one.name: one.value for one in read_claims(EVIDENCE)[1]}
+    assert {one.name: one.value for one in rows}.items() <= told.items()
+
+
+def test_the_file_holds_every_row_as_it_is_promised_and_none_is_broken():
+    _, rows = read_claims(EVIDENCE)
+    promised = [(name, says, bound) for run in claims.RUNS for name, bound, _, says, *_ in run.promises]
+    assert [(one.name, one.says) for one in rows] == [(name, says) for name, says, _ in promised]
+    assert [(one.sense, one.bound) for one in rows] == [(b.split()[0], float(b.split()[1])) for _, _, b in promised]
+    assert [one.cells for one in rows if not one.holds] == []
+    assert all(one.low <= one.value <= one.high for one in rows)
+
+
+def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(claims, "RUNS", (claims.RECORDS._replace(promises=(BROKEN, claims.RECORDS.promises[1])),))
+    with pytest.raises(SystemExit, match=r"error of R_d by hazard: 0.331 % BROKEN, promised ≤ 0.1 %"):
+        claims.main(["--out", str(tmp_path)])
+    assert "0.331 % BROKEN" in capsys.readouterr().out
+    made, rows = read_claims(tmp_path)
+    assert made["command"] == "make claims"
+    assert [one.holds for one in rows] == [False, True]
+
+    # Rows that are not asked for stay, unless they are of other records.
+    monkeypatch.setattr(claims, "numbers", lambda command: of_records())
+    written = json.loads((tmp_path / FILE).read_text(encoding="utf-8"))
+    written["rows"][0]["value"] = 0.05
+    (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
+    claims.main(["--only", "map-error", "--out", str(tmp_path)])
+    assert [one.value for one in read_claims(tmp_path)[1]] == [0.05, rows[1].value]
+    written["made"]["sha256"] = "0" * 64
+    (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
+    claims.main(["--only", "map-error", "--out", str(tmp_path)])
+    assert [one.name for one in read_claims(tmp_path)[1]] == ["map-error"]
