@@ -12,7 +12,7 @@ ARGS ?=
 TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/howto/shader.md
 
 .DEFAULT_GOAL := help
-.PHONY: help fits evidence readme docs test test-all benchmark programs lint format wheel clean
+.PHONY: help fits evidence claims readme docs test test-all benchmark programs lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
@@ -25,6 +25,11 @@ evidence: $(VENV)/.installed programs  ## measure what reports show beside the f
 	$(VENV)/bin/profilefit check --fits fits --out fits/evidence
 	$(VENV)/bin/profilefit stability --fits fits --out fits/evidence
 	$(VENV)/bin/profilefit tradeoff --fits fits --out fits/evidence
+
+claims: $(VENV)/.installed-test programs  ## measure what README and guides promise, on an idle machine: forty minutes; ARGS=--quick: ten, noisier
+	@$(PIP) install --editable '.[benchmark]'
+	$(PY) -m benchmarks.claims $(ARGS)
+	$(VENV)/bin/profilefit report --fits fits --markdown docs/guide/claims.md
 
 readme: fits  ## make fits, and put its tables into the README and the docs
 	for page in $(TABLES); do $(VENV)/bin/profilefit report --fits fits --markdown $$page || exit; done

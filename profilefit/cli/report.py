@@ -29,6 +29,9 @@ def report(
     quality: Annotated[
         bool, typer.Option("--quality", help="Measure every law against the exact half space instead (a minute).")
     ] = False,
+    claims: Annotated[
+        bool, typer.Option("--claims", help="Print what is promised of accuracy and speed, beside what was measured.")
+    ] = False,
     figures_to: Annotated[
         Path | None, typer.Option("--figures", help="Folder for the figures; without it none are drawn.")
     ] = None,
@@ -42,7 +45,7 @@ def report(
     evidence: Annotated[
         Path | None,
         typer.Option(
-            help="Folder that check, stability and tradeoff wrote into with --out, for the page: "
+            help="Folder that check, stability and tradeoff wrote into with --out, for the page and --claims: "
             "./evidence if it is there, else the one beside the records."
         ),
     ] = None,
@@ -66,8 +69,10 @@ def report(
         from profilefit.recipes import record
         from profilefit.report import every_law
         from profilefit.report.tables import law_tables
+        from profilefit.report.tables.claims_table import read_claims
 
-    _require_one({"--markdown": markdown, "--html": html, "--json": as_json, "--quality": quality and not as_json})
+    printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
+    _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
     contents = record.chosen(folder, names)
     if markdown is not None:
@@ -78,9 +83,13 @@ def report(
         body: dict[str, Any] = {"records": contents}
         if quality:
             body["quality"] = law_tables.content(_measured(folder, names, quiet))
+        if claims:
+            told["claims"] = read_claims(evidence_folder(folder, evidence))[1]
         print_json(body)
     elif quality:
         show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())
+    elif claims:
+        _show_claims(evidence_folder(folder, evidence), folder, quiet)
     else:
         _show(contents, bool(names))
     if figures_to is not None:
@@ -90,7 +99,8 @@ def report(
 def _require_one(flags: dict[str, object]) -> None:
     given = [option for option, value in flags.items() if value]
     if len(given) > 1:
-        raise InputError(f"report takes one of {', '.join(flags)}, or --json with --quality, got {' and '.join(given)}")
+        accepted = f"one of {', '.join(flags)}, or --json with --quality or --claims"
+        raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
 
 
 def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
@@ -102,6 +112,18 @@ def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
     console = screen()
     for part in parts:
         put(part, console)
+
+
+def _show_claims(evidence: Path, folder: Path, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, screen, show
+        from profilefit.recipes.evidence import stale
+        from profilefit.report.tables.claims_table import claim_tables, read_claims
+
+    made, rows = read_claims(evidence)
+    show(claim_tables(rows), screen())
+    if stale(made, folder):
+        notes(quiet).print("since then records or version have changed: `make claims` measures again", markup=False)
 
 
 def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Qualities:

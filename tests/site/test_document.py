@@ -13,7 +13,7 @@ from profilefit.recipes import catalogue, evidence
 from profilefit.report.page.document import PARTS, write_page
 from profilefit.report.page.fits import record_part
 from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, shader, speed
+from profilefit.report.page.sections import failures, promises, shader, speed
 from profilefit.report.records import Source
 
 SHIPPED = catalogue.fits_folder()
@@ -133,7 +133,7 @@ def test_it_is_whole_and_loads_nothing(page):
     found.feed(page.read_text(encoding="utf-8"))
     assert found.open == []
     assert len(found.ids) == len(set(found.ids))
-    assert set(PARTS) - {"paper"} <= set(found.ids)
+    assert set(PARTS) - {"paper", "claims"} <= set(found.ids)
     assert all(one.startswith(("#", "data:")) for one in found.loads)
     assert {one[1:] for one in found.loads if one.startswith("#")} <= set(found.ids)
     assert not re.search(r"url\((?!data:|#|&quot;|\"data:)", page.read_text(encoding="utf-8"))
@@ -182,6 +182,12 @@ def test_what_the_commands_wrote_last_can_be_read():
     assert [name in text for name, text in zip(("misprint of b0", "quantile", "hazard"), told, strict=True)] == [
         True
     ] * 3
+
+
+def test_what_was_promised_and_measured_last_is_a_section_of_its_own():
+    told = "".join(promises(Measured(SHIPPED / "evidence", SHIPPED)))
+    assert "profilefit tradeoff truth" in told
+    assert "run it again" not in told
 
 
 def test_damage_is_one_line_and_leaves_the_old_page(page, records, tmp_path):

@@ -1,14 +1,16 @@
 """What README and documentation claim is what the records say."""
 
-import json
+import re
 from pathlib import Path
 
 import pytest
 
+from benchmarks.claims import RUNS
 from profilefit.recipes import record
 from profilefit.recipes.inventory import profile_laws
 from profilefit.report import fill, sections
 from profilefit.report.tables.all_laws import measured_profile
+from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.law_tables import markdown_laws, markdown_sections
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
@@ -20,8 +22,10 @@ PLACES = {
     **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/guide/laws.md"),
     **dict.fromkeys(("constants", "readings", "inversion", "maps"), ROOT / "docs/guide/paper.md"),
     "check": ROOT / "docs/howto/shader.md",
+    "claims": ROOT / "docs/guide/claims.md",
 }
-MEASURED = ("laws", "check")
+MEASURED = ("laws", "check", "claims")
+CLAIM = re.compile(r'\[([^\]]+)\]\([\w./-]*claims\.md "([\w-]+)"\)')
 WRITTEN = [README, *(path for part in ("start", "guide", "howto", "theory") for path in ROOT.glob(f"docs/{part}/*.md"))]
 
 
@@ -62,7 +66,7 @@ def test_filling_again_changes_nothing_and_a_stale_table_is_replaced():
 
 @pytest.mark.parametrize("page", WRITTEN, ids=lambda path: path.relative_to(ROOT).as_posix())
 def test_every_picture_and_page_it_names_is_there(page):
-    names = [part.split(")")[0].split("#")[0] for part in text_of(page).split("](")[1:]]
+    names = [part.split(")")[0].split("#")[0].split(" ")[0] for part in text_of(page).split("](")[1:]]
     local = [name for name in names if name and not name.startswith("https://")]
     # A page of docs/laws is made when the documentation is built, which tells if one is missing.
     assert [name for name in local if "../laws/" not in name and not (page.parent / name).exists()] == []
@@ -73,22 +77,16 @@ def test_the_readme_is_two_screens_and_its_numbers_are_the_records_own():
     lines, words = text_of(README).splitlines(), " ".join(text_of(README).split())
     assert len(lines) <= 110
     shown = {(row[0], row[1]): row[2:] for row in rows_of("short")}
-    hazard, burley = (shown[key] for key in (("hazard", "regenerated"), ("burley", "published")))
-    assert f"**{100 * float(hazard[1]):.2f} %**" in words
+    burley = shown["burley", "published"]
     assert f"is {100 * float(burley[1]):.0f} %, and {100 * float(burley[0]):.1f} % on average" in words
 
 
-def test_times_in_prose_are_those_that_were_measured_last():
-    told = json.loads((ROOT / "fits/evidence/tradeoff.json").read_text(encoding="utf-8"))["laws"]["panels"]
-    both, alone = (
-        {one["method"]: one["facts"]["times_yardstick"] for one in told[panel]["points"] if "steps" not in one["label"]}
-        for panel in ("both", "profile")
-    )
-    assert f"**{both['hazard']:.2f} times** the time of normalized diffusion" in " ".join(text_of(README).split())
-    for page in ("laws", "tradeoff"):
-        words = " ".join(text_of(ROOT / f"docs/guide/{page}.md").split())
-        for ratio in (f"{both['hazard']:.2f}", f"{both['quantile']:.2f}", f"{alone['hazard']:.1f} times as long"):
-            assert ratio in words, page
+def test_figures_in_prose_are_the_bounds_of_the_claims_they_link_to():
+    bounds = {promise[0]: float(promise[1].split()[1]) for run in RUNS for promise in run.promises}
+    found = [(page, name, text) for page in WRITTEN for text, name in CLAIM.findall(text_of(page))]
+    assert [one for one in found if float(one[2].split()[0].replace(",", "")) != bounds[one[1]]] == []
+    assert {name for page, name, _ in found if page == README} >= {"hazard-error", "hazard-time", "shader-time"}
+    assert len(found) == sum(text_of(page).count('claims.md "') for page in WRITTEN), "a link of another form"
 
 
 def test_every_record_has_its_recipe_and_ended_well():
@@ -110,6 +108,11 @@ def test_measured_tables_name_every_law_and_two_are_measured_again():
     for one in [o for o in laws if o.label in ("burley, published", "liang-whole")]:
         line = markdown_laws([(one, measured_profile(one))]).splitlines()[2]
         assert [cell.strip() for cell in line.strip("|").split("|")] in rows, f"{one.label}: run make readme"
+
+
+def test_the_table_of_claims_is_what_was_measured_last():
+    table = markdown_claims(ROOT / "fits/evidence")
+    assert fill(text_of(PLACES["claims"]), {"claims": table}) == text_of(PLACES["claims"]), "run make claims"
 
 
 def test_all_that_was_regenerated_passes_the_check_and_what_was_printed_by_liang_does_not():

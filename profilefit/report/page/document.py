@@ -17,7 +17,7 @@ from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
 from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, shader, speed
+from profilefit.report.page.sections import failures, promises, shader, speed
 from profilefit.report.records import Source
 
 Tracked = Callable[[list[str]], Iterable[str]]
@@ -42,6 +42,7 @@ PARTS = {
     "stability": "Where methods fail",
     "tradeoff": "Speed against accuracy",
     "check": "In a shader",
+    "claims": "Promised, and measured",
     "provenance": "Where it comes from",
 }
 # Section -> the command that measures it, its parts.
@@ -95,6 +96,7 @@ def write_page(
     for file in source.paths.values():  # damage is reported now, not after a minute
         record.read(file, whole=True)
     measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
+    measured["claims"] = "\n".join(promises(found))
     makers = _makers(source, path.name) | {key: partial(str, text) for key, text in measured.items()}
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     write_whole(path, _document(made, len(source.paths)))

@@ -10,6 +10,7 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.page.markup import details, element, markup, paragraph
 from profilefit.report.page.measured import EvidenceFolder, Told, missing
 from profilefit.report.tables.cells import ABSENT, column_table, significant
+from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.studies.stability.cells import Verdict
 
 # `python -m benchmarks.render` makes them.
@@ -189,3 +190,11 @@ def _causes(regions: Sequence[Told]) -> dict[str, list[str]]:
 
 def _laws(group: Sequence[Told]) -> set[str]:
     return {one["law"] for one in group}
+
+
+def promises(found: Measured) -> Iterator[str]:
+    """The parts of the section; nothing where no checkout measured them."""
+    if (found.folder / FILE).exists():
+        made, claims = read_claims(found.folder)
+        yield found.origin({"made": made})
+        yield from map(markup, claim_tables(claims))

@@ -18,6 +18,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.fitting.sampling import SamplerQuality
+from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.tables.all_laws import (
@@ -33,6 +34,7 @@ from profilefit.report.tables.all_laws import (
 )
 from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check
+from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.report.tables.quality_tables import albedo_number
 
@@ -171,7 +173,8 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     def samplers() -> str:
         return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder)))))
 
-    return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder)}
+    claims = {"claims": lambda: markdown_claims(folder / EVIDENCE)}
+    return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder), **claims}
 
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:

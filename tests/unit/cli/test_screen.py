@@ -92,3 +92,14 @@ def test_the_command_is_told_as_it_was_typed(monkeypatch):
     assert typed() == "profilefit check burley --out 'a b'"
     monkeypatch.setattr(sys, "argv", [str(Path("somewhere/mcml_sim/__main__.py")), "run"])
     assert typed() == "mcml_sim run"
+
+
+def test_claims_are_shown_as_they_were_measured_last(command, tmp_path):
+    told = strict(command("report", "--claims", "--json")[1])["claims"]
+    status, out, _ = command("report", "--claims")
+    assert status == 0
+    assert all(one["command"] in out for one in told)
+    assert out.count("≤ ") + out.count("≥ ") == len(told) > 10
+    status, _, err = command("report", "--claims", "--evidence", str(tmp_path))
+    assert (status, err.count("\n")) == (2, 1)
+    assert "claims.json" in err

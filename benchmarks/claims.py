@@ -1,0 +1,269 @@
+"""Every figure that README and guides promise, beside what is measured: `make claims` writes fits/evidence/claims.json.
+
+    python -m benchmarks.claims [--only NAME ...] [--quick] [--out FOLDER]
+
+Forty minutes on two idle cores; with --quick ten, and noisier. A promise is a row below, read from the numbers of a
+command that prints it. Prose that states its bound links to the table by its name, [1.5](claims.md "hazard-time"), and
+a test compares them. Exit status 1 if what was measured breaks a bound.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import shlex
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict
+from functools import reduce
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from rich.console import Console
+
+from mcml_sim.cli.screen import show
+from mcml_sim.files.text_file import as_json
+from mcml_sim.files.whole_file import write_whole
+from profilefit.recipes.evidence import made, require_apart, stale
+from profilefit.report.tables.claims_table import EXACT, FILE, Claim, claim_tables, read_claims
+
+ROOT = Path(__file__).resolve().parents[1]
+FITS = ROOT / "fits"
+ANSWERS = (0, 1)  # exit statuses of a command that has numbers
+WIDTH = 160  # of the tables
+
+
+class Run(NamedTuple):
+    """A command whose numbers hold figures; what they are held against; what their spread is; what --quick adds to it.
+
+    promises  name, bound, place of the figure in the numbers or a function of them, what it is of, and its noise where
+              that is not the run's: a figure is a value, or value, low and high
+    """
+
+    command: str
+    quick: str
+    truth: str
+    noise: str
+    promises: tuple[tuple[Any, ...], ...]
+
+
+def at(numbers: Any, place: str) -> Any:
+    """What lies at a dotted place."""
+    return reduce(lambda inside, key: inside[key], place.split("."), numbers)
+
+
+def worst(place: str, scale: float = 1.0):
+    """The largest of the list there, over what a unit is."""
+    return lambda numbers: max(at(numbers, place)) / scale
+
+
+def times(place: str, over: str):
+    """One figure over another."""
+    return lambda numbers: at(numbers, place) / at(numbers, over)
+
+
+def ratio(place: str):
+    """A ratio of tracer.py with its spread."""
+    return lambda numbers: [numbers[place][end] for end in ("median", "least", "most")]
+
+
+def less_work(method: str):
+    """How many times less time x error² the longest order-resolved run takes, of all of a time."""
+
+    def read(numbers: Any) -> list[float]:
+        points = {point["method"]: point for point in at(numbers, "truth.panels.rings.points")}
+        ends = [("value", "value"), ("low", "high"), ("high", "low")]
+        return [_work(points[method], end) / _work(points["simulate_orders"], other) for end, other in ends]
+
+    return read
+
+
+def _work(point: dict[str, Any], end: str) -> float:
+    return point["cost"][end] * point["error"][end] ** 2
+
+
+def exact_error(numbers: Any) -> float:
+    """The worst of the standard quadratures."""
+    points = at(numbers, "truth.panels.rings.points")
+    return next(point["worst"]["value"] for point in points if point["label"] == "standard nodes")
+
+
+def rounding(numbers: Any) -> float:
+    """Largest error that float32 adds over the law's own; the limit is a tenth of that [%]."""
+    bounds = [bound for kind in ("laws", "maps") for one in numbers[kind] for bound in one["bounds"]]
+    return max(10 * bound["value"] / bound["limit"] for bound in bounds if bound["name"].startswith("float32 "))
+
+
+def edge(*measures: str, scale: float = 1.0):
+    """The largest of the law hazard's, over lights and albedos."""
+    return lambda numbers: max(
+        value / scale for light in numbers["laws"].values() for one in measures for value in light["hazard"][one]
+    )
+
+
+def edge_nearer(numbers: Any) -> float:
+    """Least bias of normalized diffusion over that of hazard, over lights and albedos."""
+    pairs = [zip(light["normalized diffusion"]["bias"], light["hazard"]["bias"], strict=True)
+             for light in numbers["laws"].values()]  # fmt: skip
+    return min(diffusion / hazard for both in pairs for diffusion, hazard in both)
+
+
+def apart(only_chosen: bool):
+    """Predicted and rendered error, larger over smaller, at worst."""
+
+    def read(numbers: Any) -> float:
+        pairs = [pair for one in numbers for option, pair in one["options"].items()
+                 if option == one["chosen"] or not only_chosen]  # fmt: skip
+        return max(max(p["predicted"] / p["measured"], p["measured"] / p["predicted"]) for p in pairs)
+
+    return read
+
+
+def uncovered(numbers: Any) -> int:
+    """Shares of stated intervals outside their binomial band."""
+    rows = [row for row in numbers if row["errors"] == "sandwich"]
+    pairs = [pair for row in rows for pair in zip(row["shares"].values(), row["band"], strict=True)]
+    return sum(not low <= share <= high for shares, (low, high) in pairs for share in shares)
+
+
+# fmt: off
+TURNS = "least and most of the turns"
+RECORDS = Run(
+    "profilefit report hazard albedo-rational albedo-liang", "", "exact half space, where nothing was fitted", EXACT, (
+        ("hazard-error", "≤ 0.34 %", worst("records.hazard.quality.regenerated.rel", 0.01),
+         "error of R_d by hazard, mean over radii, worst of 24 albedos from 0.05 to 0.995"),
+        ("map-error", "≤ 5e-06", "records.albedo-rational.quality.regenerated.delta_A",
+         "largest error of A by the rational map"),
+        ("map-nearer", "≥ 10000", times("records.albedo-liang.quality.published.delta_A",
+                                        "records.albedo-rational.quality.regenerated.delta_A"),
+         "largest error of A by the printed map (8) over that by the rational one"),
+    ))
+RUNS = (
+    RECORDS,
+    Run("python -m benchmarks.laws", "", "exact half space; time of normalized diffusion, exact inverse", TURNS, (
+        ("hazard-nearer", "≥ 40", times("normalized diffusion.rel.worst", "hazard.rel.worst"),
+         "worst error of R_d by normalized diffusion over that by hazard"),
+        ("quantile-nearer", "≥ 20", times("normalized diffusion.rel.worst", "quantile.rel.worst"),
+         "worst error of R_d by normalized diffusion over that by quantile"),
+        ("hazard-time", "≤ 1.5", "hazard.time_ratio.both", "time of a radius and R_d there by hazard, on a core"),
+        ("quantile-time", "≤ 0.6", "quantile.time_ratio.both", "time of a radius and R_d there by quantile, on a core"),
+        ("hazard-profile-time", "≤ 3", "hazard.time_ratio.profile", "time of R_d alone by hazard, on a core"),
+    )),
+    Run("profilefit check", "", "float64 and the exact half space; time of normalized diffusion", EXACT, (
+        ("shader-time", "≤ 3", "costs.hazard.ratio.both", "time of a radius and R_d there by hazard, in a shader",
+         "median of 7 turns"),
+        ("shader-rounding", "≤ 10 %", rounding, "error that float32 adds to an exported text, over the law's own"),
+        ("shader-faults", "≤ 0", lambda n: sum(len(one["broken"]) for kind in ("laws", "maps") for one in n[kind]),
+         "bounds that exported texts of regenerated laws and maps break"),
+    )),
+    Run("python benchmarks/tracer.py", "--quick", "compiled scalar tracers in MCML's manner, one core", TURNS, (
+        ("orders-speed", "≥ 20", ratio("simulate_orders, live events/s, over the yardstick"),
+         "live events a second of simulate_orders, over a scalar tracer with r-z tally"),
+        ("half-space-speed", "≥ 30", ratio("half space, photons/s"),
+         "photons a second in a half space, alpha 0.9, reflectance only"),
+        ("half-space-tally-speed", "≥ 15", ratio("half space, r-z, photons/s"),
+         "photons a second with an r-z tally of absorption at every event"),
+        ("layers-speed", "≥ 6", ratio("three layers, r and angle, photons/s, over the layered twin"),
+         "photons a second through MCML's three layers, by radius and angle"),
+        ("layers-tally-speed", "≥ 5", ratio("three layers, r-z tally too, over the layered twin"),
+         "photons a second through MCML's three layers, with an r-z tally"),
+        ("half-space-efficiency", "≥ 20", "efficiency.half space, Rd",
+         "variance x time over ours, reflectance of the half space", "variances of 400 blocks: 7 %"),
+        ("layers-efficiency", "≥ 6", lambda n: min(v for key, v in n["efficiency"].items() if key.startswith("three")),
+         "variance x time over ours, three layers, least of R, T and A", "variances of 400 blocks: 7 %"),
+        ("accuracy-time", "≥ 800", "time to accuracy, 32 albedos.median",
+         "time of 32 scalar runs over one order-resolved run, to 1 % in each of 100 rings", "extrapolated"),
+        ("threads", "≥ 1.6", ratio("two threads over one pinned worker, orders"), "speed of two threads over one"),
+        ("processes", "≥ 1.9", ratio("two processes over one pinned worker, orders"),
+         "speed of two processes over one"),
+        ("memory", "≤ 1", lambda n: max(n["peak_memory_gib"].values()), "memory of a process [GiB]", "one run each"),
+    )),
+    Run("profilefit tradeoff truth", "--quick", "exact half space with twice the nodes; simulate_orders",
+        "ends of the spreads of time and error", (
+        ("exact-error", "≤ 1e-09", exact_error, "largest relative error of exact, 28 rings at 5 albedos"),
+        ("orders-over-simulate", "≥ 10", less_work("simulate"), "time of simulate over ours, at equal error"),
+        ("orders-over-scalar", "≥ 300", less_work("scalar tracer"),
+         "time of one photon after another over ours, at equal error"),
+    )),
+    Run("python -m benchmarks.step_edge", "--quick", "exact step response; radii by the exact quantile", EXACT, (
+        ("edge-bias", "≤ 0.02 %", edge("bias", scale=0.01),
+         "bias of hazard within 4 mean free paths of an edge of light, share of A"),
+        ("edge-nearer", "≥ 10", edge_nearer, "bias of normalized diffusion there over that of hazard, at least"),
+        ("edge-noise", "≤ 1.01", edge("random", "lattice"), "noise of 64 samples of hazard there",
+         "4096 trials, 256 if quick; the same points for both"),
+    )),
+    Run("python -m benchmarks.choose", "--quick", "pictures rendered through OpenGL against the exact profile", EXACT, (
+        ("choose-error", "≤ 1.1", apart(True), "predicted and rendered error of what choose takes, larger over smaller",
+         "worst scene; each rendered to 3 %"),
+        ("choose-errors", "≤ 1.2", apart(False), "predicted and rendered error of every option, larger over smaller",
+         "worst of all; each rendered to 3 %"),
+    )),
+    Run("python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",
+        "constants of the law, or of the exact half space, in runs drawn anew", EXACT, (
+        ("coverage", "≤ 0", uncovered, "68 and 95 % intervals of constants that cover too seldom or too often",
+         "99 % band, binomial, Šidák over constants and levels"),
+    )),
+)
+# fmt: on
+
+
+def numbers(command: str) -> Any:
+    """What a command says as JSON."""
+    program, *words = shlex.split(command)
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "numbers.json"
+        file.touch()
+        if program == "profilefit":  # prints the numbers, and writes into the folder that it is in
+            whole = [sys.executable, "-m", program, *words, "--fits", str(FITS), "--json", "--quiet"]
+            with file.open("wb") as out:
+                done = subprocess.run(whole, cwd=folder, stdout=out, check=False)
+        else:
+            done = subprocess.run([sys.executable, *words, "--json", str(file)], cwd=ROOT, check=False)
+        if done.returncode not in ANSWERS or not (text := file.read_text(encoding="utf-8")):
+            sys.exit(f"{command} ended with status {done.returncode} and without numbers")
+        return json.loads(text)
+
+
+def claimed(run: Run, command: str, told: Any, date: str = "", load: str = "unknown") -> Iterator[Claim]:
+    """The rows of a run whose command told these numbers."""
+    for name, bound, read, says, *noise in run.promises:
+        found = at(told, read) if isinstance(read, str) else read(told)
+        value, low, high = found if isinstance(found, Sequence) else (found,) * 3
+        sense, most, *unit = bound.split()
+        spread = noise[0] if noise else EXACT if low == high else run.noise
+        yield Claim(
+            name, says, value, low, high, spread, sense, float(most), "".join(unit), run.truth, command, date, load
+        )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command."""
+    names = [promise[0] for run in RUNS for promise in run.promises]
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help="others stay")
+    parser.add_argument("--quick", action="store_true", help="shorter runs where a command has them: noisier")
+    parser.add_argument("--out", type=Path, default=FITS / "evidence", metavar="FOLDER", help="of claims.json")
+    options = parser.parse_args(arguments)
+    require_apart(options.out, FITS)
+    file, found = options.out / FILE, {}
+    if file.exists() and not stale((before := read_claims(options.out))[0], FITS):
+        found = {one.name: one for one in before[1]}
+    for run in RUNS:
+        if not {promise[0] for promise in run.promises} & {*options.only}:
+            continue
+        command = f"{run.command} {run.quick}" if options.quick and run.quick else run.command
+        origin, load = made("make claims", FITS), f"{os.getloadavg()[0]:.1f}"
+        new = [one for one in claimed(run, command, numbers(command), origin["date"], load) if one.name in options.only]
+        found |= {one.name: one for one in new}
+        rows = [asdict(found[name]) for name in names if name in found]
+        write_whole(file, as_json({"made": origin, "rows": rows}))  # after each command: the next may take ten minutes
+        show(claim_tables(new), Console(width=WIDTH, highlight=False))
+    if broken := [f"{one.says}: {one.cells[2]}, promised {one.cells[1]}" for one in found.values() if not one.holds]:
+        sys.exit("\n".join(broken))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,60 @@
+"""What is promised: quick rows measured, the file of the last measurement, and a promise that is not kept."""
+
+import json
+
+import pytest
+
+from benchmarks import claims
+from profilefit.recipes import record
+from profilefit.report.tables.claims_table import EXACT, FILE, read_claims
+
+EVIDENCE = claims.FITS / "evidence"
+BROKEN = ("broken", "≤ 0.1 %", claims.RECORDS.promises[0][2], "error of R_d by hazard")
+
+
+def of_records() -> dict:
+    return {"records": {name: record.read(path) for name, path in record.available(claims.FITS).items()}}
+
+
+def test_records_keep_what_is_promised_and_are_those_that_were_measured():
+    rows = list(claims.claimed(claims.RECORDS, claims.RECORDS.command, of_records()))
+    assert [one.cells for one in rows if not one.holds] == []
+    assert {one.noise for one in rows} == {EXACT}
+    told = {one.name: one.value for one in read_claims(EVIDENCE)[1]}
+    assert {one.name: one.value for one in rows}.items() <= told.items()
+
+
+def test_every_row_was_measured():
+    measured = {one.name for one in read_claims(EVIDENCE)[1]}
+    assert [p[0] for run in claims.RUNS for p in run.promises if p[0] not in measured] == [], "run make claims"
+
+
+def test_rows_that_were_measured_are_those_that_are_promised_and_none_is_broken():
+    promised = {p[0]: (p[3], p[1].split()) for run in claims.RUNS for p in run.promises}
+    for one in read_claims(EVIDENCE)[1]:
+        says, (sense, bound, *unit) = promised[one.name]
+        assert (one.says, one.sense, one.bound, one.unit) == (says, sense, float(bound), "".join(unit))
+        assert one.low <= one.value <= one.high
+        assert one.holds, one.cells
+
+
+def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, tmp_path, capsys):
+    monkeypatch.setattr(claims, "RUNS", (claims.RECORDS._replace(promises=(BROKEN, claims.RECORDS.promises[1])),))
+    with pytest.raises(SystemExit, match=r"error of R_d by hazard: 0.331 % BROKEN, promised ≤ 0.1 %"):
+        claims.main(["--out", str(tmp_path)])
+    assert "0.331 % BROKEN" in capsys.readouterr().out
+    made, rows = read_claims(tmp_path)
+    assert made["command"] == "make claims"
+    assert [one.holds for one in rows] == [False, True]
+
+    # Rows that are not asked for stay, unless they are of other records.
+    monkeypatch.setattr(claims, "numbers", lambda command: of_records())
+    written = json.loads((tmp_path / FILE).read_text(encoding="utf-8"))
+    written["rows"][0]["value"] = 0.05
+    (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
+    claims.main(["--only", "map-error", "--out", str(tmp_path)])
+    assert [one.value for one in read_claims(tmp_path)[1]] == [0.05, rows[1].value]
+    written["made"]["sha256"] = "0" * 64
+    (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
+    claims.main(["--only", "map-error", "--out", str(tmp_path)])
+    assert [one.name for one in read_claims(tmp_path)[1]] == ["map-error"]
