@@ -16,6 +16,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
@@ -132,14 +133,19 @@ def only(*formats: str) -> Iterator[None]:
 
 def save(figure: Figure, out: Path, name: str) -> list[Path]:
     """Write `name`.png and `name`.svg into folder `out`, both or neither; the SVG carries no date."""
-    given: dict[str, Any] = {"png": {"dpi": DPI}, "svg": {"metadata": {"Date": None}}}
     files = {kind: out / f"{name}.{kind}" for kind in FORMATS.get()}
-    figure.draw_without_rendering()
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
     figure.set_layout_engine("none")  # it is laid out now: no need to do so again for each format
     contents: dict[Path, bytes | str] = {}
     for kind, path in files.items():
         drawn = io.BytesIO()
-        figure.savefig(drawn, format=kind, **given[kind])
+        figure.dpi = DPI
+        # Not savefig, which draws everything once before, to find the layout.
+        if kind == "png":
+            FigureCanvasAgg(figure).print_png(drawn)
+        else:
+            FigureCanvasSVG(figure).print_svg(drawn, metadata={"Date": None})
         contents[path] = drawn.getvalue()
     require_folder(out)
     write_together(contents)

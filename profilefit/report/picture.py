@@ -1,0 +1,19 @@
+"""Pictures of pixels as part of a page: the address that holds one, as short as it can be with every pixel in it."""
+
+from __future__ import annotations
+
+import base64
+import io
+
+from PIL import Image
+
+
+def address(png: bytes) -> str:
+    """`data:image/webp;base64,...` of a PNG file: the same pixels in fewer bytes; OSError on what is no PNG.
+
+    Without loss: in a map of errors the noise is what is shown, and the sign is a colour.
+    """
+    file = io.BytesIO()
+    with Image.open(io.BytesIO(png), formats=["png"]) as picture:
+        picture.save(file, "webp", lossless=True, quality=100, method=6)  # of the effort, not of the picture
+    return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
