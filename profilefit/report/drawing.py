@@ -119,7 +119,7 @@ def _plain(node: Element, shapes: Mapping[str, Element]) -> list[Element]:
         if part.tag == "g":
             inside = _plain(part, shapes)
             if part.get("id", "").startswith("matplotlib.axis"):  # lines of the grid, then ticks, then their numbers
-                inside.sort(key=lambda one: (one.tag != "path", rest_of(one) if one.tag == "path" else ()))
+                inside.sort(key=lambda one: (one.tag != "path", _clip_and_style(one) if one.tag == "path" else ()))
             found += [_element("g", rest, _together(inside))] if rest and inside else inside
         elif part.tag == "use" and part.get("href", "#")[1:] in shapes:
             found.append(_drawn(part, shapes[part.get("href", "#")[1:]]))
@@ -139,7 +139,7 @@ def _plain(node: Element, shapes: Mapping[str, Element]) -> list[Element]:
     return found
 
 
-def rest_of(part: Element) -> tuple[str, ...]:
+def _clip_and_style(part: Element) -> tuple[str, ...]:
     """What two neighbours must share to be one: clip and style."""
     return part.get("clip-path", ""), part.get("style", "")
 
@@ -237,14 +237,13 @@ def _of_one_style(shared: tuple[str, str], parts: list[Element]) -> list[Element
 
 
 def _own_ids(root: Element, prefix: str) -> None:
-    """A number after the prefix; what is not pointed at needs none, and goes where it is a marker."""
+    """Ids are numbers after the prefix; what nothing points at has none."""
     values = (value for one in root.iter() for key, value in one.attrib.items() if key in ("href", "clip-path"))
     used = {found[1] for value in values if (found := POINTED_AT.search(value)) and not value.startswith("data:")}
     names = {name: f"{prefix}-{place}" for place, name in enumerate(sorted(used))}
     for part in root.iter():
-        if name := part.attrib.pop("id", None):
-            if name in names:
-                part.set("id", names[name])
+        if (name := part.attrib.pop("id", "")) in names:
+            part.set("id", names[name])
         for key in ("href", "clip-path"):
             value = part.get(key, "")
             if (found := POINTED_AT.search(value)) and not value.startswith("data:"):

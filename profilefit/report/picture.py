@@ -15,5 +15,5 @@ def address(png: bytes) -> str:
     """
     file = io.BytesIO()
     with Image.open(io.BytesIO(png), formats=["png"]) as picture:
-        picture.save(file, "webp", lossless=True, quality=100, method=6)  # of the effort, not of the picture
+        picture.save(file, "webp", lossless=True)
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

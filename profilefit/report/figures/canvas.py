@@ -23,6 +23,7 @@ from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from mcml_sim.files.whole_file import require_folder, write_together
 
 DPI = 150
+POINTS = 72  # an inch
 WIDTH = 8.0  # [inch]: 1200 pixels at DPI
 # The palette of Okabe and Ito, Color Universal Design (2008).
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -134,6 +135,8 @@ def only(*formats: str) -> Iterator[None]:
 def save(figure: Figure, out: Path, name: str) -> list[Path]:
     """Write `name`.png and `name`.svg into folder `out`, both or neither; the SVG carries no date."""
     files = {kind: out / f"{name}.{kind}" for kind in FORMATS.get()}
+    if tuple(files) == ("svg",):
+        figure.dpi = POINTS  # as the SVG is drawn: what was measured of its texts serves again
     if (layout := figure.get_layout_engine()) is not None:
         layout.execute(figure)
     figure.set_layout_engine("none")  # it is laid out now: no need to do so again for each format

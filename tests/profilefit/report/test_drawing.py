@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
 from profilefit.report.drawing import VARIABLES, checked, classed, inline
+from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
 from profilefit.report.picture import address
 from profilefit.report.svg_path import shortened
 
@@ -109,8 +109,8 @@ def test_a_path_is_off_by_less_than_a_tenth_of_a_point(digits, place):
     after = shortened(before, digits, place)
     (line,) = corners(after)
     assert len(after) < len(before) / 3
-    assert max(farthest(SPIRAL + place, line), farthest(line, SPIRAL + place)) < 10.0 ** -digits
-    assert farthest(SPIRAL + place, line[::2]) > 10.0 ** -digits  # the negative control: half of its corners
+    assert max(farthest(SPIRAL + place, line), farthest(line, SPIRAL + place)) < 10.0**-digits
+    assert farthest(SPIRAL + place, line[::2]) > 10.0**-digits  # the negative control: half of its corners
 
 
 @pytest.mark.parametrize(
@@ -139,7 +139,7 @@ def test_every_line_is_where_it_was(original, page):
         uses = [one for one in root.iter() if one.tag.endswith("use")]
         name = [(one.get("href") or one.get("{http://www.w3.org/1999/xlink}href"))[1:] for one in uses]
         placed = [
-            line + [float(use.get("x", 0)), float(use.get("y", 0))]
+            line + np.array([use.get("x", "0"), use.get("y", "0")], float)
             for use, one in zip(uses, name, strict=True)
             for line in corners(shapes[one])
         ]
