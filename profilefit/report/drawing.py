@@ -92,13 +92,20 @@ def inline(svg: str, prefix: str, title: str, variables: Mapping[str, str] = VAR
     return _written(whole)
 
 
-def classed(html: str, drawings: re.Pattern[str] = re.compile(r"<svg .*?</svg>", re.DOTALL)) -> tuple[str, str]:
+DRAWING, STYLE = re.compile(r"<svg .*?</svg>", re.DOTALL), re.compile(r' style="([^"]*)"')
+PLAIN = re.compile(r"(?:[\w.:;,#% -]|var\(--[\w-]+\))*")  # ends no rule of a style sheet
+
+
+def classed(html: str) -> tuple[str, str]:
     """The styles that the drawings of a page share, as rules of classes; the page with these classes."""
-    style = re.compile(r' style="([^"]*)"')
-    counts = Counter(found for drawing in drawings.findall(html) for found in style.findall(drawing))
-    names = {style: f"s{place}" for place, (style, _) in enumerate(counts.most_common())}
+    found = (style for drawing in DRAWING.findall(html) for style in STYLE.findall(drawing) if PLAIN.fullmatch(style))
+    names = {style: f"s{place}" for place, (style, _) in enumerate(Counter(found).most_common())}
     rules = "\n".join(f".{name} {{ {style} }}" for style, name in names.items())
-    return rules, drawings.sub(lambda one: style.sub(lambda found: f' class="{names[found[1]]}"', one[0]), html)
+
+    def named(style: re.Match[str]) -> str:
+        return f' class="{names[style[1]]}"' if style[1] in names else style[0]
+
+    return rules, DRAWING.sub(lambda drawing: STYLE.sub(named, drawing[0]), html)
 
 
 def _element(tag: str, attributes: Mapping[str, str], inside: Iterable[Element] = ()) -> Element:
@@ -198,8 +205,8 @@ def _attribute(key: str, value: str) -> str:
         return _style(_styles(value))
     if key == "transform":
         value = re.sub(r"rotate\(-?0(?: [^)]*)?\)", "", value)
-        return re.sub(r"-?\d+\.\d+(?![^()]*e)", lambda one: number(round(float(one[0]) * 100), 2), value).strip()
-    if key in ("x", "y", "width", "height") and re.fullmatch(r"-?\d+\.\d+", value):
+        return re.sub(r"-?\b\d{1,9}\.\d+(?![^()]*e)", lambda one: number(round(float(one[0]) * 100), 2), value).strip()
+    if key in ("x", "y", "width", "height") and re.fullmatch(r"-?\d{1,9}\.\d+", value):
         return number(round(float(value) * 10), 1)
     return value
 

@@ -9,11 +9,14 @@ from PIL import Image
 
 
 def address(png: bytes) -> str:
-    """`data:image/webp;base64,...` of a PNG file: the same pixels in fewer bytes; OSError on what is no PNG.
+    """`data:image/webp;base64,...` of a PNG file: the same pixels in fewer bytes. OSError, ValueError on what is no PNG.
 
     Without loss: in a map of errors the noise is what is shown, and the sign is a colour.
     """
     file = io.BytesIO()
-    with Image.open(io.BytesIO(png), formats=["png"]) as picture:
-        picture.save(file, "webp", lossless=True)
+    try:
+        with Image.open(io.BytesIO(png), formats=["png"]) as picture:
+            picture.save(file, "webp", lossless=True)
+    except (SyntaxError, Image.DecompressionBombError) as error:  # Pillow's words for a damaged one, and for a bomb
+        raise ValueError(f"a picture that cannot be read: {error}") from None
     return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 Floats = NDArray[np.float64]
 WORD = re.compile(r"[A-Za-z]|[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 COUNTS = {"M": 2, "L": 2, "Q": 4, "C": 6, "z": 0}  # numbers that follow; matplotlib knows these
+FARTHEST = 1e9  # that a place may be [pt]: no figure's is
 NEAR = 0.3  # of a straight line, in units of the last digit: with the rounding less than one
 
 
@@ -23,6 +24,8 @@ def shortened(d: str, digits: int = 1, place: tuple[float, float] = (0.0, 0.0)) 
     commands = list(_commands(WORD.findall(d)))
     if any(COUNTS.get(letter) != len(numbers) for letter, numbers in commands):
         return d
+    if any(abs(one) > FARTHEST for _, numbers in commands for one in (*numbers, *place)):
+        return d
     pen = _Pen(digits)
     lines = groupby(commands, key=lambda one: one[0])
     for letter, run in lines:
@@ -32,7 +35,8 @@ def shortened(d: str, digits: int = 1, place: tuple[float, float] = (0.0, 0.0)) 
 
 
 def _commands(words: Iterable[str]) -> Iterator[tuple[str, list[float]]]:
-    letter, numbers = "", []
+    letter = ""
+    numbers: list[float] = []
     for word in words:
         if word.isalpha():
             if letter:
@@ -48,8 +52,11 @@ class _Pen:
     """Writes a path in whole units of 10^-digits, from point to point."""
 
     def __init__(self, digits: int) -> None:
-        self.digits, self.words = digits, []
-        self.here = self.exact = self.start = np.zeros(2)
+        self.digits = digits
+        self.words: list[str] = []
+        self.here: Floats = np.zeros(2)
+        self.exact: Floats = self.here
+        self.start: Floats = self.here
 
     def draw(self, letter: str, points: list[Floats]) -> None:
         """Commands of one letter, each with its points (n, 2)."""
@@ -71,8 +78,8 @@ class _Pen:
 
     def _lines(self, points: Floats) -> None:
         steps = np.diff(points, axis=0, prepend=self.here[None])
-        moving = np.any(steps != 0, axis=1)
-        for dx, dy in steps[moving] if np.any(moving) else [(0, 0)]:
+        moving = steps[np.any(steps != 0, axis=1)]
+        for dx, dy in moving if len(moving) else np.zeros((1, 2)):
             if dy == 0:
                 self._say("h", np.array([dx]))
             elif dx == 0:
@@ -86,7 +93,8 @@ class _Pen:
 
     def path(self) -> str:
         """A letter is said once for all that follow, and a space only where two numbers would be read as one."""
-        text, letter, before = [], "", ""
+        text: list[str] = []
+        letter = before = ""
         for word in self.words:
             if word.isalpha():
                 if word != letter or word == "M":

@@ -122,6 +122,7 @@ def test_a_path_is_off_by_less_than_a_tenth_of_a_point(digits, place):
         ("M 3 3 L 3 3", "M3 3h0"),  # a dot, where the ends are round
         ("M 1 1 A 2 2 0 0 1 5 5", "M 1 1 A 2 2 0 0 1 5 5"),  # none of matplotlib's stays as it is
         ("M 1 L 2 2", "M 1 L 2 2"),
+        ("M 1 1 L 1e999 2", "M 1 1 L 1e999 2"),
         ("", ""),
     ],
 )
@@ -202,6 +203,12 @@ def test_styles_that_are_shared_are_rules(page):
     assert sorted(told.values()) == sorted(set(styles))
     assert [told[one] for one in re.findall(r' class="([^"]*)"', inside)] == styles * 2
     assert re.findall(r' style="([^"]*)"', inside) == ["color: red"]
+
+
+@pytest.mark.parametrize("evil", ["fill: red} body {display: none", "fill: /*", "fill: rgb(0", "fill: 'x"])
+def test_a_style_that_would_end_its_rule_stays_where_it_is(evil):
+    drawing = f'<svg viewBox="0 0 1 1"><path style="{evil}"/></svg>'
+    assert classed(drawing) == ("", drawing)
 
 
 def test_pictures_keep_every_pixel():
