@@ -9,7 +9,7 @@ from PIL import Image
 
 
 def address(png: bytes) -> str:
-    """`data:image/webp;base64,...` of a PNG file: the same pixels in fewer bytes. OSError, ValueError on what is no PNG.
+    """`data:image/webp;base64,...` of a PNG file; OSError, ValueError on what is none.
 
     Without loss: in a map of errors the noise is what is shown, and the sign is a colour.
     """
