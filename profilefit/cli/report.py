@@ -84,7 +84,7 @@ def report(
         if quality:
             body["quality"] = law_tables.content(_measured(folder, names, quiet))
         if claims:
-            told["claims"] = read_claims(evidence_folder(folder, evidence))[1]
+            body["claims"] = read_claims(evidence_folder(folder, evidence))[1]
         print_json(body)
     elif quality:
         show(list(every_law(_measured(folder, names, quiet), bool(names))), screen())

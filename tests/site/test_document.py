@@ -185,7 +185,7 @@ def test_what_the_commands_wrote_last_can_be_read():
 
 
 def test_what_was_promised_and_measured_last_is_a_section_of_its_own():
-    told = "".join(promises(Measured(SHIPPED / "evidence", SHIPPED)))
+    told = "".join(promises(EvidenceFolder(SHIPPED / "evidence", SHIPPED)))
     assert "profilefit tradeoff truth" in told
     assert "run it again" not in told
 

@@ -8,7 +8,8 @@ class Explorer {
     this.shaders = data.shaders;
     const tables = Object.fromEntries(Object.entries(data.tables).map(([light, floats]) =>
       [light, new ExactTable(data.grid, floats)]));
-    this.state = new State({ ...data, tables });
+    const laws = data.laws.map((law) => ({ ...law, text: law.text.map((place) => data.lines[place]).join("\n") }));
+    this.state = new State({ ...data, laws, tables });
     this.canvas = root.querySelector("[data-part='ball']");
     this.results = new Results(root);
     this.canvas.addEventListener("webglcontextlost", (event) => {

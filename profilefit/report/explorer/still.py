@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 import io
-import re
 
-import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import NullLocator
@@ -15,6 +13,7 @@ from mcml_sim import Setting, exact
 from profilefit.laws.base import ProfileLaw
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
+from profilefit.report.drawing import inline
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, RC, VERMILION, canvas, styled
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
@@ -40,7 +39,7 @@ VARIABLES = {
 def still() -> str:
     """The picture as SVG. It takes the installation's own record: what it shows is the same in every report."""
     law = catalogue.load(LAW, setting=SETTING)
-    return _inline(_drawn(law))
+    return inline(_drawn(law), "explorer-still", TITLE, VARIABLES)
 
 
 @styled
@@ -51,8 +50,7 @@ def _drawn(law: ProfileLaw) -> str:
     _edge(edge, law)
     figure.suptitle(TITLE, fontsize=9.0)
     file = io.StringIO()
-    with matplotlib.rc_context({"svg.hashsalt": "explorer"}):
-        figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
+    figure.savefig(file, format="svg", metadata={"Date": None}, transparent=True)
     return file.getvalue()
 
 
@@ -99,15 +97,3 @@ def _edge(ax: Axes, law: ProfileLaw) -> None:
     strip = srgb_codes(by_law.T)[None].astype(np.uint8)
     ax.imshow(strip, extent=(-REACH, REACH, 0.88, 1.0), aspect="auto", zorder=3)
     ax.set(xlabel="from the edge of the light [mm]", ylabel="radiance [white = 1]", xlim=(-REACH, REACH), ylim=(0, 1))
-
-
-def _inline(svg: str) -> str:
-    """Without its head, its ids its own, its colours the explorer's variables."""
-    body = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->", "", svg[svg.index("<svg") :], flags=re.DOTALL)
-    body = re.sub(r"(\d\.\d)\d+(?=[^<>]*>)", r"\1", body)  # of places, not of what is written
-    body = re.sub(r'( id="|href="#|url\(#)', r"\1explorer-still-", body)
-    for colour, name in VARIABLES.items():
-        body = re.sub(colour, f"var({name})", body, flags=re.IGNORECASE)
-    frame = re.search(r'viewBox="[^"]*"', body)
-    head = f'<svg {frame[0] if frame else ""} role="img" aria-label="{TITLE}" fill="var(--x-fg)"'
-    return f'{head} xmlns:xlink="http://www.w3.org/1999/xlink">' + body[body.index(">") + 1 :].strip()

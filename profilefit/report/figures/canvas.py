@@ -16,12 +16,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
 from mcml_sim.files.whole_file import require_folder, write_together
 
 DPI = 150
+POINTS = 72  # an inch
 WIDTH = 8.0  # [inch]: 1200 pixels at DPI
 # The palette of Okabe and Ito, Color Universal Design (2008).
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
@@ -132,14 +134,21 @@ def only(*formats: str) -> Iterator[None]:
 
 def save(figure: Figure, out: Path, name: str) -> list[Path]:
     """Write `name`.png and `name`.svg into folder `out`, both or neither; the SVG carries no date."""
-    given: dict[str, Any] = {"png": {"dpi": DPI}, "svg": {"metadata": {"Date": None}}}
     files = {kind: out / f"{name}.{kind}" for kind in FORMATS.get()}
-    figure.draw_without_rendering()
+    if tuple(files) == ("svg",):
+        figure.dpi = POINTS  # as the SVG is drawn: what was measured of its texts serves again
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
     figure.set_layout_engine("none")  # it is laid out now: no need to do so again for each format
     contents: dict[Path, bytes | str] = {}
     for kind, path in files.items():
         drawn = io.BytesIO()
-        figure.savefig(drawn, format=kind, **given[kind])
+        figure.dpi = DPI
+        # Not savefig, which draws everything once before, to find the layout.
+        if kind == "png":
+            FigureCanvasAgg(figure).print_png(drawn)
+        else:
+            FigureCanvasSVG(figure).print_svg(drawn, metadata={"Date": None})
         contents[path] = drawn.getvalue()
     require_folder(out)
     write_together(contents)

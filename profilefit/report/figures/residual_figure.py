@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import jax
-import jax.numpy as jnp
 import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
@@ -69,22 +68,30 @@ def _of_profile(ax: Axes, fitted: Fitted) -> None:
     edges = fitted.arrays["r_edges"]
     for alpha, colour, row in _chosen(fitted):
         energy, error = fitted.arrays["energy"][row], np.nan_to_num(fitted.arrays["energy_error"][row])
-        model = np.diff(energy_within(fitted.law, edges, alpha))
         last = np.searchsorted(np.cumsum(energy), WITHIN * np.sum(energy))
         known = (energy > 0) & (np.arange(energy.size) <= last)
         index = np.flatnonzero(known)
         index = index[np.unique(np.geomspace(1, index.size, MOST_RINGS).astype(int) - 1)]
-        middle = np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1:]) * edges[1:])[index]
-        left, spread = model[index] / energy[index] - 1.0, error[index] / energy[index]
+        inner, outer = edges[:-1][index], edges[1:][index]
+        middle = np.sqrt(np.maximum(inner, 0.25 * outer) * outer)
+        (model,) = np.diff(energy_within(fitted.law, np.stack([inner, outer]), alpha), axis=0)
+        left, spread = model / energy[index] - 1.0, error[index] / energy[index]
         ax.errorbar(middle, left, spread, color=colour, linewidth=1.0, elinewidth=0.7, label=f"α = {alpha:.3f}")
     ax.set(xscale="log", xlabel="r [mfp]", ylabel="energy of a radial bin: law / data − 1 [-]")
     _legend(ax)
 
 
 def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
-    """What the fit compared, within each edge [-]."""
+    """What the fit compared, within each edge (..., n) [-]."""
+    short = -edges.shape[-1] % MOST_RINGS  # so that one compilation serves all albedos
+    full = np.pad(edges, [(0, 0)] * (edges.ndim - 1) + [(0, short)], mode="edge")
     with jax.enable_x64(True):
-        return np.asarray(law.unscaled_energy(jnp.asarray(edges), jnp.asarray(alpha)))
+        return np.asarray(_energy_within(law, full, np.float64(alpha)))[..., : edges.shape[-1]]
+
+
+@jax.jit
+def _energy_within(law: ProfileLaw, edges: jax.Array, alpha: jax.Array) -> jax.Array:
+    return law.unscaled_energy(edges, alpha)
 
 
 def _chosen(fitted: Fitted) -> list[tuple[float, tuple[float, ...], int]]:

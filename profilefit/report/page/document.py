@@ -12,6 +12,7 @@ from string import Template
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import require_writable, write_whole
 from profilefit.recipes import record
+from profilefit.report.drawing import classed
 from profilefit.report.explorer import explorer_section
 from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
@@ -119,14 +120,14 @@ def _document(made: Mapping[str, str], count: int) -> str:
     records = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
     inside = {**made, "records": records}
     shown = {key: title for key, title in PARTS.items() if inside[key]}
-    sections = "\n".join(section(key, title, [inside[key]]) for key, title in shown.items())
+    rules, sections = classed("\n".join(section(key, title, [inside[key]]) for key, title in shown.items()))
     links = "".join(element("li", element("a", escape(title), href=f"#{key}")) for key, title in shown.items())
     return PAGE.substitute(
         title=escape(TITLE),
         lead=escape(LEAD),
         conventions=escape(CONVENTIONS),
         count=f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}",
-        style=_asset("page.css"),
+        style=_asset("page.css") + rules,
         script=_asset("page.js"),
         links=links,
         sections=sections,

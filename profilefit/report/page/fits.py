@@ -12,9 +12,10 @@ from pathlib import Path
 from profilefit.recipes.evidence import digest
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.run import preset_photons
+from profilefit.report.drawing import inline
 from profilefit.report.figures.canvas import only
 from profilefit.report.figures.record_figures import PAPER, Plan, plans, record_plans
-from profilefit.report.page.markup import command, details, element, inline, markup, paragraph
+from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.records import Content, Source
 from profilefit.report.tables.cells import ABSENT, column_table
 from profilefit.report.tables.record_tables import record_tables, summary
@@ -101,7 +102,7 @@ def drawing(name: str, draw: Callable[[Path], list[Path]]) -> str:
     with tempfile.TemporaryDirectory() as folder, only("svg"):
         (file,) = draw(Path(folder))
         svg = file.read_text(encoding="utf-8")
-    return inline(svg, name, caption(name))
+    return figure(inline(svg, name, caption(name)), caption(name))
 
 
 def caption(name: str) -> str:

@@ -11,7 +11,8 @@ from mcml_sim.files.text_file import MOST_JSON, parse_json
 from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.recipes import evidence
-from profilefit.report.page.markup import checked, command, inline, paragraph
+from profilefit.report.drawing import checked, inline
+from profilefit.report.page.markup import command, figure, paragraph
 
 Told = dict[str, Any]
 ALL = "all"
@@ -60,7 +61,7 @@ class EvidenceFolder:
         content = read_whole(path, MOST_DRAWING)
         if len(content) > MOST_DRAWING:
             raise ValueError(f"a drawing of more than {MOST_DRAWING} bytes, {path.name}")
-        return inline(checked(content.decode("utf-8")), name, title, on_paper)
+        return figure(inline(checked(content.decode("utf-8")), name, title), title, on_paper)
 
     def origin(self, told: Told) -> str:
         """When, where and by which command; and whether the records have changed since."""

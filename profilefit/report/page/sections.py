@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 from collections.abc import Iterator, Sequence
 from html import escape
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.report.page.markup import details, element, markup, paragraph
+from profilefit.report.page.markup import details, element, figure, markup, paragraph
 from profilefit.report.page.measured import EvidenceFolder, Told, missing
+from profilefit.report.picture import address
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.studies.stability.cells import Verdict
@@ -88,10 +88,7 @@ def _costs(costs: Told) -> dict[str, list[str]]:
 
 
 def _picture(png: bytes, title: str) -> str:
-    data = base64.b64encode(png).decode()
-    image = f'<img alt="{escape(title)}" src="data:image/png;base64,{data}">'
-    caption = element("figcaption", escape(title))
-    return element("figure", element("div", image, class_="wide", tabindex="0") + caption)
+    return figure(f'<img alt="{escape(title)}" src="{address(png)}">', title)
 
 
 CHARTS = {
@@ -192,7 +189,7 @@ def _laws(group: Sequence[Told]) -> set[str]:
     return {one["law"] for one in group}
 
 
-def promises(found: Measured) -> Iterator[str]:
+def promises(found: EvidenceFolder) -> Iterator[str]:
     """The parts of the section; nothing where no checkout measured them."""
     if (found.folder / FILE).exists():
         made, claims = read_claims(found.folder)
