@@ -7,6 +7,7 @@ a tenth of a point, points on a straight line, a style said again for each of a 
 from __future__ import annotations
 
 import base64
+import io
 import re
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
@@ -15,8 +16,9 @@ from itertools import groupby
 from types import MappingProxyType
 from xml.etree.ElementTree import Element, ParseError, fromstring, tostring
 
+from PIL import Image
+
 from profilefit.report.figures.canvas import BLACK, BLUE, GREEN, GREY, ORANGE, PURPLE, RC, SKY, VERMILION, YELLOW
-from profilefit.report.picture import address
 from profilefit.report.svg_path import number, shortened
 
 # A colour of the figures -> the page's variable for it, which has another value on a dark page.
@@ -261,3 +263,17 @@ def _written(part: Element) -> str:
     told = "".join(f' {key}="{escape(value)}"' for key, value in part.attrib.items())
     inside = escape(part.text or "", quote=False) + "".join(map(_written, part))
     return f"<{part.tag}{told}>{inside}</{part.tag}>" if inside or part.tag == "svg" else f"<{part.tag}{told}/>"
+
+
+def address(png: bytes) -> str:
+    """`data:image/webp;base64,...` of a PNG file; OSError, ValueError on what is none.
+
+    Without loss: in a map of errors the noise is what is shown, and the sign is a colour.
+    """
+    file = io.BytesIO()
+    try:
+        with Image.open(io.BytesIO(png), formats=["png"]) as picture:
+            picture.save(file, "webp", lossless=True)
+    except (SyntaxError, Image.DecompressionBombError) as error:  # Pillow's words for a damaged one, and for a bomb
+        raise ValueError(f"a picture that cannot be read: {error}") from None
+    return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"

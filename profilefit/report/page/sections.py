@@ -6,9 +6,9 @@ from collections.abc import Iterator, Sequence
 from html import escape
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.report.drawing import address
 from profilefit.report.page.markup import details, element, figure, markup, paragraph
 from profilefit.report.page.measured import EvidenceFolder, Told, missing
-from profilefit.report.picture import address
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.studies.stability.cells import Verdict

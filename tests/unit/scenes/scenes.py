@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from profilefit.scenes.skin import head, texture
+from profilefit.scenes.skin import head, material
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
 
 RADIUS = 10.0
@@ -13,7 +13,7 @@ RADIUS = 10.0
 def ball(centre=(0.0, 0.0, 0.0), radius=RADIUS):
     u, v = parameters(60, 90)
     mesh = sheet(radius * head.ball(u, v), u, v, closed=True)
-    return Part(replace(mesh, position=mesh.position + np.array(centre)), texture.plain((0.8, 0.5, 0.3)))
+    return Part(replace(mesh, position=mesh.position + np.array(centre)), material.plain((0.8, 0.5, 0.3)))
 
 
 def scene(direction, *parts, kind="orthographic"):

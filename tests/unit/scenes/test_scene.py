@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.scenes.skin import head, texture
+from profilefit.scenes.skin import head, material
 from profilefit.scenes.skin.material import translucent
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.world import Camera, parameters, sheet
@@ -46,11 +46,11 @@ def test_the_band_floats_before_the_brow(scene):
 
 def test_texture_is_skin_with_fine_detail():
     reflectance = translucent("skin1").reflectance
-    face = texture.skin(reflectance, columns=512)
+    face = material.skin(reflectance, columns=512)
     assert face.shape == (256, 512, 3)
     assert 0 < face.min() < face.max() < 1
     np.testing.assert_allclose(np.median(face, axis=(0, 1)), reflectance, rtol=0.05)
-    np.testing.assert_array_equal(face, texture.skin(reflectance, columns=512))
+    np.testing.assert_array_equal(face, material.skin(reflectance, columns=512))
     cheek = face[115:125, 200:300]
     assert np.ptp(cheek[..., 1]) > 0.3 * reflectance[1]
 
