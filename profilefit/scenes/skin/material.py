@@ -1,6 +1,6 @@
-"""What a translucent thing of the render is made of: a measured material, seen under the light of a setting; its texture.
+"""What a translucent thing of the render is made of: a measured material under the light of a setting; its texture.
 
-A reflectance texture of skin is drawn by formulas: blotches, freckles of a millimetre, stubble finer than that. A texture
+A reflectance texture of skin is drawn by formulas: blotches, freckles of a millimetre, finer stubble. A texture
 (rows, columns, 3) lies over the head's u and v; row 0 is at v = 0. Fixed seeds: the same texture everywhere.
 """
 

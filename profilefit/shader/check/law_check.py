@@ -24,7 +24,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.pipelines import inversion_error
 from profilefit.recipes.record_folder import Folder
-from profilefit.shader.check import bounds, claims, dense_grid, validity
+from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ALBEDOS, MODEL_FACTOR, ROUNDING_SHARE, Bound, ModelError
 from profilefit.shader.check.dense_grid import XI, Arguments, ShaderCheck, Spread, bad_numbers
 from profilefit.shader.check.shader_law import ShaderLaw, Values
@@ -118,7 +118,7 @@ def check_law(
     outside = dense_grid.counted(found, at, everywhere, everywhere).less(inside)
     measured = _measured(shader, one, model)
     limits = _limits(model, rounding, measured, spreads)
-    limits += [bad_numbers(inside), *claims.of_profile(one, folder)]
+    limits += [bad_numbers(inside), *validity.promised_by_profile(one, folder)]
     return LawCheck(one, model, rounding, measured, inside, outside, tuple(limits), spreads)
 
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from mcml_sim import exact
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
-from profilefit.shader.check import bounds, claims, validity
+from profilefit.shader.check import bounds, validity
 from profilefit.shader.check.bounds import MODEL_FACTOR, ROUNDING_SHARE, Bound
 from profilefit.shader.check.dense_grid import ULP, Count, ShaderCheck, bad_numbers
 from profilefit.shader.check.shader_law import ShaderMap
@@ -55,7 +55,7 @@ def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str =
         limits.append(Bound(f"float32 {name}", rounding[name], ROUNDING_SHARE * value, places[name]))
         if name in measured:
             limits.append(Bound(f"{name} against the exact half space", measured[name], MODEL_FACTOR * value))
-    limits += [bad_numbers(inside), *claims.of_map(one)]
+    limits += [bad_numbers(inside), *validity.promised_by_map(one)]
     return MapCheck(one, model, rounding, measured, inside, outside, tuple(limits), places)
 
 
