@@ -15,7 +15,7 @@ from profilefit.materials import BY_NAME
 from profilefit.recipes import catalogue
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.skin import chart, head
-from profilefit.scenes.skin.material import Translucent, translucent
+from profilefit.scenes.skin.material import Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.truth import exitance_of, own_error
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
@@ -45,14 +45,14 @@ def head_scene(material: str = "skin1", camera: Camera = FACE, detail: int = 1, 
     if detail < 1:
         raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
     what = translucent(material)
-    face = material.skin(what.reflectance, columns)
-    plain = material.plain(what.reflectance)
-    pale = material.plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), 0.9))
+    face = skin(what.reflectance, columns)
+    even = plain(what.reflectance)
+    pale = plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), 0.9))
     parts = (
         Part(head.head(detail), face),
-        Part(head.ear(-1, detail), plain),
-        Part(head.ear(1, detail), plain),
-        Part(head.neck(detail), plain),
+        Part(head.ear(-1, detail), even),
+        Part(head.ear(1, detail), even),
+        Part(head.neck(detail), even),
         Part(head.band(detail), pale, roughness=0.6),
     )
     return Head(parts, camera=camera, material=what)

@@ -1,7 +1,7 @@
 """What is said of a law: where it holds, and what its paper promises of its printed constants.
 
-What lies outside of where it holds is counted apart and breaks nothing. Promises are measured in float64, where rounding
-is no excuse; equation numbers are those of `laws.liang` and `laws.liang_albedo`.
+What lies outside of where it holds is counted apart and breaks nothing. Promises are measured in float64, where
+rounding is no excuse; equation numbers are those of `laws.liang` and `laws.liang_albedo`.
 """
 
 from __future__ import annotations
@@ -75,7 +75,7 @@ def of_map(one: Named, folder: Folder) -> tuple[Range, Range]:
 
 
 def promised_by_profile(one: Named, folder: Folder) -> list[Bound]:
-    """What Liang et al. say of (17), (21) and of alpha = 0; none for other laws, nor for constants that were regenerated."""
+    """What Liang et al. say of (17), (21) and of alpha = 0; none of other laws, nor of regenerated constants."""
     if not isinstance(one.law, Liang) or one.records:
         return []
     regenerated = [law.law for law in profile_laws(folder) if law.records and isinstance(law.law, Liang)]
