@@ -4,9 +4,10 @@
 VENV := .venv
 PY := $(VENV)/bin/python
 PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
-# A file's tests stay in one process, which compiles what they share once; the files go to every core.
+# A file's tests stay in one process, which compiles what they share once; the files go to every core, the dear ones of
+# tests/physics first.
 # A worker that dies fails the run: xdist would start another, and then wait for ever for the file that died with it.
-PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile --max-worker-restart 0
+PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 ARGS ?=
 # Pages with tables of what was fitted, between marks.
 TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/howto/shader.md

@@ -22,6 +22,8 @@ NEEDS_OPENGL = ("04-check-the-shader",)
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
+SMOKE = NEEDS_OPENGL  # each takes half a minute: these run in `make test`
+
 every = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
 
@@ -116,7 +118,11 @@ def test_links_lead_to_notebooks(path):
     assert [link for link in re.findall(r"\]\(([^)#]+)\)", "\n".join(cells)) if not (FOLDER / link).exists()] == []
 
 
-@every
+@pytest.mark.parametrize(
+    "path",
+    [path if path.stem in SMOKE else pytest.param(path, marks=pytest.mark.slow) for path in NOTEBOOKS],
+    ids=lambda path: path.stem,
+)
 def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(path):
     before = set(FOLDER.rglob("*"))
     notebook = executed(path)
@@ -126,6 +132,7 @@ def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(path):
     assert set(FOLDER.rglob("*")) - before == set()
 
 
+@pytest.mark.slow
 def test_repeats_scatter_as_the_error_bars_say_and_sums_do_not():
     text = printed("01-simulate-and-read-error-bars")
     (ratio,) = numbers(r"stated over true, .*: (\d\S+) on average", text)
@@ -140,6 +147,7 @@ def test_repeats_scatter_as_the_error_bars_say_and_sums_do_not():
     assert "the same bits as without a break: True" in text
 
 
+@pytest.mark.slow
 def test_printed_constants_of_the_paper_are_seen_to_fail():
     text = printed("02-refit-the-paper")
     assert min(numbers(r"energy of \(17\) over A:\s+(\S+) as printed", text)) > 10
@@ -154,6 +162,7 @@ def test_printed_constants_of_the_paper_are_seen_to_fail():
     assert re.search(r"rational map .*rises all the way: True", text)
 
 
+@pytest.mark.slow
 def test_light_and_surface_cost_more_steps_than_a_law():
     text = printed("03-what-errors-mean-on-screen")
     published, refitted, hazard, beam, index = numbers(r"off by at most\s+(\S+) steps", text)
@@ -174,6 +183,7 @@ def test_check_finds_a_misprint_and_a_slip_of_the_pen():
     assert alpha > 1 > 40 * colour / alpha
 
 
+@pytest.mark.slow
 def test_layers_hide_from_the_eye_and_the_index_does_not():
     text = printed("05-explore")
     assert max(numbers(r"at worst (\S+) % of white", text)) < 0.5
@@ -181,6 +191,7 @@ def test_layers_hide_from_the_eye_and_the_index_does_not():
     assert max(numbers(r"g 0.0, .*:\s+(\S+) % too much", text)) < 1
 
 
+@pytest.mark.slow
 def test_fits_report_what_is_not_identifiable():
     text = printed("06-fit-your-own-data")
     assert "alpha AND scale ARE NOT SEPARATELY IDENTIFIABLE" in text

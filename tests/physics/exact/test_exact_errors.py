@@ -26,6 +26,7 @@ def test_more_nodes_change_nothing(setting):
     assert found.max() < 2e-7
 
 
+@pytest.mark.slow
 def test_the_estimate_is_the_error():
     """With half the nodes as with all of them: it sees what a quadrature that is too coarse gets wrong."""
     r, rule = np.geomspace(1e-2, 10.0, 12), STANDARD.scaled(0.5)

@@ -82,6 +82,7 @@ def test_order_resolved_run_leaves_there_after_one_scattering(run, sidak):
     assert np.abs(z[seen]).max() > sidak(seen.sum())
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "setting", [Setting(n=1.4, g=0.6), Setting("diffuse"), Setting("diffuse", n=1.3, g=-0.3)], ids=str
 )

@@ -186,6 +186,7 @@ def small(generator) -> MediumFit:
     return fit(data, **({} if generator.random() < 0.2 else {"scale": 1.0}))
 
 
+@pytest.mark.slow
 def test_no_value_lies_outside_its_own_interval():
     """Nor is there one, or a symmetric error, where alpha = 1 fits as well: but a limit."""
     at_edge = given = 0

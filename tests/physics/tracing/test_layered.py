@@ -279,6 +279,7 @@ def test_half_space_reflects_as_the_exact_solution(alpha):
     assert np.all(np.abs(rings[:-1] - expected) < 4.5 * np.sqrt(d.reflected_squares[:-1, 0]))
 
 
+@pytest.mark.slow
 def test_conservative_half_space_ends_and_says_what_it_cut():
     d = one_layer(half_space(1.0, n=1.3, g=0.5))
     reflected, transmitted, absorbed, cut = shares(d)
@@ -318,6 +319,7 @@ def test_extremes_are_numbers_that_add_up(g, thickness):
 UNEVEN = Grid.from_edges(r=[0, 0.5, 1.5, 5], z=[0, 0.3, 0.9])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("layers", "grid", "inner"), [(3, GRID, 5), (9, UNEVEN, 1)])
 def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     """Nine are more than are followed one by one in each photon; the `inner` rings end at r = 0.5."""

@@ -151,6 +151,7 @@ def equal(a, b):
         np.testing.assert_array_equal(getattr(a, field.name), getattr(b, field.name), err_msg=field.name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", [GRID, Grid(0.5, 10, na=4)])
 def test_the_number_of_lanes_does_not_change_a_bit(grid):
     medium = half_space(0.9, MFP)

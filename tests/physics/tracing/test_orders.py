@@ -126,6 +126,7 @@ def test_every_photon_is_in_the_ledger(run):
     assert ledger.exited + ledger.rouletted + ledger.cut == ledger.started
 
 
+@pytest.mark.slow
 def test_covariance_is_the_scatter_of_batches(sidak):
     """200 small batches against the closed form of their sum; the error of a sample covariance is Wishart's."""
     grid, alphas, photons, batches = Grid.from_edges(r=[0, 0.2, 1, 4]), np.array([0.3, 0.6, 0.9, 0.98]), 20_000, 200
@@ -146,6 +147,7 @@ def test_covariance_is_the_scatter_of_batches(sidak):
         assert np.abs((scatter - np.diag(np.diag(closed))) / spread).max() > sidak(3 * 10)
 
 
+@pytest.mark.slow
 def test_covariance_of_many_albedos_fits_in_rank_8(run):
     alphas = np.linspace(0.05, 0.995, 32)
     factors, dropped = run.covariance_factor(alphas)

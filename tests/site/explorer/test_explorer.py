@@ -107,6 +107,7 @@ def test_keys_move_sliders_and_the_light(open_page, file):
     assert explorer.evaluate("explorer.state.turn") == pytest.approx([30, 0], abs=1)
 
 
+@pytest.mark.slow
 def test_every_law_runs_as_it_does_in_python(explorer, laws):
     there = explorer.evaluate("explorer.state.laws.map((law) => law.id)")
     assert set(there) == {name for name in laws if name != "beam_diffusion"}

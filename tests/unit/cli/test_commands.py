@@ -85,6 +85,7 @@ def test_a_surface_that_refracts_gets_its_own_record(command, tmp_path):
     assert command("report", "--fits", "out")[0] == 0
 
 
+@pytest.mark.slow
 def test_one_seed_gives_identical_records_and_another_does_not(command, recipe):
     for out, seed in (("a", "3"), ("b", "3"), ("c", "4")):
         assert command(*small(recipe, out, "--seed", seed))[0] == 0
@@ -258,6 +259,7 @@ def test_a_full_disk_is_named_and_leaves_the_old_record(command, recipe, monkeyp
     assert all(path.read_bytes() != old for path, old in before.items()), "else this test could not fail"
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("default::mcml_sim.DamagedBatch")  # pytest would raise it; a user is shown it
 def test_a_damaged_batch_is_named_and_traced_again(command, recipe):
     assert command(*small(recipe))[0] == 0

@@ -49,6 +49,7 @@ def half(ends):
     return (ends[1] - ends[0]) / 2
 
 
+@pytest.mark.slow
 def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path):
     """Table, JSON and chain have one and the same width: Student's of the trend's freedom, and Meier's factor."""
     rows = [line.split(",") for line in Path(PHANTOM).read_text().splitlines()[2:]]
@@ -96,6 +97,7 @@ def test_two_layers_are_a_misfit(command):
     assert found["quantities"]["mu_a"]["misfit_error"] > 20 * found["quantities"]["mu_a"]["statistical_error"]
 
 
+@pytest.mark.slow
 def test_three_rows_have_limits_where_alpha_may_be_one(command, tmp_path):
     """One-sided, without a value, marked in the row; the same in JSON."""
     rows = Path(PHANTOM).read_text().splitlines()[1:5]

@@ -50,6 +50,7 @@ def test_numpy_alone_opens_it(tmp_path):
     assert (header["photons"], header["seed"], header["format"]) == (1000, 3, 1)
 
 
+@pytest.mark.slow
 def test_equal_runs_give_equal_bytes(tmp_path):
     for name, seed in (("a", 1), ("b", 1), ("c", 2)):
         tally = simulate(LAYERS, Grid(0.1, 4), 1000, seed=seed, progress=False)

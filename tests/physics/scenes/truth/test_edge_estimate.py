@@ -78,6 +78,7 @@ def test_mean_tends_to_the_law_and_not_to_the_truth(sidak):
     assert np.max(np.abs(found.bias)) > 0.003
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [SEARCHLIGHT, DIFFUSE], ids=str)
 @pytest.mark.parametrize("alpha", [0.5, 0.99])
 def test_project_law_is_as_good_as_the_exact_quantile(alpha, setting):

@@ -11,6 +11,7 @@ REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.999
 RADII = np.geomspace(1.1e-5, 2.9e3, 41)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=str)
 def test_is_the_exact_half_space(setting):
     curves = exact_table(setting.illumination).curves(REFLECTANCES)

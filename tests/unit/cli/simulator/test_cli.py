@@ -185,6 +185,7 @@ def test_a_link_named_as_output_is_followed(command, mci):
     assert "finished before" in command("run", mci)[1]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("more", [(), ("--resume",)])
 def test_the_same_command_resumes(command, mci, monkeypatch, more):
     """Three batches a run, Ctrl-C in the middle of the second run: what is done is done once."""
