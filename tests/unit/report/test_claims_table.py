@@ -6,7 +6,7 @@ import re
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.report.page.measured import Measured
+from profilefit.report.page.measured import EvidenceFolder
 from profilefit.report.page.sections import promises
 from profilefit.report.tables.claims_table import FILE, markdown_claims, read_claims
 
@@ -24,11 +24,11 @@ def written(folder, *rows):
 
 
 def test_a_row_is_judged_by_its_numbers_and_shown_with_its_noise(tmp_path):
-    assert "".join(promises(Measured(tmp_path, tmp_path))) == "", "no section where none was measured"
+    assert "".join(promises(EvidenceFolder(tmp_path, tmp_path))) == "", "no section where none was measured"
     _, (time, share) = read_claims(written(tmp_path, ROW, {**ROW, **SHARE}))
     assert time.cells == ("time of <ours>", "≤ 1.5", "1.31", "1.25 … 1.40: least | most")
     assert share.cells[1:] == ("≥ 20 %", "12.0 % BROKEN", "exact")
-    page = "".join(promises(Measured(tmp_path, tmp_path)))
+    page = "".join(promises(EvidenceFolder(tmp_path, tmp_path)))
     for text in (
         "time of &lt;ours&gt;",
         "1.25 … 1.40",

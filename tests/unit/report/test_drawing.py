@@ -9,9 +9,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from profilefit.report.drawing import VARIABLES, checked, classed, inline
+from profilefit.report.drawing import VARIABLES, address, checked, classed, inline
 from profilefit.report.figures.canvas import BLUE, GREY, canvas, styled
-from profilefit.report.picture import address
 from profilefit.report.svg_path import shortened
 
 NOBODY_SEES = r'<path [^>]*style="fill: ?none"[^>]*>'
