@@ -49,7 +49,7 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Judge shader sources on this machine's GPU (a minute).
+    """Judge shader source on this machine's GPU (a minute).
 
     Every source is evaluated, ends of its range included, and compared with float64 and with the exact half space. Exit
     status 1 if a bound is broken: float32 errors below a tenth of the model's own; no NaN, infinity or negative value.

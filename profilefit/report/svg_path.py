@@ -1,4 +1,4 @@
-"""The path of an SVG in as few letters as a reader cannot tell from it."""
+"""The path of an SVG in as few letters as no reader sees any difference of."""
 
 from __future__ import annotations
 
