@@ -360,7 +360,7 @@ def test_a_quantity_without_light_has_no_answer(command, mci):
     mci.write_text(runs(("one.mco", 2000, 1000)))  # e^-54 gets through
     status, out, _ = command("run", mci, "--precision", 0.01, "--quantity", "ballistic_transmittance")
     assert status == 0
-    assert "ballistic_transmittance: 0.01 not reached; some bins saw too little light to tell what would" in out
+    assert "ballistic_transmittance: 0.01 not reached; some bins hold too few photons to predict how many would" in out
 
 
 @pytest.mark.filterwarnings("default")  # as outside of the tests
