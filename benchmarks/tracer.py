@@ -37,6 +37,7 @@ PARTS = ("speed", "efficiency", "cores", "accuracy", "memory", "gpu")
 MILLION, GIBIBYTE = 1e6, 2.0**30
 # The longest run that `accuracy` makes for proof; what takes longer is extrapolated [s].
 LONGEST_PROOF = 120.0
+HALF_SPACES = ("half space", "half space, r-z")
 
 
 @dataclass
@@ -112,12 +113,9 @@ def speed(report: Report) -> None:
     report.table(
         "What the kernel of the matched half space buys, photons/s over the kernel for any layers",
         ("work", "ratio"),
-        [(name, str(rates.ratio(name, name.replace("space", "space by layers")))) for name in _HALF_SPACES],
+        [(name, str(rates.ratio(name, name.replace("space", "space by layers")))) for name in HALF_SPACES],
     )
     report.numbers["rates"] = rates.by_name
-
-
-_HALF_SPACES = ("half space", "half space, r-z")
 
 
 def _speed_row(name: str, rates: Rates, events: float | None) -> tuple[str, ...]:
