@@ -1,10 +1,21 @@
-"""A command as a user gives it."""
+"""A command as a user gives it, and the OpenGL that some need."""
 
 import sys
 
 import pytest
 
 from profilefit.cli import main
+from profilefit.errors import ShaderError
+from profilefit.shader.context import open_context
+
+
+@pytest.fixture(scope="module")
+def opengl():
+    """Skips where there is none, by the name of what is missing."""
+    try:
+        open_context().release()
+    except ShaderError as error:
+        pytest.skip(str(error))
 
 
 @pytest.fixture

@@ -9,22 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from profilefit.errors import ShaderError
 from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import stale
 from profilefit.shader.check.chosen import scope
-from profilefit.shader.context import open_context
 
 FITS = catalogue.fits_folder()
-
-
-@pytest.fixture(scope="module")
-def opengl():
-    """Skips where there is none, by the name of what is missing."""
-    try:
-        open_context().release()
-    except ShaderError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture

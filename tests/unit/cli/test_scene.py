@@ -12,9 +12,8 @@ import pytest
 from matplotlib import image
 
 from mcml_sim.files.text_file import read_toml
-from profilefit.errors import InputError, ShaderError
+from profilefit.errors import InputError
 from profilefit.scenes import SCENES
-from profilefit.shader.context import open_context
 
 EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "skin-head.toml"
 SMALL = """\
@@ -25,15 +24,6 @@ chart = [64]
 [camera]
 resolution = [32, 24]
 """
-
-
-@pytest.fixture
-def opengl():
-    """Skips a test where none answers."""
-    try:
-        open_context().release()
-    except ShaderError as error:
-        pytest.skip(str(error))
 
 
 @pytest.fixture
