@@ -184,7 +184,11 @@ def test_what_a_record_lacks_is_named(tmp_path, key, spoil):
 @pytest.mark.parametrize(
     ("name", "change", "words"),
     [
-        ("liang-whole", {"pipeline": "magic"}, 'pipeline must be one of albedo, profile, as-published, .*, got "magic"'),
+        (
+            "liang-whole",
+            {"pipeline": "magic"},
+            'pipeline must be one of albedo, profile, as-published, .*, got "magic"',
+        ),
         ("liang-whole", {"pipeline": ["x"]}, r"pipeline must be one line of printable text, .*, got \[\"x\"\]"),
         ("liang-whole", {"constants": {"a1": 3.0}}, r"constants\.a1 must be a table, got 3\.0; regenerate it"),
         ("liang-as-published", {"stages": []}, r"stages must be a table, got \[\]"),
