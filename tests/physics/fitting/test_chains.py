@@ -132,7 +132,7 @@ def test_other_fits_of_a_law_compile_nothing(line_fit):
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
+@pytest.mark.timeout(1800)
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
     """Each took 5 MB and 156 memory maps, of which Linux gives a process 65530: Python aborted after some hundreds."""

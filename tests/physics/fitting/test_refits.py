@@ -93,7 +93,7 @@ def test_a_law_that_is_not_the_truth_covers_its_pseudo_true_constants(tallies, b
 
 
 @pytest.mark.slow
-@pytest.mark.timeout(1200)
+@pytest.mark.timeout(1800)
 def test_posteriors_cover_too(tallies, toy):
     """200 runs of photons, each with a fit and a chain of its own; not if intervals are a third too narrow.
 
