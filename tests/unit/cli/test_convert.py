@@ -49,7 +49,7 @@ def test_a_table_of_every_convention(command):
     assert row["absorption mu_a"][3] == "1/mm"
     assert row["diffuse mean free path"][2:4] == ["none", "mm"]
     assert ["0.90000", "0.70000", "1.0000", "diffuse"] in [line[26:].split()[:4] for line in lines]
-    assert "none: light that nothing absorbs" in out
+    assert "none: without absorption (alpha = 1)" in out
 
 
 def test_what_every_channel_has_is_not_explained_away(command):

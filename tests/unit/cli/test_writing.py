@@ -121,7 +121,7 @@ def test_what_is_filled_in_place_must_be_a_file(command, tmp_path):
 def test_a_figure_or_a_record_is_both_of_its_files_or_none(tmp_path):
     (tmp_path / "one.svg").mkdir()
     with pytest.raises(OutputError, match=r"cannot write .*one\.svg: it is a folder"):
-        save(canvas(1.0), tmp_path, "one")
+        save(canvas(1.0, layout=None), tmp_path, "one")
     (tmp_path / "two.json").mkdir()
     path = fits_folder() / "burley-whole.json"
     with pytest.raises(OutputError, match=r"cannot write .*two\.json: it is a folder"):
