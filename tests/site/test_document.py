@@ -175,6 +175,7 @@ def test_it_says_what_was_measured_where_and_what_is_missing(page, records, meas
     assert old.count("run it again") == 3
 
 
+@pytest.mark.slow
 def test_what_the_commands_wrote_last_can_be_read():
     found = EvidenceFolder(SHIPPED / "evidence", SHIPPED)
     told = ["\n".join(part(found)) for part in SECTIONS]
@@ -213,8 +214,13 @@ def test_damage_is_one_line_and_leaves_the_old_page(page, records, tmp_path):
         write_page(tmp_path / "file" / "report.html", records, tmp_path)
 
 
-@pytest.mark.parametrize("width", [400, 1400])
-@pytest.mark.parametrize("scheme", ["light", "dark"])
+@pytest.mark.parametrize(
+    ("scheme", "width"),
+    [
+        ("dark", 400),
+        *(pytest.param(*one, marks=pytest.mark.slow) for one in [("dark", 1400), ("light", 400), ("light", 1400)]),
+    ],
+)
 def test_it_opens_without_a_complaint_and_nothing_is_clipped(open_page, page, width, scheme):
     window = open_page(page, width, color_scheme=scheme)
     window.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")
@@ -226,6 +232,7 @@ def test_it_opens_without_a_complaint_and_nothing_is_clipped(open_page, page, wi
     assert window.evaluate(BACKGROUND) != background
 
 
+@pytest.mark.slow
 def test_the_check_of_clipping_sees_what_is_clipped(open_page, page):
     """The negative control: too wide a paragraph, a hidden overflow, a label outside its figure."""
     window = open_page(page, 400)
@@ -235,6 +242,7 @@ def test_the_check_of_clipping_sees_what_is_clipped(open_page, page):
     assert len(window.evaluate(CLIPPED)) >= len(SPOILED)
 
 
+@pytest.mark.slow
 def test_a_link_to_a_record_opens_it(open_page, page):
     window = open_page(page, fragment="#record-burley-whole")
     assert window.evaluate("document.getElementById('record-burley-whole').open")

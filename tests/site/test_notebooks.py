@@ -22,7 +22,8 @@ NEEDS_OPENGL = ("04-check-the-shader",)
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
-SMOKE = NEEDS_OPENGL  # each takes half a minute: these run in `make test`
+SMOKE = FOLDER / "04-check-the-shader.ipynb"
+FIRST = 6  # cells of it, up to the first picture: a whole notebook takes half a minute
 
 every = pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 
@@ -33,10 +34,10 @@ def reader(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.delenv("MPLBACKEND", raising=False)
 
 
-def run(path: Path, *more: str) -> NotebookNode:
-    """The notebook after a run from where it lies, with more cells at its end."""
+def run(path: Path, *more: str, first: int | None = None) -> NotebookNode:
+    """The notebook, or its first cells, after a run from where it lies, with more cells at its end."""
     notebook = nbformat.read(path, as_version=4)
-    notebook.cells += [nbformat.v4.new_code_cell(source) for source in more]
+    notebook.cells = notebook.cells[:first] + [nbformat.v4.new_code_cell(source) for source in more]
     NotebookClient(notebook, timeout=SECONDS, kernel_name="python3", resources={"metadata": {"path": FOLDER}}).execute()
     return notebook
 
@@ -44,13 +45,17 @@ def run(path: Path, *more: str) -> NotebookNode:
 @cache
 def executed(path: Path) -> NotebookNode:
     """The same, once for all tests."""
+    require_opengl(path)
+    return run(path)
+
+
+def require_opengl(path: Path) -> None:
     if path.stem in NEEDS_OPENGL:
         try:
             with opened():
                 pass
         except ShaderError as error:
             pytest.skip(str(error))
-    return run(path)
 
 
 def outputs(notebook: NotebookNode, kind: str) -> list[NotebookNode]:
@@ -118,18 +123,23 @@ def test_links_lead_to_notebooks(path):
     assert [link for link in re.findall(r"\]\(([^)#]+)\)", "\n".join(cells)) if not (FOLDER / link).exists()] == []
 
 
-@pytest.mark.parametrize(
-    "path",
-    [path if path.stem in SMOKE else pytest.param(path, marks=pytest.mark.slow) for path in NOTEBOOKS],
-    ids=lambda path: path.stem,
-)
+@pytest.mark.slow
+@every
 def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(path):
     before = set(FOLDER.rglob("*"))
-    notebook = executed(path)
+    require_clean(executed(path))
+    assert set(FOLDER.rglob("*")) - before == set()
+
+
+def test_the_first_cells_of_one_run():
+    require_opengl(SMOKE)
+    require_clean(run(SMOKE, first=FIRST))
+
+
+def require_clean(notebook: NotebookNode) -> None:
     assert outputs(notebook, "error") == []
     assert [one.text for one in outputs(notebook, "stream") if one.name == "stderr"] == []
     assert pictures(notebook)
-    assert set(FOLDER.rglob("*")) - before == set()
 
 
 @pytest.mark.slow
@@ -174,6 +184,7 @@ def test_light_and_surface_cost_more_steps_than_a_law():
     assert shows["b0"] < 5 < 20 < shows["c2"]
 
 
+@pytest.mark.slow
 def test_check_finds_a_misprint_and_a_slip_of_the_pen():
     text = printed("04-check-the-shader")
     assert "hazard: 7 bounds, 0 broken" in text

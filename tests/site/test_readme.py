@@ -100,6 +100,7 @@ def test_every_record_has_its_recipe_and_ended_well():
         assert {chain["result"] for chain in content["posterior"].values()} == {"converged"}, name
 
 
+@pytest.mark.slow
 def test_measured_tables_name_every_law_and_two_are_measured_again():
     """All of them would take a minute."""
     rows = rows_of("laws")[2:]

@@ -72,6 +72,7 @@ def test_the_two_transforms_in_the_plane(k, z):
     assert over_m(lambda m: np.exp(-s_of(m, k) * z)) == pytest.approx(out, rel=1e-8)  # of both 2 pi times that
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
 @pytest.mark.parametrize(("alpha", "k"), [(0.5, 0.3), (0.9, 1.5)])
 def test_wiener_and_hopf_solve_the_pseudo_problem(alpha, k, illumination):

@@ -52,6 +52,7 @@ def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
     assert {f"profilefit/examples/{path.name}" for path in (ROOT / "examples").iterdir()} <= names
 
 
+@pytest.mark.slow
 def test_unpacked_wheel_is_used_away_from_the_checkout(wheel, tmp_path):
     """The wheel alone, with the libraries of this environment: nothing of it is left behind in the checkout."""
     zipfile.ZipFile(wheel).extractall(tmp_path / "site")

@@ -3,6 +3,7 @@
 import ast
 import graphlib
 from collections.abc import Iterable, Iterator, Sequence
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -37,6 +38,11 @@ EXCEPTIONS = {
 }
 
 
+@cache
+def parsed(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"))
+
+
 def modules(root: Path, package: str) -> dict[str, Path]:
     """Dotted name -> file; a folder goes by its own name."""
     paths = sorted((root / package).rglob("*.py"))
@@ -55,6 +61,7 @@ def imported_names(tree: ast.AST, module: str, is_package: bool) -> Iterator[str
             yield from (f"{base}.{alias.name}" for alias in node.names)
 
 
+@cache
 def import_graph(root: Path, package: str) -> Imports:
     """Module -> the modules of the same package that it names, each the deepest that exists."""
     files = modules(root, package)
@@ -66,7 +73,7 @@ def import_graph(root: Path, package: str) -> Imports:
 
     graph: Imports = {}
     for module, path in files.items():
-        tree = ast.parse(path.read_text(encoding="utf-8"))
+        tree = parsed(path)
         targets = {deepest(name) for name in imported_names(tree, module, path.name == "__init__.py")}
         graph[module] = {target for target in targets if target} - {module}
     return graph
@@ -105,7 +112,7 @@ def _imports(nodes: Iterable[ast.AST]) -> set[ast.Import | ast.ImportFrom]:
 
 def inner_imports(path: Path) -> list[str]:
     """Imports inside functions of what is not optional, as file:line; of commands only those without the guard."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
+    tree = parsed(path)
     nodes = _imports(node for node in ast.walk(tree) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
     if path.parent.name == "cli":
         nodes -= _imports(node for node in ast.walk(tree) if _is_guard(node))
@@ -118,7 +125,7 @@ def inner_imports(path: Path) -> list[str]:
 
 def test_simulator_knows_nothing_of_the_fits():
     for module, path in modules(ROOT, "mcml_sim").items():
-        names = imported_names(ast.parse(path.read_text(encoding="utf-8")), module, path.name == "__init__.py")
+        names = imported_names(parsed(path), module, path.name == "__init__.py")
         assert not [name for name in names if name.split(".")[0] == "profilefit"], path
 
 
@@ -153,7 +160,7 @@ def importers(root: Path, packages: Sequence[str]) -> dict[str, set[str]]:
     found: dict[str, set[str]] = {}
     for package in packages:
         for module, path in modules(root, package).items():
-            tree = ast.parse(path.read_text(encoding="utf-8"))
+            tree = parsed(path)
             for name in imported_names(tree, module, path.name == "__init__.py"):
                 for home in (name, name.rpartition(".")[0]):
                     found.setdefault(home, set()).add(module)
@@ -178,7 +185,7 @@ def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for package in packages:
         for module, path in modules(root, package).items():
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            for node in ast.walk(parsed(path)):
                 if isinstance(node, ast.ClassDef):
                     found.setdefault(node.name, []).append(module)
     return found

@@ -23,6 +23,7 @@ def test_nothing_leaves_the_whole_step(light, case):
     assert found.total == pytest.approx(found.model, rel=0.02)
 
 
+@pytest.mark.slow
 def test_own_law_has_noise_only(light, case, hazard):
     """The truth is the law itself: what is left falls with the samples, and pixels are small."""
     found = [error(Option("sampled", n, law=hazard), case, light, WITHIN) for n in (8, 64)]

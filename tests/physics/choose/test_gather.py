@@ -4,6 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from profilefit.scenes.stage.step_edge import by_law, edge_estimate, shifted_points
 from profilefit.studies.choose.predicted import LEAST_COSINE, OWN, drawn, estimates
@@ -14,6 +15,7 @@ ALPHA = (0.9, 0.8, 0.7)
 SAMPLES = 16
 
 
+@pytest.mark.slow
 def test_plane_is_the_plain_estimator(hazard, case):
     """Root mean square error of the longest channel; 4 % is what 1024 estimates tell."""
     x = np.array([0.2, 0.9, 2.0])
@@ -27,6 +29,7 @@ def test_plane_is_the_plain_estimator(hazard, case):
     assert abs(np.sqrt(np.mean((fewer - truth[:, None]) ** 2)) / expected - 1.0) > 0.12
 
 
+@pytest.mark.slow
 def test_cylinder_is_the_obvious_loop(hazard, case):
     curved = replace(case, radius=3.0, window=(20.0, 2.0))
     x, channel = 0.625, 1

@@ -68,7 +68,7 @@ def test_reflectance_is_chandrasekhars(alpha):
 
 
 @BOTH
-@pytest.mark.parametrize("alpha", [0.05, 0.8, 0.999])
+@pytest.mark.parametrize("alpha", [pytest.param(0.05, marks=pytest.mark.slow), 0.8, 0.999])
 def test_profile_and_cdf_are_those_of_the_real_axis(alpha, setting):
     twin = RealAxis(alpha, setting.illumination)
     total = twin.transform([1e-9])[0]
@@ -81,6 +81,7 @@ def test_profile_and_cdf_are_those_of_the_real_axis(alpha, setting):
         assert exact.cdf(r, alpha, setting=setting) == pytest.approx(share, abs=1e-10)
 
 
+@pytest.mark.slow
 @BOTH
 @pytest.mark.parametrize("alpha", [0.05, 0.5, 0.9, 0.999])
 def test_profile_is_that_along_another_contour(alpha, setting):

@@ -46,6 +46,7 @@ def difference(function, x, step):
     return (8 * near - far) / (12 * step)
 
 
+@pytest.mark.slow
 def test_mapped_answers_are_those_of_numpy(table):
     alphas = ALPHAS[:-1]
     expected = {
@@ -59,6 +60,7 @@ def test_mapped_answers_are_those_of_numpy(table):
         np.testing.assert_allclose(table[name][0][:-1, :-1], values, rtol=1e-11, err_msg=name)
 
 
+@pytest.mark.slow
 def test_what_is_out_of_range_is_nan_where_it_may_be_traced(table):
     for name in ("profile", "cdf", "quantile"):
         assert np.isnan(table[name][0][-1]).all()
@@ -67,6 +69,7 @@ def test_what_is_out_of_range_is_nan_where_it_may_be_traced(table):
         assert np.isnan(table[name][0]).all(axis=1).tolist() == [False] * 5 + [True]
 
 
+@pytest.mark.slow
 def test_slopes_in_albedo_are_central_differences(table):
     alphas = ALPHAS[1:-2]
     asked = {
@@ -82,6 +85,7 @@ def test_slopes_in_albedo_are_central_differences(table):
         np.testing.assert_allclose(slope[INSIDE], along, rtol=1e-7, atol=1e-9, err_msg=name)
 
 
+@pytest.mark.slow
 def test_slopes_in_radius_and_share_are_central_differences(table):
     for name, x, room in (("profile", R, R), ("cdf", R, R), ("quantile", XI, XI * (1 - XI))):
         function, inner = getattr(exact, name), np.s_[1:-2]
@@ -89,6 +93,7 @@ def test_slopes_in_radius_and_share_are_central_differences(table):
         np.testing.assert_allclose(table[name][1][1][INSIDE], along, rtol=1e-8, atol=1e-10, err_msg=name)
 
 
+@pytest.mark.slow
 def test_slopes_in_mfp_are_those_of_a_scale(table):
     """R_d(r; l) = R_d(r / l; 1) / l^2, and the like."""
     profile, cdf, quantile = (
@@ -100,6 +105,7 @@ def test_slopes_in_mfp_are_those_of_a_scale(table):
     np.testing.assert_allclose(profile[3], -(2 * profile[0] + r * profile[2]) / MFP, rtol=1e-9)
 
 
+@pytest.mark.slow
 def test_slopes_at_the_ends_of_the_albedo(table):
     """Finite where the law is smooth, infinite where it is not: 1 - A ends in a root, and the cdf divides by A."""
     black, conservative, r = table["profile"][1][0][0], table["profile"][1][0][4], np.s_[1:-2]
@@ -114,6 +120,7 @@ def test_slopes_at_the_ends_of_the_albedo(table):
     assert np.all(table["quantile"][1][0][4, r] == np.inf)
 
 
+@pytest.mark.slow
 def test_slopes_at_the_ends_of_radius_and_share(table):
     """2 pi r R_d is alpha/2 at the source; at infinity nothing is left."""
     ratio = exact.reflectance(0.8) / 0.8
@@ -123,8 +130,9 @@ def test_slopes_at_the_ends_of_radius_and_share(table):
     assert profile[-2] == cdf[-2] == quantile[-2] == 0
 
 
-def test_the_slope_under_diffuse_light_is_a_central_difference():
-    setting = Setting("diffuse")
+@pytest.mark.parametrize("illumination", ["searchlight", pytest.param("diffuse", marks=pytest.mark.slow)])
+def test_the_slope_at_one_point_is_a_central_difference(illumination):
+    setting = Setting(illumination)
     found = jax.grad(lambda a: exact.profile(0.7, a, setting=setting))(0.8)
     assert found == pytest.approx(difference(lambda a: exact.profile(0.7, a, setting=setting), 0.8, 1e-4), rel=1e-8)
 
@@ -138,6 +146,7 @@ def test_second_derivatives():
     assert jax.jit(slope(slope(along)))(0.0) == pytest.approx((16 * near - far) / 12e-6, rel=1e-6)
 
 
+@pytest.mark.slow
 def test_no_radii_are_traced_too():
     assert exact.profile(jnp.zeros(0), 0.5).shape == exact.reflectance(jnp.zeros((0, 2))).shape[:1] == (0,)
 

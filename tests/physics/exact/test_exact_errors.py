@@ -18,6 +18,7 @@ def sampled(rule, r):
     return by_alpha(profile, r, ALPHAS, "searchlight", rule)
 
 
+@pytest.mark.slow
 @BOTH
 def test_more_nodes_change_nothing(setting):
     """The documented errors, from the estimate itself."""
@@ -44,6 +45,7 @@ def test_every_quadrature_needs_its_nodes(rule):
     assert np.abs(sampled(rule, r) / sampled(STANDARD, r) - 1).max() > 1e-7
 
 
+@pytest.mark.slow
 def test_an_estimate_has_the_shape_of_the_profile_and_is_0_at_its_ends():
     assert type(exact.error_estimate(1.0, 0.5)) is float
     np.testing.assert_array_equal(exact.error_estimate([0.0, np.inf], [[0.0], [0.5]]), 0)

@@ -52,10 +52,12 @@ def lit(request):
     return run_under(setting), setting
 
 
+@pytest.mark.slow
 def test_the_tracer_agrees_in_chi_square_over_the_rings(lit):
     assert is_likely(*lit)
 
 
+@pytest.mark.slow
 def test_chi_square_tells_another_light_and_another_albedo(lit):
     """Negative controls: 1 % less loss, and the other illumination."""
     run, setting = lit

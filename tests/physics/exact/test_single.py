@@ -55,12 +55,14 @@ def deviations(setting, truth, seed=1, photons=1_000_000):
     return (sums / photons - expected) / np.sqrt(squares - sums**2 / photons) * photons
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_photons_leave_where_it_says(setting, sidak):
     z = deviations(setting, setting)
     assert np.abs(z).max() < sidak(z.size)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_a_phase_function_or_surface_that_is_slightly_another_is_seen(setting, sidak):
     for wrong in (Setting(setting.illumination, setting.n + 0.05, setting.g),) * (setting.n != 1) + (
@@ -70,6 +72,7 @@ def test_a_phase_function_or_surface_that_is_slightly_another_is_seen(setting, s
         assert np.abs(z).max() > sidak(z.size)
 
 
+@pytest.mark.slow
 def test_order_resolved_run_leaves_there_after_one_scattering(run, sidak):
     expected = single_scattering.ring_shares(run.grid.r_edges) * run.photons
     z = (run.counts.exits[:, 0] - expected) / np.sqrt(expected)
@@ -139,6 +142,7 @@ def test_searchlight_is_the_plain_integral_over_exit_angles(setting, ring):
     assert found[0 if ring[0] == 0 else 1] == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", SETTINGS, ids=str)
 def test_finer_quadrature_changes_nothing(setting, monkeypatch):
     single_scattering.transform_density.cache_clear()

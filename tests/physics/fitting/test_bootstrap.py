@@ -25,6 +25,7 @@ def one(batches, normalisation):
     return fit(profiles, normalisation, "reflectance", ("b", "c"), jackknife=False)
 
 
+@pytest.mark.slow
 def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     """A run of all batches has the error of one over sqrt(48); 48 batches know it to a tenth."""
     found = bootstrap(batches, one, number=400, seed=1)
@@ -38,6 +39,7 @@ def test_the_scatter_of_batches_is_the_closed_form(batches, one):
     assert np.all(np.abs(found.standard_error / wrong - 1.0) > 0.45)
 
 
+@pytest.mark.slow
 def test_energies_are_those_of_the_batches(batches, one):
     found = energies(batches, one)
     assert found.shape == (BATCHES, ALPHA.size, 2)
@@ -51,6 +53,7 @@ def test_too_little_scatter_of_few_batches_is_put_right():
     np.testing.assert_allclose(Bootstrap(("a", "b"), values, 0, 10).covariance, plain * 10 / 9, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_batches_must_be_alike(batches, one):
     with pytest.raises(InputError, match="batches must be at least 10, got 3"):
         bootstrap(batches[:3], one)

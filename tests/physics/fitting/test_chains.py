@@ -17,6 +17,8 @@ from profilefit.fitting.estimate import ResidualFunction, curvature, fit
 from profilefit.fitting.profiles import Covariance, Profiles
 from profilefit.laws.base import AlbedoLaw
 
+pytestmark = pytest.mark.slow
+
 # A chain of 50 autocorrelation times and 32 walkers holds 1600 independent points, thinned to 1000; 500 to be safe.
 INDEPENDENT = 500
 
@@ -131,7 +133,6 @@ def test_other_fits_of_a_law_compile_nothing(line_fit):
     assert other.constants != line_fit.constants
 
 
-@pytest.mark.slow
 @pytest.mark.timeout(1800)
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_five_hundred_posteriors_fit_into_a_process(tallies, toy):
@@ -192,7 +193,6 @@ def test_without_photon_noise_only_the_misfit_is_left(line_fit):
         posterior(replace(line_fit, statistical=None))
 
 
-@pytest.mark.slow
 def test_photon_noise_of_a_law_that_is_not_the_truth(tallies, burley):
     """The chain has the sandwich's width although residuals are large and curved: there J^T J is not the curvature."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), burley, "energy", ("s0", "s1", "s2"))

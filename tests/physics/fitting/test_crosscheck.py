@@ -13,6 +13,8 @@ from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import crosscheck
 from profilefit.recipes.crosscheck import AGREE, DIFFER, compared, mahalanobis
 
+pytestmark = pytest.mark.slow
+
 EDGES = np.concatenate([[0.0], np.geomspace(0.02, 30.0, 25)])
 FREE = ("k", "h")
 
@@ -45,7 +47,6 @@ def exactly(toy, tallies):
     return fit(profiles, replace(toy, q=0.52), free=FREE)
 
 
-@pytest.mark.slow
 def test_replicates_scatter_as_their_errors_say(toy, tallies, exactly):
     """chi2 of 60 runs of photons is chi2 of two degrees of freedom, for a law that is not the truth too."""
     counts = tallies.draw(7, 60)
@@ -112,7 +113,6 @@ def test_a_tally_that_counts_one_photon_in_fifty_twice_is_caught(map_pair, white
     assert crosscheck.crosscheck(*map_pair, wrong).result == DIFFER
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(), Setting("diffuse")], ids=str)
 def test_profiles_agree_ring_by_ring(setting):
     """The whole of a recipe's fit, a law that is 5 % off, on two million photons."""

@@ -11,6 +11,8 @@ from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes.record import plain
 
+pytestmark = pytest.mark.slow
+
 ALPHA = 1.0 - np.linspace(0.95, 0.07, 10) ** 2
 EDGES = np.concatenate([[0.0], np.geomspace(0.01, 100.0, 30)])
 FREE = ("s0", "s1", "s2", "s3")
@@ -78,7 +80,6 @@ def test_the_band_holds_the_exact_profile_and_the_photons_alone_do_not(known):
     assert np.mean(alone) < 0.3
 
 
-@pytest.mark.slow
 def test_reflectance_of_a_map(normalisation):
     alpha = 1.0 - np.linspace(0.95, 0.05, 16) ** 2
     truth = Profiles.from_exact(alpha, [0.0, 1000.0])

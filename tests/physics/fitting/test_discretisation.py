@@ -8,6 +8,8 @@ from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes.summary import by_width, discretisation_error, widened
 
+pytestmark = pytest.mark.slow
+
 ALPHA = 1.0 - np.linspace(0.9, 0.3, 7) ** 2
 FREE = ("b1", "c3")
 
@@ -40,7 +42,6 @@ def test_middles_are_wrong_by_the_square_of_the_width_and_it_is_known(fits, lian
     assert np.all(np.abs(off / true) > 1e-6)
 
 
-@pytest.mark.slow
 def test_integrals_have_next_to_none(fits, liang):
     one = fits["energy"]
     np.testing.assert_allclose(one.solution.parameters, liang.vector(FREE), rtol=1e-6)
@@ -73,7 +74,6 @@ def test_a_wide_ring_counts_only_with_all_its_parts(fits):
     assert kept[2, 2] == 0.0
 
 
-@pytest.mark.slow
 def test_one_ring_has_no_width_to_tell(white_run, normalisation):
     one = fit(Profiles.from_orders(white_run.merged([0.0, white_run.grid.r_edges[-1]]), ALPHA), normalisation)
     np.testing.assert_array_equal(discretisation_error(one), np.zeros(3))

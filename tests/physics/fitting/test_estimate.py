@@ -88,6 +88,7 @@ def test_a_law_that_is_not_the_truth_scatters_as_predicted(tallies, burley, sida
     assert spread(scattered, one.misfit) < 1e-20
 
 
+@pytest.mark.slow
 def test_sensitivity_is_that_of_refitting(tallies, burley):
     """d constants / d ring energy, by moving single energies of a law that does not fit."""
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
@@ -173,6 +174,7 @@ def test_the_jackknife_by_hand(line):
     assert one.statistical is None
 
 
+@pytest.mark.slow
 def test_the_jackknife_sees_misfit_that_repeats_itself():
     """Points on a parabola: their neighbours agree, so independent noise promises too much."""
     alpha = np.linspace(0.1, 0.9, 60)
@@ -181,6 +183,7 @@ def test_the_jackknife_sees_misfit_that_repeats_itself():
     assert one.structure.along_alpha > 0.8
 
 
+@pytest.mark.slow
 def test_a_constant_that_is_held_stays(line):
     alpha, reflectance, _ = line
     one = fit(line_profiles(reflectance, alpha), Line(Setting(), u=0.25), "reflectance", free=("v",))
@@ -201,6 +204,7 @@ def test_only_albedos_that_are_counted_count(line):
     np.testing.assert_allclose(one.variance, misfit @ misfit / (8 - 2), rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_only_rings_that_are_used_count(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     used = np.ones(profiles.energy.shape, bool)
@@ -283,12 +287,14 @@ def test_a_perfect_fit_leaves_nothing():
     assert (found.rms, found.largest, found.along_r, found.along_alpha, found.half_waves) == (0, 0, 0, 0, 0)
 
 
+@pytest.mark.slow
 def test_rings_of_a_fit_are_its_data(tallies, toy):
     profiles = tallies.profiles(tallies.draw(0, 1)[0])
     one = fit(profiles, toy)
     np.testing.assert_array_equal(one.rings.energy, rings_of(profiles).energy)
 
 
+@pytest.mark.slow
 def test_noise_of_the_light_beyond_the_last_ring_counts():
     """A fit of A sees one number an albedo; where the rings end cannot matter to its error."""
     law = LiangAlbedo(Setting(), 5.67, 3.84, 0.84)
@@ -300,6 +306,7 @@ def test_noise_of_the_light_beyond_the_last_ring_counts():
     np.testing.assert_allclose(np.sqrt(np.diag(near.statistical)), np.sqrt(np.diag(far.statistical)), rtol=1e-2)
 
 
+@pytest.mark.slow
 def test_a_constant_that_moves_nothing_is_a_failed_fit(tallies, liang):
     """Not one with an error of zero, which the inverse of a singular matrix would make of it."""
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), liang, "energy", free=("a1", "b0", "g1"))
@@ -310,6 +317,7 @@ def test_a_constant_that_moves_nothing_is_a_failed_fit(tallies, liang):
     assert np.all(np.isnan(one.jackknife))
 
 
+@pytest.mark.slow
 def test_a_jackknife_without_enough_albedos_is_no_number(line):
     alpha, reflectance, _ = line
     few = fit(line_profiles(reflectance[:5], alpha[:5]), Line(Setting()), "reflectance")

@@ -98,6 +98,7 @@ def test_albedo_and_reflectance_vanish_on_the_map_itself(normalisation, x64):
         assert np.all(sign * more > 1e-4)
 
 
+@pytest.mark.slow
 def test_radius_and_share_vanish_on_the_samplers_own_cdf(liang, x64):
     """Data whose cdf at the edges g(xi_j) is xi_j exactly: then linear interpolation hits the nodes."""
     xi = np.linspace(0.05, 0.95, 10)
@@ -109,6 +110,7 @@ def test_radius_and_share_vanish_on_the_samplers_own_cdf(liang, x64):
         np.testing.assert_allclose(np.asarray(OBJECTIVES[name](liang, rings)), 0.0, atol=1e-13)
 
 
+@pytest.mark.slow
 def test_radius_share_and_relative_radius_measure_in_their_own_units(liang, x64):
     """All light of the data spread evenly over [0, 2]: quantile 2 xi, cdf r/2."""
     xi, alpha = np.array([0.25, 0.5]), ALPHAS[:1]
@@ -129,6 +131,7 @@ def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
     assert float(np.asarray(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisation, x64):
     """The Jacobian in a constant that is not seen is zero, and in one that is seen it is not."""
@@ -142,6 +145,7 @@ def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisat
     assert tuple(n for n, m in zip(names, moves, strict=True) if m) == law.seen_by(name)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_every_objective_has_a_derivative_in_its_data(name, liang, normalisation, x64):
     """Photon noise goes to the constants through it: finite everywhere, and the finite difference."""
@@ -183,6 +187,7 @@ def test_rings_know_reflectance_and_cdf():
     np.testing.assert_allclose(np.asarray(rings.cdf), [[0.0, 0.25, 0.75]], rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
     """A law that is 10 % off in every ring has rows of 0.1 whose squares add up to 0.01, however the rings are cut."""
     rings = of_law(burley)
@@ -196,6 +201,7 @@ def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
     assert np.all(table[:, 2 * n + 1 :] == 0)
 
 
+@pytest.mark.slow
 def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, x64):
     rings = of_law(burley)
     moved = made(np.roll(rings.energy, 1, axis=1), rings.beyond)
@@ -209,6 +215,7 @@ def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, 
     assert np.all(table[:, :n][beyond] == 0)
 
 
+@pytest.mark.slow
 def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
     """A law whose energy is (2 - alpha) times another's falls by 1e-5 over the last 1e-5 of albedo."""
 

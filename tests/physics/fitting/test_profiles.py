@@ -19,6 +19,7 @@ def truth(white_run):
     return Profiles.from_exact(ALPHAS, white_run.grid.r_edges)
 
 
+@pytest.mark.slow
 def test_photons_and_the_exact_solution_agree(photons, truth, sidak):
     keep = photons.trusted
     z = ((photons.energy - truth.energy) / np.where(keep, photons.standard_error, 1.0))[keep]

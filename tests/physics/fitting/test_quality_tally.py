@@ -32,6 +32,7 @@ def test_ring_energies_are_the_integrals():
     np.testing.assert_allclose(found, exact.reflectance(0.8) * np.diff(exact.cdf(edges, 0.8)), rtol=1e-7, atol=0)
 
 
+@pytest.mark.slow
 def test_the_truth_has_no_error_but_the_photons(light):
     found = quality_tally.profile_quality(Exactly(), light, ALPHA)
     # The mean of forty |z| is within a third of its expectation; ks is the largest of as many correlated errors.
@@ -40,6 +41,7 @@ def test_the_truth_has_no_error_but_the_photons(light):
     assert np.all(found.ks > 0)
 
 
+@pytest.mark.slow
 def test_a_law_has_the_errors_that_the_exact_measures_find(burley, light):
     found, known = quality_tally.profile_quality(burley, light, ALPHA), quality.profile_quality(burley, ALPHA)
     # Rings average over R_d, and the last one ends before 99.5 %: a tenth of the error; noise adds in squares.

@@ -136,6 +136,7 @@ def test_shares_are_counted():
     assert counted(("a",), np.ones((2, 2000, 1), bool)).honest is False
 
 
+@pytest.mark.slow
 def test_a_truth_that_cannot_be_fitted_is_named(tallies, toy):
     one = fit(tallies.profiles(tallies.draw(0, 1)[0]), toy, "energy", jackknife=False)
     with pytest.raises(InputError, match=r"energy must let Toy converge without noise, got one where it does not"):

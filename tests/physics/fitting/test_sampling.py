@@ -138,6 +138,7 @@ def test_a_clip_is_an_atom_and_loses_what_lies_beyond(burley):
     assert found.edge_bias_by_law_pdf[0] == pytest.approx((within + beyond / 3) / light - 1, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_paper_s_clip_is_an_atom(liang):
     """r = min(|g|, r_max) of (21), found from its radii alone; at 0.5 the law ends beyond the sampler's reach."""
     found = sampler_quality(liang.sampler, [0.1, 0.5, ALPHA])

@@ -39,6 +39,7 @@ def test_a_start_at_zero_can_move():
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-8)
 
 
+@pytest.mark.slow
 def test_a_linear_problem_is_lstsq():
     """The slow twin: the normal equations."""
     rng = np.random.default_rng(3)
@@ -51,6 +52,7 @@ def test_a_linear_problem_is_lstsq():
     np.testing.assert_allclose(found.jacobian.T @ found.residuals, 0.0, atol=1e-7)  # stationary
 
 
+@pytest.mark.slow
 def test_a_batch_is_its_singles():
     cases = [problem(2.0, 1.7, 0.01, 1), problem(0.5, 0.3, 0.01, 2), problem(9.0, 4.0, 0.01, 3)]
     starts = [[1.0, 1.0], [1.0, 0.5], [5.0, 2.0]]
@@ -80,6 +82,7 @@ def test_no_minimum_is_a_result():
     assert found.steps == MAX_STEPS
 
 
+@pytest.mark.slow
 def test_not_a_number_is_a_result():
     found = solve(lambda p, d: jnp.log(p - d), [1.0], np.array([2.0]))
     assert not found.converged
@@ -113,6 +116,7 @@ def test_cost_is_the_sum_of_squares():
     assert solution(np.eye(2)).cost == 25.0
 
 
+@pytest.mark.slow
 def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
     """The optimum of sqrt(x) = -1 lies beyond x = 0, where the residual is not finite."""
 

@@ -68,6 +68,7 @@ def test_the_trimming_keeps_rings_up_to_the_cut(liang):
     assert np.all(trimmed(profiles, "R_d", 0.005)[1] < cut)
 
 
+@pytest.mark.slow
 def test_the_coefficient_laws_come_back(clean, liang):
     laws = fit_coefficient_laws(clean, liang.with_vector(("b1", "c2"), [6.0, 4.0]))
     for letter, law in laws.items():
@@ -79,6 +80,7 @@ def test_the_coefficient_laws_come_back(clean, liang):
     assert laws["c"].names == ("c1", "c2", "c3")
 
 
+@pytest.mark.slow
 def test_a_held_constant_stays_out(clean, liang):
     laws = fit_coefficient_laws(clean, liang, held=("a3",))
     assert laws["a"].names == ("a1", "a2")
@@ -111,6 +113,7 @@ def misfit(values, covariance):
     return abs(np.sum(off @ np.linalg.inv(covariance) * off) - freedom) / np.sqrt(2 * freedom)
 
 
+@pytest.mark.slow
 def test_errors_of_the_stages_are_those_of_refitting(liang):
     """Independent noise in every ring: the scatter of a, b, c and of c's constants over 60 refits."""
     base = curve_profiles(liang)

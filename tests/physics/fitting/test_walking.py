@@ -16,6 +16,7 @@ def start(offset=0.0):
     return offset + SCALES * np.random.default_rng(0).standard_normal((32, 2))
 
 
+@pytest.mark.slow
 def test_a_normal_density_is_sampled():
     found = walk(log_density, start(), np.zeros(2), seed=1, max_steps=4000, kept=4000)
     assert found.result == "converged"

@@ -55,6 +55,7 @@ def test_cdf_rises_from_0_to_1(law, alpha):
     assert shares[-1] == pytest.approx(1.0, abs=1e-14)
 
 
+@pytest.mark.slow
 @LAWS
 def test_lengths_scale_with_the_mean_free_path(law):
     r, alpha = np.array([0.05, 0.7, 2.0]), np.array([[0.4], [0.9]])
@@ -96,6 +97,7 @@ def test_double_precision_whatever_the_caller_set(law):
         np.testing.assert_array_equal(law.cdf([0.3, 1.0], 0.9), outside)
 
 
+@pytest.mark.slow
 @LAWS
 def test_traced_arguments_keep_their_precision(law):
     r, alpha = np.geomspace(0.01, 2.0, 30), 0.8
@@ -118,6 +120,7 @@ def test_a_law_can_be_mapped(law):
     np.testing.assert_allclose(mapped, law.cdf(0.5, np.asarray(alphas, float)), rtol=2e-6)
 
 
+@pytest.mark.slow
 @LAWS
 @pytest.mark.parametrize("alpha", [0.3, 0.9])
 def test_derivatives_are_finite_differences(law, alpha, x64):
@@ -132,6 +135,7 @@ def test_derivatives_are_finite_differences(law, alpha, x64):
             assert float(found) == pytest.approx((method(*up) - method(*down)) / (2 * step), rel=1e-6)
 
 
+@pytest.mark.slow
 @LAWS
 def test_derivatives_stay_finite_at_both_ends(law, x64):
     """A gradient at r = 0 or beyond all light must not turn a fit into NaN."""
@@ -165,6 +169,7 @@ def pieces(law, alpha):
     return np.unique(np.concatenate([[0.0, dip / 2, dip, 1.5 * dip], np.geomspace(2 * dip, end, 40)]))
 
 
+@pytest.mark.slow
 @LAWS
 @pytest.mark.parametrize("alpha", [0.1, 0.6, 0.95])
 def test_the_density_is_that_of_the_samples(law, alpha):

@@ -41,6 +41,7 @@ def summed_single(r, alpha, n, number=200_000):
     return alpha * np.mean(np.exp(-d - critical) / d**2 * cosine * passed) / (4 * np.pi)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_profile_is_the_authors_sum(n):
     law, alpha = BeamDiffusion(Setting(n=n)), np.array([[0.3], [0.8], [0.95]])

@@ -38,6 +38,7 @@ def test_the_two_pieces_meet_and_it_falls_all_the_way(x64):
     assert np.all(np.diff(kappa[kappa < 1 - 1e-12]) < 0)
 
 
+@pytest.mark.slow
 def test_single_precision_and_derivative():
     single = np.asarray(decay_rate(jnp.asarray(ALPHA, jnp.float32)), float)
     given = np.asarray(jnp.asarray(ALPHA, jnp.float32), float)

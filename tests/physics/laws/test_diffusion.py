@@ -97,6 +97,7 @@ def test_share_is_the_integral_of_the_profile(law, tolerance):
         np.testing.assert_allclose((shares * total)[:, i + 1], inside[:, 0], rtol=0, atol=tolerance)
 
 
+@pytest.mark.slow
 @EVERY
 def test_both_ends(law):
     """Shares rise from 0 to 1, and profiles are finite, from alpha = 0 to 1 and from the source to infinity."""

@@ -46,6 +46,7 @@ def test_decay_rate_holds_for_any_constants():
         assert rate == pytest.approx(kappa + 2 / r.mean(), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_the_profile_is_the_slope_of_the_cdf(law):
     r = np.geomspace(1e-3, 5, 60)  # farther out the cdf has no digits left to take differences of
     step = 1e-5 * r
@@ -55,11 +56,13 @@ def test_the_profile_is_the_slope_of_the_cdf(law):
         np.testing.assert_allclose(slope, expected, rtol=2e-6)
 
 
+@pytest.mark.slow
 def test_scales_with_the_mean_free_path(law):
     np.testing.assert_allclose(law.profile(R, 0.8, 2.5), law.profile(R / 2.5, 0.8) / 2.5**2, rtol=1e-10)
     np.testing.assert_allclose(law.cdf(R, 0.8, 2.5), law.cdf(R / 2.5, 0.8), rtol=1e-10)
 
 
+@pytest.mark.slow
 def test_ends_are_finite_and_right(law):
     for alpha in (0.0, 1e-12, 0.5, 1.0):
         assert law.cdf(0.0, alpha) == 0.0
@@ -74,6 +77,7 @@ def test_ends_are_finite_and_right(law):
     assert law.sampler.pdf(0.0, 0.5) == pytest.approx(0.25 / law.albedo.reflectance(0.5), rel=1e-3)
 
 
+@pytest.mark.slow
 def test_monotone_in_radius_and_albedo(law):
     """In alpha up to 1 - 1e-5: nearer to white it may fall by a millionth."""
     alpha = np.unique(np.concatenate([ALPHA, 1 - np.geomspace(1e-5, 0.1, 30)]))
@@ -110,6 +114,7 @@ def test_another_light_is_seen(law):
     assert profile_quality(mixed, [0.5]).rel[0] > 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("steps", "error"), [(1, 1e-4), (2, 1e-7)])
 def test_inverse_in_a_fixed_number_of_steps(law, steps, error):
     xi = np.concatenate([np.linspace(0, 0.999, 400), 1 - np.geomspace(1e-3, 1e-6, 20)[1:]])
@@ -119,6 +124,7 @@ def test_inverse_in_a_fixed_number_of_steps(law, steps, error):
     assert np.max(missed) > error / 1e4  # fewer steps than these are not exact, and the bound says something
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(n=1.5), Setting("diffuse", n=1.4)], ids=str)
 def test_a_surface_that_refracts_takes_two_steps(setting):
     law = load("hazard", setting=setting)
@@ -128,6 +134,7 @@ def test_a_surface_that_refracts_takes_two_steps(setting):
     assert np.max(missed[0]) > 1e-4 > 1e-7 > np.max(missed[1])
 
 
+@pytest.mark.slow
 def test_density_of_the_sampler_is_its_own(law):
     """d xi / dx of the map itself, by differences; the law's own density differs from it by parts in a thousand."""
     xi, step = np.linspace(0.01, 0.99, 99), 1e-6

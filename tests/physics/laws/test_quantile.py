@@ -55,6 +55,7 @@ def test_map_by_hand_in_between(law):
     assert law.sampler.sample(xi, alpha) == pytest.approx(t * m / (kappa * m + 1 / y - kappa), rel=1e-6)
 
 
+@pytest.mark.slow
 def test_limits_at_the_source_and_far_away(law):
     alpha = ALBEDOS[:, None]
     hazard = 0.5 * law.albedo.albedo_over_reflectance(alpha)
@@ -69,6 +70,7 @@ def test_limits_at_the_source_and_far_away(law):
     np.testing.assert_allclose(kappa * slope, 1.0, rtol=1e-6)
 
 
+@pytest.mark.slow
 def test_ends_are_finite_and_right(shipped):
     alpha = ALBEDOS[:, None]
     np.testing.assert_array_equal(shipped.sampler.sample([0.0, 1.0], alpha), np.tile([0.0, np.inf], (ALBEDOS.size, 1)))
@@ -82,6 +84,7 @@ def test_ends_are_finite_and_right(shipped):
     np.testing.assert_array_equal(profile[:, 2], 0.0)
 
 
+@pytest.mark.slow
 def test_map_rises_with_xi_and_widens_with_alpha(shipped):
     alpha = 1 - np.linspace(1, 0, 201)[:, None] ** 2
     x, slope = mapped(shipped, np.geomspace(1e-9, 1e6, 400), alpha)
@@ -105,6 +108,7 @@ def test_cdf_is_the_inverse_of_the_map(law):
     np.testing.assert_allclose(law.cdf(law.sampler.sample(xi, alpha), alpha), xi + 0 * alpha, rtol=0, atol=2e-14)
 
 
+@pytest.mark.slow
 def test_newton_reaches_rounding_at_every_radius(shipped):
     x = np.geomspace(1e-20, FARTHEST, 500)
     with jax.enable_x64(True):
@@ -126,6 +130,7 @@ def test_pdf_is_the_slope_of_the_map_and_integrates_to_one(law):
     np.testing.assert_allclose(inside, 0.999, rtol=0, atol=1e-8)
 
 
+@pytest.mark.slow
 def test_profile_is_the_density_on_rings(law):
     r, alpha = np.geomspace(0.01, 20, 12), 0.7
     expected = 2 * np.pi * r * law.profile(r, alpha) / law.albedo.reflectance(alpha)

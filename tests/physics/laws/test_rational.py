@@ -82,6 +82,7 @@ def test_the_twin_is_the_exact_half_space_where_nothing_refracts():
         np.testing.assert_allclose(twin, exact.reflectance(ALPHA, setting=setting), rtol=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(n=1.4), Setting("diffuse", n=1.4)], ids=str)
 def test_photons_leave_specular_light_out(setting):
     light = simulate_orders(Grid.from_edges(r=[0.0, 1000.0]), 2**19, seed=4, setting=setting, progress=False)

@@ -86,6 +86,7 @@ def test_errors_are_those_of_linear_least_squares(plain):
     assert 0 < plain.errors(plain.of_law)["l"] < errors["l"], "hazard is ten times nearer than these data"
 
 
+@pytest.mark.slow
 def test_what_is_held_stays_and_what_is_known_counts():
     data = rings(seed=1)
     held = fit(data, scale=1.0, l=1.0)
@@ -155,6 +156,7 @@ def test_two_layers_are_no_half_space():
     assert relative_errors(found, found.of_misfit)["mu_a"] > 0.1
 
 
+@pytest.mark.slow
 def test_near_the_beam_colour_length_and_scale_are_one():
     near = fit(rings(seed=2, most=0.3 * MFP))
     near_to = identifiability(near)
@@ -248,6 +250,7 @@ def test_what_is_known_of_a_law():
     assert relative_error(dipole, 0.9, None) is None
 
 
+@pytest.mark.slow
 def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
     """Values of thirty decades and both signs, with a free scale: numpy warned, and the answer had numbers."""
     r = np.array([0.002, 0.05, 0.2, 0.28, 1.2, 70.0, 990.0])

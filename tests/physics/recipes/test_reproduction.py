@@ -55,6 +55,7 @@ def test_cut_is_the_first_low_radius_and_not_the_last():
     assert cut_radius(r, np.ones_like(r), "walk") == pytest.approx(r[-1])
 
 
+@pytest.mark.slow
 def test_fit_finds_a_rational_profile_whatever_it_starts_from():
     profiles = _hand_made(lambda r: np.maximum((-0.004 * r + 0.03) / (r + 0.4), 0.0))
     for protocol in (Protocol7(), Protocol7(stop="stride before")):

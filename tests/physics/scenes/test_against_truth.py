@@ -53,6 +53,7 @@ def view(name):
     return head, (80, 60), head.material.mfp
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["ball", "head"])
 def test_a_scene_is_the_exact_profile_over_what_is_seen(context, hazard, sidak, name):
     """Every pixel within its standard errors and the law's bias; half as much over all of them together."""

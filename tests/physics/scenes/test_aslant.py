@@ -9,6 +9,8 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from tests.physics.scenes import edges
 
+pytestmark = pytest.mark.slow
+
 ALPHA, MFP = 0.8, 8.0
 A = exact.reflectance(ALPHA, edges.DIFFUSE)
 SIZE, MIDDLE = (64, 128), (slice(48, 80), slice(24, 40))

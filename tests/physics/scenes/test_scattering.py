@@ -51,6 +51,7 @@ def test_a_pixel_alone_is_lambert(small, burley, samples):
     np.testing.assert_allclose(light[0, 0], 50.0)  # off the mask nothing scatters
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["burley", SeparableFilter()], ids=["burley", "separable"])
 @pytest.mark.parametrize(("gap", "bleeds"), [(50.0, False), (0.2, True)])
 def test_light_does_not_cross_a_gap(stage, burley, law, gap, bleeds):

@@ -33,6 +33,7 @@ def small(context):
         yield stage
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "channels"), [("importance", "longest"), ("importance blue", "mixture")])
 def test_step_edge_is_the_exact_integral(stage, exact_law, sidak, kind, channels):
     """With the exact profile; all columns within 4 mfp, mean over rows and seeds within its standard error."""
@@ -69,6 +70,7 @@ def rmse(light, truth):
 EDGES = [(0.8, (128, 96), 8), pytest.param(0.95, (512, 512), 32, marks=pytest.mark.slow)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("alpha", "size", "seeds"), EDGES)
 def test_our_law_is_as_good_as_the_exact_quantile(context, hazard, alpha, size, seeds):
     """The same points: noise at most 1.1 times as large, and a bias of at most 0.3 % of A; uniform radii have more."""
@@ -93,6 +95,7 @@ def at_the_edge(small, law, mfp, kind):
     return means.mean(), means.std(ddof=1) / np.sqrt(8)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", KINDS)
 def test_short_paths_gather_until_nothing_leaves_a_pixel(small, exact_law, kind):
     """Right from a fifth of a pixel, where Lambert would be off by 0.02 of A, at 0.6 pixels by 0.14."""
@@ -105,6 +108,7 @@ def test_short_paths_gather_until_nothing_leaves_a_pixel(small, exact_law, kind)
         assert truth > 0.02 > 10 * error
 
 
+@pytest.mark.slow
 def test_short_paths_fade_to_lambert_without_a_seam(small, exact_law):
     """Between a twentieth and a tenth of a pixel, never more than 0.003 of A off."""
     edge = step_edge((16, 128), 1.0, 1.0)

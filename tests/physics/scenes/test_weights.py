@@ -84,6 +84,7 @@ def own_moment(burley):
     return np.array(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("depth", [None, 150.0])
 @pytest.mark.parametrize("channels", CHANNELS)
 def test_second_moment_is_the_law_s_own(context, burley, own_moment, sidak, channels, depth):
@@ -94,6 +95,7 @@ def test_second_moment_is_the_law_s_own(context, burley, own_moment, sidak, chan
     assert np.all(error < 0.01 * own_moment)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("right", "wrong", "channels"), WRONG_MOMENTS)
 def test_second_moment_tells_what_is_wrong(context, alter, burley, own_moment, right, wrong, channels):
     alter(right, wrong)

@@ -9,6 +9,7 @@ from profilefit.studies.stability import atlas
 FITS = catalogue.fits_folder()
 
 
+@pytest.mark.slow
 def test_jobs_by_name():
     assert [name for name, _ in atlas.jobs(["liang"], FITS, False)] == [
         *("liang, published", "liang, corrected", "liang-whole", "liang-as-published", "liang-inverse-as-published"),

@@ -37,6 +37,7 @@ def keys(regions):
     return {(one.quantity, one.verdict, one.cause.key) for one in regions}
 
 
+@pytest.mark.slow
 def test_g_is_negative_below_eps_and_the_energy_is_a_misprint(printed):
     inverse, energy = (regions_of(cells) for cells in printed)
     assert (model_cells.INVERSE, Verdict.NEGATIVE, "g < 0 for xi < eps") in keys(inverse)
@@ -47,6 +48,7 @@ def test_g_is_negative_below_eps_and_the_energy_is_a_misprint(printed):
     }
 
 
+@pytest.mark.slow
 def test_the_map_folds_and_the_rational_one_does_not(of_maps):
     ours = [one for one in of_maps if one.subject == "albedo-rational"]
     theirs = [one for one in of_maps if one.subject != "albedo-rational"]
@@ -58,6 +60,7 @@ def test_the_map_folds_and_the_rational_one_does_not(of_maps):
     assert {one.cause.key for one in ours} == {"alpha near 1 in half"}  # and no other
 
 
+@pytest.mark.slow
 def test_none_of_them_is_unexplained(printed, of_maps):
     regions = [*of_maps, *(region for cells in printed for region in regions_of(cells))]
     assert [one for one in regions if one.is_unexplained] == []

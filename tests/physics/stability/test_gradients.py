@@ -1,5 +1,7 @@
 """Derivatives are those of differences, and what has none says so."""
 
+import pytest
+
 from profilefit.recipes import catalogue, inventory
 from profilefit.shader.check import validity
 from profilefit.studies.stability import gradients
@@ -29,6 +31,7 @@ def test_the_printed_map_has_no_slope_above_its_fold():
     assert any(one.verdict == Verdict.NOT_FINITE and one.cause.key == "no A above the fold" for one in regions)
 
 
+@pytest.mark.slow
 def test_a_wrong_derivative_is_found_and_leaves_nothing_behind(monkeypatch):
     """Negative control: differences of half the step are half as large. What was compiled with them is not used again:
     the atlas, looked at later in the same process, had four regions that nothing explained."""

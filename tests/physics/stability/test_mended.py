@@ -34,6 +34,7 @@ def test_the_density_of_hazards_radii_in_single_precision():
     np.testing.assert_allclose(made[seen], exactly[seen], rtol=3e-4)
 
 
+@pytest.mark.slow
 def test_the_radius_of_quantile_is_inverted_up_to_white():
     law, x = catalogue.load("quantile"), np.geomspace(1e-25, 1e8, 60)
     alpha = np.array([0.0, 0.5, 1 - 1e-9, 1 - 1e-12, 1 - 2.0**-53, 1.0])[:, None]

@@ -40,6 +40,7 @@ def tally(request):
     return simulate(request.param, Grid(1.0, 1, na=ANGLES), PHOTONS, seed=SEED)
 
 
+@pytest.mark.slow
 def test_tracer_sends_light_where_adding_doubling_does(tally, sidak):
     z = deviations(tally, solve(tally.medium, ANGLES))
     assert z.size == 2 * ANGLES
@@ -47,11 +48,13 @@ def test_tracer_sends_light_where_adding_doubling_does(tally, sidak):
     assert np.abs(z).max() < sidak(z.size)
 
 
+@pytest.mark.slow
 def test_light_of_a_slightly_different_phase_function_is_seen(tally, sidak):
     z = deviations(tally, solve(with_g(tally.medium, 0.02), ANGLES))
     assert np.abs(z).max() > sidak(z.size)
 
 
+@pytest.mark.slow
 def test_light_in_bins_one_degree_off_is_seen(tally, sidak):
     """90 bins of a degree, of which the first is left out, put together to 18 of five."""
     fine = solve(tally.medium, 90, nodes=1)
@@ -62,6 +65,7 @@ def test_light_in_bins_one_degree_off_is_seen(tally, sidak):
     assert np.abs(z).max() > sidak(z.size)
 
 
+@pytest.mark.slow
 def test_totals_of_the_tracer(tally):
     answer = solve(tally.medium, ANGLES)
     for seen, light in (

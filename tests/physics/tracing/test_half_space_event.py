@@ -11,6 +11,8 @@ from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import half_space_event, orders_batch, rng
 from mcml_sim.tracing.isotropic_event import DOUBLINGS
 
+pytestmark = pytest.mark.slow
+
 EDGES = np.array([0, 0.1, 0.3, 0.6, 1, 2, 4, 8.0])
 SETTINGS = [
     Setting(n=1.4),
@@ -125,7 +127,6 @@ def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
     assert np.abs(z).max() < sidak(z.size)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(n=1.4, g=0.5), Setting(n=1.3)], ids=str)
 def test_every_albedo_agrees_with_a_run_of_its_own(setting, sidak):
     grid = Grid.from_edges(r=EDGES)
@@ -181,7 +182,6 @@ def test_another_setting_does_not_compile_again():
     assert again.seconds == 0
 
 
-@pytest.mark.slow
 def test_double_precision_elsewhere_does_not_change_a_bit():
     setting = Setting("diffuse", n=1.4, g=0.7)
     alone = traced(setting, 2000)

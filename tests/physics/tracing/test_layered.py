@@ -10,6 +10,8 @@ from mcml_sim import Grid, Layer, Medium, exact, half_space
 from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import layered_batch
 
+pytestmark = pytest.mark.slow
+
 # Mismatched indices everywhere, forward, isotropic and backward scattering, every layer a few mean free paths.
 SMALL = Medium((Layer(1.4, 0.5, 9.5, 0.8, 0.2), Layer(1.2, 1, 4, 0, 0.3), Layer(1.5, 2, 3, -0.4, 0.3)), 1.0, 1.3)
 GRID = Grid(0.1, 8, 0.1, 8, na=6)
@@ -279,7 +281,6 @@ def test_half_space_reflects_as_the_exact_solution(alpha):
     assert np.all(np.abs(rings[:-1] - expected) < 4.5 * np.sqrt(d.reflected_squares[:-1, 0]))
 
 
-@pytest.mark.slow
 def test_conservative_half_space_ends_and_says_what_it_cut():
     d = one_layer(half_space(1.0, n=1.3, g=0.5))
     reflected, transmitted, absorbed, cut = shares(d)
@@ -319,7 +320,6 @@ def test_extremes_are_numbers_that_add_up(g, thickness):
 UNEVEN = Grid.from_edges(r=[0, 0.5, 1.5, 5], z=[0, 0.3, 0.9])
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("layers", "grid", "inner"), [(3, GRID, 5), (9, UNEVEN, 1)])
 def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     """Nine are more than are followed one by one in each photon; the `inner` rings end at r = 0.5."""
@@ -339,7 +339,6 @@ def test_a_layer_cut_into_many_is_the_same_layer(layers, grid, inner):
     assert np.all((claimed / d.absorbed[:-1] > 1e-4) & (claimed / d.absorbed[:-1] < 0.01))
 
 
-@pytest.mark.slow
 def test_errors_of_many_layers_are_those_of_few_groups_too():
     """A table so large that there are 8 groups; the same photons give the same errors but for the spread of 8."""
     medium = Medium((Layer(1.4, 1, 9, 0.5, 0.1),) * 9)

@@ -15,6 +15,8 @@ from mcml_sim.tracing import matched_batch, orders_batch, rng
 from mcml_sim.tracing.deposits import Deposits, shapes
 from mcml_sim.tracing.isotropic_event import DOUBLINGS
 
+pytestmark = pytest.mark.slow
+
 ALPHAS = [0.0, 0.05, 0.3, 0.6, 0.9, 0.97, 0.99, 0.999]
 PHOTONS = 2**17
 MFP = 2.5
@@ -151,7 +153,6 @@ def equal(a, b):
         np.testing.assert_array_equal(getattr(a, field.name), getattr(b, field.name), err_msg=field.name)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("grid", [GRID, Grid(0.5, 10, na=4)])
 def test_the_number_of_lanes_does_not_change_a_bit(grid):
     medium = half_space(0.9, MFP)

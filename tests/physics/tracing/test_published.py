@@ -40,6 +40,7 @@ def test_slab_of_van_de_hulst(photons):
     assert not is_met(tally.diffuse_transmittance, published.VAN_DE_HULST_TRANSMITTANCE)
 
 
+@pytest.mark.slow
 @sizes
 def test_three_layers_of_mcml(photons):
     tally = three_layers(photons)
@@ -52,6 +53,7 @@ def test_three_layers_of_mcml(photons):
     assert is_met(tally.absorbed_per_layer, by_layer, error, rounding)
 
 
+@pytest.mark.slow
 @sizes
 def test_three_layers_by_adding_doubling(photons):
     """Known to 1e-7, so only the run's own error counts."""

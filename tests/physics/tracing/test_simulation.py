@@ -8,6 +8,8 @@ from mcml_sim.runs import simulation
 from mcml_sim.tracing import layered_batch, matched_batch
 from mcml_sim.tracing.deposits import Deposits
 
+pytestmark = pytest.mark.slow
+
 SLAB = Medium((Layer(1.4, 0.5, 9.5, 0.6, 0.1), Layer(1.2, 2.0, 8.0, 0.2, 0.2)), n_above=1.0, n_below=1.1)
 GRID = Grid(0.05, 20, 0.029, 10, na=6)
 PHOTONS = 40_000
@@ -154,7 +156,6 @@ def test_one_photon_says_nothing_of_its_error():
         assert np.all(np.isinf(alone.quantity(name).standard_error)), name
 
 
-@pytest.mark.slow
 def test_stopping_early_leaves_the_errors_honest(monkeypatch):
     """30 runs, each of which stops by its own error at 800 to 1600 photons: z of their means against the exact one."""
     monkeypatch.setitem(simulation.BATCH_PHOTONS, matched_batch, 100)

@@ -92,6 +92,7 @@ def test_photons_that_were_not_asked_for_are_not_started():
     assert np.all(np.asarray(found.order)[100:] == 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [512, 16384])
 def test_the_number_of_lanes_does_not_change_a_bit(ends, lanes):
     found = traced(PHOTONS, lanes)
@@ -104,6 +105,7 @@ def test_a_shorter_batch_holds_the_first_photons_of_a_longer_one(ends):
     np.testing.assert_array_equal(np.asarray(found.rho)[:5000], ends[0][:5000])
 
 
+@pytest.mark.slow
 def test_double_precision_elsewhere_in_the_program_does_not_change_a_bit(ends):
     with jax.enable_x64(True):
         found = traced(PHOTONS)
@@ -155,6 +157,7 @@ def test_the_exact_answer_to_the_other_light_is_told_apart(lit, sidak):
     assert np.abs(deviations(counts, other)).max() > 3 * sidak(4 * 13)
 
 
+@pytest.mark.slow
 def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
     illumination, counts = lit
     where = half_space_event.half_space(Setting(illumination))
@@ -166,6 +169,7 @@ def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
     assert np.abs((general - fast) / error).max() < sidak(13)
 
 
+@pytest.mark.slow
 def test_other_settings_take_the_general_kernel():
     glass = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000, setting=Setting(n=1.4))
     free = orders_batch.trace_batch(Grid(1.0, 3), 0, 0, 20_000)

@@ -12,6 +12,7 @@ from profilefit.studies.tradeoff import contenders, laws
 from profilefit.studies.tradeoff.contenders import table_contender
 
 
+@pytest.mark.slow
 def test_fast_forms_are_the_laws():
     """In float32, as they are timed."""
     alpha = jnp.array([[0.1], [0.8], [0.99]])

@@ -23,6 +23,7 @@ def drawn(gather, law, seed=1):
     return found.mean[0] - found.truth[0], found.standard_error[0]
 
 
+@pytest.mark.slow
 def test_bias_is_what_drawing_finds(uniform):
     """With the right density and with a wrong one, which shows: radii are uniform, and the law's are not."""
     law = uniform.law

@@ -10,6 +10,7 @@ from profilefit.studies.tradeoff import truth
 from profilefit.studies.tradeoff.points import standings
 
 
+@pytest.mark.slow
 def test_reference_is_the_exact_profile():
     within = exact.cdf(truth.EDGES, truth.ALPHAS[:, None]) * np.asarray(exact.reflectance(truth.ALPHAS))[:, None]
     np.testing.assert_allclose(truth.reference()[truth.judged()], np.diff(within, axis=1)[truth.judged()], rtol=1e-9)
@@ -18,6 +19,7 @@ def test_reference_is_the_exact_profile():
     assert not truth.judged()[0, -1]  # beyond 99.5 % of the energy at alpha 0.2
 
 
+@pytest.mark.slow
 def test_errors_are_those_of_the_rings_that_count():
     energy = truth.reference().copy()
     assert truth.errors(energy) == (0.0, 0.0)
@@ -29,6 +31,7 @@ def test_errors_are_those_of_the_rings_that_count():
     assert rms == pytest.approx(0.1 / np.sqrt(truth.judged().sum()))
 
 
+@pytest.mark.slow
 def test_scalar_rings_are_unions_of_even_ones():
     np.testing.assert_allclose(truth.EDGES, truth.WIDTH * truth.RINGS)
 

@@ -5,6 +5,8 @@ import json
 import numpy as np
 import pytest
 
+pytestmark = pytest.mark.slow
+
 BALL = "() => explorer.ball && explorer.ball.done >= explorer.state.samples"
 BALL_PLACE = "#explorer?law={}&A=0.3,0.6,0.9&l={}&radius={}&samples=16&turn=40,20&even=0"
 WEIGHT = "inside[c] * law_density(x, shape) / p"  # of a sample, in ball.frag

@@ -13,6 +13,8 @@ from profilefit.report.explorer.fragment import first, offered
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
 
+pytestmark = pytest.mark.slow
+
 ROUNDING = 1e-5  # relative, of R_d in float32: `profilefit check` finds at most 2.3e-6; this is another float32
 TABLE = 2e-5  # of the exact solution between the knots of the explorer's table
 # One law of each kind: the first call of a law in Python takes as long as ten in the browser.
@@ -107,7 +109,6 @@ def test_keys_move_sliders_and_the_light(open_page, file):
     assert explorer.evaluate("explorer.state.turn") == pytest.approx([30, 0], abs=1)
 
 
-@pytest.mark.slow
 def test_every_law_runs_as_it_does_in_python(explorer, laws):
     there = explorer.evaluate("explorer.state.laws.map((law) => law.id)")
     assert set(there) == {name for name in laws if name != "beam_diffusion"}

@@ -9,6 +9,8 @@ import profilefit
 from benchmarks import forms
 from benchmarks.survival import FORMS, HAZARD
 
+pytestmark = pytest.mark.slow
+
 NEAR, FAR = 1.2, 0.6
 
 
@@ -57,7 +59,6 @@ def made_truth(law, constants):
     return forms.Truth(*(np.asarray(part) for part in blank._replace(left=left, density=density)))
 
 
-@pytest.mark.slow
 def test_free_fit_and_coefficient_laws_find_what_was_put_in():
     small, law = (forms.CoefficientLaw("lambda_0", degrees) for degrees in ((0, 1, 0, 0), (1, 1, 0, 0)))
     put_in = np.array([0.5, -0.2, 0.6, 0.1, 0.2, 0.7])

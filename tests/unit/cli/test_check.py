@@ -38,6 +38,7 @@ def test_a_good_law_passes_in_100_columns(command, opengl):
     assert "float16 arithmetic: not offered by" in out or "arithmetic" in out
 
 
+@pytest.mark.slow
 def test_json_has_all_of_it_and_is_what_a_folder_keeps(command, opengl):
     status, out, err = command("check", "albedo-rational-n1.4", "hazard-n1.4", "--json", "--out", "kept")
     found = json.loads(out)
@@ -68,6 +69,7 @@ def test_a_part_is_not_told_as_the_whole(names, constants, told):
     assert scope(names, constants) == told
 
 
+@pytest.mark.slow
 def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
     """A record that claims a model a million times as good as it is."""
     path = folder / "hazard-n1.4.json"
@@ -80,6 +82,7 @@ def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
     assert out.splitlines()[-1] == "1 law or map: 1 fail"
 
 
+@pytest.mark.slow
 def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     status, out, _ = command("check", "liang", "--constants", "published")
     text = " ".join(out.split())
@@ -101,10 +104,10 @@ def test_the_printed_laws_of_liang_fail_where_they_are_wrong(command, opengl):
     ("words", "told"),
     [
         (("nothing",), "name must be a law, map or record, got 'nothing'; laws: liang, "),
-        (("hazzard",), "did you mean hazard"),
+        pytest.param(("hazzard",), "did you mean hazard", marks=pytest.mark.slow),
         (("hazard", "--constants", "nothing"), "--constants must be one of regenerated"),
         (("--constants", "nothing"), "--constants must be regenerated or a printed set, got 'nothing'"),
-        (("reproduction",), "record 'reproduction' holds no law"),
+        pytest.param(("reproduction",), "record 'reproduction' holds no law", marks=pytest.mark.slow),
         (("hazard", "--precision", "float8"), "float8"),
     ],
 )
@@ -127,6 +130,7 @@ def blind(tmp_path):
     return run
 
 
+@pytest.mark.slow
 def test_no_opengl_is_one_line_and_status_2(blind):
     done = blind("check", "hazard-n1.4")
     assert (done.returncode, done.stdout) == (2, "")
@@ -134,6 +138,7 @@ def test_no_opengl_is_one_line_and_status_2(blind):
     assert done.stderr.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_without_opengl_a_readme_keeps_its_table(blind, folder):
     page = folder / "page.md"
     page.write_text("<!-- check -->\nas it was\n<!-- /check -->\n")

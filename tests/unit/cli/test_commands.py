@@ -41,6 +41,7 @@ def small(recipe: Path, out: str = "out", *more: str) -> tuple[str, ...]:
     return ("regenerate", str(recipe), "--out", out, "--photons", "20000", *more)
 
 
+@pytest.mark.slow
 def test_regenerate_writes_a_record_that_loads(command, recipe):
     status, out, err = command(*small(recipe, "out", "--json", "--quiet"))
     assert (status, err) == (0, "")
@@ -115,6 +116,7 @@ def test_more_photons_resume_the_ones_that_are_there(command, recipe):
         assert Path(f"out/small.{suffix}").read_bytes() == Path(f"at-once/small.{suffix}").read_bytes()
 
 
+@pytest.mark.slow
 def test_control_c_is_one_line_and_keeps_the_batches(recipe, tmp_path):
     """In a process of its own, with the handler of Ctrl-C that a shell's background jobs lack."""
     code = "import runpy, signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
@@ -273,6 +275,7 @@ def test_a_damaged_batch_is_named_and_traced_again(command, recipe):
     assert batch.read_bytes() == whole
 
 
+@pytest.mark.slow
 def test_the_photons_of_another_run_are_refused(command, recipe):
     assert command(*small(recipe))[0] == 0
     manifest = next(Path("out/.photons").glob("*/run.json"))
@@ -283,6 +286,7 @@ def test_the_photons_of_another_run_are_refused(command, recipe):
     assert err.count("\n") == 1
 
 
+@pytest.mark.slow
 def test_report_shows_shipped_records_and_draws_figures(command):
     status, out, err = command("report", "albedo-liang", "--figures", "figures", "--quiet")
     assert (status, err) == (0, "")

@@ -16,6 +16,7 @@ def phantom(command, tmp_path):
     return command("fit", PHANTOM, "--out", str(tmp_path / "out"))
 
 
+@pytest.mark.slow
 def test_a_phantom_is_told_in_100_columns_with_figures_and_json(phantom, tmp_path):
     status, out, err = phantom
     assert (status, err) == (0, f"wrote fit.json and 4 figures into {tmp_path / 'out'}\n")
@@ -71,6 +72,7 @@ def test_errors_from_three_replicates_are_said_to_be_estimates(command, tmp_path
     assert half(length["interval_95_data"]) == pytest.approx(2.07 * length["statistical_error"], rel=0.1)
 
 
+@pytest.mark.slow
 def test_what_is_not_identifiable_is_reported_with_a_remedy(command):
     status, out, err = command("fit", PHANTOM, "--scale", "free", "--r-max", "0.5mm")
     assert (status, err) == (0, "")

@@ -46,6 +46,7 @@ def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
         assert getattr(said, key) == getattr(taken, key), key
 
 
+@pytest.mark.slow
 def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
     """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
     status, out, err = command("scene", str(small), "--out", "drawn", "--json", "--quiet")
@@ -101,6 +102,7 @@ def test_a_mistake_is_one_line_that_names_file_and_key(command, small, old, new,
     assert not Path("drawn").exists()
 
 
+@pytest.mark.slow
 def test_nothing_to_see_is_one_line(command, small, opengl):
     dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
     small.write_text(SMALL + dark, encoding="utf-8")

@@ -67,7 +67,7 @@ def test_an_unknown_record_names_the_nearest(command, name, near):
     assert err.count("\n") == 1
 
 
-@pytest.mark.parametrize("width", [40, 60, 80, 100, 120])
+@pytest.mark.parametrize("width", [40, 80, *(pytest.param(one, marks=pytest.mark.slow) for one in (60, 100, 120))])
 @pytest.mark.parametrize("words", [("report",), ("report", "liang-whole", "reproduction")])
 def test_tables_are_whole_at_any_width(command, monkeypatch, width, words):
     monkeypatch.setenv("COLUMNS", str(width))

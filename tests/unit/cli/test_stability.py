@@ -12,6 +12,7 @@ from profilefit.recipes.evidence import stale
 FITS = catalogue.fits_folder()
 
 
+@pytest.mark.slow
 def test_a_map_that_holds_and_one_that_folds(command, tmp_path):
     status, out, err = command("stability", "albedo-rational", "--out", "atlas")
     assert status == 0, err

@@ -61,6 +61,7 @@ def test_a_fork_after_work_is_told_what_to_do():
     assert lines[-1] == "worked"
 
 
+@pytest.mark.slow
 def test_a_fork_before_any_work_works():
     lines = run("print(*in_fork(['exact', 'law']), sep='\\n')\nprint(said('law'))")
     assert lines == ["worked"] * 3

@@ -430,6 +430,7 @@ def test_reading_refuses_or_takes_data(kind, elsewhere):
     assert QUICK / 40 < len(accepted) < QUICK  # neither all nor none, or nothing was tried
 
 
+@pytest.mark.slow
 def test_exports_and_tables_of_what_is_accepted(elsewhere):
     faults: list[str] = []
     names = [(seed, name) for seed in range(60) if (name := copied(seed, elsewhere))]

@@ -73,6 +73,7 @@ def jitted(method, *arguments):
         return np.asarray(jax.jit(method)(*map(jnp.asarray, arguments)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0, 1, 63, 64, 65, 1024, 1025, 2 * BLOCKS[-1] + 1])
 def test_every_length_is_that_of_one_call(burley, size):
     """To rounding: a vector's last numbers may be worked out by other instructions."""

@@ -111,6 +111,7 @@ def test_replicates_that_agree_by_accident(table):
     assert np.all(table("r,value1,value2,value3\n" + flat).sigma > 0)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "text",
     [

@@ -20,6 +20,7 @@ def run(tmp_path):
     return RecipeRun("quick", 3, tmp_path / "out", tmp_path / "photons", 2000, said.append, False)
 
 
+@pytest.mark.slow
 def test_every_setting_has_its_own_store_and_resumes(run):
     for setting, folder in SETTINGS.items():
         light = run.light(setting)

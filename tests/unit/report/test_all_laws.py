@@ -64,6 +64,7 @@ def test_records_restrict_and_a_failed_one_has_no_law(folder):
     assert printed(every_law(measured(folder, ["burley-whole"]))) == [NOTHING]
 
 
+@pytest.mark.slow
 def test_tables_of_one_record(folder):
     """What is printed is what was measured."""
     found = measured(folder, ["burley-whole"], ALPHA, [0.9])

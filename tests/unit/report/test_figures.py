@@ -17,6 +17,8 @@ from profilefit.report.figures.record_figures import PAPER, plans
 from profilefit.report.figures.residual_figure import energy_within
 from profilefit.report.records import DRAWS, Source, coefficients
 
+pytestmark = pytest.mark.slow
+
 SHIPPED = catalogue.fits_folder()
 SMALL_CORNER = "corner-albedo-liang"
 # Every kind of figure once: corner plots differ in nothing but their record, nor does (15) from (11) but in its letter.
@@ -74,7 +76,6 @@ def test_png_is_1200_pixels_wide_with_ink_that_nowhere_touches_its_edge(drawn):
     require_whole(drawn[0])
 
 
-@pytest.mark.slow
 def test_the_dear_ones_are_whole_too(source, tmp_path):
     assert {*DEAR, *EACH_KIND} >= {plan.name for plan in PAPER if plan.name != "liang-15-c"}
     chosen = [plan for plan in plans(source) if plan.name in DEAR]

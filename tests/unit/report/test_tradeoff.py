@@ -25,6 +25,7 @@ POINTS = tuple(
 PART = TradeoffPart("demo", "Demo", (Panel("p", "R$_d$ of p", "time [s]", "error [-]", POINTS),), ("left out: three",))
 
 
+@pytest.mark.slow
 def test_labels_keep_off_each_other_and_inside():
     chart = canvas(4.0)
     axes = chart.subplots()
@@ -42,6 +43,7 @@ def test_labels_keep_off_each_other_and_inside():
         assert not any(box.overlaps(other) for other in boxes[:i])
 
 
+@pytest.mark.slow
 def test_crowded_labels_say_so():
     """Negative control: where there is no room, overlaps are counted and not denied."""
     chart = canvas(1.2, width=1.6)

@@ -212,6 +212,7 @@ def test_angles_that_are_not_resolved_are_one_bin(tally, tmp_path):
     assert found["Rd_a"] * 2 * math.pi * math.sin(math.pi / 4) * math.pi / 2 == pytest.approx(found["RAT"][1], rel=1e-4)
 
 
+@pytest.mark.slow
 def test_a_simulation_goes_out_and_comes_back(tmp_path):
     medium = Medium((Layer(1.0, 10, 90, 0.75, 0.02),))
     tally = simulate(medium, Grid(0.01, 10, 0.002, 10, na=5), 5000, seed=1, progress=False)

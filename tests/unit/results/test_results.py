@@ -175,6 +175,7 @@ def test_what_no_run_wrote_is_one_line(tmp_path, changes, reason):
     assert "\n" not in str(error.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("photons", [1, 77])
 def test_few_photons_come_back_with_an_infinite_error(tmp_path, photons):
     """Of what is absorbed, errors come from the spread between groups of photons: of one group there is none."""

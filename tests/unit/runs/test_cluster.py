@@ -47,10 +47,12 @@ def pids(workers):
         return set(client.run(os.getpid).values())
 
 
+@pytest.mark.slow
 def test_two_processes_give_the_bits_of_one(workers, alone):
     assert equal(run_batches(TRACE, BATCH, BATCH * BATCHES, scheduler=workers.scheduler_address), alone)
 
 
+@pytest.mark.slow
 def test_a_batch_that_ends_as_the_wait_for_it_does_is_taken(workers, alone, monkeypatch):
     real, waited = distributed.Future.result, set()
 

@@ -156,6 +156,7 @@ def may_mount():
     return shutil.which("unshare") is not None and subprocess.run(trial, capture_output=True).returncode == 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("how", "reason"), [("small disk", "No space left on device"), ("small files", "File too large")]
 )

@@ -102,6 +102,7 @@ def test_radiance_has_a_highlight_where_it_must(stage, burley):
     assert bright @ np.array([0.8, 0.0, 1.6]) / np.hypot(0.8, 1.6) > 0.97
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("law", ["burley", SeparableFilter()], ids=["burley", "separable"])
 def test_buffers_come_back_as_they_went(stage, burley, law):
     """Drawn, read, uploaded: the same pixels and the same light."""
@@ -115,6 +116,7 @@ def test_buffers_come_back_as_they_went(stage, burley, law):
     np.testing.assert_array_equal(stage.scatter(law, 2.0, Sampling(8)), drawn)
 
 
+@pytest.mark.slow
 def test_leaves_the_state_as_it_was(context, burley):
     """Target and viewport of the owner's, and the pixels of its target."""
     own = context.simple_framebuffer((8, 8))
@@ -138,6 +140,7 @@ def test_times_and_compiles_apart(stage, burley):
     assert set(stage.compile_milliseconds) == {"scatter burley", "combine burley"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("share", [0.25, 0.5])
 def test_covering_zooms_to_a_share(context, burley, share):
     """And covered pixels gather: one that does not is Lambert's to the last bit, as are those in even shade."""

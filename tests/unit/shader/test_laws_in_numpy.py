@@ -83,7 +83,13 @@ def mismatch(names, law):
     return found
 
 
-@pytest.mark.parametrize("label", LAWS)
+# A record of another setting has the text of its law and other constants.
+ELSEWHERE = [one for one in LAWS if "-" in one and one != "gaussians-2"]
+
+
+@pytest.mark.parametrize(
+    "label", [pytest.param(one, marks=pytest.mark.slow) if one in ELSEWHERE else one for one in LAWS]
+)
 def test_the_twin_is_the_law(label):
     law = LAWS[label]
     found = mismatch(twin(text_of(law)), law)
@@ -91,6 +97,7 @@ def test_the_twin_is_the_law(label):
     assert {what: error for what, error in found.items() if error > accepted[what]} == {}
 
 
+@pytest.mark.slow
 def test_two_steps_of_hazard_draw_its_density():
     law = LAWS["hazard-n1.3"]
     with jax.enable_x64(True):

@@ -61,6 +61,7 @@ def test_azimuth_is_cosine_and_sine_to_5e_7():
     np.testing.assert_allclose(np.hypot(cosine, sine), 1, atol=5e-7)
 
 
+@pytest.mark.slow
 @some_directions
 @pytest.mark.parametrize(("layer", "g"), [(1, 0.8), (2, -0.5), (3, 0.0)])
 def test_scattering_turns_by_g_and_evenly_around(direction, layer, g):

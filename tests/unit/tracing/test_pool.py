@@ -44,6 +44,7 @@ def followed(photons, lanes, turn=turn):
     return np.asarray(jax.jit(lambda n: pool.follow(enter, turn, seen, n, lanes))(jnp.int32(photons)))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lanes", [64, 512, 8192])
 @pytest.mark.parametrize("photons", [1, 100, 20_000])
 def test_every_photon_lives_once_to_its_end_and_no_other_is_started(photons, lanes):

@@ -105,6 +105,7 @@ def test_avalanche_test_sees_a_generator_without_its_last_shift(draw, sidak):
     assert avalanche(unfinished, jnp.asarray(rng.batch_key(0, 0)), sidak) > 5
 
 
+@pytest.mark.slow
 def test_words_repeat_as_often_as_birthdays_say(draw):
     for drawn in np.moveaxis(words(draw, photons=2**14), -1, 0).reshape(-1, 2**14 * EVENTS):
         expected = drawn.size**2 / 2**33

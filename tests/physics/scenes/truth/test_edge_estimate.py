@@ -28,6 +28,7 @@ def noise(gather, points, alpha, setting):
     return np.sqrt(np.mean(edge_estimate(gather, points, PLACES, alpha, setting).rmse ** 2))
 
 
+@pytest.mark.slow
 def test_is_the_obvious_loop():
     law = profilefit.load("burley", "published")
     points = random_points(5, 3, seed=4)
@@ -47,6 +48,7 @@ def test_is_the_obvious_loop():
     assert estimate.law_bias == pytest.approx(step_response(0.3, 0.8, law=law) - step_response(0.3, 0.8), abs=1e-15)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [SEARCHLIGHT, DIFFUSE], ids=str)
 def test_exact_quantile_is_binomial(setting, sidak):
     """Of 64 weights of 1 a number is lit that is binomial: mean and variance are known, and it has no bias."""

@@ -26,6 +26,7 @@ def test_is_the_exact_half_space(setting):
     assert np.max(np.abs(shifted.density(x) - truth)[bright] / truth[bright]) > 1e-5
 
 
+@pytest.mark.slow
 def test_ends():
     curves = exact_table("diffuse").curves([0.0, 1.0])
     np.testing.assert_array_equal(curves.alpha, [0.0, 1.0])
@@ -33,6 +34,7 @@ def test_ends():
     np.testing.assert_allclose(curves.share(np.array([[0.0, 1e9], [0.0, 1e9]])), [[0.0, 1.0], [0.0, 1.0]], atol=2e-4)
 
 
+@pytest.mark.slow
 def test_misuse():
     with pytest.raises(InputError, match="illumination must be one of searchlight, diffuse, got 'sun'"):
         exact_table("sun")

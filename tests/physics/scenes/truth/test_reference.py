@@ -76,6 +76,7 @@ def double_loop(surface, view, mfp, setting, pixels):
     return surface.reflectance[tuple(np.transpose(pixels))] * light / share, share
 
 
+@pytest.mark.slow
 def test_is_the_double_loop():
     """Neighbours by 4 x 4 and 2 x 2 Gauss points, others by one: 2e-4 at pixels of 0.23 to 0.6 mfp."""
     surface, pixels = hill(3, 16), np.array([[0, 1], [2, 15]])
@@ -95,6 +96,7 @@ def test_even_light_on_even_skin_is_conserved(reflectance):
     assert np.all((found.share > 0.1) & (found.share < 1.0))
 
 
+@pytest.mark.slow
 def test_step_edge_is_the_integral():
     """Of a plane that ends 16 mfp away, with pixels of half a mfp."""
     surface, view = seen(buffers.step_edge((64, 64), 0.5, [0.1, 0.3, 0.5]))
@@ -109,6 +111,7 @@ def test_step_edge_is_the_integral():
         assert np.max(np.abs(share - wrong)) > 1e-3
 
 
+@pytest.mark.slow
 def test_short_mean_free_path_is_lambert():
     surface = hill(4, 6)
     found = gathered(surface, VIEW, np.full(3, 1e-3))
@@ -118,6 +121,7 @@ def test_short_mean_free_path_is_lambert():
     assert not found.light[1, 2].any()
 
 
+@pytest.mark.slow
 def test_no_light_crosses_a_gap_in_depth():
     surface = flat(8, 24, 0.8)
     near = np.broadcast_to(np.arange(24) < 12, (8, 24))
@@ -139,6 +143,7 @@ def test_own_pixel_holds_its_disc():
     assert wide == pytest.approx(strip, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_refined_says_what_coarse_pixels_cost():
     fine, view = seen(buffers.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
     pixels = np.array([[12, 11], [12, 12], [12, 15]])

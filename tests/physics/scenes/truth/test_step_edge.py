@@ -26,6 +26,7 @@ def plane_sum(distance, alpha, setting):
     return 2.0 * share @ profile @ share
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("setting", [Setting(), DIFFUSE], ids=str)
 def test_is_the_sum_over_the_lit_half_plane(setting):
     found = step_response(-0.5, 0.9, setting=setting)
@@ -41,6 +42,7 @@ def test_one_gaussian_is_an_error_function(normalisation):
     np.testing.assert_allclose(step_response(x, 0.5, law=law), 0.5 + 0.5 * erf(x / (0.7 * 2**0.5)), atol=1e-12)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "law", [None, ("hazard", "regenerated"), ("liang", "corrected"), ("gaussians:4", "regenerated")]
 )
@@ -54,6 +56,7 @@ def test_more_nodes_change_nothing(law, monkeypatch):
     assert np.max(np.abs(coarse - step_response(PLACES, alphas, law=chosen))) > 1e-5
 
 
+@pytest.mark.slow
 def test_ends_symmetry_and_units():
     assert step_response(0.0, 0.8) == 0.5
     assert step_response(-1e6, 0.8) == 0.0
@@ -69,6 +72,7 @@ def test_ends_symmetry_and_units():
     assert isinstance(step_response(1.0, 0.5), float)
 
 
+@pytest.mark.slow
 def test_bias_of_the_project_law_is_small():
     """Within 4 mfp of the edge, at most 0.3 % of A; a published law has more."""
     x = np.linspace(-4.0, 4.0, 41)

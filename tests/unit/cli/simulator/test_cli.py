@@ -77,6 +77,7 @@ def names(folder: Path = Path()) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file()}
 
 
+@pytest.mark.slow
 def test_runs_everything_and_tells_it_with_errors(command, mci):
     status, out, err = command("run", mci)
     assert (status, err) == (0, "")
@@ -116,6 +117,7 @@ def test_photons_seed_and_folder_are_the_users(command, mci):
     assert read_results("a/first.npz").photons == 1000
 
 
+@pytest.mark.slow
 def test_results_of_another_run_are_replaced(command, mci):
     assert command("run", mci, "--seed", 3)[0] == 0
     before = Path("first.mco").read_bytes()
@@ -165,6 +167,7 @@ def test_what_no_run_wrote_is_not_replaced(command, mci, name, kept, said):
     assert there() == before
 
 
+@pytest.mark.slow
 def test_a_name_that_leads_elsewhere_takes_a_folder(command, mci, tmp_path):
     elsewhere = tmp_path / "elsewhere"
     elsewhere.mkdir()
@@ -175,6 +178,7 @@ def test_a_name_that_leads_elsewhere_takes_a_folder(command, mci, tmp_path):
     assert not list(elsewhere.iterdir())
 
 
+@pytest.mark.slow
 def test_a_link_named_as_output_is_followed(command, mci):
     mci.write_text(runs(("first.mco", 2000, 10)))
     Path("sub").mkdir()
@@ -251,6 +255,7 @@ def test_a_precision_that_was_not_reached_blocks_no_run(command, mci, words):
     assert "finished before" not in out
 
 
+@pytest.mark.slow
 def test_two_at_once_with_other_seeds_are_told_to_part(command, mci, monkeypatch):
     """Both begin before the other has a batch: nothing is mixed, and nobody is told to delete what is in use."""
     mci.write_text(runs(("one.mco", 2000, 10)))
@@ -301,6 +306,7 @@ def test_a_run_that_ended_before_its_first_batch_is_in_nobodys_way(command, mci,
     assert read_results("first.npz").seed == 8
 
 
+@pytest.mark.slow
 def test_fewer_photons_do_not_cost_the_others(command, mci):
     photons = layered_batch.BATCH_PHOTONS + 77
     mci.write_text(runs(("one.mco", photons, 10)))

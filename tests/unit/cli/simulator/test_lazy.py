@@ -78,6 +78,7 @@ runpy.run_module(package, run_name="__main__")
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("imported", "package", "words"),
     [

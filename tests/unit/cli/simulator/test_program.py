@@ -91,6 +91,7 @@ def small():
     return start
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("words", ["printed", "shown", "--help"])
 def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
     """As in `| head`: the status that a shell gives what SIGPIPE ended, and no traceback."""
@@ -134,6 +135,7 @@ def test_whatever_a_message_holds_it_is_one_line_that_is_only_printed(small):
     assert len(said) < 2100
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seconds", "printed"), [("50", (b"",)), ("0", (b"", b"slept\n"))])
 def test_ctrl_c_in_a_callback_of_the_collector_is_not_lost(small, seconds, printed):
     """Python drops what is raised there: it comes again, or the command had just ended by then."""
@@ -143,6 +145,7 @@ def test_ctrl_c_in_a_callback_of_the_collector_is_not_lost(small, seconds, print
     assert out in printed
 
 
+@pytest.mark.slow
 def test_other_errors_that_cannot_be_raised_are_told_as_ever(small):
     with small("unraisable") as run:
         _, err = run.communicate(timeout=60)

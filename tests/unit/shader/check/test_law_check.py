@@ -40,6 +40,7 @@ def test_a_regenerated_law_passes_with_room(context, exact):
     assert {bound.name for bound in found.bounds} >= {"float32 rel", "float32 ks", "bad numbers"}
 
 
+@pytest.mark.slow
 def test_the_gpus_numbers_have_the_records_errors(context):
     """Of a law that has an exact profile, measured anew."""
     (found,) = check_laws(context, [inventory.find("burley-whole", FITS)], FITS)
@@ -89,6 +90,7 @@ def test_what_the_paper_promises_is_judged_of_its_constants_alone():
     assert set(bounds.of_profile(inverse, FITS).values) == {"inversion_error"}
 
 
+@pytest.mark.slow
 def test_names_choose_laws_and_maps():
     laws, maps = regenerated(FITS)
     assert {"hazard", "hazard-diffuse-n1.5", "liang-whole", "liang-inverse-as-published"} <= {o.label for o in laws}
@@ -155,6 +157,7 @@ def test_the_grid_has_both_ends():
         assert np.array_equal(values, values.astype(np.float32))
 
 
+@pytest.mark.slow
 def test_costs_are_counted_in_normalized_diffusion(context):
     yardstick = catalogue.load("burley", "published")
     found = costs(context, [HAZARD.law], yardstick)
@@ -163,6 +166,7 @@ def test_costs_are_counted_in_normalized_diffusion(context):
     assert all(value > 0 for cost in found.values() for value in (*cost.ns.values(), *cost.ratio.values()))
 
 
+@pytest.mark.slow
 def test_a_stored_reflectance_loses_less_than_a_stored_albedo(context):
     found = check_half(context, HAZARD)
     assert 1e-5 < found.rel[REFLECTANCE] < 0.5 * found.rel[ALPHA] < 0.01
