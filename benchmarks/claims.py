@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import math
 import os
 import shlex
 import subprocess
@@ -111,6 +112,26 @@ def edge_nearer(numbers: Any) -> float:
     return min(diffusion / hazard for both in pairs for diffusion, hazard in both)
 
 
+def flip(numbers: Any, law: str = "hazard") -> tuple[float, float, float]:
+    """FLIP with the most samples: mean, least and most of the seeds."""
+    seeds = numbers["laws"][law]["flip"][-1]
+    return sum(seeds) / len(seeds), min(seeds), max(seeds)
+
+
+def flip_nearer(numbers: Any) -> tuple[float, float, float]:
+    """The same of normalized diffusion, refitted, over that of hazard."""
+    (own, least, most), (other, low, high) = flip(numbers), flip(numbers, "burley refitted")
+    return other / own, low / most, high / least
+
+
+def recovered(numbers: Any) -> float:
+    """The farthest of what a file of a simulation knows, in errors that the fit states."""
+    known = [one for one in numbers["quantities"].values() if one["of_file"] is not None]
+    return max(
+        abs(one["value"] - one["of_file"]) / math.hypot(one["statistical_error"], one["law_error"]) for one in known
+    )
+
+
 def apart(only_chosen: bool):
     """Predicted and rendered error, larger over smaller, at worst."""
 
@@ -159,6 +180,10 @@ RUNS = (
         ("shader-faults", "≤ 0", lambda n: sum(len(one["broken"]) for kind in ("laws", "maps") for one in n[kind]),
          "bounds that exported texts of regenerated laws and maps break"),
     )),
+    Run("profilefit fit examples/half_space.mco", "", "medium of the simulation", EXACT, (
+        ("own-data", "≤ 2", recovered, "distance of fitted from simulated alpha, l, mu_a and mu_s', in stated errors",
+         "stated errors: statistical and model"),
+    )),
     Run("python benchmarks/tracer.py", "--quick", "compiled scalar tracers in MCML's manner, one core", TURNS, (
         ("orders-speed", "≥ 20", ratio("simulate_orders, live events/s, over the yardstick"),
          "live events a second of simulate_orders, over a scalar tracer with r-z tally"),
@@ -195,6 +220,10 @@ RUNS = (
         ("edge-noise", "≤ 1.01", edge("random", "lattice"), "noise of 64 samples of hazard there",
          "4096 trials, 256 if quick; the same points for both"),
     )),
+    Run("python -m benchmarks.render errors", "", "exact profile over the visible surface", "extremes of four seeds", (
+        ("flip", "≤ 0.006", flip, "FLIP of a head by 256 samples of hazard"),
+        ("flip-nearer", "≥ 1.7", flip_nearer, "FLIP of normalized diffusion, refitted, over that of hazard"),
+    )),
     Run("python -m benchmarks.choose", "--quick", "pictures rendered through OpenGL against the exact profile", EXACT, (
         ("choose-error", "≤ 1.1", apart(True), "predicted and rendered error of what choose takes, larger over smaller",
          "worst scene; each rendered to 3 %"),
@@ -217,6 +246,7 @@ def numbers(command: str) -> Any:
         file = Path(folder) / "numbers.json"
         file.touch()
         if program == "profilefit":  # prints the numbers, and writes into the folder that it is in
+            (Path(folder) / "examples").symlink_to(ROOT / "examples")
             whole = [sys.executable, "-m", program, *words, "--fits", str(FITS), "--json", "--quiet"]
             with file.open("wb") as out:
                 done = subprocess.run(whole, cwd=folder, stdout=out, check=False)

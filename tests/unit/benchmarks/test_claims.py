@@ -39,6 +39,7 @@ def test_rows_that_were_measured_are_those_that_are_promised_and_none_is_broken(
         assert one.holds, one.cells
 
 
+@pytest.mark.slow
 def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, tmp_path, capsys):
     monkeypatch.setattr(claims, "RUNS", (claims.RECORDS._replace(promises=(BROKEN, claims.RECORDS.promises[1])),))
     with pytest.raises(SystemExit, match=r"error of R_d by hazard: 0.331 % BROKEN, promised ≤ 0.1 %"):
