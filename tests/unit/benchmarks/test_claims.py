@@ -24,7 +24,6 @@ def test_records_keep_what_is_promised_and_are_those_that_were_measured():
     assert {one.name: one.value for one in rows}.items() <= told.items()
 
 
-@pytest.mark.xfail(strict=True, reason="`make claims` takes forty minutes of an idle machine: not yet run to its end")
 def test_every_row_was_measured():
     measured = {one.name for one in read_claims(EVIDENCE)[1]}
     assert [p[0] for run in claims.RUNS for p in run.promises if p[0] not in measured] == [], "run make claims"
