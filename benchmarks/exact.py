@@ -55,7 +55,7 @@ class Point:
 def solved(rule: Rule) -> Floats:
     """R_d (albedos, radii), from nothing."""
     forget()
-    return by_alpha(profile, RADII, ALPHAS[:, None], "searchlight", rule)
+    return by_alpha(profile, RADII, ALPHAS[:, None], exact.SEARCHLIGHT, rule)
 
 
 def fastest(works: dict[str, Callable[[], object]]) -> dict[str, float]:

@@ -12,6 +12,8 @@ os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "xla"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
+# Tables of the exact half space under refracting surfaces: not the user's, and made once.
+os.environ["XDG_CACHE_HOME"] = str(Path(__file__).parents[1] / ".pytest_cache" / "user")
 pytest_plugins = ["tests.fixtures"]  # imports jax, and so comes after the lines above
 MOST_MAPS = 20_000  # of 65530 that Linux gives a process; a file of tests takes a few thousand
 

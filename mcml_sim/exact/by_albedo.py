@@ -15,20 +15,29 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact.transform import STANDARD, Rule, Transform, solve
+from mcml_sim.exact import table, tables, transform
+from mcml_sim.exact.transform import STANDARD, Rule, Transform
+from mcml_sim.media.setting import ILLUMINATIONS, Setting, is_traced
 
 Floats = NDArray[np.float64]
 
 Kernel = Callable[[Transform, jax.Array, jax.Array], jax.Array]
 """(transform, alpha, x) -> the quantity wanted, at radii or shares x of any shape, of one albedo."""
 
+Each = Callable[[jax.Array, "Surface"], jax.Array]
+"""(alpha, surface) -> the quantity wanted, of one albedo."""
+
 BLOCK = 64
 
 
-def by_alpha(kernel: Kernel, x: Any, alpha: Any, illumination: str, rule: Rule = STANDARD) -> Any:
-    """The kernel on x broadcast against alpha, float64 arrays; a jax array if one of them is."""
-    if isinstance(x, jax.Array) or isinstance(alpha, jax.Array):
-        return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), illumination, rule)
+Surface = table.Table | None
+"""The table of a surface that refracts; None of one that does not."""
+
+
+def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = STANDARD) -> Any:
+    """The kernel on x broadcast against alpha, float64 arrays; a jax array if one of them or the setting's n is."""
+    if any(isinstance(one, jax.Array) for one in (x, alpha, setting.n)):
+        return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), surface(setting, rule), setting.illumination, rule)
     x, alpha = np.broadcast_arrays(x, alpha)
     out = np.empty(x.shape)
     # Worked out at once, even where the caller is being traced: what is kept must hold no tracer of JAX.
@@ -36,19 +45,19 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, illumination: str, rule: Rule =
         started = []  # all, before the first is waited for
         for value in np.unique(alpha):
             here = alpha == value
-            transform = _transform(float(value), illumination, rule)
-            started.append((here, [_of_block(kernel, transform, value, block) for block in blocks(x[here])]))
+            solved = _transform(float(value), setting, rule)
+            started.append((here, [_of_block(kernel, solved, value, block) for block in blocks(x[here])]))
         for here, parts in started:
             out[here] = np.concatenate(parts)[: np.count_nonzero(here)]
     return out
 
 
-def elementwise(function: Callable[[jax.Array], jax.Array], alpha: Any) -> Any:
+def elementwise(function: Each, alpha: Any, of: Surface = None) -> Any:
     """`function` of each albedo by itself, a float64 array."""
-    if isinstance(alpha, jax.Array):
-        return _traced_each(function, alpha)
+    if any(isinstance(one, jax.Array) for one in (alpha, *jax.tree.leaves(of))):
+        return _traced_each(function, jnp.asarray(alpha), of)
     with jax.enable_x64(True), jax.core.eval_context():
-        parts = [_each(function, block) for block in blocks(alpha.ravel())]
+        parts = [_each(function, block, of) for block in blocks(alpha.ravel())]
         return np.concatenate([np.empty(0), *parts])[: alpha.size].reshape(alpha.shape)
 
 
@@ -57,12 +66,33 @@ def forget() -> None:
     _transform.cache_clear()
 
 
+def surface(setting: Setting, rule: Rule = STANDARD) -> Surface:
+    """For `solve`; makes a table where there is none."""
+    if is_traced(setting.n):
+        return tables.traced_table(jnp.asarray(setting.n), rule)
+    return None if setting.n == 1.0 else tables.table(float(setting.n), rule)
+
+
+def solve(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> Transform:
+    """The transform of one albedo, a float64 scalar in [0, 1]."""
+    if of is None:
+        return transform.solve(alpha, illumination, rule)
+    return table.transform(of, alpha, ILLUMINATIONS.index(illumination), rule)
+
+
+def total(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> jax.Array:
+    """A / alpha of one albedo."""
+    if of is None:
+        return transform.reflectance_over_alpha(alpha, illumination, rule)
+    return table.total(of, alpha, ILLUMINATIONS.index(illumination))
+
+
 @lru_cache(maxsize=512)
-def _transform(alpha: float, illumination: str, rule: Rule) -> Transform:
-    return _solve(np.float64(alpha), illumination, rule)
+def _transform(alpha: float, setting: Setting, rule: Rule) -> Transform:
+    return _solve(np.float64(alpha), surface(setting, rule), setting.illumination, rule)
 
 
-_solve = jax.jit(solve, static_argnums=(1, 2))
+_solve = jax.jit(solve, static_argnums=(2, 3))
 
 
 @partial(jax.jit, static_argnums=0)
@@ -71,8 +101,8 @@ def _of_block(kernel: Kernel, transform: Transform, alpha: jax.Array, x: jax.Arr
 
 
 @partial(jax.jit, static_argnums=0)
-def _each(function: Callable[[jax.Array], jax.Array], alpha: jax.Array) -> jax.Array:
-    return jax.vmap(function)(alpha)
+def _each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
+    return jax.vmap(function, in_axes=(0, None))(alpha, of)
 
 
 def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
@@ -81,11 +111,11 @@ def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
     return list(full.reshape(-1, size))
 
 
-@partial(jax.jit, static_argnums=(0, 3, 4))
-def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, illumination: str, rule: Rule) -> jax.Array:
+@partial(jax.jit, static_argnums=(0, 4, 5))
+def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, of: Surface, illumination: str, rule: Rule) -> jax.Array:
     shape = jnp.broadcast_shapes(x.shape, alpha.shape)
     albedos = alpha.ravel()
-    transforms = _map(lambda a: solve(a, illumination, rule), albedos, at_once=1)
+    transforms = _map(lambda a: solve(a, of, illumination, rule), albedos, at_once=1)
     owner = np.broadcast_to(np.arange(albedos.size).reshape(alpha.shape), shape).ravel()
 
     def one(pair: tuple[jax.Array, jax.Array]) -> jax.Array:
@@ -97,8 +127,8 @@ def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, illumination: str, r
 
 
 @partial(jax.jit, static_argnums=0)
-def _traced_each(function: Callable[[jax.Array], jax.Array], alpha: jax.Array) -> jax.Array:
-    return _map(function, alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
+def _traced_each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
+    return _map(lambda one: function(one, of), alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
 
 
 def _map(function: Callable, arguments: Any, at_once: int) -> Any:

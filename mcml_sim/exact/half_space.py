@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import dispersion, hankel
-from mcml_sim.exact.by_albedo import by_alpha, elementwise
-from mcml_sim.exact.transform import STANDARD, Transform, reflectance_over_alpha
+from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, surface, total
+from mcml_sim.exact.transform import STANDARD, Transform
 from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
-from mcml_sim.media.setting import ILLUMINATIONS, Setting
+from mcml_sim.media.setting import ILLUMINATIONS, Setting, is_traced
 
 Floats = NDArray[np.float64]
 Numbers = ArrayLike | jax.Array
@@ -41,14 +41,14 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
     """
     _require_solved(setting)
     (albedo,) = _all_checked(alpha=alpha)
-    return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo))
+    return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo, surface(setting)))
 
 
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A. 2 pi r R_d tends to alpha/2 at r = 0."""
     _require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
-    values = by_alpha(hankel.profile, radius / length, albedo, setting.illumination)
+    values = by_alpha(hankel.profile, radius / length, albedo, setting)
     return _scalar_or_array(values / length**2)
 
 
@@ -56,7 +56,7 @@ def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARC
     """Share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
     _require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
-    return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting.illumination))
+    return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting))
 
 
 def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -66,14 +66,15 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
     """
     _require_solved(setting)
     share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
-    traced = isinstance(share, jax.Array) or isinstance(albedo, jax.Array)
-    values = (_radius_within if traced else partial(by_alpha, _radius))(share, albedo, setting.illumination)
+    n, light = setting.n, setting.illumination
+    traced = any(isinstance(one, jax.Array) for one in (share, albedo, n))
+    values = _radius_within(share, albedo, n, light) if traced else by_alpha(_radius, share, albedo, setting)
     return _scalar_or_array(values * length)
 
 
 def decay_rate(alpha: Numbers) -> float | Floats:
     """kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls off as e^{-kappa r / mfp} r^-2 [-]."""
-    return _scalar_or_array(elementwise(dispersion.decay_rate, *_all_checked(alpha=alpha)))
+    return _scalar_or_array(elementwise(_decay_rate, *_all_checked(alpha=alpha)))
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
@@ -86,13 +87,17 @@ def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Sett
     _require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     x = radius / length
-    coarse, fine = (by_alpha(hankel.profile, x, albedo, setting.illumination, rule) for rule in (STANDARD, FINER))
+    coarse, fine = (by_alpha(hankel.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
     xp = jnp if isinstance(fine, jax.Array) else np
     same = coarse == fine
     return _scalar_or_array(xp.abs(xp.where(same, 1.0, coarse) / xp.where(same, 1.0, fine) - 1.0))
 
 
-_reflectance = {name: partial(reflectance_over_alpha, illumination=name) for name in ILLUMINATIONS}
+_reflectance = {name: partial(total, illumination=name) for name in ILLUMINATIONS}
+
+
+def _decay_rate(alpha: jax.Array, of: Surface) -> jax.Array:
+    return dispersion.decay_rate(alpha)
 
 
 def _cdf(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
@@ -107,25 +112,26 @@ def _radius(transform: Transform, alpha: jax.Array, xi: jax.Array) -> jax.Array:
     return hankel.radius_within(transform, xi)
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(2,))
-def _radius_within(xi: jax.Array, alpha: jax.Array, illumination: str) -> jax.Array:
-    return by_alpha(_radius, xi, alpha, illumination)
+@partial(jax.custom_jvp, nondiff_argnums=(3,))
+def _radius_within(xi: jax.Array, alpha: jax.Array, n: Any, illumination: str) -> jax.Array:
+    return by_alpha(_radius, xi, alpha, Setting(illumination, n))
 
 
 @_radius_within.defjvp
 def _radius_within_jvp(illumination: str, primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
-    """Of the implicit function: cdf(x, alpha) = xi."""
-    (xi, alpha), (d_xi, d_alpha) = primals, tangents
-    radius = _radius_within(xi, alpha, illumination)
+    """Of the implicit function: cdf(x, alpha, n) = xi."""
+    (xi, *where), (d_xi, *d_where) = primals, tangents
+    radius = _radius_within(xi, *where, illumination)
     x = jnp.where(xi == 1.0, 1.0, radius)
-    _, d_cdf = jax.jvp(lambda a: by_alpha(_cdf, x, a, illumination), (alpha,), (d_alpha,))
-    density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, illumination))
+    _, d_cdf = jax.jvp(lambda a, n: by_alpha(_cdf, x, a, Setting(illumination, n)), tuple(where), tuple(d_where))
+    alpha, n = where
+    density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, Setting(illumination, n)))
     return radius, (d_xi - d_cdf) / density
 
 
 def _require_solved(setting: Setting) -> None:
-    if not (isinstance(setting, Setting) and setting.is_matched_isotropic):
-        raise SettingError(f"the exact half space has n = 1 and g = 0, got {setting}: simulate it instead")
+    if not (isinstance(setting, Setting) and setting.g == 0 and (is_traced(setting.n) or setting.n >= 1)):
+        raise SettingError(f"the exact half space has n >= 1 and g = 0, got {setting}: simulate it instead")
 
 
 def _all_checked(**given: Any) -> list[Any]:

@@ -16,10 +16,9 @@ import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.exact.special_functions import bessel_k
-from mcml_sim.exact.transform import FARTHEST_RADIUS, NEAREST_RADIUS, Transform
+from mcml_sim.exact.transform import NEAREST_RADIUS, NO_LIGHT, Transform
 
 MAX_STEPS = 60  # of Newton's method, which takes twelve at most where xi < 1 - 1e-8
-NO_LIGHT = 1e100  # mfp: nothing is left there but in a conservative medium, and products are finite
 SETTLED = 4e-15  # of the logarithm of a share: its rounding
 
 
@@ -51,8 +50,9 @@ def ring_density(transform: Transform, x: jax.Array) -> jax.Array:
 def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
     """Radius within which the share xi in [0, 1], of any shape, leaves.
 
-    Newton's method for the logarithm of the share beyond. Its slope falls from 1/2A at the source to kappa far away,
-    so that from a point on the near side, such as the first, every step ends on that side and closer.
+    Newton's method for the logarithm of the share beyond. Where the surface does not refract, its slope falls from 1/2A
+    at the source to kappa far away, so that from a point on the near side, such as the first, every step ends on that
+    side and closer. Where it does, a step that leaves what is known to lie on either side goes halfway instead.
     """
     share = jnp.where(xi == 1.0, 0.0, xi)
     target = -jnp.log1p(-share)
@@ -62,18 +62,23 @@ def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
         beyond = jnp.where(x < NEAREST_RADIUS, 1.0 - (1.0 - beyond) * x / NEAREST_RADIUS, beyond)
         return target + jnp.log(beyond), ring_density(transform, x) / (transform.reflectance * beyond)
 
-    def is_far(state: tuple[jax.Array, jax.Array, jax.Array]) -> jax.Array:
-        step, x, change = state
+    def is_far(state: tuple[jax.Array, ...]) -> jax.Array:
+        step, x, change, _, _ = state
         return (step < MAX_STEPS) & jnp.any(jnp.abs(change) > 1e-13 * x)
 
-    def improve(state: tuple[jax.Array, jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array, jax.Array]:
-        step, x, _ = state
+    def improve(state: tuple[jax.Array, ...]) -> tuple[jax.Array, ...]:
+        step, x, _, low, high = state
         error, slope = excess(x)
-        change = jnp.where(jnp.abs(error) > SETTLED, jnp.maximum(error / slope, -0.9 * x), 0.0)
-        return step + 1, x + change, change
+        low, high = jnp.where(error > 0.0, x, low), jnp.where(error < 0.0, x, high)
+        newton = jnp.where(jnp.abs(error) > SETTLED, jnp.maximum(error / slope, -0.9 * x), 0.0)
+        halved = jnp.where(high == jnp.inf, x, 0.5 * (low + high) - x)
+        change = jnp.where((newton == 0.0) | ((x + newton > low) & (x + newton < high)), newton, halved)
+        return step + 1, x + change, change, low, high
 
     first = 2.0 * transform.reflectance * target
-    _, x, _ = jax.lax.while_loop(is_far, improve, (jnp.zeros((), int), first, first))
+    between = jnp.zeros_like(first), jnp.full_like(first, jnp.inf)
+    start: tuple[jax.Array, ...] = (jnp.zeros((), int), first, first, *between)
+    _, x, *_ = jax.lax.while_loop(is_far, improve, start)
     return jnp.where(xi == 1.0, jnp.inf, x)
 
 
@@ -81,7 +86,7 @@ def _energy_beyond(transform: Transform, x: jax.Array) -> jax.Array:
     """Share of the reflected energy that leaves beyond x, or beyond NEAREST_RADIUS if that is farther."""
     inside = _solved(transform, x)
     # Next to the derivative in alpha of A, infinite at alpha = 1, no other counts.
-    conservative = transform.pole > 0.0
+    conservative = transform.farthest < NO_LIGHT
     held = jax.tree.map(lambda leaf: jnp.where(conservative, jax.lax.stop_gradient(leaf), leaf), transform)
     here = _concentrated(inside)
     rest = held.value - (here * held.reflectance)[..., None]
@@ -103,4 +108,4 @@ def _concentrated(x: jax.Array) -> jax.Array:
 
 def _solved(transform: Transform, x: jax.Array) -> jax.Array:
     """The nearest radius that the contour reaches; at alpha = 1 light ends in R_d ~ x^-3."""
-    return jnp.clip(x, NEAREST_RADIUS, jnp.where(transform.pole > 0.0, FARTHEST_RADIUS, NO_LIGHT))
+    return jnp.clip(x, NEAREST_RADIUS, transform.farthest)

@@ -23,7 +23,7 @@ All that is differentiable in alpha. The result does not depend on where contour
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import partial
 from typing import NamedTuple
 
@@ -41,6 +41,7 @@ Floats = NDArray[np.float64]
 NEAREST_RADIUS = 1e-6
 # At alpha = 1 light falls off as a power, and is that power beyond, to 1e-9 [mfp].
 FARTHEST_RADIUS = 1e6
+NO_LIGHT = 1e100  # mfp: nothing is left there but in a conservative medium, and products are finite
 START = 0.9  # of the contour, of the way to the singularity at i kappa
 DIRECTION = complex(np.exp(0.25j * np.pi))
 CONSERVATIVE_SCALE = 0.1 / FARTHEST_RADIUS  # of rho where there is no kappa to set one
@@ -54,15 +55,22 @@ X_SCALE, X_LAST = 0.33, 1e4  # of sqrt(k^2 + 1): the x from which nodes grow apa
 
 @dataclass(frozen=True)
 class Rule:
-    """Number of nodes of each quadrature."""
+    """Number of nodes of each quadrature: k, m and x here, the others of `table`, where the surface refracts."""
 
     k: int
     m: int
     x: int
+    line: int = 12
+    """Wave numbers of a panel."""
+    depth: int = 96
+    """Nodes x of `cone`."""
+    angles: int = 72
+    degree: int = 18
+    """Polynomials in w."""
 
     def scaled(self, factor: float) -> Rule:
         """The rule with that many times as many nodes."""
-        return Rule(*(round(factor * count) for count in (self.k, self.m, self.x)))
+        return Rule(*(round(factor * count) for count in astuple(self)))
 
 
 # Leaves 5e-12 of the profile wrong for alpha in [0.05, 0.999], and 1e-10 at alpha = 1, whose contour has the longest
@@ -82,7 +90,9 @@ class Transform(NamedTuple):
     reflectance: jax.Array
     """A / alpha, float64 () [-]."""
     pole: jax.Array
-    """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where kappa = 0."""
+    """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where it starts at 0."""
+    farthest: jax.Array
+    """Radius from which on R_d is taken for its power, r^-3, float64 () [mfp]: below NO_LIGHT where alpha = 1."""
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
@@ -90,7 +100,7 @@ def solve(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> Transfo
     """The transform of one albedo, a float64 scalar in [0, 1]."""
     k, weight = _contour(alpha, rule)
     value = over_alpha(alpha, jnp.append(k, ORIGIN), illumination, rule)
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha))
+    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha))
 
 
 @solve.defjvp
@@ -100,8 +110,9 @@ def _solve_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tuple) -
     k, weight = _contour(alpha, rule)
     value, slope = _with_slope(alpha, jnp.append(k, ORIGIN), illumination, rule)
     of_value, of_total = slope[:-1] * d_alpha, slope[-1].real * d_alpha
-    tangent = Transform(jnp.zeros_like(k), jnp.zeros_like(k), of_value, of_total, jnp.zeros_like(alpha))
-    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha)), tangent
+    held = jnp.zeros_like(k), jnp.zeros_like(k)
+    tangent = Transform(*held, of_value, of_total, jnp.zeros_like(alpha), jnp.zeros_like(alpha))
+    return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha)), tangent
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
@@ -130,6 +141,10 @@ def _total(alpha: jax.Array, value: jax.Array) -> jax.Array:
 def _pole(alpha: jax.Array) -> jax.Array:
     """The contour that starts at the origin itself passes half of the pole of H1 there."""
     return jnp.where(alpha == 1.0, 0.5, 0.0)
+
+
+def _farthest(alpha: jax.Array) -> jax.Array:
+    return jnp.where(alpha == 1.0, FARTHEST_RADIUS, NO_LIGHT)
 
 
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
+import jax
+
 from mcml_sim.errors import InputError
 from mcml_sim.media.checks import is_number, shown
 
@@ -16,7 +18,8 @@ class Setting:
     """The light and the surface that a half-space profile belongs to.
 
     illumination  "searchlight", a pencil beam (normal, collimated; MCML's), or "diffuse", cosine-weighted light
-    n             refractive index of the half space over that outside [-], > 0
+    n             refractive index of the half space over that outside [-], > 0; a jax array () where an exact solution
+                  is to be differentiated by it, and nowhere else
     g             mean cosine of the scattering angle [-], -1 < g < 1
 
     Profiles, laws and records of different settings never mix.
@@ -29,7 +32,7 @@ class Setting:
     def __post_init__(self) -> None:
         if self.illumination not in ILLUMINATIONS:
             raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(self.illumination)}")
-        if not (is_number(self.n) and math.isfinite(self.n) and self.n > 0):
+        if not (is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)):
             raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
         if not (is_number(self.g) and -1 < self.g < 1):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
@@ -40,4 +43,10 @@ class Setting:
         return self.n == 1.0 and self.g == 0.0
 
     def __str__(self) -> str:
-        return f"{self.illumination}, n = {self.n:g}, g = {self.g:g}"
+        n = str(self.n) if is_traced(self.n) else f"{self.n:g}"
+        return f"{self.illumination}, n = {n}, g = {self.g:g}"
+
+
+def is_traced(n: object) -> bool:
+    """True for an index by which jax may differentiate."""
+    return isinstance(n, jax.Array) and n.shape == ()

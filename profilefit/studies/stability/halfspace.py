@@ -53,7 +53,7 @@ def cells_of(setting: Setting, normalisation: Rational) -> Iterator[Cells]:
 
 def finer_cdf(x: Floats, alpha: Floats, setting: Setting) -> Floats:
     """(alphas, radii, 1)."""
-    return np.asarray(by_alpha(_share_within, x, alpha[:, None], setting.illumination, FINER))[..., None]
+    return np.asarray(by_alpha(_share_within, x, alpha[:, None], setting, FINER))[..., None]
 
 
 def _share_within(transform: Transform, alpha: Array, x: Array) -> Array:

@@ -213,7 +213,7 @@ def _exact(rule: Rule) -> Method:
 def _solved(rule: Rule) -> Floats:
     """Ring energies from nothing: no transform is kept from one call to the next."""
     forget()
-    return np.diff(by_alpha(_energy_within, EDGES, ALPHAS[:, None], "searchlight", rule), axis=1)
+    return np.diff(by_alpha(_energy_within, EDGES, ALPHAS[:, None], exact.SEARCHLIGHT, rule), axis=1)
 
 
 def _energy_within(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:

@@ -1,0 +1,169 @@
+"""The half space under a surface that refracts, n > 1, scattering isotropically: mirror and escape cone.
+
+A surface that reflected everything would make the half space, with its mirror image, an infinite medium, which a
+Fourier transform in depth solves. The real surface is that mirror less the light that leaves through the cone of angles
+that total reflection spares. With phi the fluence, its cosine transform u(x) = int_0^inf phi cos(x z) dz obeys, at
+transverse wave number k, in mean free paths,
+
+    u(x) = s(x) + alpha [D(x) u(x) - (2/pi) int_0^inf B(x, x') u(x') dx'],     D = arctan(K)/K,   K^2 = k^2 + x^2
+    B(x, x') = 1/2 (Q(x) - Q(x')) / (x^2 - x'^2),      R^(k) = (alpha/pi) int_0^inf q(x) u(x) dx
+
+where, with mu the cosine inside to the normal and T Fresnel's transmittance from inside,
+
+    f(x) = mu / sqrt((1 + i x mu)^2 + k^2 (1 - mu^2))            the mean over azimuth of 1 / (1/mu + i (x + k tan cos))
+    q(x) = int T (f(x) + f(-x)) / 2 dmu,        Q(x) = -x int (T / mu) (f(x) - f(-x)) / 2i dmu        over the cone
+    s = 4 n / (n + 1)^2 / (1 + x^2) under a searchlight,   2 n^2 q under diffuse light,   per photon that arrives
+
+With nodes x of weights w, M = D - (2/pi) sqrt(w) B sqrt(w) is symmetric and knows nothing of alpha:
+
+    R^(k) / alpha = (1/pi) sqrt(w) q . (1 - alpha M)^-1 sqrt(w) s
+
+What makes few nodes enough:
+
+- k and x lie on rays at pi/4, where nothing oscillates (complex scaling); k may start at i b, b < 1.
+- The angle of refraction outside is theta = (pi/2) / (1 + e^-tau): trapezoids in tau converge exponentially at both
+  ends of the cone. They run midway between the zeros of f's square root, which close in on real angles as k grows.
+- x has trapezoids in a variable that is even about 0, fine about the edge of the cone, x = k tan(theta), and else
+  logarithmic.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+
+from mcml_sim.exact.dispersion import dispersion
+from mcml_sim.exact.special_functions import logarithm, square_root
+
+SLOPES = np.linspace(-0.8, 0.8, 7)  # Im tau of the paths at hand
+FIRST_TAU, LAST_TAU = -7.0, 10.0  # beyond, the integrand is its own leading power to 1e-12
+FARTHEST_X = 1e3  # of 1 + |k|: the integrand has fallen as x^-4
+BISECTIONS = 50
+
+
+class System(NamedTuple):
+    """The half space at one wave number, on nodes x."""
+
+    matrix: jax.Array
+    """M, complex128 (x, x)."""
+    leaving: jax.Array
+    """sqrt(w) q, complex128 (x,)."""
+    source: jax.Array
+    """sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)."""
+
+
+class _Cone(NamedTuple):
+    """Nodes of the escape cone along the paths, each complex128 (paths, angles)."""
+
+    mu: jax.Array
+    sine: jax.Array
+    weight: jax.Array
+
+
+def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -> jax.Array:
+    """m_j, where R^(k) / alpha = sum alpha^j m_j over the orders of scattering less one: (2, orders)."""
+    matrix, leaving, source = system(n, k, x_nodes, angles)
+    _, powers = jax.lax.scan(lambda v, _: (matrix @ v, v), leaving, None, length=orders)
+    return source @ powers.T / np.pi
+
+
+def system(n: jax.Array, k: jax.Array, x_nodes: int, angles: int) -> System:
+    """At k = rho e^{i pi/4} or i b + rho e^{i pi/4}, or real, complex128 (), not 0; n > 1 may be traced."""
+    turn = jnp.where(k.imag == 0.0, 1.0, np.exp(0.25j * np.pi))
+    y, dy = _y_nodes(jax.lax.stop_gradient(n), jnp.abs(k), x_nodes)
+    x, root = turn * y, jnp.sqrt(dy) * square_root(turn)
+    f, slope, mu, weight = _mean_over_azimuth(n, k, turn, y, angles)
+    q = 0.5 * jnp.sum(f * weight, axis=(0, 2))
+    over_mu = -0.5j * weight / mu
+    (ahead, back), dh = jnp.sum(f * over_mu, axis=2), jnp.sum(slope * over_mu, axis=(0, 2))
+    h = ahead - back
+    whole, derivative = -x * h, -(h + x * dh) / (2.0 * x)  # Q and dQ / d(x^2)
+    squares = x * x
+    same = np.eye(x_nodes, dtype=bool)
+    apart = jnp.where(same, 1.0, squares[:, None] - squares)
+    loewner = jnp.where(same, derivative, (whole[:, None] - whole) / apart)
+    spread = 1.0 - dispersion(jnp.ones(()), squares + k * k)
+    matrix = jnp.where(same, spread, 0.0) - root[:, None] * loewner * root / np.pi
+    source = root * jnp.stack([4.0 * n / (n + 1.0) ** 2 / (1.0 + squares), 2.0 * n**2 * q])
+    return System(matrix, root * q, source)
+
+
+def _mean_over_azimuth(
+    n: jax.Array, k: jax.Array, turn: jax.Array, y: jax.Array, angles: int
+) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
+    """f(x) and f(-x) by nodes of the cone, their derivatives by x and -x, mu and the weights: each (2, x, angles)."""
+    both = jnp.stack([y, -y])
+    cone = _cone(n, jnp.abs(k), angles)
+    middle = _between_singularities(*jax.lax.stop_gradient((n, k, turn * both)))
+    nearest = jnp.argmin(jnp.abs(middle[..., None] - SLOPES), axis=-1)
+    mu, sine, weight = (one[nearest] for one in cone)
+    depth = 1.0 + 1j * (turn * both)[..., None] * mu
+    across = 1j * k * sine
+    # The first factor winds from the fourth quadrant to the third, the second from the second to the fourth.
+    f = mu / (np.exp(0.25j * np.pi) * square_root(-1j * (depth + across)) * square_root(depth - across))
+    return f, -1j * (depth / mu) * f**3, mu, weight
+
+
+def _between_singularities(n: jax.Array, k: jax.Array, x: jax.Array) -> jax.Array:
+    """Im tau halfway between the singularities of the integrand on either side of the real axis, (2, x).
+
+    They are Fresnel's, at pi/2, and zeros of (1 + i x mu)^2 + k^2 (1 - mu^2), where mu is that of the cone's sheet.
+    """
+    square = k * k + x * x
+    split = k * square_root(1.0 + square)
+    mu = jnp.stack([(1j * x + split) / square, (1j * x - split) / square])
+    outside = n * square_root(1.0 - mu * mu)
+    theta = -1j * logarithm(1j * outside + square_root(1.0 - outside * outside))
+    share = jnp.stack([theta, -theta, np.pi - theta, np.pi + theta]) * (2.0 / np.pi)
+    tau = logarithm(share / (1.0 - share)).imag
+    known = mu.real > 0.0
+    above = jnp.where(known & (tau > 0.0), jnp.minimum(tau, 0.5 * np.pi), 0.5 * np.pi)
+    below = jnp.where(known & (tau < 0.0), jnp.maximum(tau, -0.5 * np.pi), -0.5 * np.pi)
+    return 0.5 * (jnp.min(above, axis=(0, 1)) + jnp.max(below, axis=(0, 1)))
+
+
+def _cone(n: jax.Array, k: jax.Array, angles: int) -> _Cone:
+    """For k = |k|. The weights have Fresnel's transmittance and dmu in them."""
+    first = FIRST_TAU - jnp.log1p(k)
+    cosine = jnp.sqrt((n - 1.0) * (n + 1.0)) / n  # of the critical angle
+    last = LAST_TAU - jnp.log(jax.lax.stop_gradient(cosine))
+    step = (last - first) / (angles - 1)
+    tau = first + step * np.arange(angles) + 1j * SLOPES[:, None]
+    decay = jnp.exp(-tau)
+    share = 1.0 / (1.0 + decay)
+    theta, rest = 0.5 * np.pi * share, 0.5 * np.pi * decay * share
+    sine, outside = jnp.sin(theta), jnp.sin(rest)
+    mu = square_root(cosine**2 + (outside / n) ** 2)
+    passes = 2.0 * n * mu * outside * ((outside + n * mu) ** -2 + (mu + n * outside) ** -2)
+    weight = passes * sine * outside / (n * n * mu) * theta * decay * share * step
+    # Geometric series beyond the ends, where the integrand goes as e^{2 tau} and as e^{-3 tau}.
+    ends = jnp.ones(angles).at[0].set(-1.0 / jnp.expm1(-2.0 * step)).at[-1].set(-1.0 / jnp.expm1(-3.0 * step))
+    return _Cone(mu, sine / n, weight * ends)
+
+
+def _y_nodes(n: jax.Array, k: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:
+    """y and dy of x = y e^{i pi/4}, for k = |k|: midpoints of a variable that is odd in y."""
+    cosine = jnp.sqrt((n - 1.0) * (n + 1.0)) / n
+    edge, width = k / (n * cosine), 1.0 / cosine
+    scale = jnp.minimum(1.0, k)
+
+    def variable(y: jax.Array) -> jax.Array:
+        return jnp.arcsinh(y / scale) + 0.5 * (jnp.arcsinh((y - edge) / width) + jnp.arcsinh((y + edge) / width))
+
+    def halve(_: int, between: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
+        low, high = between
+        middle = 0.5 * (low + high)
+        below = variable(scale * jnp.sinh(middle)) < wanted
+        return jnp.where(below, middle, low), jnp.where(below, high, middle)
+
+    last = FARTHEST_X * (1.0 + k)
+    step = variable(last) / count
+    wanted = step * (np.arange(count) + 0.5)
+    top = jnp.full(count, jnp.arcsinh(last / scale))
+    low, high = jax.lax.fori_loop(0, BISECTIONS, halve, (jnp.zeros(count), top))
+    y = scale * jnp.sinh(0.5 * (low + high))
+    sides = ((y - edge) ** 2 + width**2) ** -0.5 + ((y + edge) ** 2 + width**2) ** -0.5
+    return y, step / ((y * y + scale**2) ** -0.5 + 0.5 * sides)

@@ -1,0 +1,278 @@
+"""The transform of the half space under a refracting surface, n > 1, for every albedo.
+
+`cone` has it at one wave number k, from one matrix for all albedos. On the way back to r a contour must start below
+i kappa, the closer the farther r is, and kappa is the albedo's own. So albedos go by groups of kappa, each with a line
+from i b to 8 e^{i pi/4}, in panels that grow, of Gauss's nodes. From there one ray serves all, where R^ is its first
+orders of scattering, a polynomial in alpha. On a line R^(k) / alpha is a polynomial in w = sqrt(1 - alpha arctan(k)/k):
+the singularity where k = i kappa is where w = 0, in which alpha is analytic. `made` finds the polynomials, once for an
+n, from albedos that put w on Chebyshev's nodes, and `transform` reads them off at an albedo.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from functools import lru_cache, partial
+from typing import Any, NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.exact import cone
+from mcml_sim.exact.dispersion import dispersion
+from mcml_sim.exact.single_scattering import entered
+from mcml_sim.exact.special_functions import square_root
+from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
+from mcml_sim.media.setting import ILLUMINATIONS, Setting
+
+Floats = NDArray[np.float64]
+Complexes = NDArray[Any]
+
+KAPPAS = np.array([1.0, 0.88, 0.72, 0.55, 0.4, 0.28, 0.19, 0.12, 0.06, 0.0])  # decay rates between the groups
+ALPHAS = np.append(0.0, np.append(KAPPAS[1:-1] / np.arctanh(KAPPAS[1:-1]), 1.0))  # the same as albedos
+START = 0.88  # b, of a group's least kappa
+FIRST_PANEL = 0.1  # of that kappa; and of the last group, where it is 0:
+FIRST_WAVE = 1e-5  # [1/mfp]
+FARTHEST = 1e3  # mfp: at alpha = 1, R_d is taken for its power, r^-3, from here on
+GROWTH, LAST_GROWTH = 3.5, 4.5  # of panels, at most, before and beyond the ray's middle
+DIRECTION = complex(np.exp(0.25j * np.pi))
+CORNER, MIDDLE, LAST_WAVE = 8.0, 300.0, 3.5e7  # of the ray [1/mfp]
+# Nodes of `cone` beyond the corner and beyond the middle, where edges of the cone lie far apart: of those before it.
+MIDDLE_NODES, LAST_NODES = (5 / 3, 4 / 3), (5 / 2, 16 / 9)
+ORDERS = 18  # of scattering along the ray: the next has (pi / 16)^18 of the light
+ORIGIN = 1e-6 * DIRECTION  # stands for k = 0
+CHUNK = 16  # wave numbers at once
+
+
+class Table(NamedTuple):
+    """What albedos share under one surface."""
+
+    lines: Complexes
+    """R^(k) / alpha on the groups' lines, and at k = 0, in Chebyshev polynomials: (2 lights, groups, k, degree)."""
+    ray: Complexes
+    """Of each order of scattering, on the ray: (2 lights, k, orders)."""
+
+
+class _Contour(NamedTuple):
+    k: Complexes
+    dk: Complexes
+
+
+def transform(table: Table, alpha: jax.Array, light: int, rule: Rule) -> Transform:
+    """Of one albedo, a float64 scalar in [0, 1]; `light` is 0 for a searchlight, 1 for diffuse light."""
+    group = _group(alpha)
+    k, dk = _whole_contour(group, rule)
+    own = jnp.asarray(table.lines)[light, group]
+    values = _sum(own[:-1], _variable(alpha, group, k[: own.shape[0] - 1]))
+    beyond = jnp.asarray(table.ray)[light] @ (alpha ** np.arange(ORDERS))
+    pole = jnp.where(group == KAPPAS.size - 2, 0.5, 0.0)  # the last line starts at the origin, H1's pole
+    farthest = jnp.where(alpha == 1.0, FARTHEST, NO_LIGHT)
+    return Transform(k, dk, jnp.append(values, beyond), total(table, alpha, light), pole, farthest)
+
+
+def total(table: Table, alpha: jax.Array, light: int) -> jax.Array:
+    """A / alpha of one albedo."""
+    group = _group(alpha)
+    return _total(alpha, jnp.asarray(table.lines)[light, group, -1], group)
+
+
+def _group(alpha: jax.Array) -> jax.Array:
+    return jnp.searchsorted(ALPHAS[1:-1], jax.lax.stop_gradient(alpha))
+
+
+def _whole_contour(group: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
+    lines, ray = _lines(rule.line), _ray(rule.line)
+    k, dk = (jnp.stack([getattr(line, name) for line in lines])[group] for name in _Contour._fields)
+    return jnp.append(k, ray.k), jnp.append(dk, ray.dk)
+
+
+def _variable(alpha: jax.Array, group: jax.Array | int, k: jax.Array) -> jax.Array:
+    """z, from w, between 1 and -1 at the ends of the group."""
+    first, last = (_root(jnp.asarray(ALPHAS)[group + end], k) for end in (0, 1))
+    return (2.0 * _root(alpha, k) - first - last) / (first - last)
+
+
+def _root(alpha: jax.Array, k: Any) -> jax.Array:
+    return square_root(dispersion(alpha, k * k))
+
+
+def _sum(coefficients: jax.Array, z: jax.Array) -> jax.Array:
+    """Of Chebyshev polynomials, by Clenshaw's recurrence: (..., degree) and (...)."""
+    one, two = jnp.zeros_like(z), jnp.zeros_like(z)
+    for index in range(coefficients.shape[-1] - 1, 0, -1):
+        one, two = 2.0 * z * one - two + coefficients[..., index], one
+    return z * one - two + coefficients[..., 0]
+
+
+@jax.custom_jvp
+def _total(alpha: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Array:
+    """A / alpha, at k = 0."""
+    return _total_of(jnp.sqrt(1.0 - alpha), coefficients, group)
+
+
+@_total.defjvp
+def _total_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+    """Infinite at alpha = 1."""
+    alpha, coefficients, group = primals
+    w = jnp.sqrt(1.0 - alpha)
+    value, slope = jax.jvp(lambda one: _total_of(one, coefficients, group), (w,), (jnp.ones_like(w),))
+    return value, slope * (-0.5 / w) * tangents[0] + _total_of(w, tangents[1], group)
+
+
+def _total_of(w: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Array:
+    first, last = (jnp.sqrt(1.0 - jnp.asarray(ALPHAS)[group + end]) for end in (0, 1))
+    return _sum(coefficients, ((2.0 * w - first - last) / (first - last)).astype(complex)).real
+
+
+def made(n: float, rule: Rule, slope: bool = False) -> Table:
+    """The table of one n > 1, or its derivative by n, in seconds."""
+    with jax.enable_x64(True), jax.core.eval_context():
+        lines = np.stack([_line(n, group, line.k, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
+        lines = np.concatenate([lines, _totals(n, rule, slope)[:, :, None]], axis=2)
+        ray = _ray(rule.line).k
+        last = np.abs(ray) > MIDDLE
+        sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
+        parts = [
+            _in_chunks(partial(_orders, n, sizes=size, slope=slope), part)
+            for part, size in zip((ray[~last], ray[last]), sizes, strict=True)
+        ]
+    if not slope:  # what enters comes out again where nothing is absorbed, z = -1
+        for light, name in enumerate(ILLUMINATIONS):
+            white = lines[light, -1, -1]
+            white[0] += entered(Setting(name, n)) - white @ (-1.0) ** np.arange(rule.degree)
+    return Table(lines, np.concatenate(parts, axis=1))
+
+
+def shapes(rule: Rule) -> Table:
+    """Of a table's arrays, as jax.ShapeDtypeStruct."""
+    lines, ray = _lines(rule.line), _ray(rule.line)
+    shape = (2, len(lines), lines[0].k.size + 1, rule.degree), (2, ray.k.size, ORDERS)
+    made_of: Any = [jax.ShapeDtypeStruct(one, np.complex128) for one in shape]
+    return Table(*made_of)
+
+
+def _line(n: float, group: int, k: Complexes, rule: Rule, slope: bool) -> Complexes:
+    """The polynomials of a group: (2, k, degree)."""
+    z = _nodes(rule.degree)
+
+    def values(part: Complexes) -> Complexes:
+        first, last = (np.asarray(_root(jnp.asarray(ALPHAS[group + end]), part)) for end in (0, 1))
+        w = 0.5 * (first + last)[:, None] + 0.5 * (first - last)[:, None] * z
+        alpha = (1.0 - w * w) / (1.0 - np.asarray(_root(jnp.ones(()), part))[:, None] ** 2)
+        return _resolvents(n, part, alpha, rule.depth, rule.angles, slope)
+
+    return _polynomials(_in_chunks(values, k))
+
+
+def _totals(n: float, rule: Rule, slope: bool) -> Complexes:
+    """The same at k = 0, of all groups: (2, groups, degree)."""
+    first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
+    alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * _nodes(rule.degree)) ** 2
+    origins = np.full(alpha.shape[0], ORIGIN)
+    return _polynomials(_resolvents(n, origins, alpha, *_sizes(rule, MIDDLE_NODES), slope))
+
+
+def _nodes(degree: int) -> Floats:
+    return np.cos(np.pi * (np.arange(degree) + 0.5) / degree)
+
+
+def _polynomials(values: Complexes) -> Complexes:
+    """Coefficients of Chebyshev polynomials from values on their nodes, the last axis of both."""
+    degree = values.shape[-1]
+    found: Complexes = 2.0 / degree * values @ np.cos(np.outer(np.arccos(_nodes(degree)), np.arange(degree)))
+    found[..., 0] *= 0.5
+    return found
+
+
+def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: int, slope: bool) -> Complexes:
+    """R^(k) / alpha for albedos (k, m), which the nodes in w make complex, or its derivative by n: (2, k, m)."""
+    here, change = ([np.asarray(part) for part in system] for system in _systems(n, k, x_nodes, angles, slope))
+    found = []
+    for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=True):
+        resolvents = np.eye(x_nodes) - albedo[:, None, None] * matrix
+        adjoint = np.linalg.solve(resolvents, leaving[None, :, None])[..., 0]
+        if not slope:
+            found.append(source @ adjoint.T)
+            continue
+        matrix_by_n, leaving_by_n, source_by_n = by_n
+        solution = np.linalg.solve(resolvents, source.T[None])  # (m, x, 2)
+        within = albedo * np.einsum("mx,mxl->lm", adjoint @ matrix_by_n, solution)
+        found.append(source_by_n @ adjoint.T + np.einsum("x,mxl->lm", leaving_by_n, solution) + within)
+    return np.stack(found, axis=1) / np.pi
+
+
+def _orders(n: float, k: Complexes, sizes: tuple[int, int], slope: bool) -> Complexes:
+    return np.moveaxis(np.asarray(_series(n, k, *sizes, slope)), 0, 1)
+
+
+def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Complexes:
+    """Of all k: (2, k, ...), on every core."""
+    parts = np.array_split(np.pad(k, (0, -k.size % CHUNK), mode="edge"), -(-k.size // CHUNK))
+
+    def in_double(part: Complexes) -> Complexes:
+        with jax.enable_x64(True):  # which holds for a thread
+            return function(part)
+
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return np.concatenate(list(pool.map(in_double, parts)), axis=1)[:, : k.size]
+
+
+@partial(jax.jit, static_argnums=(2, 3, 4))
+def _systems(
+    n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool
+) -> tuple[cone.System, cone.System | tuple[()]]:
+    """And their derivatives by n, if wanted."""
+
+    def at(n: jax.Array) -> cone.System:
+        return jax.vmap(lambda one: cone.system(n, one, x_nodes, angles))(k)
+
+    return jax.jvp(at, (n,), (1.0,)) if slope else (at(n), ())
+
+
+@partial(jax.jit, static_argnums=(2, 3, 4))
+def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
+    """Of each order of scattering, or its derivative by n: (k, 2, orders)."""
+
+    def at(n: jax.Array) -> jax.Array:
+        return jax.vmap(lambda one: cone.series(n, one, ORDERS, x_nodes, angles))(k)
+
+    return jax.jvp(at, (n,), (1.0,))[1] if slope else at(n)
+
+
+def _sizes(rule: Rule, factors: tuple[float, float]) -> tuple[int, int]:
+    return round(factors[0] * rule.depth), round(factors[1] * rule.angles)
+
+
+@lru_cache(maxsize=8)
+def _lines(nodes: int) -> tuple[_Contour, ...]:
+    """Of each group, of one length: the shorter ones end with nodes that have no weight."""
+    lines = []
+    for kappa in KAPPAS[1:]:
+        start = 1j * START * kappa
+        way = CORNER * DIRECTION - start
+        first = FIRST_PANEL * kappa if kappa else FIRST_WAVE
+        s, ds = _panels(np.append(0.0, _grown(first, abs(way))), nodes)
+        lines.append(_Contour(start + way / abs(way) * s, way / abs(way) * ds))
+    longest = max(line.k.size for line in lines)
+    return tuple(
+        _Contour(np.pad(k, (0, longest - k.size), mode="edge"), np.pad(dk, (0, longest - k.size))) for k, dk in lines
+    )
+
+
+@lru_cache(maxsize=8)
+def _ray(nodes: int) -> _Contour:
+    rho, drho = _panels(np.append(_grown(CORNER, MIDDLE), _grown(MIDDLE, LAST_WAVE, LAST_GROWTH)[1:]), nodes)
+    return _Contour(DIRECTION * rho, DIRECTION * drho)
+
+
+def _grown(first: float, last: float, growth: float = GROWTH) -> Floats:
+    return np.geomspace(first, last, int(np.ceil(np.log(last / first) / np.log(growth))) + 1)
+
+
+def _panels(edges: Floats, nodes: int) -> tuple[Floats, Floats]:
+    t, weights = np.polynomial.legendre.leggauss(nodes)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (t + 1.0)).ravel(), (half * weights).ravel()

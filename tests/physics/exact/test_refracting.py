@@ -1,0 +1,214 @@
+"""The half space under a refracting surface: published totals, other ways to the same, and its tables."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy.special import erfc, j0
+
+from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate_orders
+from mcml_sim.errors import Notice
+from mcml_sim.exact import cone, hankel, table, tables
+from mcml_sim.exact.by_albedo import by_alpha
+from mcml_sim.exact.single_scattering import entered, transform_density
+from mcml_sim.exact.transform import STANDARD
+from tests.physics.tracing.adding_doubling import solve as added
+
+LIGHTS = ("searchlight", "diffuse")
+RADII = np.geomspace(1e-3, 15.0, 60)
+ALPHAS = np.array([0.05, 0.3, 0.8, 0.95, 0.99, 0.999])[:, None]
+
+each_light = pytest.mark.parametrize("light", LIGHTS)
+
+
+def test_published_totals():
+    """Giovanelli (1955) at n = 1.5, and adding-doubling at n = 1.4."""
+    assert exact.reflectance(0.9, Setting(n=1.5)) == pytest.approx(0.219919, abs=1e-6)
+    for alpha in (0.5, 0.99):
+        twin = added(Medium((Layer(1.4, 1 - alpha, alpha, 0.0, 200.0),)), 18).reflected.sum()
+        assert exact.reflectance(alpha, Setting(n=1.4)) == pytest.approx(twin, abs=2e-5)
+
+
+@each_light
+def test_all_that_enters_comes_back_where_nothing_is_absorbed(light):
+    where = Setting(light, n=1.4)
+    assert exact.reflectance(1.0, where) == pytest.approx(entered(where), rel=1e-14)
+    near = 1 - 1e-8
+    assert entered(where) - exact.reflectance(near, where) == pytest.approx(
+        (entered(where) - exact.reflectance(1 - 1e-6, where)) / 10, rel=4e-3
+    )
+
+
+@each_light
+def test_light_scattered_once_is_the_closed_form(light):
+    """`single_scattering` shares no code with the cone."""
+    where = Setting(light, n=1.4)
+    rate, weighted = transform_density(where)
+    with jax.enable_x64(True):
+        for size in (1.0, 10.0, 300.0):
+            k = size * np.exp(0.25j * np.pi)
+            once = np.asarray(cone.series(1.4, k, 1, 160, 112))[LIGHTS.index(light), 0]
+            assert abs(once / (entered(where) * np.sum(weighted * rate / np.sqrt(rate**2 + k**2))) - 1) < 2e-9
+
+
+@pytest.mark.parametrize("light", [LIGHTS[0], pytest.param(LIGHTS[1], marks=pytest.mark.slow)])
+def test_rotated_contour_meets_the_real_axis(light):
+    """Light scattered once in closed form; of the rest the real transform, faded out where it is c / k^2."""
+    where, alpha, r = Setting(light, n=1.4), 0.8, np.array([1.0, 1.4])
+    k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 2.0)))
+    rate, weighted = transform_density(where)
+    with jax.enable_x64(True):
+        systems = jax.jit(lambda k: jax.lax.map(lambda one: cone.system(1.4, one, 160, 160), k, batch_size=16))(k + 0j)
+        matrix, leaving, source = (np.asarray(part) for part in systems)
+    adjoint = np.linalg.solve(np.eye(160) - alpha * matrix, leaving[..., None])[..., 0]
+    whole = np.einsum("kx,kx->k", source[:, LIGHTS.index(light)], adjoint).real / np.pi
+    once = entered(where) * np.sum(weighted * rate / np.sqrt(rate**2 + k[:, None] ** 2), axis=1)
+    rest = (whole - once) * 0.5 * erfc((k - 70.0) / 14.0)
+    twin = np.sum(dk * k * rest * j0(np.multiply.outer(r, k)), axis=1) / (2 * np.pi)
+    twin += entered(where) * np.exp(-np.multiply.outer(r, rate)) @ (weighted * rate) / (2 * np.pi * r)
+    np.testing.assert_allclose(exact.profile(r, alpha, setting=where), alpha * twin, rtol=2e-7)
+
+
+@pytest.mark.slow
+@each_light
+def test_more_nodes_change_nothing(light):
+    assert np.max(exact.error_estimate(RADII, ALPHAS, setting=Setting(light, n=1.4))) < 1e-7
+
+
+@pytest.mark.slow
+@each_light
+@pytest.mark.parametrize("n", [1.001, 1.3, 1.5, 3.0])
+def test_more_nodes_change_nothing_under_other_surfaces(light, n):
+    assert np.max(exact.error_estimate(RADII, ALPHAS, setting=Setting(light, n=n))) < 1e-7
+
+
+@each_light
+def test_a_surface_that_hardly_refracts_is_none(light):
+    """The cone shares no code with the H functions of n = 1."""
+    here, there = Setting(light, n=1 + 1e-12), Setting(light)
+    found = exact.reflectance(ALPHAS, here)
+    np.testing.assert_allclose(found, exact.reflectance(ALPHAS, there), rtol=1e-7)
+    r = np.geomspace(1e-3, 5.0, 30)
+    np.testing.assert_allclose(
+        exact.profile(r, ALPHAS, setting=here), exact.profile(r, ALPHAS, setting=there), rtol=1e-6
+    )
+
+
+@each_light
+def test_quantile_undoes_cdf_and_profile_is_its_slope(light):
+    where = Setting(light, n=1.4)
+    share = exact.cdf(RADII, ALPHAS, setting=where)
+    assert np.all(np.diff(share, axis=1) > 0)
+    inner = share < 1 - 1e-6
+    radius = exact.quantile(share, ALPHAS, setting=where)
+    assert np.abs(radius / RADII - 1)[inner].max() < 1e-9
+    slope = (exact.cdf(RADII * 1.0001, ALPHAS, setting=where) - exact.cdf(RADII / 1.0001, ALPHAS, setting=where)) / (
+        2 * np.log(1.0001)
+    )
+    ring = 2 * np.pi * RADII**2 * exact.profile(RADII, ALPHAS, setting=where) / exact.reflectance(ALPHAS, where)
+    np.testing.assert_allclose(slope[inner], ring[inner], rtol=1e-5)
+
+
+@pytest.mark.slow
+@each_light
+def test_photons_agree(light, sidak):
+    where = Setting(light, n=1.4)
+    edges = np.append(0.0, np.geomspace(0.02, 8.0, 25))
+    run = simulate_orders(Grid.from_edges(r=edges), 2**22, seed=31, setting=where)
+    for alpha, wanted in ((0.5, True), (0.9, True), (0.9, False)):
+        seen = run.profile(alpha)
+        other = where if wanted else Setting(light, n=1.41)
+        area = np.pi * np.diff(edges**2)
+        inside = np.diff(exact.cdf(edges, alpha, setting=other)) * exact.reflectance(alpha, other)
+        z = (seen.value * area - inside) / (seen.standard_error * area)
+        assert (np.abs(z).max() < sidak(z.size)) == wanted
+
+
+@each_light
+def test_derivatives_are_those_of_differences(light):
+    with jax.enable_x64(True):
+        at = tuple(map(jnp.float64, (0.9, 1.3, 1.2)))
+        where = Setting(light, n=1.4)
+        by_each = jax.grad(lambda a, r, m: exact.profile(r, a, m, where), argnums=(0, 1, 2))(*at)
+    for index, slope in enumerate(by_each):
+
+        def value(x, index=index):
+            alpha, r, mfp = (x if one == index else float(old) for one, old in enumerate(at))
+            return exact.profile(r, alpha, mfp, where)
+
+        assert slope == pytest.approx(difference(value, float(at[index])), rel=1e-8)
+
+
+@pytest.mark.slow
+@each_light
+def test_derivatives_by_n_are_those_of_differences(light):
+    def quantities(n):
+        where = Setting(light, n=n)
+        return (
+            exact.profile(1.3, 0.9, setting=where),
+            exact.reflectance(0.9, where),
+            exact.quantile(0.7, 0.9, 1.0, where),
+        )
+
+    slopes = [difference(lambda n, one=one: quantities(n)[one], 1.4, 4e-3) for one in range(3)]
+    with jax.enable_x64(True):
+        values, found = jax.jvp(quantities, (jnp.float64(1.4),), (jnp.float64(1.0),))
+        backwards = jax.grad(lambda n: quantities(n)[0])(jnp.float64(1.4))
+    np.testing.assert_allclose(values, quantities(1.4), rtol=1e-12)
+    np.testing.assert_allclose(found, slopes, rtol=1e-8)
+    assert backwards == pytest.approx(float(found[0]), rel=1e-12)
+
+
+def difference(function, x, step=1e-3):
+    """Of fourth order."""
+    ends = [function(x + shift * step) for shift in (-2, -1, 1, 2)]
+    return (ends[0] - 8 * ends[1] + 8 * ends[2] - ends[3]) / (12 * step)
+
+
+def panels(edges):
+    t, weights = np.polynomial.legendre.leggauss(16)
+    half = 0.5 * np.diff(edges)[:, None]
+    return (edges[:-1, None] + half * (t + 1)).ravel(), (half * weights).ravel()
+
+
+def test_a_table_is_kept_and_a_damaged_one_is_named_and_made_anew(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    small = STANDARD.scaled(0.25)
+    made = []
+    monkeypatch.setattr(tables, "made", lambda *all: made.append(all) or table.made(*all))
+    tables.table.cache_clear()
+    first = tables.table(1.4, small)
+    tables.table.cache_clear()
+    again = tables.table(1.4, small)
+    assert len(made) == 1
+    assert all(np.array_equal(*pair) for pair in zip(first, again, strict=True))
+    (path,) = tmp_path.rglob("*.npz")
+    for damaged in (path.read_bytes()[:-50], b"", changed(path)):
+        path.write_bytes(damaged)
+        tables.table.cache_clear()
+        with pytest.warns(Notice, match=r"half-space-n1\.4.* is damaged"):
+            assert np.array_equal(tables.table(1.4, small).lines, first.lines)
+    assert len(made) == 4
+    tables.table.cache_clear()
+    path.unlink()
+    monkeypatch.setenv("XDG_CACHE_HOME", "/dev/null/nowhere")
+    assert np.array_equal(tables.table(1.4, small).lines, first.lines)
+    tables.table.cache_clear()
+
+
+def changed(path):
+    """The same file with one number changed by one bit."""
+    arrays = dict(np.load(path))
+    arrays["lines"].view(np.uint64).flat[7] ^= 1
+    other = path.with_name("other.npz")
+    np.savez(other, **arrays)
+    content = other.read_bytes()
+    other.unlink()
+    return content
+
+
+def test_fewer_nodes_are_seen():
+    """Negative control of the error estimate."""
+    where = Setting(n=1.4)
+    coarse = by_alpha(hankel.profile, RADII, ALPHAS, where, STANDARD.scaled(0.5))
+    assert np.abs(coarse / exact.profile(RADII, ALPHAS, setting=where) - 1).max() > 1e-6
