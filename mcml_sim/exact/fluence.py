@@ -87,11 +87,8 @@ class Stack(NamedTuple):
     """n over the index above."""
     below: float
     """n over the index below; 1 in a half space."""
-
-    @property
-    def is_clear(self) -> bool:
-        """True where light neither scatters nor is absorbed."""
-        return self.optical == 0
+    pane: bool
+    """True of a single layer of clear glass."""
 
     @property
     def panels(self) -> int:
@@ -153,6 +150,7 @@ def stack(medium: Medium, k: float, rule: Rule) -> Stack:
         optical=float(tau_tops[-1]),
         above=layers[0].n / medium.n_above,
         below=1.0 if medium.is_half_space else layers[0].n / medium.n_below,
+        pane=len(layers) == 1 and not layers[0].mu_t,
     )
 
 
@@ -299,7 +297,7 @@ class Slants(NamedTuple):
     """E(d - z), (directions, N)."""
 
 
-def _reflectance(ratio: float, t: Complexes) -> Complexes:
+def reflectance(ratio: float, t: Complexes) -> Complexes:
     """Fresnel's for unpolarised light, from inside, n over the index outside `ratio`; 1 beyond the critical angle."""
     if ratio == 1:
         return np.zeros_like(t)
@@ -373,7 +371,7 @@ def _slants(here: Stack, k: float, rule: Rule) -> Slants:
     else:
         whole = np.exp(wave * here.height - slow * here.optical)
         to_bottom = np.exp(wave[:, None] * (here.height - here.z) - slow[:, None] * (here.optical - here.tau))
-    return Slants(t, weight, _reflectance(here.above, t), _reflectance(here.below, t), whole, from_top, to_bottom)
+    return Slants(t, weight, reflectance(here.above, t), reflectance(here.below, t), whole, from_top, to_bottom)
 
 
 def solve(here: Stack, k: float, illumination: str, rule: Rule) -> Answer:
@@ -523,7 +521,7 @@ def thrown_back(here: Stack, k: float, illumination: str, rule: Rule) -> float:
         a, b = normal_reflectances(here)
         back = b * np.exp(-2 * here.optical)
         # MCML counts what comes out of a single pane of clear glass as specular.
-        return 0.0 if here.is_clear else float((1 - a) ** 2 * back / (1 - a * back))
+        return 0.0 if here.pane else float((1 - a) ** 2 * back / (1 - a * back))
     slants = _slants(here, k, rule)
     a, b, back = slants.a, slants.b, slants.whole**2
     flux = slants.weight / (1 + slants.t**2)

@@ -18,16 +18,18 @@ transform of what it gives, of which first is taken apart what k would have to g
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.special import j0, j1
+from scipy.special import erfc, j0, j1
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact import fluence, half_space
+from mcml_sim.exact import fluence, half_space, known
 from mcml_sim.exact.fluence import Answer, Rule, Stack
+from mcml_sim.exact.single_scattering import entered
+from mcml_sim.media import fresnel
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
@@ -38,7 +40,7 @@ MAX_LAYERS = 20
 STANDARD = Rule(depth=20, slope=24, azimuth=24)
 COARSE = Rule(depth=16, slope=18, azimuth=18)
 WAVE_NODES = 10  # of a panel of k, which is as long as it is far from 0
-DECAYED = 25.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
+DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
 FIRST_WAVE = 1e-3  # times the smallest mu_t, where nothing is absorbed
 FARTHEST_PHASE = 1e5  # k r
@@ -152,28 +154,130 @@ def _specular(medium: Medium, illumination: str) -> float:
 
 @dataclass(frozen=True)
 class _Difference:
-    """A stack's profile less what is known of it, by wave number, and what is known."""
+    """A profile as what is known of it, and the transform of the rest."""
 
-    here: Stack
-    """Of k = 0."""
     medium: Medium
     illumination: str
-    base: Layer | None
-    """The layer whose half space is taken away; None where nothing is."""
+    base: Medium | None
+    """The half space whose profile is taken away; None where nothing is."""
     edges: Floats
     """Of panels of k, (panels + 1,) [1/length]."""
-    beyond_once: Floats
-    """Transform of the difference without what was scattered once and goes straight out, (panels, WAVE_NODES) [-]."""
-    whole: Floats
-    """Transform of the difference, (panels, WAVE_NODES) [-]."""
+    rest: Floats
+    """Transform without what has a formula by radius, (panels, WAVE_NODES) [-]."""
 
     def profile(self, r: Floats) -> Floats:
-        """R_d [1/length^2], (n,)."""
-        source = 0.0 if self.medium.layers[0].mu_s == 0 else np.inf
-        near = np.clip(r, 1e-9 / self._mu_t, 1e30 / self._mu_t)
-        value = self._inverse(near, self.beyond_once, 0) / (2 * np.pi) + self._once(near, self.medium)
+        """R_d [1/length^2] at radii of shape (n,)."""
+        first = self.medium.layers[0]
+        unit = _unit(self.medium)
+        near = np.clip(r, 1e-9 * unit, 1e9 * unit)
+        value = self._inverse(near, 0) / (2 * np.pi) + known.profile(self.medium, self.illumination, near)
         if self.base is not None:
-            light = Setting(self.illumination, n=self.here.above)
-            value += half_space.profile(near, self.base.alpha, self.base.mfp, light)
-            value -= self._once(near, _alone(self.medium, self.base))
-        return np.where(r == np.inf, 0.0, np.where((r == 0) & (source > 0), np.inf, value))
+            (layer,), light = self.base.layers, Setting(self.illumination, n=first.n / self.medium.n_above)
+            value += half_space.profile(near, layer.alpha, layer.mfp, light)
+            value -= known.profile(self.base, self.illumination, near)
+        value = np.where(r > 1e9 * unit, 0.0, value)
+        return np.where((r == 0) & (first.mu_s > 0), np.inf, value)
+
+    def within(self, r: Floats) -> Floats:
+        """Light that leaves within radii of shape (n,) [-]."""
+        unit = _unit(self.medium)
+        near = np.clip(r, 1e-9 * unit, 1e9 * unit)
+        value = near * self._inverse(near, 1) + known.within(self.medium, self.illumination, near)
+        if self.base is not None:
+            (layer,) = self.base.layers
+            light = Setting(self.illumination, n=layer.n / self.medium.n_above)
+            total = half_space.reflectance(layer.alpha, light)
+            value += total * half_space.cdf(near, layer.alpha, layer.mfp, light)
+            value -= known.within(self.base, self.illumination, near)
+        return value
+
+    def _inverse(self, r: Floats, order: int) -> Floats:
+        """int_0^inf f(k) J(k r) dk, f the rest times k with J0 and the rest itself with J1, (n,)."""
+        value = np.zeros_like(r)
+        # Radii of like size share nodes.
+        size = np.ceil(np.log2(r))
+        for group in np.unique(size):
+            here = size == group
+            for low, high, rest in zip(self.edges[:-1], self.edges[1:], self.rest, strict=True):
+                farthest = float(r[here].max())
+                if high * farthest < FARTHEST_PHASE:
+                    value[here] += self._panel(low, high, rest, r[here], order)
+        return value
+
+    def _panel(self, low: float, high: float, rest: Floats, r: Floats, order: int) -> Floats:
+        """The part of the integral between two wave numbers, in steps of a few periods of J."""
+        steps = int(np.ceil((high - low) * r.max() / PHASE_STEP)) or 1
+        x, weight = np.polynomial.legendre.leggauss(PHASE_NODES)
+        at = ((np.arange(steps)[:, None] + 0.5 * (1 + x)) / steps).ravel()
+        k = low + (high - low) * at
+        # Ended softly, what is left at the last k blurs the source and no radius beyond.
+        soft = 0.5 * erfc(9.0 * (k / self.edges[-1] - 0.52))
+        values = soft * (_interpolation(at) @ rest) * np.tile(0.5 * weight, steps) * ((high - low) / steps)
+        waves = np.multiply.outer(r, k)
+        return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
+
+
+def _interpolation(at: Floats) -> Floats:
+    """From WAVE_NODES Gauss nodes on (0, 1) to places there, (places, WAVE_NODES)."""
+    x, weight = np.polynomial.legendre.leggauss(WAVE_NODES)
+    degree = np.arange(WAVE_NODES)
+    basis = np.polynomial.legendre.legvander(x, WAVE_NODES - 1) * (2 * degree + 1) * 0.5 * weight[:, None]
+    return np.polynomial.legendre.legvander(2 * at - 1, WAVE_NODES - 1) @ basis.T
+
+
+def _unit(medium: Medium) -> float:
+    """A length of the medium's own: the shortest mean free path, or thickness where nothing scatters [length]."""
+    return min(layer.mfp if layer.mu_s > 0 else layer.thickness for layer in medium.layers)
+
+
+def _difference(medium: Medium, illumination: str) -> _Difference:
+    base, last = _base(medium)
+    edges = _wave_edges(medium, last)
+    x, _ = np.polynomial.legendre.leggauss(WAVE_NODES)
+    waves = edges[:-1, None] + np.diff(edges)[:, None] * (0.5 * (1 + x))
+    rest = np.array([_rest(medium, k, illumination) for k in waves.flat])
+    if base is not None:
+        rest -= [_rest(base, k, illumination) for k in waves.flat]
+    return _Difference(medium, illumination, base, edges, rest.reshape(waves.shape))
+
+
+def _rest(medium: Medium, k: float, illumination: str) -> float:
+    """Transform of the light that `known` has no formula for [-]."""
+    here, answer = _answer(medium, k, illumination)
+    once = answer.unscattered * answer.up_at_once if illumination == "searchlight" else 0.0
+    return float(here.weight @ (answer.phi * answer.up - once))
+
+
+def _base(medium: Medium) -> tuple[Medium | None, float]:
+    """The half space to take away, and the wave number from which the rest of the light is its."""
+    layers, tops = medium.layers, medium.z_edges
+    number = next((number for number, layer in enumerate(layers) if layer.mu_s > 0), None)
+    if number is None:
+        return None, 0.0
+    first, matched = layers[number], layers[0].n == medium.n_above
+    farthest = LAST_WAVE[matched] * max(layer.mu_t for layer in layers if layer.mu_s > 0)
+    if tops[number] > 0 and DECAYED / tops[number] < farthest:
+        return None, DECAYED / tops[number]
+    base = Medium((Layer(first.n, first.mu_a, first.mu_s, 0.0),), medium.n_above)
+    return base, min(farthest, DECAYED / first.thickness)
+
+
+def _wave_edges(medium: Medium, last: float) -> Floats:
+    """Panels of k, each as long as it is far from 0, (panels + 1,)."""
+    scatter = [layer for layer in medium.layers if layer.mu_s > 0]
+    if last == 0:
+        return np.zeros(1)
+    slowest = min(layer.mu_t * max(float(half_space.decay_rate(layer.alpha)), FIRST_WAVE) for layer in scatter)
+    first = min(0.5 * slowest, 0.5 * last)
+    return np.append(0.0, np.geomspace(first, last, int(np.ceil(np.log2(last / first))) + 1))
+
+
+def _checked(name: str, value: Any, accepted: str) -> Floats:
+    numbers = checked_numbers(name, value, accepted)
+    if not np.all(numbers >= 0):
+        raise InputError(f"{name} must be {accepted}, got {float(numbers[~(numbers >= 0)].flat[0])}")
+    return numbers
+
+
+def _scalar_or_array(values: Floats) -> float | Floats:
+    return float(values) if values.ndim == 0 else values
