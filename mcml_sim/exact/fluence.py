@@ -40,7 +40,7 @@ FIRST_PANEL = 1.5  # mean free paths, of the panels at interfaces
 DEEPEST = 40.0  # mean free paths beyond which an infinite layer has nothing but its slowest mode
 DARK = 38.0  # optical depth beyond which e^-T is rounding
 GRADING = 2  # power of the distance to the end of a panel by which nodes crowd there
-NEAR_STEP, NEAR_LAST = 0.17, 3.4  # of the double-exponential rule
+NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
 WAVES = 4.0  # 1/k, of the panels at surfaces
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
 SERIES_TERMS = 16
@@ -344,9 +344,16 @@ def _slopes(here: Stack, k: float, rule: Rule) -> tuple[Complexes, Floats, Compl
         phase = k * deep * min(steepest, 4.0)
         t, d_mu = _cone(low, ratio, rule.slope + int(0.4 * phase))
         azimuths = 1 if k == 0 else rule.azimuth // 2 + int(0.27 * phase)
-        parts.append((t + 0j, np.cos(0.5 * np.pi * (np.arange(azimuths) + 0.5) / azimuths), d_mu, np.full(azimuths, 1 / azimuths)))
+        parts.append(
+            (
+                t + 0j,
+                np.cos(0.5 * np.pi * (np.arange(azimuths) + 0.5) / azimuths),
+                d_mu,
+                np.full(azimuths, 1 / azimuths),
+            )
+        )
         low = steepest
-    reflected_below = here.below != 1 and here.optical < DARK
+    reflected_below = here.below != 1 and 0 < here.optical < DARK
     if reflected_below or min(here.above, here.below) < 1:
         last = DARK / max(here.optical, 1e-6) if min(here.above, here.below) >= 1 else 1e7
         phase = k * deep * max(low, 1.0)
@@ -504,9 +511,7 @@ def _out(here: Stack, slants: Slants, k: float, to_and_fro: bool) -> Floats:
 
 
 def _upside_down(here: Stack) -> Stack:
-    return here._replace(
-        z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above
-    )
+    return here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
 
 
 def _slants_upside_down(slants: Slants) -> Slants:

@@ -14,6 +14,8 @@ too. Under diffuse light what comes back without scattering after m + 1 times to
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -77,8 +79,7 @@ def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
         return _thrown_back(here, r)
     value = np.zeros_like(r)
     share, weight = _double_exponential()
-    for piece in _pieces(here, medium):
-        low, high = _angles(here, r, piece.near, piece.far)
+    for piece, low, high in _ranges(here, medium, r, ends=True):
         theta = low + (high - low) * share
         height, cosine = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far), np.cos(theta)
         tau = piece.optical + piece.layer.mu_t * (height - piece.near)
@@ -94,16 +95,12 @@ def within(medium: Medium, illumination: str, r: Floats) -> Floats:
         return _thrown_back_within(here, r)
     value = np.full_like(r, fluence.thrown_back(here, 0.0, illumination, SURFACES))
     share, weight = _double_exponential()
-    for piece in _pieces(here, medium):
-        # Slopes whose light leaves within r from all of the piece, and from its nearer part.
-        whole = [(piece.far, np.inf)] if piece.far < np.inf else []
-        for near, far in (*whole, (piece.near, piece.far)):
-            low, high = _angles(here, r, near, far)
-            theta = low + (high - low) * share
-            farthest = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far)
-            light = piece.scattered(here, piece.near + 0 * theta, farthest, 1 / np.cos(theta))
-            out = piece.passes(here, np.tan(theta)) * np.sin(theta)
-            value += 0.5 * np.sum((high - low) * weight * out * light, axis=1)
+    for piece, low, high in _ranges(here, medium, r, ends=False):
+        theta = low + (high - low) * share
+        farthest = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far)
+        light = piece.scattered(here, piece.near + 0 * theta, farthest, 1 / np.cos(theta))
+        out = piece.passes(here, np.tan(theta)) * np.sin(theta)
+        value += 0.5 * np.sum((high - low) * weight * out * light, axis=1)
     return value
 
 
@@ -120,10 +117,20 @@ def _pieces(here: Stack, medium: Medium) -> list[_Piece]:
     return pieces
 
 
-def _angles(here: Stack, r: Floats, near: float, far: float) -> tuple[Floats, Floats]:
-    """Least and largest angle inside under which light from heights near to far leaves at r, (n, 1)."""
-    steepest = np.arctan(fluence.critical_slope(here.above))
-    return tuple(np.minimum(np.arctan2(r, height), steepest)[:, None] for height in (far, near))  # type: ignore[return-value]
+def _ranges(here: Stack, medium: Medium, r: Floats, ends: bool) -> Iterator[tuple[_Piece, Floats, Floats]]:
+    """Each piece with the least and largest angles inside, (n, 1), under which its light leaves at r, or within r."""
+    for piece in _pieces(here, medium):
+        heights = [piece.near, piece.far] if ends or piece.far == np.inf else [piece.near, piece.far, np.inf]
+        for near, far in itertools.pairwise(heights):
+            low, high = np.arctan2(r, far)[:, None], np.arctan2(r, near)[:, None]
+            for start, stop in itertools.pairwise(_breaks(here)):
+                yield piece, np.clip(low, start, stop), np.clip(high, start, stop)
+
+
+def _breaks(here: Stack) -> list[float]:
+    """0, the critical angles inside as far as light gets out above, and the last of these."""
+    above, below = (float(np.arctan(fluence.critical_slope(ratio))) for ratio in (here.above, here.below))
+    return [0.0, below, above] if below < above else [0.0, above]
 
 
 def _double_exponential() -> tuple[Floats, Floats]:
@@ -157,10 +164,12 @@ def _thrown_back_within(here: Stack, r: Floats) -> Floats:
     value = np.zeros_like(r)
     share, weight = _double_exponential()
     for turn in _turns(here):
-        _, high = _angles(here, r, 2 * (turn + 1) * here.height, np.inf)
-        theta = high * share
-        flux = _returned(here, np.tan(theta), turn) * np.sin(2 * theta)
-        light = here.above**2 * np.sum(high * weight * flux, axis=1)
+        light = np.zeros_like(r)
+        for start, stop in itertools.pairwise(_breaks(here)):
+            width = np.clip(np.arctan2(r, 2 * (turn + 1) * here.height), start, stop)[:, None] - start
+            theta = start + width * share
+            flux = _returned(here, np.tan(theta), turn) * np.sin(2 * theta)
+            light += here.above**2 * np.sum(width * weight * flux, axis=1)
         value += light
         if not np.any(light > LEAST * value):
             break

@@ -39,11 +39,13 @@ Floats = NDArray[np.float64]
 MAX_LAYERS = 20
 STANDARD = Rule(depth=20, slope=24, azimuth=24)
 COARSE = Rule(depth=16, slope=18, azimuth=18)
-WAVE_NODES = 10  # of a panel of k, which is as long as it is far from 0
+WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
 FIRST_WAVE = 1e-3  # times the smallest mu_t, where nothing is absorbed
-FARTHEST_PHASE = 1e5  # k r
+LAST_PHASE = 1e4  # k r
+SMOOTH = 5.0  # k times the depth of the first layer that scatters, where a half space without that depth is no use
+NEAREST, FARTHEST = 1e-9, 1e9  # radii, in units of the medium's own
 PHASE_STEP, PHASE_NODES = 20.0, 24
 
 
@@ -99,9 +101,7 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
     _require_solved(medium, illumination)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
     waves = (0.0, first.mu_t)
-    fine, coarse = (
-        np.array([_reflected(medium, k, illumination, rule) for k in waves]) for rule in (STANDARD, COARSE)
-    )
+    fine, coarse = (np.array([_reflected(medium, k, illumination, rule) for k in waves]) for rule in (STANDARD, COARSE))
     changes = np.abs(fine - coarse) / np.where(fine > 0, fine, 1.0)
     return Solution(
         medium,
@@ -159,62 +159,61 @@ class _Difference:
     medium: Medium
     illumination: str
     base: Medium | None
-    """The half space whose profile is taken away; None where nothing is."""
+    """The half space whose profile, without what is known of it, is taken away; None where nothing is."""
+    share: float
+    """Of that profile [-]."""
     edges: Floats
     """Of panels of k, (panels + 1,) [1/length]."""
     rest: Floats
-    """Transform without what has a formula by radius, (panels, WAVE_NODES) [-]."""
+    """Transform of the rest, (panels, WAVE_NODES) [-]."""
 
     def profile(self, r: Floats) -> Floats:
         """R_d [1/length^2] at radii of shape (n,)."""
-        first = self.medium.layers[0]
-        unit = _unit(self.medium)
-        near = np.clip(r, 1e-9 * unit, 1e9 * unit)
+        unit, scatters = _unit(self.medium), self.medium.layers[0].mu_s > 0
+        near = np.clip(r, NEAREST * unit, FARTHEST * unit)
         value = self._inverse(near, 0) / (2 * np.pi) + known.profile(self.medium, self.illumination, near)
         if self.base is not None:
-            (layer,), light = self.base.layers, Setting(self.illumination, n=first.n / self.medium.n_above)
-            value += half_space.profile(near, layer.alpha, layer.mfp, light)
-            value -= known.profile(self.base, self.illumination, near)
-        value = np.where(r > 1e9 * unit, 0.0, value)
-        return np.where((r == 0) & (first.mu_s > 0), np.inf, value)
+            layer, light = _half_space(self.base, self.illumination)
+            deep = half_space.profile(near, layer.alpha, layer.mfp, light)
+            value += self.share * (deep - known.profile(self.base, self.illumination, near))
+        return np.where(r > FARTHEST * unit, 0.0, np.where((r == 0) & scatters, np.inf, value))
 
     def within(self, r: Floats) -> Floats:
         """Light that leaves within radii of shape (n,) [-]."""
         unit = _unit(self.medium)
-        near = np.clip(r, 1e-9 * unit, 1e9 * unit)
+        near = np.clip(r, NEAREST * unit, FARTHEST * unit)
         value = near * self._inverse(near, 1) + known.within(self.medium, self.illumination, near)
         if self.base is not None:
-            (layer,) = self.base.layers
-            light = Setting(self.illumination, n=layer.n / self.medium.n_above)
-            total = half_space.reflectance(layer.alpha, light)
-            value += total * half_space.cdf(near, layer.alpha, layer.mfp, light)
-            value -= known.within(self.base, self.illumination, near)
+            layer, light = _half_space(self.base, self.illumination)
+            deep = half_space.cdf(near, layer.alpha, layer.mfp, light) * half_space.reflectance(layer.alpha, light)
+            value += self.share * (deep - known.within(self.base, self.illumination, near))
         return value
 
     def _inverse(self, r: Floats, order: int) -> Floats:
         """int_0^inf f(k) J(k r) dk, f the rest times k with J0 and the rest itself with J1, (n,)."""
         value = np.zeros_like(r)
-        # Radii of like size share nodes.
-        size = np.ceil(np.log2(r))
+        size = np.ceil(np.log2(r))  # radii of like size share nodes
         for group in np.unique(size):
             here = size == group
+            last = min(self.edges[-1], LAST_PHASE / float(r[here].max()))
             for low, high, rest in zip(self.edges[:-1], self.edges[1:], self.rest, strict=True):
-                farthest = float(r[here].max())
-                if high * farthest < FARTHEST_PHASE:
-                    value[here] += self._panel(low, high, rest, r[here], order)
+                if low < last:
+                    value[here] += _panel(low, high, last, rest, r[here], order)
         return value
 
-    def _panel(self, low: float, high: float, rest: Floats, r: Floats, order: int) -> Floats:
-        """The part of the integral between two wave numbers, in steps of a few periods of J."""
-        steps = int(np.ceil((high - low) * r.max() / PHASE_STEP)) or 1
-        x, weight = np.polynomial.legendre.leggauss(PHASE_NODES)
-        at = ((np.arange(steps)[:, None] + 0.5 * (1 + x)) / steps).ravel()
-        k = low + (high - low) * at
-        # Ended softly, what is left at the last k blurs the source and no radius beyond.
-        soft = 0.5 * erfc(9.0 * (k / self.edges[-1] - 0.52))
-        values = soft * (_interpolation(at) @ rest) * np.tile(0.5 * weight, steps) * ((high - low) / steps)
-        waves = np.multiply.outer(r, k)
-        return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
+
+def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order: int) -> Floats:
+    """The part of the integral between two wave numbers, in steps of a few periods of J."""
+    stop = min(high, last)
+    steps = int(np.ceil((stop - low) * r.max() / PHASE_STEP)) or 1
+    x, weight = np.polynomial.legendre.leggauss(PHASE_NODES)
+    k = low + (stop - low) * ((np.arange(steps)[:, None] + 0.5 * (1 + x)) / steps).ravel()
+    # Ended softly, what is left at the last k blurs the light over a few times its wavelength, and that is all.
+    soft = 0.5 * erfc(9.0 * (k / last - 0.52))
+    through = _interpolation((k - low) / (high - low))
+    values = soft * (through @ rest) * np.tile(0.5 * weight, steps) * ((stop - low) / steps)
+    waves = np.multiply.outer(r, k)
+    return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
 
 
 def _interpolation(at: Floats) -> Floats:
@@ -235,10 +234,17 @@ def _difference(medium: Medium, illumination: str) -> _Difference:
     edges = _wave_edges(medium, last)
     x, _ = np.polynomial.legendre.leggauss(WAVE_NODES)
     waves = edges[:-1, None] + np.diff(edges)[:, None] * (0.5 * (1 + x))
-    rest = np.array([_rest(medium, k, illumination) for k in waves.flat])
+    rest, share = np.array([_rest(medium, k, illumination) for k in waves.flat]), 0.0
     if base is not None:
-        rest -= [_rest(base, k, illumination) for k in waves.flat]
-    return _Difference(medium, illumination, base, edges, rest.reshape(waves.shape))
+        deep = np.array([_rest(base, k, illumination) for k in waves.flat])
+        share = 1.0 if medium.layers[0].n >= medium.n_above else rest[-1] / deep[-1]
+        rest -= share * deep
+    return _Difference(medium, illumination, base, share, edges, rest.reshape(waves.shape))
+
+
+def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
+    (layer,) = base.layers
+    return layer, Setting(illumination, n=layer.n)
 
 
 def _rest(medium: Medium, k: float, illumination: str) -> float:
@@ -256,9 +262,11 @@ def _base(medium: Medium) -> tuple[Medium | None, float]:
         return None, 0.0
     first, matched = layers[number], layers[0].n == medium.n_above
     farthest = LAST_WAVE[matched] * max(layer.mu_t for layer in layers if layer.mu_s > 0)
-    if tops[number] > 0 and DECAYED / tops[number] < farthest:
-        return None, DECAYED / tops[number]
-    base = Medium((Layer(first.n, first.mu_a, first.mu_s, 0.0),), medium.n_above)
+    if tops[number] * farthest > SMOOTH:
+        return None, min(farthest, DECAYED / tops[number])
+    # A half space under a denser medium is not solved; at the same wave numbers one without a surface is much like it.
+    index = max(first.n / medium.n_above, 1.0)
+    base = Medium((Layer(index, first.mu_a, first.mu_s, 0.0),))
     return base, min(farthest, DECAYED / first.thickness)
 
 
