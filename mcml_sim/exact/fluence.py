@@ -28,7 +28,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import exp1, expn
+from scipy.special import exp1, expn, j0
 
 from mcml_sim.exact.half_space import decay_rate
 from mcml_sim.media.medium import Layer, Medium
@@ -46,7 +46,8 @@ CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated b
 SERIES_TERMS = 16
 DIRECT_NODES = 20
 TURN = np.exp(0.25j * np.pi)  # of slopes beyond the cones
-RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved
+RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
+MOST_PHASE = 50.0  # as far as they turn no farther than this
 
 
 @dataclass(frozen=True)
@@ -282,10 +283,9 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
 class Slants(NamedTuple):
     """Directions, arrays (directions,), and light along them."""
 
-    t: Complexes
-    """tan(theta)."""
     weight: Complexes
     """dmu/mu, times 1/2, times the share of the azimuth."""
+    mu: Complexes
     a: Complexes
     """Reflectance of the upper surface from inside."""
     b: Complexes
@@ -295,6 +295,8 @@ class Slants(NamedTuple):
     """E(z), (directions, N)."""
     to_bottom: Complexes
     """E(d - z), (directions, N)."""
+    cones: int
+    """So many of them, the first, are inside the cones of escape."""
 
 
 def reflectance(ratio: float, t: Complexes) -> Complexes:
@@ -312,14 +314,21 @@ def critical_slope(ratio: float) -> float:
     return float(1 / np.sqrt(ratio**2 - 1)) if ratio > 1 else np.inf
 
 
-def _cone(low: float, ratio: float, nodes: int) -> tuple[Floats, Floats]:
-    """Slopes between `low` and the critical one, and dmu/mu, in the cosine outside: there Fresnel's law is smooth."""
-    top = np.sqrt(1 - (ratio * low) ** 2 / (1 + low**2))
-    x, weight = _gauss(nodes)
-    # Squared: where the indices are nearly equal mu follows the cosine but close to 0.
-    outside, d_outside = top * x**2, top * 2 * x * weight
-    mu = np.sqrt(1 - (1 - outside**2) / ratio**2)
-    return np.sqrt(1 - outside**2) / (ratio * mu), outside * d_outside / (ratio * mu) ** 2
+def _cones(here: Stack, nodes: int) -> tuple[Complexes, Complexes]:
+    """Slopes under which light gets out somewhere, and dmu/mu, in the cosine outside: there Fresnel's law is smooth."""
+    slopes, weights, low = [np.empty(0)], [np.empty(0)], 0.0
+    for ratio in sorted({ratio for ratio in (here.above, here.below) if ratio > 1}, reverse=True):
+        top = np.sqrt(1 - (ratio * low) ** 2 / (1 + low**2))
+        x, weight = _gauss(nodes)
+        # Flat at the normal, where the slope goes as the root of the cosine, and at 90 degrees: where the indices are
+        # nearly equal mu follows the cosine but close to 0.
+        angle = 0.5 * np.pi * x
+        outside, d_outside = top * np.sin(angle) ** 2, top * 0.5 * np.pi * np.sin(2 * angle) * weight
+        mu = np.sqrt(1 - (1 - outside**2) / ratio**2)
+        slopes.append(np.sqrt(1 - outside**2) / (ratio * mu))
+        weights.append(outside * d_outside / (ratio * mu) ** 2)
+        low = critical_slope(ratio)
+    return np.concatenate(slopes) + 0j, np.concatenate(weights) + 0j
 
 
 def _ray(start: float, phase: float, last: float) -> tuple[Complexes, Complexes]:
@@ -333,59 +342,66 @@ def _ray(start: float, phase: float, last: float) -> tuple[Complexes, Complexes]
     return t, TURN * (np.diff(edges)[:, None] * weight).ravel() * t / (1 + t * t)
 
 
-def _slopes(here: Stack, k: float, rule: Rule) -> tuple[Complexes, Floats, Complexes]:
-    """tan(theta), cos(azimuth) and the weight of every direction that a surface makes a difference to."""
-    cones = sorted({ratio for ratio in (here.above, here.below) if ratio > 1}, reverse=True)
-    seen = np.append(here.z[here.tau < RESOLVED], here.height if here.optical < RESOLVED else 0.0)
-    deep = float(seen.max())
-    parts, low = [], 0.0
-    for ratio in cones:
-        steepest = critical_slope(ratio)
-        phase = k * deep * min(steepest, 4.0)
-        t, d_mu = _cone(low, ratio, rule.slope + int(0.4 * phase))
-        azimuths = 1 if k == 0 else rule.azimuth // 2 + int(0.27 * phase)
-        parts.append(
-            (
-                t + 0j,
-                np.cos(0.5 * np.pi * (np.arange(azimuths) + 0.5) / azimuths),
-                d_mu,
-                np.full(azimuths, 1 / azimuths),
-            )
-        )
-        low = steepest
+def _steepest(here: Stack) -> float:
+    """The largest of the critical slopes; 0 where there is none."""
+    return max((critical_slope(ratio) for ratio in (here.above, here.below) if ratio > 1), default=0.0)
+
+
+def _deepest(here: Stack) -> float:
+    """Depth from which slanted light still gets out [length]."""
+    seen = here.z[here.tau < RESOLVED]
+    return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
+
+
+def _slopes(here: Stack, k: float, phase: float, rule: Rule) -> tuple[Complexes, Floats, Complexes, int]:
+    """tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
+    t, d_mu = _cones(here, rule.slope + int(0.7 * phase))
+    azimuths = 1 if k == 0 else rule.azimuth // 2 + int(0.27 * phase)
+    parts = [(t, np.cos(0.5 * np.pi * (np.arange(azimuths) + 0.5) / azimuths), d_mu, np.full(azimuths, 1 / azimuths))]
     reflected_below = here.below != 1 and 0 < here.optical < DARK
     if reflected_below or min(here.above, here.below) < 1:
         last = DARK / max(here.optical, 1e-6) if min(here.above, here.below) >= 1 else 1e7
-        phase = k * deep * max(low, 1.0)
-        t, d_mu = _ray(low, phase, last)
+        t, d_mu = _ray(_steepest(here), k * _deepest(here), last)
         # Close to 90 degrees the phase stays small out to the largest slopes.
         x, weight = _gauss(rule.azimuth + int(0.3 * phase))
         parts.append((t, np.sin(0.5 * np.pi * x**4), d_mu, 4 * x**3 * weight))
     columns = [
         (np.repeat(t, c.size), np.tile(c, t.size), 0.5 * np.outer(d_mu, share).ravel()) for t, c, d_mu, share in parts
     ]
-    if not columns:
-        return np.empty(0, complex), np.empty(0), np.empty(0, complex)
-    return tuple(np.concatenate(column) for column in zip(*columns, strict=True))  # type: ignore[return-value]
+    slope, cosine, weight = (np.concatenate(column) for column in zip(*columns, strict=True))
+    return slope, cosine, weight, columns[0][0].size
 
 
 def _slants(here: Stack, k: float, rule: Rule) -> Slants:
-    t, cosine, weight = _slopes(here, k, rule)
-    slow, wave = np.sqrt(1 + t * t), 1j * k * t * cosine
-    from_top = np.exp(wave[:, None] * here.z - slow[:, None] * here.tau)
+    """Light whose phase turns farther than MOST_PHASE is left out: it is as good as averaged away."""
+    wave = k * min(_steepest(here), 1.5)
+    deepest = min(_deepest(here), MOST_PHASE / wave if wave > 0 else np.inf)
+    t, cosine, weight, cones = _slopes(here, k, 2 * wave * deepest, rule)
+
+    def along(z: Floats, tau: Floats) -> Complexes:
+        seen = (z <= deepest) | (wave == 0)
+        light = np.zeros((t.size, z.size), complex)
+        light[:, seen] = np.exp((1j * k * t * cosine)[:, None] * z[seen] - np.sqrt(1 + t * t)[:, None] * tau[seen])
+        return light
+
     if np.isinf(here.height):
         whole, to_bottom = np.zeros_like(t), np.zeros((t.size, 0), complex)
     else:
-        whole = np.exp(wave * here.height - slow * here.optical)
-        to_bottom = np.exp(wave[:, None] * (here.height - here.z) - slow[:, None] * (here.optical - here.tau))
-    return Slants(t, weight, reflectance(here.above, t), reflectance(here.below, t), whole, from_top, to_bottom)
+        whole = along(np.array([here.height]), np.array([here.optical]))[:, 0]
+        to_bottom = along(here.height - here.z, here.optical - here.tau)
+    a, b = reflectance(here.above, t), reflectance(here.below, t)
+    return Slants(weight, 1 / np.sqrt(1 + t * t), a, b, whole, along(here.z, here.tau), to_bottom, cones)
 
 
 def solve(here: Stack, k: float, illumination: str, rule: Rule) -> Answer:
     """phi, phi_0 and X at wave number k [1/length]."""
     slants = _slants(here, k, rule)
-    up, at_once = (_out(here, slants, k, orders) for orders in (True, False))
-    down = _out(_upside_down(here), _slants_upside_down(slants), k, True) if here.height < np.inf else 0 * up
+    at_once = _out_at_once(here, slants, k, rule)
+    up = at_once + _out_later(here, slants)
+    down = 0 * up
+    if here.height < np.inf:
+        turned, slants_turned = _upside_down(here), _slants_upside_down(slants)
+        down = _out_at_once(turned, slants_turned, k, rule) + _out_later(turned, slants_turned)
     unscattered = 4 * here.above**2 * up if illumination == "diffuse" else beam(here, here.tau)
     matrix = np.eye(here.z.size) - _scattered(here, slants, k)
     return Answer(np.linalg.solve(matrix, unscattered), unscattered, up, at_once, down)
@@ -495,19 +511,34 @@ def _below(here: Stack, k: float) -> Floats:
     return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
 
 
-def _out(here: Stack, slants: Slants, k: float, to_and_fro: bool) -> Floats:
-    """X, (N,); without `to_and_fro` only straight up, and up from the lower surface."""
-    a, b, whole, matched = slants.a, slants.b, slants.whole, here.above == 1
-    mu = 1 / np.sqrt(1 + slants.t**2)
-    passes = (1 - a) / (1 - a * b * whole**2) if to_and_fro else 1 - a
-    out = ((slants.weight * mu * (passes - matched)) @ slants.from_top).real
-    if matched:
-        out = out + _out_freely(here.tau, here.z, k)
+def _out_at_once(here: Stack, slants: Slants, k: float, rule: Rule) -> Floats:
+    """X, (N,), of light that goes straight up, or by way of the lower surface."""
+    matched = here.above == 1
+    t, d_mu = _cones(here, rule.slope + int(0.7 * k * _deepest(here) * min(_steepest(here), 1.5)))
+    a, b = reflectance(here.above, t), reflectance(here.below, t)
+    ways = [(here.z, here.tau, 1 - a - matched)]
     if here.height < np.inf and here.below != 1:
-        out += ((slants.weight * mu * whole * (passes * b - matched)) @ slants.to_bottom).real
+        ways.append((2 * here.height - here.z, 2 * here.optical - here.tau, (1 - a) * b - matched))
+    out = np.zeros_like(here.z)
+    for z, tau, passes in ways:
+        light = np.exp(-np.multiply.outer(np.sqrt(1 + t * t).real, tau)) * j0(k * np.multiply.outer(t.real, z))
+        out += (0.5 * d_mu * passes / np.sqrt(1 + t * t)).real @ light
         if matched:
-            out += _out_freely(2 * here.optical - here.tau, 2 * here.height - here.z, k)
+            out += _out_freely(tau, z, k)
+    ray = slice(slants.cones, None)
+    a, b, weight = slants.a[ray], slants.b[ray], slants.weight[ray] * slants.mu[ray]
+    out += ((weight * (1 - a - matched)) @ slants.from_top[ray]).real
+    if here.height < np.inf:
+        out += ((weight * ((1 - a) * b - matched) * slants.whole[ray]) @ slants.to_bottom[ray]).real
     return out
+
+
+def _out_later(here: Stack, slants: Slants) -> Floats:
+    """X, (N,), of light that the upper surface has reflected before."""
+    a, b, whole = slants.a, slants.b, slants.whole
+    passes = slants.weight * slants.mu * (1 - a) * a * b * whole**2 / (1 - a * b * whole**2)
+    out = (passes @ slants.from_top).real
+    return out + ((passes * b * whole) @ slants.to_bottom).real if here.height < np.inf else out
 
 
 def _upside_down(here: Stack) -> Stack:
@@ -529,7 +560,7 @@ def thrown_back(here: Stack, k: float, illumination: str, rule: Rule) -> float:
         return 0.0 if here.pane else float((1 - a) ** 2 * back / (1 - a * back))
     slants = _slants(here, k, rule)
     a, b, back = slants.a, slants.b, slants.whole**2
-    flux = slants.weight / (1 + slants.t**2)
+    flux = slants.weight * slants.mu**2
     return float(4 * here.above**2 * np.sum(flux * (1 - a) ** 2 * b * back / (1 - a * b * back)).real)
 
 
@@ -542,5 +573,5 @@ def straight_through(here: Stack, illumination: str, rule: Rule) -> float:
         return float(2 * expn(3, here.optical))
     slants = _slants(here, 0.0, rule)
     a, b, whole = slants.a, slants.b, slants.whole
-    flux = slants.weight / (1 + slants.t**2)
+    flux = slants.weight * slants.mu**2
     return float(4 * here.above**2 * np.sum(flux * (1 - a) * (1 - b) * whole / (1 - a * b * whole**2)).real)
