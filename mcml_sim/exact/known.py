@@ -7,9 +7,9 @@ distance r = Z tan(theta), and dZ / (r^2 + Z^2) = d(theta) / r:
     int_0^r 2 pi r R_1 dr = (1/2) int (1 - a) [int_0^{r / tan(theta)} mu_s phi_0 e^{-T / mu} dZ] dmu,   mu = cos(theta)
 
 with a Fresnel's reflectance of the upper surface from inside; light by way of the lower surface has its reflectance
-too. Under diffuse light what comes back without scattering after m + 1 times to and fro, d the height of the stack:
+too. Under diffuse light what comes back without scattering after M = m + 1 times to and fro, d the stack's height:
 
-    R_0(r) = (n^2/pi) sum over m of (1 - a)^2 b (a b)^m mu^4 e^{-2(m+1) T / mu} / (2(m+1) d)^2,   tan(theta) = r / 2(m+1) d
+    R_0(r) = (n^2/pi) sum over m of (1 - a)^2 b (a b)^m mu^4 e^{-2 M T / mu} / (2 M d)^2,   tan(theta) = r / 2 M d
 """
 
 from __future__ import annotations
@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact import fluence
-from mcml_sim.exact.fluence import Rule, Stack
+from mcml_sim.exact import depths, fluence
+from mcml_sim.exact.depths import Rule, Stack
+from mcml_sim.exact.slants import critical_slope, reflectance
 from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
@@ -68,13 +69,13 @@ class _Piece(NamedTuple):
 
     def passes(self, here: Stack, t: Floats) -> Floats:
         """Share of light of that slope that the surfaces let out [-]."""
-        out = 1 - fluence.reflectance(here.above, t + 0j).real
-        return out * fluence.reflectance(here.below, t + 0j).real if self.image else out
+        out = 1 - reflectance(here.above, t + 0j).real
+        return out * reflectance(here.below, t + 0j).real if self.image else out
 
 
 def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
     """R_d of that light [1/length^2] at radii r > 0 of shape (n,)."""
-    here = fluence.stack(medium, 0.0, SURFACES)
+    here = depths.stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back(here, r)
     value = np.zeros_like(r)
@@ -90,7 +91,7 @@ def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
 
 def within(medium: Medium, illumination: str, r: Floats) -> Floats:
     """What of that light leaves within radii r > 0 of shape (n,), and the beam that comes straight back [-]."""
-    here = fluence.stack(medium, 0.0, SURFACES)
+    here = depths.stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back_within(here, r)
     value = np.full_like(r, fluence.thrown_back(here, 0.0, illumination, SURFACES))
@@ -129,7 +130,7 @@ def _ranges(here: Stack, medium: Medium, r: Floats, ends: bool) -> Iterator[tupl
 
 def _breaks(here: Stack) -> list[float]:
     """0, the critical angles inside as far as light gets out above, and the last of these."""
-    above, below = (float(np.arctan(fluence.critical_slope(ratio))) for ratio in (here.above, here.below))
+    above, below = (float(np.arctan(critical_slope(ratio))) for ratio in (here.above, here.below))
     return [0.0, below, above] if below < above else [0.0, above]
 
 
@@ -178,5 +179,5 @@ def _thrown_back_within(here: Stack, r: Floats) -> Floats:
 
 def _returned(here: Stack, t: Floats, turn: int) -> Floats:
     """(1 - a)^2 b (a b)^turn e^{-T / mu} after that many turns more than one."""
-    a, b = (fluence.reflectance(ratio, t + 0j).real for ratio in (here.above, here.below))
+    a, b = (reflectance(ratio, t + 0j).real for ratio in (here.above, here.below))
     return (1 - a) ** 2 * b * (a * b) ** turn * np.exp(-2 * (turn + 1) * here.optical * np.sqrt(1 + t * t))

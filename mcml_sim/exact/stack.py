@@ -26,8 +26,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc, j0, j1
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact import fluence, half_space, known
-from mcml_sim.exact.fluence import Answer, Rule, Stack
+from mcml_sim.exact import depths, fluence, half_space, known
+from mcml_sim.exact.depths import Rule, Stack
+from mcml_sim.exact.fluence import Answer
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media import fresnel
 from mcml_sim.media.checks import checked_numbers, shown
@@ -136,7 +137,7 @@ def _reflected(medium: Medium, k: float, illumination: str, rule: Rule = STANDAR
 
 
 def _answer(medium: Medium, k: float, illumination: str, rule: Rule = STANDARD) -> tuple[Stack, Answer]:
-    here = fluence.stack(medium, k, rule)
+    here = depths.stack(medium, k, rule)
     return here, fluence.solve(here, k, illumination, rule)
 
 
