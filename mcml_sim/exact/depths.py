@@ -13,6 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.exact.half_space import decay_rate
 from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
@@ -20,6 +21,7 @@ Floats = NDArray[np.float64]
 FIRST_PANEL = 1.5  # mean free paths, of the panels at interfaces
 WAVES = 4.0  # 1/k, of the panels at surfaces
 DEEPEST = 40.0  # mean free paths beyond which an infinite layer has nothing but its slowest mode
+FADED = 30.0  # exponent by which light has faded where it is not followed any deeper
 DARK = 38.0  # optical depth beyond which e^-T is rounding
 GRADING = 2  # power of the distance to the end of a panel by which nodes crowd there
 NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
@@ -81,18 +83,7 @@ def stack(medium: Medium, k: float, rule: Rule) -> Stack:
     """Depths of a medium whose layers share one index, for light of wave number k [1/length]."""
     layers, tops = medium.layers, medium.z_edges
     tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
-    ends: list[tuple[float, float, float, float]] = []
-    scatters: list[Layer] = []
-    for number, layer in enumerate(layers):
-        if layer.mu_s > 0:
-            # At the surfaces, where light gets out, its own length 1/k must be resolved.
-            finest = min(FIRST_PANEL, WAVES * layer.mu_t / k) if k > 0 else FIRST_PANEL
-            first = [finest if number == at else FIRST_PANEL for at in (0, len(layers) - 1)]
-            cuts = _cuts(tau_tops[number + 1] - tau_tops[number], *first)
-            z, tau = tops[number] + cuts / layer.mu_t, tau_tops[number] + cuts
-            ends += zip(z[:-1], z[1:], tau[:-1], tau[1:], strict=True)
-            scatters += [layer] * (cuts.size - 1)
-    z_ends, tau_ends = np.reshape(np.reshape(ends, (-1, 4)).T, (2, 2, -1))
+    z_ends, tau_ends, scatters = _panels(layers, tops, tau_tops, k)
     s, d_s = gauss(rule.depth)
     at = np.stack([1 - _crowded(s), _crowded(s)], axis=1)
     length = np.diff(z_ends, axis=0)[0][:, None] * (d_s * _crowding(s))
@@ -105,7 +96,7 @@ def stack(medium: Medium, k: float, rule: Rule) -> Stack:
         z_ends=z_ends,
         tau_ends=tau_ends,
         alpha=np.array([layer.alpha for layer in scatters]),
-        tail=_tail(medium, tops[-2], tau_tops[-2]),
+        tail=_tail(layers[-1], tops[-2], tau_tops[-2], seen=bool(np.any(tau_ends[1:] == tau_tops[-2] + DEEPEST))),
         last=layers[-1],
         height=float(tops[-1]),
         optical=float(tau_tops[-1]),
@@ -113,6 +104,35 @@ def stack(medium: Medium, k: float, rule: Rule) -> Stack:
         below=1.0 if medium.is_half_space else layers[0].n / medium.n_below,
         pane=len(layers) == 1 and not layers[0].mu_t,
     )
+
+
+def _panels(layers: tuple[Layer, ...], tops: Floats, tau_tops: Floats, k: float) -> tuple[Floats, Floats, list[Layer]]:
+    """Depths and optical depths of the ends of panels, (2, panels) each, and the panels' layers."""
+    ends: list[tuple[float, float, float, float]] = []
+    scatters: list[Layer] = []
+    faded = 0.0
+    numbers = [number for number, layer in enumerate(layers) if layer.mu_s > 0]
+    for number, layer in enumerate(layers):
+        optical = tau_tops[number + 1] - tau_tops[number]
+        fades = min(np.hypot(slowest(layer.alpha), k / layer.mu_t), 1.0) if layer.mu_t else 0.0  # per mean free path
+        if layer.mu_s > 0:
+            # Where light gets out its own length 1/k must be resolved.
+            finest = min(FIRST_PANEL, WAVES * layer.mu_t / k) if k > 0 else FIRST_PANEL
+            cuts = _cuts(optical, *(finest if number == numbers[at] else FIRST_PANEL for at in (0, -1)))
+            cuts = cuts[: 1 + np.count_nonzero(faded + fades * cuts[:-1] < FADED)]
+            z, tau = tops[number] + cuts / layer.mu_t, tau_tops[number] + cuts
+            ends += zip(z[:-1], z[1:], tau[:-1], tau[1:], strict=True)
+            scatters += [layer] * (cuts.size - 1)
+        if np.isfinite(optical):
+            faded += fades * optical
+    z_ends, tau_ends = np.reshape(np.reshape(ends, (-1, 4)).T, (2, 2, -1))
+    return z_ends, tau_ends, scatters
+
+
+@lru_cache(maxsize=512)
+def slowest(alpha: float) -> float:
+    """The rate at which light far from all sources fades [1/mfp]."""
+    return float(decay_rate(alpha))
 
 
 def _cuts(optical: float, first: float, last: float) -> Floats:
@@ -127,11 +147,10 @@ def _cuts(optical: float, first: float, last: float) -> Floats:
     return np.concatenate([down, optical - up[::-1]])
 
 
-def _tail(medium: Medium, top: float, tau_top: float) -> Floats:
-    layer = medium.layers[-1]
-    if not (medium.is_half_space and layer.mu_s):
+def _tail(layer: Layer, top: float, tau_top: float, seen: bool) -> Floats:
+    if np.isfinite(layer.thickness) or not seen:
         return np.empty((3, 0))
-    share, weight = _double_exponential()
+    share, weight = double_exponential()
     depth = DEEPEST + DARK * share
     return np.stack([top + depth / layer.mu_t, tau_top + depth, layer.alpha * DARK * weight])
 
@@ -169,7 +188,7 @@ class Near(NamedTuple):
 @lru_cache
 def near_node(nodes: int) -> Near:
     """From the node to both ends, in x, not s: K is a logarithm times what is smooth as far as those."""
-    share, d_share = _double_exponential()
+    share, d_share = double_exponential()
     x = _crowded(gauss(nodes)[0])[:, None, None]
     side = np.concatenate([-x, 1 - x], axis=1)
     at, length = (x + side * share).reshape(nodes, -1), np.abs(side)
@@ -179,11 +198,11 @@ def near_node(nodes: int) -> Near:
 @lru_cache
 def near_end(nodes: int) -> Near:
     """The same from the panel's upper end, (rule,) and (rule, nodes)."""
-    share, d_share = _double_exponential()
+    share, d_share = double_exponential()
     return Near(share, d_share, _through(share, nodes))
 
 
-def _double_exponential() -> tuple[Floats, Floats]:
+def double_exponential() -> tuple[Floats, Floats]:
     """Nodes and weights on (0, 1)."""
     y = np.arange(-NEAR_LAST, NEAR_LAST + NEAR_STEP / 2, NEAR_STEP)
     share = 1 / (1 + np.exp(np.pi * np.sinh(y)))

@@ -10,11 +10,14 @@ crossed and wherever it was reflected. So the fluence phi obeys, with mu_s phi /
 
 where D = 1 - a b E(2d), <> is the mean over psi, a and b are Fresnel's reflectances of the two surfaces from inside,
 and d is the height of the stack. K is the inverse-square law transformed: E1(T)/2 at k = 0, and logarithmic at
-T = Z = 0. What comes out above of a source at z is X(z) = (1/2) int_0^1 <(1 - a) (E(z) + b E(2d - z)) / D> dmu, which without surfaces is
-e^{-L}/2 - T K (Case & Zweifel, Linear Transport Theory, 1967). Nystroem's method solves it: K is integrated from each
-node of `depths` over near panels by a double-exponential rule. Where a surface reflects, the mirror image K(z + z')
-holds all that is singular; what G has beside, light that gets out and light that crosses the stack, is smooth, and is
-summed over the directions of `slants`.
+T = Z = 0. What comes out above of a source at z is
+
+    X(z) = (1/2) int_0^1 <(1 - a) (E(z) + b E(2d - z)) / D> dmu
+
+which without surfaces is e^{-L}/2 - T K (Case & Zweifel, Linear Transport Theory, 1967). Nystroem's method solves it:
+K is integrated from each node of `depths` over near panels by a double-exponential rule. Where a surface reflects, the
+mirror image K(z + z') holds all that is singular; what G has beside, light that gets out and light that crosses the
+stack, is smooth, and is summed over the directions of `slants`.
 """
 
 from __future__ import annotations
@@ -25,8 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss, near_end, near_node
-from mcml_sim.exact.half_space import decay_rate
+from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss, near_end, near_node, slowest
 from mcml_sim.exact.slants import Slants, cones, deepest, directions, reflectance, steepest
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
@@ -206,7 +208,7 @@ def _slanted(here: Stack, slants: Slants) -> Floats:
 def _below(here: Stack, k: float) -> Floats:
     """mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode goes on for ever."""
     z, tau, weight = here.tail
-    decay = np.hypot(here.last.mu_t * float(decay_rate(here.last.alpha)), k)
+    decay = np.hypot(here.last.mu_t * slowest(here.last.alpha), k)
     mode = weight * np.exp(-decay * (z - here.z[-1]))
     return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
 

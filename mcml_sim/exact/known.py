@@ -28,7 +28,6 @@ from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
 
-STEP, LAST = 0.11, 3.2  # of the double-exponential rule
 SURFACES = Rule(depth=1, slope=1, azimuth=1)  # of a stack whose depths nobody asks for
 LEAST = 1e-13  # of light to and fro
 MOST_TURNS = 10_000
@@ -79,7 +78,7 @@ def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
     if illumination == "diffuse":
         return _thrown_back(here, r)
     value = np.zeros_like(r)
-    share, weight = _double_exponential()
+    share, weight = depths.double_exponential()
     for piece, low, high in _ranges(here, medium, r, ends=True):
         theta = low + (high - low) * share
         height, cosine = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far), np.cos(theta)
@@ -95,7 +94,7 @@ def within(medium: Medium, illumination: str, r: Floats) -> Floats:
     if illumination == "diffuse":
         return _thrown_back_within(here, r)
     value = np.full_like(r, fluence.thrown_back(here, 0.0, illumination, SURFACES))
-    share, weight = _double_exponential()
+    share, weight = depths.double_exponential()
     for piece, low, high in _ranges(here, medium, r, ends=False):
         theta = low + (high - low) * share
         farthest = np.clip(r[:, None] / np.tan(theta), piece.near, piece.far)
@@ -134,13 +133,6 @@ def _breaks(here: Stack) -> list[float]:
     return [0.0, below, above] if below < above else [0.0, above]
 
 
-def _double_exponential() -> tuple[Floats, Floats]:
-    """Nodes and weights on (0, 1) (Takahasi & Mori, Publ. RIMS 9, 1974)."""
-    y = np.arange(-LAST, LAST + STEP / 2, STEP)
-    share = 1 / (1 + np.exp(np.pi * np.sinh(y)))
-    return share, STEP * np.pi * np.cosh(y) * share * (1 - share)
-
-
 def _turns(here: Stack) -> range:
     """As often as light goes to and fro until LEAST of it is left."""
     if here.below == 1:
@@ -163,7 +155,7 @@ def _thrown_back(here: Stack, r: Floats) -> Floats:
 def _thrown_back_within(here: Stack, r: Floats) -> Floats:
     """2 n^2 int mu ... dmu as far as the slope that leaves at r, from sin(theta)^2."""
     value = np.zeros_like(r)
-    share, weight = _double_exponential()
+    share, weight = depths.double_exponential()
     for turn in _turns(here):
         light = np.zeros_like(r)
         for start, stop in itertools.pairwise(_breaks(here)):

@@ -207,21 +207,21 @@ def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order:
     """The part of the integral between two wave numbers, in steps of a few periods of J."""
     stop = min(high, last)
     steps = int(np.ceil((stop - low) * r.max() / PHASE_STEP)) or 1
-    x, weight = np.polynomial.legendre.leggauss(PHASE_NODES)
-    k = low + (stop - low) * ((np.arange(steps)[:, None] + 0.5 * (1 + x)) / steps).ravel()
+    x, weight = depths.gauss(PHASE_NODES)
+    k = low + (stop - low) * ((np.arange(steps)[:, None] + x) / steps).ravel()
     # Ended softly, what is left at the last k blurs the light over a few times its wavelength, and that is all.
     soft = 0.5 * erfc(9.0 * (k / last - 0.52))
     through = _interpolation((k - low) / (high - low))
-    values = soft * (through @ rest) * np.tile(0.5 * weight, steps) * ((stop - low) / steps)
+    values = soft * (through @ rest) * np.tile(weight, steps) * ((stop - low) / steps)
     waves = np.multiply.outer(r, k)
     return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
 
 
 def _interpolation(at: Floats) -> Floats:
     """From WAVE_NODES Gauss nodes on (0, 1) to places there, (places, WAVE_NODES)."""
-    x, weight = np.polynomial.legendre.leggauss(WAVE_NODES)
+    x, weight = depths.gauss(WAVE_NODES)
     degree = np.arange(WAVE_NODES)
-    basis = np.polynomial.legendre.legvander(x, WAVE_NODES - 1) * (2 * degree + 1) * 0.5 * weight[:, None]
+    basis = np.polynomial.legendre.legvander(2 * x - 1, WAVE_NODES - 1) * (2 * degree + 1) * weight[:, None]
     return np.polynomial.legendre.legvander(2 * at - 1, WAVE_NODES - 1) @ basis.T
 
 
@@ -233,8 +233,7 @@ def _unit(medium: Medium) -> float:
 def _difference(medium: Medium, illumination: str) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
-    x, _ = np.polynomial.legendre.leggauss(WAVE_NODES)
-    waves = edges[:-1, None] + np.diff(edges)[:, None] * (0.5 * (1 + x))
+    waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(WAVE_NODES)[0]
     rest, share = np.array([_rest(medium, k, illumination) for k in waves.flat]), 0.0
     if base is not None:
         deep = np.array([_rest(base, k, illumination) for k in waves.flat])

@@ -31,9 +31,9 @@ def upside_down(medium):
 
 
 def milkier(medium):
-    """The second layer scatters 3 % more."""
+    """The second layer scatters a fifth more."""
     first, second, *others = medium.layers
-    return replace(medium, layers=(first, replace(second, mu_s=1.03 * second.mu_s), *others))
+    return replace(medium, layers=(first, replace(second, mu_s=1.2 * second.mu_s), *others))
 
 
 def cut(alpha, change=1e-9):
