@@ -17,8 +17,8 @@ from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
 TURN = complex(np.exp(0.25j * np.pi))  # of slopes beyond the cones
-RAY_NODES = 12  # of a panel
-STEEPEST = 1e7  # where no critical angle ends the slopes
+RAY_NODES = 16  # of a panel
+STEEPEST = 1e9  # where no critical angle ends the slopes
 THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical angles crosses to and fro
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
 MOST_PHASE = 40.0  # as far as they turn no farther than this

@@ -67,11 +67,13 @@ class Solution:
     transmittance: float | None
     """Light that left below, whether it was scattered or not [-]; None where there is no below."""
     error: float
-    """Relative change of `reflectance`, and of the transform at one mean free path, with fewer nodes [-]."""
+    """Relative change of `reflectance`, and of the transform at k = 1 / mfp, with fewer nodes: above their error."""
 
     def transform(self, k: ArrayLike) -> float | Floats:
         """2 pi int_0^inf r R_d(r) J0(k r) dr at wave numbers k >= 0 [1/length], of any shape [-]; A at k = 0."""
-        waves = _checked("k", k, "a wave number >= 0")
+        waves = _checked("k", k, "a finite wave number >= 0")
+        if np.any(np.isinf(waves)):
+            raise InputError("k must be a finite wave number >= 0, got inf")
         values = np.array([_reflected(self.medium, float(k), self.illumination) for k in waves.flat])
         return _scalar_or_array(values.reshape(waves.shape))
 
@@ -84,7 +86,8 @@ class Solution:
         """Share of `reflectance` that leaves within radius r >= 0 of any shape [-]; 1 at infinity."""
         radius = _checked("r", r, "a radius >= 0")
         within = self._difference.within(radius.ravel()).reshape(radius.shape)
-        return _scalar_or_array(within / self.reflectance if self.reflectance > 0 else np.ones_like(radius))
+        all_of_it = np.isinf(radius) | (self.reflectance == 0)
+        return _scalar_or_array(np.where(all_of_it, 1.0, within / (self.reflectance or 1.0)))
 
     @cached_property
     def _difference(self) -> _Difference:
@@ -98,6 +101,12 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
     illumination  "searchlight" or "diffuse", as in `mcml_sim.Setting`
 
     InputError on any other medium and illumination.
+
+    Relative error of the reflectance and the transmittance, and of the transform up to k = 5 / mfp: below 1e-7, mostly
+    1e-9. Where the index above is another the transform's grows to 1e-4 at k = 25 / mfp. That of the profile is below
+    1e-5 as far as R_d is more than 1e-6 of what it is at one mean free path, but for the radii at which light comes
+    just from the next interface under the critical angle, where it is 1e-4. The first profile or cdf solves for some
+    hundred k, which takes a second or, where the index above is another, some seconds; further radii cost little.
     """
     _require_solved(medium, illumination)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
@@ -264,10 +273,10 @@ def _base(medium: Medium) -> tuple[Medium | None, float]:
     farthest = LAST_WAVE[matched] * max(layer.mu_t for layer in layers if layer.mu_s > 0)
     if tops[number] * farthest > SMOOTH:
         return None, min(farthest, DECAYED / tops[number])
-    # A half space under a denser medium is not solved; at the same wave numbers one without a surface is much like it.
-    index = max(first.n / medium.n_above, 1.0)
-    base = Medium((Layer(index, first.mu_a, first.mu_s, 0.0),))
-    return base, min(farthest, DECAYED / first.thickness)
+    index = first.n / medium.n_above
+    base = Medium((Layer(max(index, 1.0), first.mu_a, first.mu_s, 0.0),))
+    # A half space under a denser medium is not solved: one without a surface is much like it, but not the same.
+    return base, min(farthest, DECAYED / first.thickness) if index >= 1 else farthest
 
 
 def _wave_edges(medium: Medium, last: float) -> Floats:

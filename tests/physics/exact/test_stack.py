@@ -22,6 +22,7 @@ MATCHED = Medium((Layer(1.0, 0.1, 2.0, 0.0, 0.5), Layer(1.0, 0.5, 0.5, 0.0, 0.7)
 GLAZED = Medium(
     (Layer(1.4, 0.0, 0.0, 0.0, 0.2), Layer(1.4, 0.3, 3.0, 0.0, 0.5), Layer(1.4, 0.5, 0.0, 0.0, 0.1)), n_below=1.2
 )
+UNDER_GLASS = Medium((Layer(1.3, 0.1, 2.0, 0.0, 0.3), Layer(1.3, 0.5, 1.5, 0.0, 0.4)), n_above=1.5)
 
 
 def upside_down(medium):
@@ -120,11 +121,11 @@ def test_adding_and_doubling_agrees_in_twenty_stacks():
 @pytest.mark.parametrize("white", [True, False])
 def test_no_light_is_lost(white, illumination):
     rng = np.random.default_rng(6)
-    for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0)):
+    for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0), (1.6, 1.6)):
         medium = replace(random_stack(rng, white), n_above=above, n_below=below)
         found = stack.solve(medium, illumination)
         total = found.specular + found.reflectance + found.transmittance + absorbed(medium, illumination)
-        assert total == pytest.approx(1, abs=2e-8)
+        assert total == pytest.approx(1, abs=2e-9)
 
 
 @BOTH
@@ -149,7 +150,9 @@ def test_thin_and_thick_plates(optical):
 
 
 @BOTH
-@pytest.mark.parametrize("medium", [MATCHED, replace(GLAZED, n_above=1.4), GLAZED])
+@pytest.mark.parametrize(
+    "medium", [MATCHED, *(pytest.param(replace(GLAZED, n_above=n), marks=pytest.mark.slow) for n in (1.4, 1.0))]
+)
 def test_the_transform_is_the_profiles(medium, illumination):
     """int_0^R 2 pi r R_d J0(k r) dr by quadrature over radii, with what lies at r = 0."""
     found = stack.solve(medium, illumination)
@@ -171,7 +174,8 @@ def test_ends():
     assert found.transform(0.0) == pytest.approx(found.reflectance, rel=1e-12)
     assert found.profile(0.0) == np.inf
     assert found.profile(np.inf) == 0.0
-    assert found.cdf(np.inf) == pytest.approx(1, abs=1e-9)
+    assert found.cdf(np.inf) == 1.0
+    assert found.cdf(1e5) == pytest.approx(1, abs=1e-9)
     assert found.cdf([[0.0, 1.0]]).shape == (1, 2)
     clear = stack.solve(Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0),)))
     assert clear.reflectance == 0.0
@@ -181,7 +185,7 @@ def test_ends():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("medium", [MATCHED, GLAZED])
+@pytest.mark.parametrize("medium", [MATCHED, GLAZED, UNDER_GLASS])
 def test_photons_agree_in_chi_square_over_the_rings(medium):
     edges = np.concatenate([[0.0], np.geomspace(0.02, 8.0, 30)])
     tally = simulate(medium, Grid.from_edges(r=edges), 2 * 10**6, seed=9)
@@ -225,5 +229,5 @@ def test_other_arguments_are_refused_by_name():
             found.profile(bad)
         with pytest.raises(InputError, match="r must be a radius >= 0, got"):
             found.cdf(bad)
-        with pytest.raises(InputError, match="k must be a wave number >= 0, got"):
+        with pytest.raises(InputError, match="k must be a finite wave number >= 0, got"):
             found.transform(bad)
