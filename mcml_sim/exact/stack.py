@@ -106,7 +106,7 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
     1e-9. Where the index above is another the transform's grows to 1e-4 at k = 25 / mfp. That of the profile is below
     1e-5 as far as R_d is more than 1e-6 of what it is at one mean free path, but for the radii at which light comes
     just from the next interface under the critical angle, where it is 1e-4. The first profile or cdf solves for some
-    hundred k, which takes a second or, where the index above is another, some seconds; further radii cost little.
+    hundred k, which takes a second or two, up to ten where the index above is another; further radii cost little.
     """
     _require_solved(medium, illumination)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])

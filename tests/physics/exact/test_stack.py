@@ -118,7 +118,7 @@ def test_adding_and_doubling_agrees_in_twenty_stacks():
 
 
 @BOTH
-@pytest.mark.parametrize("white", [True, False])
+@pytest.mark.parametrize("white", [True, pytest.param(False, marks=pytest.mark.slow)])
 def test_no_light_is_lost(white, illumination):
     rng = np.random.default_rng(6)
     for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0), (1.6, 1.6)):
