@@ -1,0 +1,280 @@
+"""The fluence in a stack of layers that scatter isotropically and share one index, at one transverse wave number.
+
+With light that varies as e^{i k x} along the surface, every path of slope t = tan(theta) and azimuth psi has the
+amplitude E(Z) = exp(-T sqrt(1 + t^2) + i k Z t cos psi) after a height Z of optical thickness T, whatever layers it
+crossed and wherever it was reflected. So the fluence phi obeys, with mu_s phi / 4 pi the source,
+
+    phi(z) = phi_0(z) + int (K + G)(z, z') mu_s(z') phi(z') dz'
+    K = (1/2) int_0^1 <E(|z - z'|)> dmu/mu = (1/2) int_0^inf e^{-L cosh v - T sinh v} dv,   L^2 = T^2 + (k Z)^2
+    G = (1/2) int_0^1 <[a E(z + z') + b E(2d - z - z') + a b (E(2d + z - z') + E(2d - z + z'))] / D> dmu/mu
+
+where D = 1 - a b E(2d), <> is the mean over psi, a and b are Fresnel's reflectances of the two surfaces from inside,
+and d is the height of the stack. K is the inverse-square law transformed: E1(T)/2 at k = 0, and logarithmic at
+T = Z = 0. What comes out above of a source at z is
+
+    X(z) = (1/2) int_0^1 <(1 - a) (E(z) + b E(2d - z)) / D> dmu
+
+which without surfaces is e^{-L}/2 - T K (Case & Zweifel, Linear Transport Theory, 1967). Nystroem's method solves it:
+K is integrated from each node of `depths` over near panels by a double-exponential rule. Where a surface reflects, the
+mirror image K(z + z') holds all that is singular; what G has beside, light that gets out and light that crosses the
+stack, is smooth, and is summed over the directions of `slants`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import exp1, expn, j0
+
+from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss, near_end, near_node, slowest
+from mcml_sim.exact.slants import Slants, cones, deepest, directions, reflectance, steepest
+
+CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
+SERIES_TERMS = 16
+DIRECT_NODES = 20
+
+
+class Answer(NamedTuple):
+    """At one wave number; arrays (N,)."""
+
+    phi: Floats
+    """Fluence over the light that arrives [-]."""
+    unscattered: Floats
+    """phi_0 [-]."""
+    up: Floats
+    """X."""
+    up_at_once: Floats
+    """X without the light that the upper surface had reflected before."""
+    down: Floats
+    """X of the light that comes out below."""
+
+
+def direct(optical: Floats, height: Floats, k: float) -> Floats:
+    """K at optical thicknesses T > 0 and heights Z, of one shape."""
+    across = k * height
+    length = np.hypot(optical, across)
+    # a e^v + b e^-v is the exponent
+    a = 0.5 * (length + optical)
+    b = 0.25 * across**2 / a
+    value = np.zeros_like(a)
+    close, seen = a < 1.0, (a >= 1.0) & (length < DARK)
+    value[close] = _direct_close(a[close], b[close])
+    value[seen] = _direct_far(a[seen], b[seen])
+    return value
+
+
+def _direct_close(a: Floats, b: Floats) -> Floats:
+    """(1/2) sum over m of (-b)^m/m! E_{m+1}(a)."""
+    decay, integral = np.exp(-a), exp1(a)
+    total, power = integral.copy(), np.ones_like(a)
+    for m in range(1, SERIES_TERMS):
+        integral = (decay - a * integral) / m
+        power *= -b / m
+        total += power * integral
+    return 0.5 * total
+
+
+def _direct_far(a: Floats, b: Floats) -> Floats:
+    """Gauss's rule in v as far as the exponent has grown by DARK."""
+    largest = a + b + DARK
+    v = np.log((largest + np.sqrt(largest**2 - 4 * a * b)) / (2 * a))
+    total = np.zeros_like(a)
+    for x, weight in zip(*gauss(DIRECT_NODES), strict=True):
+        growth = np.exp(x * v)
+        total += weight * np.exp(-a * growth - b / growth)
+    return 0.5 * v * total
+
+
+def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
+    """X without surfaces."""
+    return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
+
+
+def solve(here: Stack, k: float, illumination: str, rule: Rule) -> Answer:
+    """phi, phi_0 and X at wave number k [1/length]."""
+    if not here.panels:
+        return Answer(*(np.empty(0) for _ in Answer._fields))
+    slants = directions(here, k, rule)
+    at_once = _out_at_once(here, slants, k, rule)
+    up = at_once + _out_later(here, slants)
+    down = 0 * up
+    if here.height < np.inf:
+        turned, slants_turned = _upside_down(here), _slants_upside_down(slants)
+        down = _out_at_once(turned, slants_turned, k, rule) + _out_later(turned, slants_turned)
+    unscattered = 4 * here.above**2 * up if illumination == "diffuse" else beam(here, here.tau)
+    matrix = np.eye(here.z.size) - _scattered(here, slants, k)
+    phi = np.asarray(np.linalg.solve(matrix, unscattered), np.float64)
+    return Answer(phi, unscattered, up, at_once, down)
+
+
+def beam(here: Stack, tau: Floats) -> Floats:
+    """phi_0 of a searchlight at optical depths tau, per photon that arrives [-]."""
+    a, b = normal_reflectances(here)
+    back = b * np.exp(-(2 * here.optical - tau)) if b else 0.0
+    return (1 - a) * (np.exp(-tau) + back) / (1 - a * b * np.exp(-2 * here.optical))
+
+
+def normal_reflectances(here: Stack) -> tuple[float, float]:
+    """Of the two surfaces, at normal incidence [-]."""
+    a, b = (((ratio - 1) / (ratio + 1)) ** 2 for ratio in (here.above, here.below))
+    return a, b
+
+
+def _scattered(here: Stack, slants: Slants, k: float) -> Floats:
+    """The integral operator on fluences at the nodes, (N, N)."""
+    matrix = _by_panel(here, k)
+    for mirror in _mirrors(here):
+        matrix += _by_panel(here, k, mirror)
+    matrix += _slanted(here, slants) * here.weight
+    if here.tail.size:
+        matrix[:, -1] += _below(here, k)
+    return matrix
+
+
+def _mirrors(here: Stack) -> list[tuple[float, float]]:
+    """Twice the depth and the optical depth of the surfaces that reflect."""
+    top = [(0.0, 0.0)] if here.above != 1 else []
+    return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
+
+
+def _by_panel(here: Stack, k: float, mirror: tuple[float, float] | None = None) -> Floats:
+    """mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
+    z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
+    if mirror is not None:
+        z, tau, z_ends, tau_ends = mirror[0] - z, mirror[1] - tau, mirror[0] - z_ends[::-1], mirror[1] - tau_ends[::-1]
+    close = _is_close(here, z_ends, tau_ends)
+    own = np.eye(here.panels, dtype=bool) & (mirror is None)
+    matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
+    far = np.broadcast_to(~(close | own)[:, None, :, None], matrix.shape).reshape(z.size, z.size)
+    row, column = np.nonzero(far)
+    whole = matrix.reshape(z.size, z.size)
+    whole[row, column] = direct(np.abs(here.tau[row] - tau[column]), np.abs(here.z[row] - z[column]), k)
+    whole *= here.weight
+    target, source = np.nonzero(close & ~own)
+    rule = near_end(here.nodes)
+    # The panel's end on the target's side, and whether that is its lower one.
+    below = tau_ends[0, source] < here.tau_ends[0, target]
+    upwards = np.where(below, 1, 0)
+    tau_end, z_end = tau_ends[upwards, source, None], z_ends[upwards, source, None]
+    tau_gap = np.abs(here.tau.reshape(-1, here.nodes)[target] - tau_end)
+    z_gap = np.abs(here.z.reshape(-1, here.nodes)[target] - z_end)
+    tau_length, z_length = np.diff(tau_ends, axis=0)[0, source], np.diff(z_ends, axis=0)[0, source]
+    kernel = direct(
+        tau_gap[:, :, None] + tau_length[:, None, None] * rule.height,
+        z_gap[:, :, None] + z_length[:, None, None] * rule.height,
+        k,
+    ) * (rule.weight * (here.alpha[source] * tau_length)[:, None, None])
+    blocks = kernel @ rule.through
+    flip = below if mirror is None else ~below
+    blocks[flip] = blocks[flip][:, :, ::-1]
+    matrix[target, :, source] = blocks
+    if mirror is None:
+        matrix[np.arange(here.panels), :, np.arange(here.panels)] = _own(here, k)
+    return whole
+
+
+def _is_close(here: Stack, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_]:
+    """Whether K varies on a source panel (second axis) faster than its nodes follow, seen from a target panel."""
+    close = np.zeros((here.panels, here.panels), bool)
+    for own, ends in ((here.z_ends, z_ends), (here.tau_ends, tau_ends)):
+        gap = np.maximum(own[0][:, None] - ends[1], ends[0] - own[1][:, None])
+        close |= gap < CLOSE * (ends[1] - ends[0])
+    return close
+
+
+def _own(here: Stack, k: float) -> Floats:
+    """mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
+    rule = near_node(here.nodes)
+    tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
+    kernel = direct(tau_length * rule.height, z_length * rule.height, k) * rule.weight
+    return np.einsum("piq,iqj->pij", here.alpha[:, None, None] * tau_length * kernel, rule.through, optimize=True)
+
+
+def _slanted(here: Stack, slants: Slants) -> Floats:
+    """G without the mirror images, (N, N)."""
+    a, b, whole = slants.a, slants.b, slants.whole
+    series = slants.weight / (1 - a * b * whole**2)
+    top = (a * series - (here.above != 1) * slants.weight)[:, None] * slants.from_top
+    kernel = (slants.from_top.T @ top).real
+    if here.height < np.inf:
+        bottom = (b * series - (here.below != 1) * slants.weight)[:, None] * slants.to_bottom
+        across = (slants.from_top.T @ ((a * b * whole * series)[:, None] * slants.to_bottom)).real
+        kernel += (slants.to_bottom.T @ bottom).real + across + across.T
+    return kernel
+
+
+def _below(here: Stack, k: float) -> Floats:
+    """mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode goes on for ever."""
+    z, tau, weight = here.tail
+    decay = np.hypot(here.last.mu_t * slowest(here.last.alpha), k)
+    mode = weight * np.exp(-decay * (z - here.z[-1]))
+    return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
+
+
+def _out_at_once(here: Stack, slants: Slants, k: float, rule: Rule) -> Floats:
+    """X, (N,), of light that goes straight up, or by way of the lower surface."""
+    matched = here.above == 1
+    t, d_mu = cones(here, rule.slope + int(0.55 * k * deepest(here) * min(steepest(here), 1.5)))
+    a, b = reflectance(here.above, t), reflectance(here.below, t)
+    ways = [(here.z, here.tau, 1 - a - matched)]
+    if here.height < np.inf and here.below != 1:
+        ways.append((2 * here.height - here.z, 2 * here.optical - here.tau, (1 - a) * b - matched))
+    out = np.zeros_like(here.z)
+    for z, tau, passes in ways:
+        light = np.exp(-np.multiply.outer(np.sqrt(1 + t * t).real, tau)) * j0(k * np.multiply.outer(t.real, z))
+        out += (0.5 * d_mu * passes / np.sqrt(1 + t * t)).real @ light
+        if matched:
+            out += _out_freely(tau, z, k)
+    ray = slice(slants.cones, None)
+    a, b, weight = slants.a[ray], slants.b[ray], slants.weight[ray] * slants.mu[ray]
+    out += ((weight * (1 - a - matched)) @ slants.from_top[ray]).real
+    if here.height < np.inf:
+        out += ((weight * ((1 - a) * b - matched) * slants.whole[ray]) @ slants.to_bottom[ray]).real
+    return out
+
+
+def _out_later(here: Stack, slants: Slants) -> Floats:
+    """X, (N,), of light that the upper surface has reflected before."""
+    a, b, whole = slants.a, slants.b, slants.whole
+    passes = slants.weight * slants.mu * (1 - a) * a * b * whole**2 / (1 - a * b * whole**2)
+    out = (passes @ slants.from_top).real
+    return out + ((passes * b * whole) @ slants.to_bottom).real if here.height < np.inf else out
+
+
+def _upside_down(here: Stack) -> Stack:
+    return here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
+
+
+def _slants_upside_down(slants: Slants) -> Slants:
+    return slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
+
+
+def thrown_back(here: Stack, k: float, illumination: str, rule: Rule) -> float:
+    """Share of the light that comes out above, never scattered but reflected below, transformed [-]."""
+    if here.below == 1:
+        return 0.0
+    if illumination == "searchlight":
+        top, bottom = normal_reflectances(here)
+        once = bottom * np.exp(-2 * here.optical)
+        # MCML counts what comes out of a single pane of clear glass as specular.
+        return 0.0 if here.pane else float((1 - top) ** 2 * once / (1 - top * once))
+    slants = directions(here, k, rule)
+    a, b, back = slants.a, slants.b, slants.whole**2
+    flux = slants.weight * slants.mu**2
+    return float(4 * here.above**2 * np.sum(flux * (1 - a) ** 2 * b * back / (1 - a * b * back)).real)
+
+
+def straight_through(here: Stack, illumination: str, rule: Rule) -> float:
+    """Share of the light that comes out below unscattered [-]."""
+    if illumination == "searchlight":
+        top, bottom = normal_reflectances(here)
+        left = np.exp(-here.optical)
+        return float((1 - top) * (1 - bottom) * left / (1 - top * bottom * left**2))
+    if here.above == here.below == 1:
+        return float(2 * expn(3, here.optical))
+    slants = directions(here, 0.0, rule)
+    a, b, whole = slants.a, slants.b, slants.whole
+    flux = slants.weight * slants.mu**2
+    return float(4 * here.above**2 * np.sum(flux * (1 - a) * (1 - b) * whole / (1 - a * b * whole**2)).real)

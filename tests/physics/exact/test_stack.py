@@ -1,0 +1,233 @@
+"""Layers solved exactly: against closed forms, adding-doubling, conservation of energy, their own cuts, and photons."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import j0
+from scipy.stats import chi2
+
+from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space, simulate
+from mcml_sim.exact import depths, fluence, stack
+from mcml_sim.exact.single_scattering import entered
+from mcml_sim.exact.stack import STANDARD
+from tests.physics.tracing import adding_doubling
+
+BOTH = pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+RADII = np.geomspace(1e-3, 15.0, 40)
+CHANCE = 1e-3  # that a right answer fails
+
+MATCHED = Medium((Layer(1.0, 0.1, 2.0, 0.0, 0.5), Layer(1.0, 0.5, 0.5, 0.0, 0.7), Layer(1.0, 0.05, 1.5, 0.0)))
+# Clear and purely absorbing layers, and another index below.
+GLAZED = Medium(
+    (Layer(1.4, 0.0, 0.0, 0.0, 0.2), Layer(1.4, 0.3, 3.0, 0.0, 0.5), Layer(1.4, 0.5, 0.0, 0.0, 0.1)), n_below=1.2
+)
+UNDER_GLASS = Medium((Layer(1.3, 0.1, 2.0, 0.0, 0.3), Layer(1.3, 0.5, 1.5, 0.0, 0.4)), n_above=1.5)
+
+
+def upside_down(medium):
+    """The first two layers swapped."""
+    first, second, *others = medium.layers
+    return replace(medium, layers=(second, first, *others))
+
+
+def milkier(medium):
+    """The second layer scatters a fifth more."""
+    first, second, *others = medium.layers
+    return replace(medium, layers=(first, replace(second, mu_s=1.2 * second.mu_s), *others))
+
+
+def cut(alpha, change=1e-9):
+    """A half space of one mean free path cut into three layers, none quite equal to another."""
+    absorbs, scatters = 1 - alpha, alpha
+    return Medium(
+        (
+            Layer(1.0, absorbs, scatters, 0.0, 0.3),
+            Layer(1.0, absorbs * (1 + change), scatters, 0.0, 1.0),
+            Layer(1.0, absorbs, scatters * (1 + change), 0.0),
+        )
+    )
+
+
+def random_stack(rng, white=False):
+    """Two to four layers between equal media."""
+    n, layers = rng.uniform(1.0, 1.5), []
+    for _ in range(rng.integers(2, 5)):
+        alpha = 1.0 if white else 1 - np.exp(rng.uniform(np.log(1e-3), np.log(0.7)))
+        mu_t, optical = np.exp(rng.uniform(np.log(0.1), np.log(10.0))), np.exp(rng.uniform(np.log(0.05), np.log(10.0)))
+        layers.append(Layer(n, (1 - alpha) * mu_t, alpha * mu_t, 0.0, optical / mu_t))
+    return Medium(tuple(layers))
+
+
+def absorbed(medium, illumination):
+    """Integral of mu_a phi over layers that all scatter."""
+    here = depths.stack(medium, 0.0, STANDARD)
+    return here.absorbs @ fluence.solve(here, 0.0, illumination, STANDARD).phi
+
+
+@pytest.mark.parametrize("alpha", [0.3, 0.9, 0.999, 1.0])
+@BOTH
+def test_one_matched_layer_is_the_exact_half_space(alpha, illumination):
+    found = stack.solve(half_space(alpha), illumination)
+    assert found.reflectance == pytest.approx(exact.reflectance(alpha, Setting(illumination)), rel=1e-7)
+    assert found.transmittance is None
+    assert found.error < 1e-5
+
+
+@pytest.mark.parametrize(
+    ("n", "alpha", "illumination", "reflectance"),
+    [
+        (1.4, 0.5, "searchlight", 0.0523015670),
+        (1.4, 0.99, "searchlight", 0.6035892943),
+        # Giovanelli, Optica Acta 2, 1955
+        (1.5, 0.9, "searchlight", 0.2199185699),
+        (1.5, 0.9, "diffuse", 0.2161120812),
+    ],
+)
+def test_half_spaces_that_refract(n, alpha, illumination, reflectance):
+    assert stack.solve(half_space(alpha, n=n), illumination).reflectance == pytest.approx(reflectance, rel=3e-9)
+
+
+@BOTH
+def test_a_half_space_may_be_cut(illumination):
+    setting, found = Setting(illumination), stack.solve(cut(0.9), illumination)
+    assert found.reflectance == pytest.approx(exact.reflectance(0.9, setting), rel=2e-9)
+    np.testing.assert_allclose(found.profile(RADII), exact.profile(RADII, 0.9, setting=setting), rtol=1e-5)
+    np.testing.assert_allclose(found.cdf(RADII), exact.cdf(RADII, 0.9, setting=setting), atol=1e-8)
+    # Negative control: a change of 0.1 % in the middle layer is seen.
+    other = stack.solve(cut(0.9, 1e-3), illumination)
+    assert other.reflectance != pytest.approx(found.reflectance, rel=1e-5)
+
+
+def test_adding_and_doubling_agrees():
+    rng = np.random.default_rng(4)
+    for _ in range(4):
+        medium = random_stack(rng)
+        reflected = adding_doubling.solve(medium, angles=6, nodes=8).reflected.sum()
+        assert stack.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
+        assert stack.solve(upside_down(medium)).reflectance != pytest.approx(reflected, rel=1e-3)
+
+
+@pytest.mark.slow
+def test_adding_and_doubling_agrees_in_twenty_stacks():
+    rng = np.random.default_rng(5)
+    for _ in range(20):
+        medium = random_stack(rng)
+        reflected = adding_doubling.solve(medium, angles=9, nodes=8).reflected.sum()
+        assert stack.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
+
+
+@BOTH
+@pytest.mark.parametrize("white", [True, pytest.param(False, marks=pytest.mark.slow)])
+def test_no_light_is_lost(white, illumination):
+    rng = np.random.default_rng(6)
+    for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0), (1.6, 1.6)):
+        medium = replace(random_stack(rng, white), n_above=above, n_below=below)
+        found = stack.solve(medium, illumination)
+        total = found.specular + found.reflectance + found.transmittance + absorbed(medium, illumination)
+        assert total == pytest.approx(1, abs=2e-9)
+
+
+@BOTH
+def test_a_white_half_space_sends_all_light_back(illumination):
+    medium = Medium((Layer(1.4, 0.0, 1.0, 0.0, 0.5), Layer(1.4, 0.0, 3.0, 0.0)))
+    found = stack.solve(medium, illumination)
+    assert found.reflectance == pytest.approx(entered(Setting(illumination, n=1.4)), rel=1e-6)
+
+
+@pytest.mark.parametrize("optical", [1e-3, 1e3])
+def test_thin_and_thick_plates(optical):
+    """Of white matter: little and nearly all comes back."""
+    plate = Medium((Layer(1.0, 0.0, 1.0, 0.0, optical / 2), Layer(1.0, 0.0, 2.0, 0.0, optical / 4)))
+    found = stack.solve(plate)
+    assert found.reflectance + found.transmittance == pytest.approx(1, abs=1e-7)
+    if optical < 1:
+        assert found.reflectance == pytest.approx(optical / 2, rel=0.02)
+    else:
+        # H(1) / sqrt(3) at the front and Milne's extrapolated ends (Chandrasekhar 1950; Case & Zweifel 1967).
+        found_at = (2.907810529 / np.sqrt(3)) / (optical + 2 * 0.7104460896)
+        assert found.transmittance == pytest.approx(found_at, rel=1e-6)
+
+
+@BOTH
+@pytest.mark.parametrize(
+    "medium", [MATCHED, *(pytest.param(replace(GLAZED, n_above=n), marks=pytest.mark.slow) for n in (1.4, 1.0))]
+)
+def test_the_transform_is_the_profiles(medium, illumination):
+    """int_0^R 2 pi r R_d J0(k r) dr by quadrature over radii, with what lies at r = 0."""
+    found = stack.solve(medium, illumination)
+    edges = np.concatenate(
+        [[0.0], np.geomspace(1e-3, 0.3, 12), np.linspace(0.3, 25.0, 120)[1:], np.geomspace(25, 1e4, 30)[1:]]
+    )
+    x, weight = np.polynomial.legendre.leggauss(10)
+    r = (edges[:-1, None] + 0.5 * (1 + x) * np.diff(edges)[:, None]).ravel()
+    light = 2 * np.pi * r * found.profile(r) * (0.5 * weight * np.diff(edges)[:, None]).ravel()
+    at_source = found.cdf(0.0) * found.reflectance
+    assert light.sum() + at_source == pytest.approx(found.reflectance, abs=2e-5)
+    for k in (1.0, 3.0):
+        # Too coarse for J0 where hardly any light is left.
+        assert light @ j0(k * r) + at_source == pytest.approx(found.transform(k), abs=2e-5)
+
+
+def test_ends():
+    found = stack.solve(MATCHED)
+    assert found.transform(0.0) == pytest.approx(found.reflectance, rel=1e-12)
+    assert found.profile(0.0) == np.inf
+    assert found.profile(np.inf) == 0.0
+    assert found.cdf(np.inf) == 1.0
+    assert found.cdf(1e5) == pytest.approx(1, abs=1e-9)
+    assert found.cdf([[0.0, 1.0]]).shape == (1, 2)
+    clear = stack.solve(Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0),)))
+    assert clear.reflectance == 0.0
+    assert clear.specular + clear.transmittance == pytest.approx(1, abs=1e-15)
+    dark = stack.solve(Medium((Layer(1.5, 1.0, 0.0, 0.0, 1.0),)))
+    assert dark.reflectance == pytest.approx(0.96**2 * 0.04 * np.exp(-2) / (1 - 0.04**2 * np.exp(-2)), rel=1e-12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("medium", [MATCHED, GLAZED, UNDER_GLASS])
+def test_photons_agree_in_chi_square_over_the_rings(medium):
+    edges = np.concatenate([[0.0], np.geomspace(0.02, 8.0, 30)])
+    tally = simulate(medium, Grid.from_edges(r=edges), 2 * 10**6, seed=9)
+    rings = tally.reflectance_r.scaled(tally.grid.r_areas)
+
+    def likelihood(other):
+        found = stack.solve(other)
+        light = np.diff(found.cdf(edges) * found.reflectance)
+        light[0] += found.cdf(0.0) * found.reflectance
+        return chi2.sf(np.sum(((rings.value - light) / rings.standard_error) ** 2), light.size)
+
+    assert likelihood(medium) > CHANCE
+    assert likelihood(milkier(medium)) < CHANCE
+    for seen, known in ((tally.diffuse_reflectance, "reflectance"), (tally.specular_reflectance, "specular")):
+        assert abs(seen.value - getattr(stack.solve(medium), known)) <= 4 * seen.standard_error + 1e-12
+
+
+@pytest.mark.parametrize(
+    ("medium", "message"),
+    [
+        (half_space(0.9, g=0.5), r"must scatter with g = 0, got 0.5 in layer 1"),
+        (
+            Medium((Layer(1.3, 1.0, 1.0, 0.0, 1.0), Layer(1.4, 1.0, 1.0, 0.0))),
+            r"one n in all layers, got 1.3 in layer 1 and 1.4 in layer 2",
+        ),
+        (Medium((Layer(1.3, 1.0, 1.0, 0.0, 1.0),) * 21), r"must have at most 20 layers, got 21"),
+        (0.9, r"medium must be a mcml_sim.Medium, got 0.9"),
+    ],
+)
+def test_other_media_are_refused_by_name(medium, message):
+    with pytest.raises(InputError, match=message):
+        stack.solve(medium)
+
+
+def test_other_arguments_are_refused_by_name():
+    with pytest.raises(InputError, match="illumination must be one of searchlight, diffuse, got 'sun'"):
+        stack.solve(MATCHED, "sun")
+    found = stack.solve(MATCHED)
+    for bad in (-1.0, np.nan, [1.0, -2.0], "far"):
+        with pytest.raises(InputError, match="r must be a radius >= 0, got"):
+            found.profile(bad)
+        with pytest.raises(InputError, match="r must be a radius >= 0, got"):
+            found.cdf(bad)
+        with pytest.raises(InputError, match="k must be a finite wave number >= 0, got"):
+            found.transform(bad)
