@@ -162,6 +162,7 @@ RECORDS = Run(
                                         "records.albedo-rational.quality.regenerated.delta_A"),
          "largest error of A by the printed map (8) over that by the rational one"),
     ))
+SCALAR = "compiled scalar tracers in MCML's manner, one core with AVX-512"
 RUNS = (
     RECORDS,
     Run("python -m benchmarks.laws", "", "exact half space; time of normalized diffusion, exact inverse", TURNS, (
@@ -184,7 +185,7 @@ RUNS = (
         ("own-data", "≤ 2", recovered, "distance of fitted from simulated alpha, l, mu_a and mu_s', in stated errors",
          "stated errors: statistical and model"),
     )),
-    Run("python benchmarks/tracer.py", "--quick", "compiled scalar tracers in MCML's manner, one core with AVX-512", TURNS, (
+    Run("python benchmarks/tracer.py", "--quick", SCALAR, TURNS, (
         ("orders-speed", "≥ 20", ratio("simulate_orders, live events/s, over the yardstick"),
          "live events a second of simulate_orders, over a scalar tracer with r-z tally"),
         ("half-space-speed", "≥ 30", ratio("half space, photons/s"),

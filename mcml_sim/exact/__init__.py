@@ -1,25 +1,33 @@
-"""The index-matched, isotropic half space solved exactly: no photons, no noise.
+"""Light solved exactly where scattering has no preferred direction: no photons, no noise.
 
     import jax
-    from mcml_sim import exact
+    from mcml_sim import Layer, Medium, Setting, exact
 
-    exact.profile([0.1, 1.0], 0.9)                                  # numpy, float64
+    exact.profile([0.1, 1.0], 0.9)                                  # a half space, numpy, float64
+    exact.profile([0.1, 1.0], 0.9, setting=Setting(n=1.4))          # whose surface refracts, n >= 1
     with jax.enable_x64(True):
         jax.jit(jax.grad(exact.profile, argnums=1))(1.0, 0.9)       # jax
 
-How: `transform` has the transform of the profile, `hankel` its inverse, both with their sources.
+    light = exact.solve(Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0))))   # a stack of layers
+    light.reflectance, light.profile([0.01, 0.1])
 
-Every function takes lengths in any one unit with `mfp` in that unit, and broadcasts `r` (or `xi`) against `alpha`.
-Numbers, lists and numpy arrays give float64 numpy arrays, a float for scalars; what is out of range is an InputError.
-An albedo's transform is kept, so that further radii cost little. Where an argument is a jax array, concrete or traced,
-so is the answer, which can be jitted, vmapped and differentiated in every argument but `setting`, forwards and
-backwards; double precision must be on then (`jax.enable_x64(True)`), and what is out of range gives nan. Derivatives by
-alpha are infinite at alpha = 1, where everything is smooth in sqrt(1 - alpha) only: A is 1 - c sqrt(1 - alpha) there.
+How: `transform` has the transform of the profile where n = 1, `cone` and `table` where n > 1, `hankel` its inverse,
+`stack` the layers, all with their sources.
 
-Relative error of `profile`, for alpha in [0.05, 1]: below 1e-10 for r in [1e-3, 35] mfp, below 2e-7 up to 100 mfp,
-where the profile of alpha = 0.05 has fallen to 1e-51. Closer than 1e-6 mfp to the source the profile is taken for its
-own limit, alpha / (4 pi r), which is 1e-5 off at most. Absolute error of `cdf`: below 1e-10. `error_estimate` says what
-more nodes would change.
+Every function of the half space takes lengths in any one unit with `mfp` in that unit, and broadcasts `r` (or `xi`)
+against `alpha`. Numbers, lists and numpy arrays give float64 numpy arrays, a float for scalars; what is out of range is
+an InputError. An albedo's transform is kept, so that further radii cost little. An index other than 1 needs a table,
+which takes some seconds (a minute for derivatives by n, compilation included) and is kept in the user's cache folder.
+Where an argument is a jax array, concrete or traced, so is the answer, which can be jitted, vmapped and differentiated
+in every argument but the kind of light, forwards and backwards: by n where `Setting.n` is a jax array. Double precision
+must be on then (`jax.enable_x64(True)`), and what is out of range gives nan. Derivatives by alpha are infinite at
+alpha = 1, where everything is smooth in sqrt(1 - alpha) only: A is A(1) - c sqrt(1 - alpha) there.
+
+Relative error of `profile` where n = 1, for alpha in [0.05, 1]: below 1e-10 for r in [1e-3, 35] mfp, below 2e-7 up to
+100 mfp, where the profile of alpha = 0.05 has fallen to 1e-51. Where 1 < n <= 3, for alpha in [0.05, 0.999]: below 1e-7
+for r in [1e-3, 15] mfp; where alpha = 1 and r > 1000 mfp it is taken for its power, r^-3. Closer than 1e-6 mfp to the
+source the profile is taken for its own limit, alpha / (4 pi r) where n = 1, which is 1e-5 off at most. Absolute error
+of `cdf`: below 1e-10 where n = 1, else below 1e-7. `error_estimate` says what more nodes would change.
 """
 
 from mcml_sim.exact.half_space import (
@@ -33,15 +41,18 @@ from mcml_sim.exact.half_space import (
     quantile,
     reflectance,
 )
+from mcml_sim.exact.stack.solution import Solution, solve
 
 __all__ = [
     "ARGUMENTS",
     "FINER",
     "SEARCHLIGHT",
+    "Solution",
     "cdf",
     "decay_rate",
     "error_estimate",
     "profile",
     "quantile",
     "reflectance",
+    "solve",
 ]

@@ -35,9 +35,9 @@ ARGUMENTS = {
 def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
 
-    R^(0), which equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu) mu dmu
-    under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12. Its
-    derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
+    R^(0), which where n = 1 equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu)
+    mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
+    n > 1 below 1e-8. Its derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
     """
     _require_solved(setting)
     (albedo,) = _all_checked(alpha=alpha)
@@ -45,7 +45,10 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
 
 
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A. 2 pi r R_d tends to alpha/2 at r = 0."""
+    """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A.
+
+    2 pi r R_d tends to alpha/2 at r = 0 where n = 1, else to alpha times `single_scattering.source_strength`.
+    """
     _require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     values = by_alpha(hankel.profile, radius / length, albedo, setting)
@@ -78,7 +81,7 @@ def decay_rate(alpha: Numbers) -> float | Floats:
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Relative change of `profile` with half as many nodes again in each of its three quadratures, none in common [-].
+    """Relative change of `profile` with half as many nodes again in each quadrature, none in common [-].
 
     Their errors fall exponentially with the number of nodes, so nearly all of the change is the error of `profile`:
     that of quadrature, and of rounding, which differs too. It knows nothing of what both take for granted: the

@@ -8,9 +8,9 @@ from scipy.special import j0
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space, simulate
-from mcml_sim.exact import depths, fluence, stack
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.stack import STANDARD
+from mcml_sim.exact.stack import depths, fluence
+from mcml_sim.exact.stack.solution import STANDARD
 from tests.physics.tracing import adding_doubling
 
 BOTH = pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
@@ -68,7 +68,7 @@ def absorbed(medium, illumination):
 @pytest.mark.parametrize("alpha", [0.3, 0.9, 0.999, 1.0])
 @BOTH
 def test_one_matched_layer_is_the_exact_half_space(alpha, illumination):
-    found = stack.solve(half_space(alpha), illumination)
+    found = exact.solve(half_space(alpha), illumination)
     assert found.reflectance == pytest.approx(exact.reflectance(alpha, Setting(illumination)), rel=1e-7)
     assert found.transmittance is None
     assert found.error < 1e-5
@@ -85,17 +85,17 @@ def test_one_matched_layer_is_the_exact_half_space(alpha, illumination):
     ],
 )
 def test_half_spaces_that_refract(n, alpha, illumination, reflectance):
-    assert stack.solve(half_space(alpha, n=n), illumination).reflectance == pytest.approx(reflectance, rel=3e-9)
+    assert exact.solve(half_space(alpha, n=n), illumination).reflectance == pytest.approx(reflectance, rel=3e-9)
 
 
 @BOTH
 def test_a_half_space_may_be_cut(illumination):
-    setting, found = Setting(illumination), stack.solve(cut(0.9), illumination)
+    setting, found = Setting(illumination), exact.solve(cut(0.9), illumination)
     assert found.reflectance == pytest.approx(exact.reflectance(0.9, setting), rel=2e-9)
     np.testing.assert_allclose(found.profile(RADII), exact.profile(RADII, 0.9, setting=setting), rtol=1e-5)
     np.testing.assert_allclose(found.cdf(RADII), exact.cdf(RADII, 0.9, setting=setting), atol=1e-8)
     # Negative control: a change of 0.1 % in the middle layer is seen.
-    other = stack.solve(cut(0.9, 1e-3), illumination)
+    other = exact.solve(cut(0.9, 1e-3), illumination)
     assert other.reflectance != pytest.approx(found.reflectance, rel=1e-5)
 
 
@@ -104,8 +104,8 @@ def test_adding_and_doubling_agrees():
     for _ in range(4):
         medium = random_stack(rng)
         reflected = adding_doubling.solve(medium, angles=6, nodes=8).reflected.sum()
-        assert stack.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
-        assert stack.solve(upside_down(medium)).reflectance != pytest.approx(reflected, rel=1e-3)
+        assert exact.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
+        assert exact.solve(upside_down(medium)).reflectance != pytest.approx(reflected, rel=1e-3)
 
 
 @pytest.mark.slow
@@ -114,7 +114,7 @@ def test_adding_and_doubling_agrees_in_twenty_stacks():
     for _ in range(20):
         medium = random_stack(rng)
         reflected = adding_doubling.solve(medium, angles=9, nodes=8).reflected.sum()
-        assert stack.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
+        assert exact.solve(medium).reflectance == pytest.approx(reflected, rel=2e-7)
 
 
 @BOTH
@@ -123,7 +123,7 @@ def test_no_light_is_lost(white, illumination):
     rng = np.random.default_rng(6)
     for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0), (1.6, 1.6)):
         medium = replace(random_stack(rng, white), n_above=above, n_below=below)
-        found = stack.solve(medium, illumination)
+        found = exact.solve(medium, illumination)
         total = found.specular + found.reflectance + found.transmittance + absorbed(medium, illumination)
         assert total == pytest.approx(1, abs=2e-9)
 
@@ -131,7 +131,7 @@ def test_no_light_is_lost(white, illumination):
 @BOTH
 def test_a_white_half_space_sends_all_light_back(illumination):
     medium = Medium((Layer(1.4, 0.0, 1.0, 0.0, 0.5), Layer(1.4, 0.0, 3.0, 0.0)))
-    found = stack.solve(medium, illumination)
+    found = exact.solve(medium, illumination)
     assert found.reflectance == pytest.approx(entered(Setting(illumination, n=1.4)), rel=1e-6)
 
 
@@ -139,7 +139,7 @@ def test_a_white_half_space_sends_all_light_back(illumination):
 def test_thin_and_thick_plates(optical):
     """Of white matter: little and nearly all comes back."""
     plate = Medium((Layer(1.0, 0.0, 1.0, 0.0, optical / 2), Layer(1.0, 0.0, 2.0, 0.0, optical / 4)))
-    found = stack.solve(plate)
+    found = exact.solve(plate)
     assert found.reflectance + found.transmittance == pytest.approx(1, abs=1e-7)
     if optical < 1:
         assert found.reflectance == pytest.approx(optical / 2, rel=0.02)
@@ -155,7 +155,7 @@ def test_thin_and_thick_plates(optical):
 )
 def test_the_transform_is_the_profiles(medium, illumination):
     """int_0^R 2 pi r R_d J0(k r) dr by quadrature over radii, with what lies at r = 0."""
-    found = stack.solve(medium, illumination)
+    found = exact.solve(medium, illumination)
     edges = np.concatenate(
         [[0.0], np.geomspace(1e-3, 0.3, 12), np.linspace(0.3, 25.0, 120)[1:], np.geomspace(25, 1e4, 30)[1:]]
     )
@@ -170,17 +170,17 @@ def test_the_transform_is_the_profiles(medium, illumination):
 
 
 def test_ends():
-    found = stack.solve(MATCHED)
+    found = exact.solve(MATCHED)
     assert found.transform(0.0) == pytest.approx(found.reflectance, rel=1e-12)
     assert found.profile(0.0) == np.inf
     assert found.profile(np.inf) == 0.0
     assert found.cdf(np.inf) == 1.0
     assert found.cdf(1e5) == pytest.approx(1, abs=1e-9)
     assert found.cdf([[0.0, 1.0]]).shape == (1, 2)
-    clear = stack.solve(Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0),)))
+    clear = exact.solve(Medium((Layer(1.5, 0.0, 0.0, 0.0, 1.0),)))
     assert clear.reflectance == 0.0
     assert clear.specular + clear.transmittance == pytest.approx(1, abs=1e-15)
-    dark = stack.solve(Medium((Layer(1.5, 1.0, 0.0, 0.0, 1.0),)))
+    dark = exact.solve(Medium((Layer(1.5, 1.0, 0.0, 0.0, 1.0),)))
     assert dark.reflectance == pytest.approx(0.96**2 * 0.04 * np.exp(-2) / (1 - 0.04**2 * np.exp(-2)), rel=1e-12)
 
 
@@ -192,7 +192,7 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
     rings = tally.reflectance_r.scaled(tally.grid.r_areas)
 
     def likelihood(other):
-        found = stack.solve(other)
+        found = exact.solve(other)
         light = np.diff(found.cdf(edges) * found.reflectance)
         light[0] += found.cdf(0.0) * found.reflectance
         return chi2.sf(np.sum(((rings.value - light) / rings.standard_error) ** 2), light.size)
@@ -200,7 +200,7 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
     assert likelihood(medium) > CHANCE
     assert likelihood(milkier(medium)) < CHANCE
     for seen, known in ((tally.diffuse_reflectance, "reflectance"), (tally.specular_reflectance, "specular")):
-        assert abs(seen.value - getattr(stack.solve(medium), known)) <= 4 * seen.standard_error + 1e-12
+        assert abs(seen.value - getattr(exact.solve(medium), known)) <= 4 * seen.standard_error + 1e-12
 
 
 @pytest.mark.parametrize(
@@ -217,13 +217,13 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
 )
 def test_other_media_are_refused_by_name(medium, message):
     with pytest.raises(InputError, match=message):
-        stack.solve(medium)
+        exact.solve(medium)
 
 
 def test_other_arguments_are_refused_by_name():
     with pytest.raises(InputError, match="illumination must be one of searchlight, diffuse, got 'sun'"):
-        stack.solve(MATCHED, "sun")
-    found = stack.solve(MATCHED)
+        exact.solve(MATCHED, "sun")
+    found = exact.solve(MATCHED)
     for bad in (-1.0, np.nan, [1.0, -2.0], "far"):
         with pytest.raises(InputError, match="r must be a radius >= 0, got"):
             found.profile(bad)

@@ -1,10 +1,9 @@
 """Layers that scatter isotropically solved exactly: what leaves above and below, and where. No photons, no noise.
 
-    from mcml_sim import Layer, Medium
-    from mcml_sim.exact import stack
+    from mcml_sim import Layer, Medium, exact
 
     skin = Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0)))
-    light = stack.solve(skin)
+    light = exact.solve(skin)
     light.reflectance, light.profile([0.01, 0.1]), light.cdf(0.1)
 
 `fluence` has the equation, at one transverse wave number k, and its numerics. The profile is the inverse Hankel
@@ -26,10 +25,11 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc, j0, j1
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact import depths, fluence, half_space, known
-from mcml_sim.exact.depths import Rule, Stack
-from mcml_sim.exact.fluence import Answer
+from mcml_sim.exact import half_space
 from mcml_sim.exact.single_scattering import entered
+from mcml_sim.exact.stack import depths, fluence, known
+from mcml_sim.exact.stack.depths import Nodes, Stack
+from mcml_sim.exact.stack.fluence import Answer
 from mcml_sim.media import fresnel
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.medium import Layer, Medium
@@ -38,8 +38,8 @@ from mcml_sim.media.setting import ILLUMINATIONS, Setting
 Floats = NDArray[np.float64]
 
 MAX_LAYERS = 20
-STANDARD = Rule(depth=20, slope=24, azimuth=24)
-COARSE = Rule(depth=16, slope=18, azimuth=18)
+STANDARD = Nodes(depth=20, slope=24, azimuth=24)
+COARSE = Nodes(depth=16, slope=18, azimuth=18)
 WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
@@ -103,7 +103,7 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
     InputError on any other medium and illumination.
 
     Relative error of the reflectance and the transmittance, and of the transform up to k = 5 / mfp: below 1e-7, mostly
-    1e-9. Where the index above is another the transform's grows to 1e-4 at k = 25 / mfp. That of the profile is below
+    1e-9. Where the index above is another the transform's grows to 5e-4 at k = 25 / mfp. That of the profile is below
     1e-5 as far as R_d is more than 1e-6 of what it is at one mean free path, but for the radii at which light comes
     just from the next interface under the critical angle, where it is 1e-4. The first profile or cdf solves for some
     hundred k, which takes a second or two, up to ten where the index above is another; further radii cost little.
@@ -139,13 +139,13 @@ def _require_solved(medium: Medium, illumination: str) -> None:
             raise InputError(f"a stack solved exactly must have one n in all layers, got {got}")
 
 
-def _reflected(medium: Medium, k: float, illumination: str, rule: Rule = STANDARD) -> float:
+def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> float:
     """R^(k) [-]."""
     here, answer = _answer(medium, k, illumination, rule)
     return float(here.weight @ (answer.phi * answer.up)) + fluence.thrown_back(here, k, illumination, rule)
 
 
-def _answer(medium: Medium, k: float, illumination: str, rule: Rule = STANDARD) -> tuple[Stack, Answer]:
+def _answer(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> tuple[Stack, Answer]:
     here = depths.stack(medium, k, rule)
     return here, fluence.solve(here, k, illumination, rule)
 

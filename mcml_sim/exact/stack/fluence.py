@@ -28,8 +28,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss, near_end, near_node, slowest
-from mcml_sim.exact.slants import Slants, cones, deepest, directions, reflectance, steepest
+from mcml_sim.exact.stack.depths import DARK, Floats, Nodes, Stack, gauss, near_end, near_node, slowest
+from mcml_sim.exact.stack.slants import Slants, cones, deepest, directions, reflectance, steepest
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
 SERIES_TERMS = 16
@@ -92,7 +92,7 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
     return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
 
 
-def solve(here: Stack, k: float, illumination: str, rule: Rule) -> Answer:
+def solve(here: Stack, k: float, illumination: str, rule: Nodes) -> Answer:
     """phi, phi_0 and X at wave number k [1/length]."""
     if not here.panels:
         return Answer(*(np.empty(0) for _ in Answer._fields))
@@ -213,7 +213,7 @@ def _below(here: Stack, k: float) -> Floats:
     return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
 
 
-def _out_at_once(here: Stack, slants: Slants, k: float, rule: Rule) -> Floats:
+def _out_at_once(here: Stack, slants: Slants, k: float, rule: Nodes) -> Floats:
     """X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
     t, d_mu = cones(here, rule.slope + int(0.55 * k * deepest(here) * min(steepest(here), 1.5)))
@@ -251,7 +251,7 @@ def _slants_upside_down(slants: Slants) -> Slants:
     return slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
 
 
-def thrown_back(here: Stack, k: float, illumination: str, rule: Rule) -> float:
+def thrown_back(here: Stack, k: float, illumination: str, rule: Nodes) -> float:
     """Share of the light that comes out above, never scattered but reflected below, transformed [-]."""
     if here.below == 1:
         return 0.0
@@ -266,7 +266,7 @@ def thrown_back(here: Stack, k: float, illumination: str, rule: Rule) -> float:
     return float(4 * here.above**2 * np.sum(flux * (1 - a) ** 2 * b * back / (1 - a * b * back)).real)
 
 
-def straight_through(here: Stack, illumination: str, rule: Rule) -> float:
+def straight_through(here: Stack, illumination: str, rule: Nodes) -> float:
     """Share of the light that comes out below unscattered [-]."""
     if illumination == "searchlight":
         top, bottom = normal_reflectances(here)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact.depths import DARK, Floats, Rule, Stack, gauss
+from mcml_sim.exact.stack.depths import DARK, Floats, Nodes, Stack, gauss
 
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
@@ -97,7 +97,7 @@ def deepest(here: Stack) -> float:
     return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
 
 
-def _slopes(here: Stack, k: float, phase: float, rule: Rule) -> tuple[Complexes, Floats, Complexes, int]:
+def _slopes(here: Stack, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
     t, d_mu = cones(here, rule.slope + int(0.55 * phase))
     azimuths = 1 if k == 0 else rule.azimuth // 3 + int(0.25 * phase)
@@ -116,7 +116,7 @@ def _slopes(here: Stack, k: float, phase: float, rule: Rule) -> tuple[Complexes,
     return slope, cosine, weight, columns[0][0].size
 
 
-def directions(here: Stack, k: float, rule: Rule) -> Slants:
+def directions(here: Stack, k: float, rule: Nodes) -> Slants:
     """Light whose phase turns farther than MOST_PHASE is left out: it is as good as averaged away."""
     wave = k * min(steepest(here), 1.5)
     last = min(deepest(here), MOST_PHASE / wave if wave > 0 else np.inf)

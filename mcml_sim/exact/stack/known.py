@@ -21,14 +21,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact import depths, fluence
-from mcml_sim.exact.depths import Rule, Stack
-from mcml_sim.exact.slants import critical_slope, reflectance
+from mcml_sim.exact.stack import depths, fluence
+from mcml_sim.exact.stack.depths import Nodes, Stack
+from mcml_sim.exact.stack.slants import critical_slope, reflectance
 from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
 
-SURFACES = Rule(depth=1, slope=1, azimuth=1)  # of a stack whose depths nobody asks for
+SURFACES = Nodes(depth=1, slope=1, azimuth=1)  # of a stack whose depths nobody asks for
 LEAST = 1e-13  # of light to and fro
 MOST_TURNS = 10_000
 

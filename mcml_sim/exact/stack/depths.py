@@ -28,7 +28,7 @@ NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
 
 
 @dataclass(frozen=True)
-class Rule:
+class Nodes:
     """Numbers of nodes: of a panel of depths, and of slopes and azimuths of slanted light where k = 0."""
 
     depth: int
@@ -79,7 +79,7 @@ class Stack(NamedTuple):
         return self.z.size // max(self.panels, 1)
 
 
-def stack(medium: Medium, k: float, rule: Rule) -> Stack:
+def stack(medium: Medium, k: float, rule: Nodes) -> Stack:
     """Depths of a medium whose layers share one index, for light of wave number k [1/length]."""
     layers, tops = medium.layers, medium.z_edges
     tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
