@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 os.environ["MPLBACKEND"] = "Agg"
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # every core has a worker: threads of small solves wait for each other
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # every core has a worker
 # XLA takes two thirds of all time: workers, the commands that they start, and the next run share what it made.
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "xla"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
