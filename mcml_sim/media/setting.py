@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
+import sys
 from dataclasses import dataclass
-
-import jax
 
 from mcml_sim.errors import InputError
 from mcml_sim.media.checks import is_number, shown
@@ -49,4 +48,5 @@ class Setting:
 
 def is_traced(n: object) -> bool:
     """True for an index by which jax may differentiate."""
-    return isinstance(n, jax.Array) and n.shape == ()
+    jax = sys.modules.get("jax")  # half a second to import, for those who only name a setting
+    return jax is not None and isinstance(n, jax.Array) and n.shape == ()

@@ -25,7 +25,7 @@ from mcml_sim.errors import InputError, SettingError
 from mcml_sim.media.checks import require_own_process
 from profilefit.fitting.objectives import NO_LIMITS, OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import Solution, solve, solve_batch
+from profilefit.fitting.solver import Optimum, solve, solve_batch
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.liang import QUANTILES
 
@@ -55,7 +55,7 @@ class Fit:
     free: tuple[str, ...]
     objective: str
     rings: Rings
-    solution: Solution
+    solution: Optimum
     statistical: Floats | None
     misfit: Floats
     jackknife: Floats
@@ -166,12 +166,12 @@ class ResidualFunction:
         return (rings.weight[:, None] * table).ravel()
 
 
-def degrees_of_freedom(solution: Solution) -> int:
+def degrees_of_freedom(solution: Optimum) -> int:
     """Residuals that count, less the free constants."""
     return max(int(np.count_nonzero(solution.residuals)) - solution.parameters.size, 1)
 
 
-def misfit_covariance(solution: Solution) -> Floats:
+def misfit_covariance(solution: Optimum) -> Floats:
     """s^2 (J^T J)^-1 (p, p); NaN where the fit failed."""
     if not solution.converged:
         return np.full((solution.parameters.size,) * 2, np.nan)
@@ -185,7 +185,7 @@ def scaled_inverse(matrix: Floats) -> Floats:
     return np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
 
 
-def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
+def judged(solution: Optimum, names: tuple[str, ...]) -> Optimum:
     """A solution whose constants are not separately identifiable has failed, however small its misfit."""
     if not solution.converged or (condition := solution.condition_number) <= DEGENERATE:
         return solution
@@ -202,7 +202,7 @@ def residual_structure(table: Floats) -> Structure:
     return Structure(rms, float(np.max(np.abs(table), initial=0.0)), _lag_one(table), _lag_one(table.T), waves)
 
 
-def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def _jackknife(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
     """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
     m = rings.alpha.size
     if not solution.converged or m < JACKKNIFE_GROUPS:
@@ -221,7 +221,7 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
     return np.sqrt((len(groups) - 1) / len(groups) * spread)
 
 
-def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def sensitivity(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
     """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
     its data."""
     with jax.enable_x64(True):
@@ -230,7 +230,7 @@ def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, r
     return -np.einsum("pq,aiq->pai", scaled_inverse(np.asarray(hessian)), np.asarray(mixed))
 
 
-def curvature(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
+def curvature(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
     """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)

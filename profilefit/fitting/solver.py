@@ -1,6 +1,6 @@
 """Nonlinear least squares by optimistix: parameters scaled, in float64, one problem or a batch of them.
 
-A failure is a result, not an exception: `Solution.result` is "converged" or says what happened and what to try.
+A failure is a result, not an exception: `Optimum.result` is "converged" or says what happened and what to try.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ LINEAR_SOLVER = lx.Normal(lx.Cholesky())
 
 
 @dataclass(frozen=True)
-class Solution:
+class Optimum:
     """Where a least-squares problem ended.
 
     parameters  (p,) the minimiser, in the caller's units
@@ -66,13 +66,13 @@ class Solution:
         return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
 
 
-def solve(residual: Callable, start: ArrayLike, data: object = None) -> Solution:
+def solve(residual: Callable, start: ArrayLike, data: object = None) -> Optimum:
     """Minimise |residual(parameters, data)|^2 from `start` (p,); `data` is any pytree of arrays."""
     batch = jax.tree.map(lambda leaf: np.asarray(leaf)[None], data)
     return solve_batch(residual, np.asarray(start, float)[None], batch)[0]
 
 
-def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> tuple[Solution, ...]:
+def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> tuple[Optimum, ...]:
     """Solve m problems of one shape at once: `starts` (m, p), every leaf of `data` with a leading axis m."""
     with jax.enable_x64(True):
         begin = jnp.asarray(starts, jnp.float64)
@@ -80,7 +80,7 @@ def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> t
         found, steps, codes = _levenberg_marquardt(residual, begin, arrays)
         ended = (found, *_linearise(residual, found, arrays), steps, codes)
     return tuple(
-        Solution(p, v, j, int(n), _explain(int(c), p, v, j))
+        Optimum(p, v, j, int(n), _explain(int(c), p, v, j))
         for p, v, j, n, c in zip(*map(np.asarray, ended), strict=True)  # rows of a jax array cost a dispatch each
     )
 

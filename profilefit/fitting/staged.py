@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.fitting.estimate import scaled_inverse
 from profilefit.fitting.profiles import Profiles, trimmed_radius
-from profilefit.fitting.solver import Solution, solve, solve_batch
+from profilefit.fitting.solver import Optimum, solve, solve_batch
 from profilefit.laws.liang import Liang
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class CoefficientLaw:
     """One of (11), (13), (15) through the per-albedo coefficients: names, solution, covariance or None."""
 
     names: tuple[str, ...]
-    solution: Solution
+    solution: Optimum
     covariance: Floats | None
 
 

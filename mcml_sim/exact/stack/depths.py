@@ -36,7 +36,7 @@ class Nodes:
     azimuth: int
 
 
-class Stack(NamedTuple):
+class Depths(NamedTuple):
     """Depths in the layers of a medium that scatter, N = panels * nodes, for one wave number. Lengths in its unit."""
 
     z: Floats
@@ -79,7 +79,7 @@ class Stack(NamedTuple):
         return self.z.size // max(self.panels, 1)
 
 
-def stack(medium: Medium, k: float, rule: Nodes) -> Stack:
+def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     """Depths of a medium whose layers share one index, for light of wave number k [1/length]."""
     layers, tops = medium.layers, medium.z_edges
     tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
@@ -88,7 +88,7 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Stack:
     at = np.stack([1 - _crowded(s), _crowded(s)], axis=1)
     length = np.diff(z_ends, axis=0)[0][:, None] * (d_s * _crowding(s))
     mu_s, mu_a = np.reshape([(layer.mu_s, layer.mu_a) for layer in scatters], (-1, 2)).T[:, :, None]
-    return Stack(
+    return Depths(
         z=(at @ z_ends).T.ravel(),
         tau=(at @ tau_ends).T.ravel(),
         weight=(mu_s * length).ravel(),

@@ -28,7 +28,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.stack.depths import DARK, Floats, Nodes, Stack, gauss, near_end, near_node, slowest
+from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss, near_end, near_node, slowest
 from mcml_sim.exact.stack.slants import Slants, cones, deepest, directions, reflectance, steepest
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
@@ -36,7 +36,7 @@ SERIES_TERMS = 16
 DIRECT_NODES = 20
 
 
-class Answer(NamedTuple):
+class Field(NamedTuple):
     """At one wave number; arrays (N,)."""
 
     phi: Floats
@@ -92,10 +92,10 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
     return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
 
 
-def solve(here: Stack, k: float, illumination: str, rule: Nodes) -> Answer:
+def solve(here: Depths, k: float, illumination: str, rule: Nodes) -> Field:
     """phi, phi_0 and X at wave number k [1/length]."""
     if not here.panels:
-        return Answer(*(np.empty(0) for _ in Answer._fields))
+        return Field(*(np.empty(0) for _ in Field._fields))
     slants = directions(here, k, rule)
     at_once = _out_at_once(here, slants, k, rule)
     up = at_once + _out_later(here, slants)
@@ -106,23 +106,23 @@ def solve(here: Stack, k: float, illumination: str, rule: Nodes) -> Answer:
     unscattered = 4 * here.above**2 * up if illumination == "diffuse" else beam(here, here.tau)
     matrix = np.eye(here.z.size) - _scattered(here, slants, k)
     phi = np.asarray(np.linalg.solve(matrix, unscattered), np.float64)
-    return Answer(phi, unscattered, up, at_once, down)
+    return Field(phi, unscattered, up, at_once, down)
 
 
-def beam(here: Stack, tau: Floats) -> Floats:
+def beam(here: Depths, tau: Floats) -> Floats:
     """phi_0 of a searchlight at optical depths tau, per photon that arrives [-]."""
     a, b = normal_reflectances(here)
     back = b * np.exp(-(2 * here.optical - tau)) if b else 0.0
     return (1 - a) * (np.exp(-tau) + back) / (1 - a * b * np.exp(-2 * here.optical))
 
 
-def normal_reflectances(here: Stack) -> tuple[float, float]:
+def normal_reflectances(here: Depths) -> tuple[float, float]:
     """Of the two surfaces, at normal incidence [-]."""
     a, b = (((ratio - 1) / (ratio + 1)) ** 2 for ratio in (here.above, here.below))
     return a, b
 
 
-def _scattered(here: Stack, slants: Slants, k: float) -> Floats:
+def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
     """The integral operator on fluences at the nodes, (N, N)."""
     matrix = _by_panel(here, k)
     for mirror in _mirrors(here):
@@ -133,13 +133,13 @@ def _scattered(here: Stack, slants: Slants, k: float) -> Floats:
     return matrix
 
 
-def _mirrors(here: Stack) -> list[tuple[float, float]]:
+def _mirrors(here: Depths) -> list[tuple[float, float]]:
     """Twice the depth and the optical depth of the surfaces that reflect."""
     top = [(0.0, 0.0)] if here.above != 1 else []
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
-def _by_panel(here: Stack, k: float, mirror: tuple[float, float] | None = None) -> Floats:
+def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None) -> Floats:
     """mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
     if mirror is not None:
@@ -175,7 +175,7 @@ def _by_panel(here: Stack, k: float, mirror: tuple[float, float] | None = None) 
     return whole
 
 
-def _is_close(here: Stack, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_]:
+def _is_close(here: Depths, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_]:
     """Whether K varies on a source panel (second axis) faster than its nodes follow, seen from a target panel."""
     close = np.zeros((here.panels, here.panels), bool)
     for own, ends in ((here.z_ends, z_ends), (here.tau_ends, tau_ends)):
@@ -184,7 +184,7 @@ def _is_close(here: Stack, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_
     return close
 
 
-def _own(here: Stack, k: float) -> Floats:
+def _own(here: Depths, k: float) -> Floats:
     """mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
     rule = near_node(here.nodes)
     tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
@@ -192,7 +192,7 @@ def _own(here: Stack, k: float) -> Floats:
     return np.einsum("piq,iqj->pij", here.alpha[:, None, None] * tau_length * kernel, rule.through, optimize=True)
 
 
-def _slanted(here: Stack, slants: Slants) -> Floats:
+def _slanted(here: Depths, slants: Slants) -> Floats:
     """G without the mirror images, (N, N)."""
     a, b, whole = slants.a, slants.b, slants.whole
     series = slants.weight / (1 - a * b * whole**2)
@@ -205,7 +205,7 @@ def _slanted(here: Stack, slants: Slants) -> Floats:
     return kernel
 
 
-def _below(here: Stack, k: float) -> Floats:
+def _below(here: Depths, k: float) -> Floats:
     """mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode goes on for ever."""
     z, tau, weight = here.tail
     decay = np.hypot(here.last.mu_t * slowest(here.last.alpha), k)
@@ -213,7 +213,7 @@ def _below(here: Stack, k: float) -> Floats:
     return direct(tau - here.tau[:, None], z - here.z[:, None], k) @ mode
 
 
-def _out_at_once(here: Stack, slants: Slants, k: float, rule: Nodes) -> Floats:
+def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
     """X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
     t, d_mu = cones(here, rule.slope + int(0.55 * k * deepest(here) * min(steepest(here), 1.5)))
@@ -235,7 +235,7 @@ def _out_at_once(here: Stack, slants: Slants, k: float, rule: Nodes) -> Floats:
     return out
 
 
-def _out_later(here: Stack, slants: Slants) -> Floats:
+def _out_later(here: Depths, slants: Slants) -> Floats:
     """X, (N,), of light that the upper surface has reflected before."""
     a, b, whole = slants.a, slants.b, slants.whole
     passes = slants.weight * slants.mu * (1 - a) * a * b * whole**2 / (1 - a * b * whole**2)
@@ -243,7 +243,7 @@ def _out_later(here: Stack, slants: Slants) -> Floats:
     return out + ((passes * b * whole) @ slants.to_bottom).real if here.height < np.inf else out
 
 
-def _upside_down(here: Stack) -> Stack:
+def _upside_down(here: Depths) -> Depths:
     return here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
 
 
@@ -251,7 +251,7 @@ def _slants_upside_down(slants: Slants) -> Slants:
     return slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
 
 
-def thrown_back(here: Stack, k: float, illumination: str, rule: Nodes) -> float:
+def thrown_back(here: Depths, k: float, illumination: str, rule: Nodes) -> float:
     """Share of the light that comes out above, never scattered but reflected below, transformed [-]."""
     if here.below == 1:
         return 0.0
@@ -266,7 +266,7 @@ def thrown_back(here: Stack, k: float, illumination: str, rule: Nodes) -> float:
     return float(4 * here.above**2 * np.sum(flux * (1 - a) ** 2 * b * back / (1 - a * b * back)).real)
 
 
-def straight_through(here: Stack, illumination: str, rule: Nodes) -> float:
+def straight_through(here: Depths, illumination: str, rule: Nodes) -> float:
     """Share of the light that comes out below unscattered [-]."""
     if illumination == "searchlight":
         top, bottom = normal_reflectances(here)

@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact.stack import depths, fluence
-from mcml_sim.exact.stack.depths import Nodes, Stack
+from mcml_sim.exact.stack.depths import Depths, Nodes
 from mcml_sim.exact.stack.slants import critical_slope, reflectance
 from mcml_sim.media.medium import Layer, Medium
 
@@ -45,7 +45,7 @@ class _Piece(NamedTuple):
     layer: Layer
     image: bool
 
-    def scattered(self, here: Stack, low: Floats, high: Floats, slow: Floats) -> Floats:
+    def scattered(self, here: Depths, low: Floats, high: Floats, slow: Floats) -> Floats:
         """Integral of mu_s phi_0 e^{-T slow} from height low to high [-]."""
         a, b = fluence.normal_reflectances(here)
         entering = (1 - a) / (1 - a * b * np.exp(-2 * here.optical))
@@ -61,12 +61,12 @@ class _Piece(NamedTuple):
                 total += share * np.exp(-rate * start - more) * mean
         return entering * self.layer.mu_s * (high - low) * total
 
-    def fluence(self, here: Stack, height: Floats) -> Floats:
+    def fluence(self, here: Depths, height: Floats) -> Floats:
         """mu_s phi_0 [1/length]."""
         tau = self.optical + self.layer.mu_t * (height - self.near)
         return self.layer.mu_s * fluence.beam(here, 2 * here.optical - tau if self.image else tau)
 
-    def passes(self, here: Stack, t: Floats) -> Floats:
+    def passes(self, here: Depths, t: Floats) -> Floats:
         """Share of light of that slope that the surfaces let out [-]."""
         out = 1 - reflectance(here.above, t + 0j).real
         return out * reflectance(here.below, t + 0j).real if self.image else out
@@ -104,7 +104,7 @@ def within(medium: Medium, illumination: str, r: Floats) -> Floats:
     return value
 
 
-def _pieces(here: Stack, medium: Medium) -> list[_Piece]:
+def _pieces(here: Depths, medium: Medium) -> list[_Piece]:
     pieces, tau = [], 0.0
     for layer, top in zip(medium.layers, medium.z_edges, strict=False):
         bottom, thickness = top + layer.thickness, layer.mu_t * layer.thickness if layer.mu_t else 0.0
@@ -117,7 +117,7 @@ def _pieces(here: Stack, medium: Medium) -> list[_Piece]:
     return pieces
 
 
-def _ranges(here: Stack, medium: Medium, r: Floats, ends: bool) -> Iterator[tuple[_Piece, Floats, Floats]]:
+def _ranges(here: Depths, medium: Medium, r: Floats, ends: bool) -> Iterator[tuple[_Piece, Floats, Floats]]:
     """Each piece with the least and largest angles inside, (n, 1), under which its light leaves at r, or within r."""
     for piece in _pieces(here, medium):
         heights = [piece.near, piece.far] if ends or piece.far == np.inf else [piece.near, piece.far, np.inf]
@@ -127,20 +127,20 @@ def _ranges(here: Stack, medium: Medium, r: Floats, ends: bool) -> Iterator[tupl
                 yield piece, np.clip(low, start, stop), np.clip(high, start, stop)
 
 
-def _breaks(here: Stack) -> list[float]:
+def _breaks(here: Depths) -> list[float]:
     """0, the critical angles inside as far as light gets out above, and the last of these."""
     above, below = (float(np.arctan(critical_slope(ratio))) for ratio in (here.above, here.below))
     return [0.0, below, above] if below < above else [0.0, above]
 
 
-def _turns(here: Stack) -> range:
+def _turns(here: Depths) -> range:
     """As often as light goes to and fro until LEAST of it is left."""
     if here.below == 1:
         return range(0)
     return range(int(min(-np.log(LEAST) / max(2 * here.optical, 1e-9) + 1, MOST_TURNS)))
 
 
-def _thrown_back(here: Stack, r: Floats) -> Floats:
+def _thrown_back(here: Depths, r: Floats) -> Floats:
     value = np.zeros_like(r)
     for turn in _turns(here):
         flown = 2 * (turn + 1)
@@ -152,7 +152,7 @@ def _thrown_back(here: Stack, r: Floats) -> Floats:
     return value
 
 
-def _thrown_back_within(here: Stack, r: Floats) -> Floats:
+def _thrown_back_within(here: Depths, r: Floats) -> Floats:
     """2 n^2 int mu ... dmu as far as the slope that leaves at r, from sin(theta)^2."""
     value = np.zeros_like(r)
     share, weight = depths.double_exponential()
@@ -169,7 +169,7 @@ def _thrown_back_within(here: Stack, r: Floats) -> Floats:
     return value
 
 
-def _returned(here: Stack, t: Floats, turn: int) -> Floats:
+def _returned(here: Depths, t: Floats, turn: int) -> Floats:
     """(1 - a)^2 b (a b)^turn e^{-T / mu} after that many turns more than one."""
     a, b = (reflectance(ratio, t + 0j).real for ratio in (here.above, here.below))
     return (1 - a) ** 2 * b * (a * b) ** turn * np.exp(-2 * (turn + 1) * here.optical * np.sqrt(1 + t * t))

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact.stack.depths import DARK, Floats, Nodes, Stack, gauss
+from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss
 
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
@@ -58,7 +58,7 @@ def critical_slope(ratio: float) -> float:
     return float(1 / np.sqrt(ratio**2 - 1)) if ratio > 1 else np.inf
 
 
-def cones(here: Stack, nodes: int) -> tuple[Complexes, Complexes]:
+def cones(here: Depths, nodes: int) -> tuple[Complexes, Complexes]:
     """Slopes under which light gets out somewhere, and dmu/mu, in the cosine outside: there Fresnel's law is smooth."""
     slopes, weights, low = [np.empty(0)], [np.empty(0)], 0.0
     for ratio in sorted({ratio for ratio in (here.above, here.below) if ratio > 1}, reverse=True):
@@ -86,18 +86,18 @@ def _ray(start: float, phase: float, last: float) -> tuple[Complexes, Complexes]
     return t, TURN * (np.diff(edges)[:, None] * weight).ravel() * t / (1 + t * t)
 
 
-def steepest(here: Stack) -> float:
+def steepest(here: Depths) -> float:
     """The largest of the critical slopes; 0 where there is none."""
     return max((critical_slope(ratio) for ratio in (here.above, here.below) if ratio > 1), default=0.0)
 
 
-def deepest(here: Stack) -> float:
+def deepest(here: Depths) -> float:
     """Depth from which slanted light still gets out [length]."""
     seen = here.z[here.tau < RESOLVED]
     return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
 
 
-def _slopes(here: Stack, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
+def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
     t, d_mu = cones(here, rule.slope + int(0.55 * phase))
     azimuths = 1 if k == 0 else rule.azimuth // 3 + int(0.25 * phase)
@@ -116,7 +116,7 @@ def _slopes(here: Stack, k: float, phase: float, rule: Nodes) -> tuple[Complexes
     return slope, cosine, weight, columns[0][0].size
 
 
-def directions(here: Stack, k: float, rule: Nodes) -> Slants:
+def directions(here: Depths, k: float, rule: Nodes) -> Slants:
     """Light whose phase turns farther than MOST_PHASE is left out: it is as good as averaged away."""
     wave = k * min(steepest(here), 1.5)
     last = min(deepest(here), MOST_PHASE / wave if wave > 0 else np.inf)

@@ -28,8 +28,8 @@ from mcml_sim.errors import InputError
 from mcml_sim.exact import half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import depths, fluence, known
-from mcml_sim.exact.stack.depths import Nodes, Stack
-from mcml_sim.exact.stack.fluence import Answer
+from mcml_sim.exact.stack.depths import Depths, Nodes
+from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.media import fresnel
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.medium import Layer, Medium
@@ -145,7 +145,7 @@ def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes = STANDA
     return float(here.weight @ (answer.phi * answer.up)) + fluence.thrown_back(here, k, illumination, rule)
 
 
-def _answer(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> tuple[Stack, Answer]:
+def _answer(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> tuple[Depths, Field]:
     here = depths.stack(medium, k, rule)
     return here, fluence.solve(here, k, illumination, rule)
 

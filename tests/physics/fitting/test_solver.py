@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Solution, solve, solve_batch
+from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Optimum, solve, solve_batch
 
 X = np.linspace(0, 3, 20)
 
@@ -97,7 +97,7 @@ def test_one_bad_problem_leaves_the_others_of_its_batch_alone():
 
 
 def solution(jacobian):
-    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
+    return Optimum(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e8])
