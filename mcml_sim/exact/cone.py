@@ -29,6 +29,7 @@ What makes few nodes enough:
 
 from __future__ import annotations
 
+from functools import partial
 from typing import NamedTuple
 
 import jax
@@ -68,6 +69,19 @@ def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -
     matrix, leaving, source = system(n, k, x_nodes, angles)
     _, powers = jax.lax.scan(lambda v, _: (matrix @ v, v), leaving, None, length=orders)
     return source @ powers.T / np.pi
+
+
+@partial(jax.jit, static_argnames=("x_nodes", "angles"))
+def orders(n: float, alpha: float, k: jax.Array, x_nodes: int = 240, angles: int = 72) -> tuple[jax.Array, jax.Array]:
+    """R^(k) of one albedo at real k > 0 of shape (k,), and what of it was scattered once: float64 (2, k) each."""
+
+    def at(k: jax.Array) -> tuple[jax.Array, jax.Array]:
+        matrix, leaving, source = system(jnp.asarray(n), k + 0j, x_nodes, angles)
+        all_orders = jnp.linalg.solve(jnp.eye(x_nodes) - alpha * matrix, leaving)
+        return (alpha / np.pi * source @ all_orders).real, (alpha / np.pi * source @ leaving).real
+
+    whole, once = jax.lax.map(at, k)
+    return whole.T, once.T
 
 
 def system(n: jax.Array, k: jax.Array, x_nodes: int, angles: int) -> System:

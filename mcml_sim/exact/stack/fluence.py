@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
 from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss, near_end, near_node, slowest
-from mcml_sim.exact.stack.slants import Slants, cones, deepest, directions, reflectance, steepest
+from mcml_sim.exact.stack.slants import Complexes, Slants, cones, deepest, directions, reflectance, steepest
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
 SERIES_TERMS = 16
@@ -196,13 +196,21 @@ def _slanted(here: Depths, slants: Slants) -> Floats:
     """G without the mirror images, (N, N)."""
     a, b, whole = slants.a, slants.b, slants.whole
     series = slants.weight / (1 - a * b * whole**2)
-    top = (a * series - (here.above != 1) * slants.weight)[:, None] * slants.from_top
-    kernel = (slants.from_top.T @ top).real
+    kernel = _real_product(slants.from_top, a * series - (here.above != 1) * slants.weight, slants.from_top)
     if here.height < np.inf:
-        bottom = (b * series - (here.below != 1) * slants.weight)[:, None] * slants.to_bottom
-        across = (slants.from_top.T @ ((a * b * whole * series)[:, None] * slants.to_bottom)).real
-        kernel += (slants.to_bottom.T @ bottom).real + across + across.T
+        kernel += _real_product(slants.to_bottom, b * series - (here.below != 1) * slants.weight, slants.to_bottom)
+        across = _real_product(slants.from_top, a * b * whole * series, slants.to_bottom)
+        kernel += across + across.T
     return kernel
+
+
+def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Floats:
+    """Re(left^T diag(weight) right), (N, N): in half the time where the weights are real."""
+    if np.any(weight.imag):
+        return np.asarray((left.T @ (weight[:, None] * right)).real)
+    weights = np.concatenate([weight.real, -weight.real])[:, None]
+    both = np.concatenate([left.real, left.imag])
+    return np.asarray(both.T @ (weights * (both if right is left else np.concatenate([right.real, right.imag]))))
 
 
 def _below(here: Depths, k: float) -> Floats:

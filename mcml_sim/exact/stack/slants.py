@@ -17,7 +17,8 @@ from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 
 TURN = complex(np.exp(0.25j * np.pi))  # of slopes beyond the cones
-RAY_NODES = 16  # of a panel
+RAY_NODES = 14  # of a panel
+AZIMUTHS = 0.7  # eights of them for each e-fold by which waves are shorter than mean free paths
 STEEPEST = 1e9  # where no critical angle ends the slopes
 THINNEST = 1e-6  # optical thickness of a plate that light beyond the critical angles crosses to and fro
 RESOLVED = 16.0  # optical depth down to which the phases of slanted light are resolved,
@@ -106,8 +107,9 @@ def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexe
     if reflected_below or min(here.above, here.below) < 1:
         last = DARK / max(here.optical, THINNEST) if min(here.above, here.below) >= 1 else STEEPEST
         t, d_mu = _ray(steepest(here), k * deepest(here), last)
-        # Close to 90 degrees the phase stays small out to the largest slopes.
-        x, weight = gauss(rule.azimuth + 8 * int(0.04 * phase))
+        # Close to 90 degrees the phase stays small out to the largest slopes: within an angle of mu_t / k.
+        waves = k * here.z[-1] / here.tau[-1] if here.panels else 0.0
+        x, weight = gauss(rule.azimuth + 8 * int(0.04 * phase + AZIMUTHS * np.log1p(waves)))
         parts.append((t, np.sin(0.5 * np.pi * x**4), d_mu, 4 * x**3 * weight))
     columns = [
         (np.repeat(t, c.size), np.tile(c, t.size), 0.5 * np.outer(d_mu, share).ravel()) for t, c, d_mu, share in parts

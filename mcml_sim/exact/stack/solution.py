@@ -16,16 +16,22 @@ transform of what it gives, of which first is taken apart what k would have to g
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import os
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.special import erfc, j0, j1
+from threadpoolctl import threadpool_limits
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact import half_space
+from mcml_sim.exact import cone, half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import depths, fluence, known
 from mcml_sim.exact.stack.depths import Depths, Nodes
@@ -43,8 +49,10 @@ COARSE = Nodes(depth=16, slope=18, azimuth=18)
 WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
+THIN = 1.0  # mean free paths: plates that a half space is not much like, and in which slanted light does not go far:
+RESOLVED = 60.0  # k times their height
 FIRST_WAVE = 1e-3  # times the smallest mu_t, where nothing is absorbed
-LAST_PHASE = 1e4  # k r
+LAST_PHASE = 200.0  # k r: light changes little within a hundredth of r
 SMOOTH = 5.0  # k times the depth of the first layer that scatters, where a half space without that depth is no use
 NEAREST, FARTHEST = 1e-9, 1e9  # radii, in units of the medium's own
 PHASE_STEP, PHASE_NODES = 20.0, 24
@@ -74,8 +82,7 @@ class Solution:
         waves = _checked("k", k, "a finite wave number >= 0")
         if np.any(np.isinf(waves)):
             raise InputError("k must be a finite wave number >= 0, got inf")
-        values = np.array([_reflected(self.medium, float(k), self.illumination) for k in waves.flat])
-        return _scalar_or_array(values.reshape(waves.shape))
+        return _scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination), waves))
 
     def profile(self, r: ArrayLike) -> float | Floats:
         """R_d(r) [1/length^2] at radii r >= 0 of any shape: 2 pi r R_d integrates to what is not left at r = 0."""
@@ -104,14 +111,18 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
 
     Relative error of the reflectance and the transmittance, and of the transform up to k = 5 / mfp: below 1e-7, mostly
     1e-9. Where the index above is another the transform's grows to 5e-4 at k = 25 / mfp. That of the profile is below
-    1e-5 as far as R_d is more than 1e-6 of what it is at one mean free path, but for the radii at which light comes
-    just from the next interface under the critical angle, where it is 1e-4. The first profile or cdf solves for some
-    hundred k, which takes a second or two, up to ten where the index above is another; further radii cost little.
+    1e-5 as far as R_d is more than 1e-3 of what it is at one mean free path. Where the index above is another it is
+    1e-4 at the radii at which light comes just from the next interface under the critical angle, 5e-4 closer than
+    0.1 mfp where the topmost layer is thinner than that, and 1e-3 in plates thinner than one mean free path.
+
+    The first profile or cdf solves for some hundred k, which takes some seconds (twenty layers: half a minute); further
+    radii cost little.
     """
     _require_solved(medium, illumination)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
-    waves = (0.0, first.mu_t)
-    fine, coarse = (np.array([_reflected(medium, k, illumination, rule) for k in waves]) for rule in (STANDARD, COARSE))
+    waves = np.array([0.0, first.mu_t])
+    fine = _each(lambda k: _reflected(medium, k, illumination), waves)
+    coarse = _each(lambda k: _reflected(medium, k, illumination, COARSE), waves)
     changes = np.abs(fine - coarse) / np.where(fine > 0, fine, 1.0)
     return Solution(
         medium,
@@ -243,12 +254,33 @@ def _difference(medium: Medium, illumination: str) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
     waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(WAVE_NODES)[0]
-    rest, share = np.array([_rest(medium, k, illumination) for k in waves.flat]), 0.0
+    rest, share = _each(lambda k: _rest(medium, k, illumination), waves), 0.0
     if base is not None:
-        deep = np.array([_rest(base, k, illumination) for k in waves.flat])
-        share = 1.0 if medium.layers[0].n >= medium.n_above else rest[-1] / deep[-1]
+        deep = _rest_of_half_space(base, medium, waves, illumination)
+        share = 1.0 if medium.layers[0].n >= medium.n_above else rest.flat[-1] / deep.flat[-1]
         rest -= share * deep
-    return _Difference(medium, illumination, base, share, edges, rest.reshape(waves.shape))
+    return _Difference(medium, illumination, base, share, edges, rest)
+
+
+def _each(transform: Callable[[float], float], waves: Floats) -> Floats:
+    """A transform at wave numbers of any shape, one on each core: BLAS's own threads only slow such small ones down."""
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
+        return np.reshape(list(pool.map(transform, waves.ravel().tolist())), waves.shape)
+
+
+def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illumination: str) -> Floats:
+    """What of the half space is to be taken away from the medium's rest at wave numbers of any shape [-]."""
+    layer, light = _half_space(base, illumination)
+    if _is_thin(medium) and layer.n > 1:
+        with jax.enable_x64(True):
+            whole, once = map(np.asarray, cone.orders(light.n, layer.alpha, jnp.asarray(waves.ravel() * layer.mfp)))
+        searchlight, diffuse = whole - [[1], [0]] * once
+        return np.reshape(searchlight if illumination == "searchlight" else diffuse, waves.shape)
+    # In layers of the medium's heights: what is not resolved at its depths is the same in both.
+    number = _first_to_scatter(medium)
+    heights = [each.thickness for each in medium.layers[number:] if np.isfinite(each.thickness)]
+    likewise = replace(base, layers=(*(replace(layer, thickness=height) for height in heights), layer))
+    return _each(lambda k: _rest(likewise, k, illumination), waves)
 
 
 def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
@@ -266,17 +298,27 @@ def _rest(medium: Medium, k: float, illumination: str) -> float:
 def _base(medium: Medium) -> tuple[Medium | None, float]:
     """The half space to take away, and the wave number from which the rest of the light is its."""
     layers, tops = medium.layers, medium.z_edges
-    number = next((number for number, layer in enumerate(layers) if layer.mu_s > 0), None)
+    number = _first_to_scatter(medium)
     if number is None:
         return None, 0.0
-    first, matched = layers[number], layers[0].n == medium.n_above
-    farthest = LAST_WAVE[matched] * max(layer.mu_t for layer in layers if layer.mu_s > 0)
+    first, steepest = layers[number], max(layer.mu_t for layer in layers if layer.mu_s > 0)
+    farthest = LAST_WAVE[layers[0].n == medium.n_above] * steepest
+    if _is_thin(medium):
+        farthest = min(LAST_WAVE[True] * steepest, RESOLVED / tops[-1])
     if tops[number] * farthest > SMOOTH:
         return None, min(farthest, DECAYED / tops[number])
     index = first.n / medium.n_above
     base = Medium((Layer(max(index, 1.0), first.mu_a, first.mu_s, 0.0),))
     # A half space under a denser medium is not solved: one without a surface is much like it, but not the same.
     return base, min(farthest, DECAYED / first.thickness) if index >= 1 else farthest
+
+
+def _first_to_scatter(medium: Medium) -> int | None:
+    return next((number for number, layer in enumerate(medium.layers) if layer.mu_s > 0), None)
+
+
+def _is_thin(medium: Medium) -> bool:
+    return max(layer.mu_t for layer in medium.layers if layer.mu_s > 0) * medium.z_edges[-1] < THIN
 
 
 def _wave_edges(medium: Medium, last: float) -> Floats:

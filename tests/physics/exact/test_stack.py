@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space, simulate
 from mcml_sim.exact.single_scattering import entered
-from mcml_sim.exact.stack import depths, fluence
+from mcml_sim.exact.stack import depths, fluence, solution
 from mcml_sim.exact.stack.solution import STANDARD
 from tests.physics.tracing import adding_doubling
 
@@ -22,6 +22,8 @@ MATCHED = Medium((Layer(1.0, 0.1, 2.0, 0.0, 0.5), Layer(1.0, 0.5, 0.5, 0.0, 0.7)
 GLAZED = Medium(
     (Layer(1.4, 0.0, 0.0, 0.0, 0.2), Layer(1.4, 0.3, 3.0, 0.0, 0.5), Layer(1.4, 0.5, 0.0, 0.0, 0.1)), n_below=1.2
 )
+REFRACTING = Medium((Layer(1.4, 0.1, 2.0, 0.0, 0.5), Layer(1.4, 0.5, 0.5, 0.0, 0.7), Layer(1.4, 0.05, 1.5, 0.0)))
+PLATE = Medium((Layer(1.4, 0.01, 1.0, 0.0, 0.05), Layer(1.4, 0.1, 1.0, 0.0, 0.05)))
 UNDER_GLASS = Medium((Layer(1.3, 0.1, 2.0, 0.0, 0.3), Layer(1.3, 0.5, 1.5, 0.0, 0.4)), n_above=1.5)
 
 
@@ -37,14 +39,14 @@ def milkier(medium):
     return replace(medium, layers=(first, replace(second, mu_s=1.2 * second.mu_s), *others))
 
 
-def cut(alpha, change=1e-9):
+def cut(alpha, n=1.0, change=1e-9):
     """A half space of one mean free path cut into three layers, none quite equal to another."""
     absorbs, scatters = 1 - alpha, alpha
     return Medium(
         (
-            Layer(1.0, absorbs, scatters, 0.0, 0.3),
-            Layer(1.0, absorbs * (1 + change), scatters, 0.0, 1.0),
-            Layer(1.0, absorbs, scatters * (1 + change), 0.0),
+            Layer(n, absorbs, scatters, 0.0, 0.3),
+            Layer(n, absorbs * (1 + change), scatters, 0.0, 1.0),
+            Layer(n, absorbs, scatters * (1 + change), 0.0),
         )
     )
 
@@ -89,13 +91,14 @@ def test_half_spaces_that_refract(n, alpha, illumination, reflectance):
 
 
 @BOTH
-def test_a_half_space_may_be_cut(illumination):
-    setting, found = Setting(illumination), exact.solve(cut(0.9), illumination)
-    assert found.reflectance == pytest.approx(exact.reflectance(0.9, setting), rel=2e-9)
-    np.testing.assert_allclose(found.profile(RADII), exact.profile(RADII, 0.9, setting=setting), rtol=1e-5)
+@pytest.mark.parametrize("n", [1.0, pytest.param(1.4, marks=pytest.mark.slow)])
+def test_a_half_space_may_be_cut(n, illumination):
+    setting, found = Setting(illumination, n=n), exact.solve(cut(0.9, n), illumination)
+    assert found.reflectance == pytest.approx(exact.reflectance(0.9, setting), rel=5e-9)
+    np.testing.assert_allclose(found.profile(RADII), exact.profile(RADII, 0.9, setting=setting), rtol=5e-8)
     np.testing.assert_allclose(found.cdf(RADII), exact.cdf(RADII, 0.9, setting=setting), atol=1e-8)
-    # Negative control: a change of 0.1 % in the middle layer is seen.
-    other = exact.solve(cut(0.9, 1e-3), illumination)
+    # Negative control: a change of 0.1 % in the layers below the first is seen.
+    other = exact.solve(cut(0.9, n, 1e-3), illumination)
     assert other.reflectance != pytest.approx(found.reflectance, rel=1e-5)
 
 
@@ -126,6 +129,17 @@ def test_no_light_is_lost(white, illumination):
         found = exact.solve(medium, illumination)
         total = found.specular + found.reflectance + found.transmittance + absorbed(medium, illumination)
         assert total == pytest.approx(1, abs=2e-9)
+
+
+@BOTH
+def test_the_way_a_thin_plate_is_solved_is_the_other_in_thicker_ones(illumination, monkeypatch):
+    """What is taken away from its transform is the half space by mirror and cone, or in layers like its own."""
+    r, plate = np.array([0.001, 0.1, 1.0, 5.0]), Medium((replace(PLATE.layers[0], thickness=1.5),))
+    thick = exact.solve(plate, illumination).profile(r)
+    monkeypatch.setattr(solution, "THIN", 2.0)
+    thin = exact.solve(plate, illumination).profile(r)
+    np.testing.assert_allclose(thin, thick, rtol=2e-5)
+    assert not np.array_equal(thin, thick)
 
 
 @BOTH
@@ -185,7 +199,7 @@ def test_ends():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("medium", [MATCHED, GLAZED, UNDER_GLASS])
+@pytest.mark.parametrize("medium", [MATCHED, REFRACTING, GLAZED, UNDER_GLASS, PLATE])
 def test_photons_agree_in_chi_square_over_the_rings(medium):
     edges = np.concatenate([[0.0], np.geomspace(0.02, 8.0, 30)])
     tally = simulate(medium, Grid.from_edges(r=edges), 2 * 10**6, seed=9)
