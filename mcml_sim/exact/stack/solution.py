@@ -19,7 +19,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -46,6 +46,7 @@ Floats = NDArray[np.float64]
 MAX_LAYERS = 20
 STANDARD = Nodes(depth=20, slope=24, azimuth=24)
 COARSE = Nodes(depth=16, slope=18, azimuth=18)
+FINE = Nodes(depth=28, slope=32, azimuth=32)
 WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
@@ -76,13 +77,14 @@ class Solution:
     """Light that left below, whether it was scattered or not [-]; None where there is no below."""
     error: float
     """Relative change of `reflectance`, and of the transform at k = 1 / mfp, with fewer nodes: above their error."""
+    nodes: Nodes = field(default=STANDARD, repr=False)
 
     def transform(self, k: ArrayLike) -> float | Floats:
         """2 pi int_0^inf r R_d(r) J0(k r) dr at wave numbers k >= 0 [1/length], of any shape [-]; A at k = 0."""
         waves = _checked("k", k, "a finite wave number >= 0")
         if np.any(np.isinf(waves)):
             raise InputError("k must be a finite wave number >= 0, got inf")
-        return _scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination), waves))
+        return _scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination, self.nodes), waves))
 
     def profile(self, r: ArrayLike) -> float | Floats:
         """R_d(r) [1/length^2] at radii r >= 0 of any shape: 2 pi r R_d integrates to what is not left at r = 0."""
@@ -98,14 +100,15 @@ class Solution:
 
     @cached_property
     def _difference(self) -> _Difference:
-        return _difference(self.medium, self.illumination)
+        return _difference(self.medium, self.illumination, self.nodes)
 
 
-def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
+def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STANDARD) -> Solution:
     """Light in a stack of up to 20 layers of one index that scatter isotropically, or not at all.
 
     medium        its indices above and below may be any
     illumination  "searchlight" or "diffuse", as in `mcml_sim.Setting`
+    nodes         of its quadratures
 
     InputError on any other medium and illumination.
 
@@ -121,7 +124,7 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
     _require_solved(medium, illumination)
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
     waves = np.array([0.0, first.mu_t])
-    fine = _each(lambda k: _reflected(medium, k, illumination), waves)
+    fine = _each(lambda k: _reflected(medium, k, illumination, nodes), waves)
     coarse = _each(lambda k: _reflected(medium, k, illumination, COARSE), waves)
     changes = np.abs(fine - coarse) / np.where(fine > 0, fine, 1.0)
     return Solution(
@@ -129,8 +132,9 @@ def solve(medium: Medium, illumination: str = "searchlight") -> Solution:
         illumination,
         specular=_specular(medium, illumination),
         reflectance=float(fine[0]),
-        transmittance=None if medium.is_half_space else _transmitted(medium, illumination),
+        transmittance=None if medium.is_half_space else _transmitted(medium, illumination, nodes),
         error=float(changes.max()),
+        nodes=nodes,
     )
 
 
@@ -150,20 +154,20 @@ def _require_solved(medium: Medium, illumination: str) -> None:
             raise InputError(f"a stack solved exactly must have one n in all layers, got {got}")
 
 
-def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> float:
+def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
     """R^(k) [-]."""
     here, answer = _answer(medium, k, illumination, rule)
     return float(here.weight @ (answer.phi * answer.up)) + fluence.thrown_back(here, k, illumination, rule)
 
 
-def _answer(medium: Medium, k: float, illumination: str, rule: Nodes = STANDARD) -> tuple[Depths, Field]:
+def _answer(medium: Medium, k: float, illumination: str, rule: Nodes) -> tuple[Depths, Field]:
     here = depths.stack(medium, k, rule)
     return here, fluence.solve(here, k, illumination, rule)
 
 
-def _transmitted(medium: Medium, illumination: str) -> float:
-    here, answer = _answer(medium, 0.0, illumination)
-    return float(here.weight @ (answer.phi * answer.down)) + fluence.straight_through(here, illumination, STANDARD)
+def _transmitted(medium: Medium, illumination: str, rule: Nodes) -> float:
+    here, answer = _answer(medium, 0.0, illumination, rule)
+    return float(here.weight @ (answer.phi * answer.down)) + fluence.straight_through(here, illumination, rule)
 
 
 def _specular(medium: Medium, illumination: str) -> float:
@@ -250,13 +254,13 @@ def _unit(medium: Medium) -> float:
     return min(layer.mfp if layer.mu_s > 0 else layer.thickness for layer in medium.layers)
 
 
-def _difference(medium: Medium, illumination: str) -> _Difference:
+def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
     waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(WAVE_NODES)[0]
-    rest, share = _each(lambda k: _rest(medium, k, illumination), waves), 0.0
+    rest, share = _each(lambda k: _rest(medium, k, illumination, rule), waves), 0.0
     if base is not None:
-        deep = _rest_of_half_space(base, medium, waves, illumination)
+        deep = _rest_of_half_space(base, medium, waves, illumination, rule)
         share = 1.0 if medium.layers[0].n >= medium.n_above else rest.flat[-1] / deep.flat[-1]
         rest -= share * deep
     return _Difference(medium, illumination, base, share, edges, rest)
@@ -268,7 +272,7 @@ def _each(transform: Callable[[float], float], waves: Floats) -> Floats:
         return np.reshape(list(pool.map(transform, waves.ravel().tolist())), waves.shape)
 
 
-def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illumination: str) -> Floats:
+def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illumination: str, rule: Nodes) -> Floats:
     """What of the half space is to be taken away from the medium's rest at wave numbers of any shape [-]."""
     layer, light = _half_space(base, illumination)
     if _is_thin(medium) and layer.n > 1:
@@ -280,7 +284,7 @@ def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illuminatio
     number = _first_to_scatter(medium)
     heights = [each.thickness for each in medium.layers[number:] if np.isfinite(each.thickness)]
     likewise = replace(base, layers=(*(replace(layer, thickness=height) for height in heights), layer))
-    return _each(lambda k: _rest(likewise, k, illumination), waves)
+    return _each(lambda k: _rest(likewise, k, illumination, rule), waves)
 
 
 def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
@@ -288,9 +292,9 @@ def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
     return layer, Setting(illumination, n=layer.n)
 
 
-def _rest(medium: Medium, k: float, illumination: str) -> float:
+def _rest(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
     """Transform of the light that `known` has no formula for [-]."""
-    here, answer = _answer(medium, k, illumination)
+    here, answer = _answer(medium, k, illumination, rule)
     once = answer.unscattered * answer.up_at_once if illumination == "searchlight" else 0.0
     return float(here.weight @ (answer.phi * answer.up - once))
 

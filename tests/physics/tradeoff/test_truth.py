@@ -6,49 +6,50 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.studies.tradeoff import truth
+from profilefit.studies.tradeoff import rings, truth
 from profilefit.studies.tradeoff.points import standings
+from profilefit.studies.tradeoff.rings import MATCHED
 
 
 @pytest.mark.slow
 def test_reference_is_the_exact_profile():
-    within = exact.cdf(truth.EDGES, truth.ALPHAS[:, None]) * np.asarray(exact.reflectance(truth.ALPHAS))[:, None]
-    np.testing.assert_allclose(truth.reference()[truth.judged()], np.diff(within, axis=1)[truth.judged()], rtol=1e-9)
-    assert truth.judged().any(axis=1).all()
-    assert not truth.judged()[:, 0].any()  # the disc within 0.01 mfp
-    assert not truth.judged()[0, -1]  # beyond 99.5 % of the energy at alpha 0.2
+    within = exact.cdf(rings.EDGES, rings.ALPHAS[:, None]) * np.asarray(exact.reflectance(rings.ALPHAS))[:, None]
+    np.testing.assert_allclose(MATCHED.reference[MATCHED.judged], np.diff(within, axis=1)[MATCHED.judged], rtol=1e-9)
+    assert MATCHED.judged.any(axis=1).all()
+    assert not MATCHED.judged[:, 0].any()  # the disc within 0.01 mfp
+    assert not MATCHED.judged[0, -1]  # beyond 99.5 % of the energy at alpha 0.2
 
 
 @pytest.mark.slow
 def test_errors_are_those_of_the_rings_that_count():
-    energy = truth.reference().copy()
-    assert truth.errors(energy) == (0.0, 0.0)
-    row, ring = np.argwhere(truth.judged())[3]
+    energy = MATCHED.reference.copy()
+    assert MATCHED.errors(energy) == (0.0, 0.0)
+    row, ring = np.argwhere(MATCHED.judged)[3]
     energy[row, ring] *= 1.1
     energy[:, 0] = 7.0  # does not count
-    rms, worst = truth.errors(energy)
+    rms, worst = MATCHED.errors(energy)
     assert worst == pytest.approx(0.1)
-    assert rms == pytest.approx(0.1 / np.sqrt(truth.judged().sum()))
+    assert rms == pytest.approx(0.1 / np.sqrt(MATCHED.judged.sum()))
 
 
 @pytest.mark.slow
 def test_scalar_rings_are_unions_of_even_ones():
-    np.testing.assert_allclose(truth.EDGES, truth.WIDTH * truth.RINGS)
+    np.testing.assert_allclose(rings.EDGES, rings.WIDTH * rings.BREAKS)
 
     def trace(seed, photons, mu_a, mu_s, dr, reflected):
         reflected += np.arange(reflected.size) * photons  # a ring's weight is its index
 
     energy = truth.scalar_tracer(trace, 10)(1).energy
-    assert energy.shape == truth.reference().shape
-    first, last = truth.RINGS[-2], truth.RINGS[-1]
+    assert energy.shape == MATCHED.reference.shape
+    first, last = rings.BREAKS[-2], rings.BREAKS[-1]
     assert energy[0, -1] == pytest.approx(sum(range(first, last)))
 
 
 def test_order_resolved_error_is_what_it_states(sidak):
     """Each ring within its own error; with the error stated ten times too small some are not."""
     answer = truth.by_orders(20_000)(1)
-    z = (answer.energy / truth.reference() - 1.0) / answer.stated
-    judged = np.abs(z[truth.judged()])
+    z = (answer.energy / MATCHED.reference - 1.0) / answer.stated
+    judged = np.abs(z[MATCHED.judged])
     limit = sidak(judged.size)
     assert judged.max() < limit
     assert 10.0 * judged.max() > limit
@@ -68,4 +69,7 @@ def test_all_of_them_small():
     ours = by_method[truth.SIMULATE]
     assert ours.error.value == pytest.approx(ours.facts["stated"], rel=0.5)
     assert "compiling" in part.notes[-1]
-    assert {p.panel for p in part.points} == {"rings", "tracers"}
+    assert [panel.name for panel in part.panels] == ["rings", "tracers", "refracting", "stack"]
+    for panel, worst in (("refracting", 1e-6), ("stack", 1e-5)):
+        points = {point.label: point for point in part.points if point.panel == panel}
+        assert points[truth.AS_IS].worst.value < worst < points["2e4 photons"].error.value
