@@ -29,8 +29,7 @@ class Setting:
     g: float = 0.0
 
     def __post_init__(self) -> None:
-        if self.illumination not in ILLUMINATIONS:
-            raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(self.illumination)}")
+        require_illumination(self.illumination)
         if not (is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)):
             raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
         if not (is_number(self.g) and -1 < self.g < 1):
@@ -44,6 +43,12 @@ class Setting:
     def __str__(self) -> str:
         n = str(self.n) if is_traced(self.n) else f"{self.n:g}"
         return f"{self.illumination}, n = {n}, g = {self.g:g}"
+
+
+def require_illumination(name: object) -> None:
+    """InputError unless that is one of ILLUMINATIONS."""
+    if name not in ILLUMINATIONS:
+        raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(name)}")
 
 
 def is_traced(n: object) -> bool:

@@ -52,6 +52,8 @@ def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
 
 def mco_text(tally: Tally, name: str) -> str:
     """What `write_mco` writes into a file of that name."""
+    if tally.illumination != "searchlight":
+        raise InputError(f"an .mco is of a searchlight, got a tally of {tally.illumination} light")
     return "".join(_sections(tally, name))
 
 

@@ -10,9 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
+from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media import fresnel
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
+from mcml_sim.media.setting import Setting
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing.deposits import Deposits
 
@@ -86,6 +88,8 @@ class Tally:
     seed: int
     deposits: Deposits
     """The sums that all estimates come from, for photons of weight 1 that have entered."""
+    illumination: str = "searchlight"
+    """As in `Setting`."""
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -211,6 +215,8 @@ class Tally:
     @property
     def _entering(self) -> float:
         """Share of the light that enters [-]."""
+        if self.illumination == "diffuse":
+            return entered(Setting(self.illumination, n=self.medium.layers[0].n / self.medium.n_above))
         return 1 - fresnel.specular_reflectance(self.medium)
 
     def _by_radius(self, what: str) -> Estimate:

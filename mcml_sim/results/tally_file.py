@@ -27,12 +27,14 @@ from mcml_sim.files.whole_file import checked_path, write_whole
 from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
+from mcml_sim.media.setting import require_illumination
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.results.tally import Tally, shapes
 
 FORMAT = 1
 ENDS = ("", "_standard_error", "_effective_samples")  # the fields of an Estimate
 EDGES = ("r_edges", "z_edges", "a_edges")
+LIGHT = "illumination"
 HEADER = frozenset({"format", "mcml_sim", "photons", "seed", "cut", "medium"})
 MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) for kind in (Medium, Layer))
 MAX_BYTES = 2**28  # of a file; the finest tables have 2^27.2 unpacked
@@ -56,6 +58,7 @@ class Results:
     """Light terminated at the scattering limit, still inside [-]."""
     estimates: Mapping[str, Estimate]
     """By the names of the tally's properties."""
+    illumination: str = "searchlight"
 
 
 def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
@@ -70,7 +73,7 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
 
 def results_bytes(tally: Tally) -> bytes:
     """What `write_results` writes."""
-    header = {
+    header: dict[str, object] = {
         "format": FORMAT,
         "mcml_sim": __version__,
         "photons": tally.photons,
@@ -78,6 +81,8 @@ def results_bytes(tally: Tally) -> bytes:
         "cut": tally.cut,
         "medium": asdict(tally.medium),
     }
+    if tally.illumination != "searchlight":  # which files said nothing of when there was no other
+        header[LIGHT] = tally.illumination
     edges = {"r_edges": tally.grid.r_edges, "z_edges": tally.grid.z_edges, "a_edges": tally.grid.a_edges}
     arrays = {name: one for name, one in edges.items() if one is not None}
     for name in tally.quantities:
@@ -113,7 +118,10 @@ def parse_results(content: bytes, name: str) -> Results:
 def _results(content: bytes) -> Results:
     """What was run comes first: it says how large everything else is. ValueError in one line."""
     first = read_npz(content, MOST_FIRST, {"header": (), **dict.fromkeys(EDGES)}, text=["header"])
-    header = _table("header", parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True), HEADER)
+    told = parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True)
+    light = told.pop(LIGHT, "searchlight") if isinstance(told, dict) else None
+    header = _table("header", told, HEADER)
+    require_illumination(light)
     if type(header["format"]) is not int or header["format"] != FORMAT:
         raise ValueError(f"format {shown(header['format'])}, not {FORMAT}")
     medium, grid = _medium(header["medium"]), _grid(first)
@@ -134,6 +142,7 @@ def _results(content: bytes) -> Results:
         version=version,
         cut=cut,
         estimates={name: _estimate(arrays, name) for name in sizes},
+        illumination=str(light),
     )
 
 

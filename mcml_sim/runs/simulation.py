@@ -1,4 +1,4 @@
-"""Photons of a normal pencil beam through a layered medium."""
+"""Photons through a layered medium, of a normal pencil beam or of diffuse light."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.checks import MAX_PHOTONS, checked_folder, checked_whole, checked_workers, require_own_process
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import Medium
+from mcml_sim.media.setting import require_illumination
 from mcml_sim.results.tally import Precision, Tally, require_quantity
 from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store, manifest, require_ours
@@ -29,8 +30,9 @@ def simulate(
     precision: float | Precision | None = None,
     progress: bool | None = None,
     scheduler: str | None = None,
+    illumination: str = "searchlight",
 ) -> Tally:
-    """Trace photons of a normal pencil beam through a layered medium (Wang, Jacques & Zheng 1995).
+    """Trace photons, by default of a normal pencil beam, through a layered medium (Wang, Jacques & Zheng 1995).
 
     medium     layers; lengths in any unit
     grid       bins in the same unit: rings, and if wanted depths (for absorption) and exit angles
@@ -44,6 +46,7 @@ def simulate(
                look would make the error bars too small
     progress   show a bar on stderr; by default only if that is a terminal
     scheduler  address of a Dask scheduler whose workers trace the batches, instead of threads here
+    illumination  "searchlight", the pencil beam, or "diffuse", cosine-weighted light that arrives at r = 0
 
     InputError on other arguments; StoreError if the folder is another run's or cannot be written. Ctrl-C stops after
     the batches in flight, which the store keeps too.
@@ -51,15 +54,17 @@ def simulate(
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {medium!r}")
     require_resolved(grid)
+    require_illumination(illumination)
     require_own_process()
     number = checked_whole("photons", photons, lowest=1, highest=MAX_PHOTONS)
     key = checked_whole("seed", seed, lowest=0)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
-    kernel, made_by = _kernel(medium), _made_by(medium, grid, key)
-    enough = None if precision is None else _enough(precision, medium, grid, key)
+    kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
+    enough = None if precision is None else _enough(precision, medium, grid, key, illumination)
+    light = {} if kernel is matched_batch else {"illumination": illumination}
     read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
     sums = run_batches(
-        partial(kernel.trace_batch, medium, grid, key),
+        partial(kernel.trace_batch, medium, grid, key, **light),
         BATCH_PHOTONS[kernel],
         number,
         workers=threads,
@@ -68,51 +73,53 @@ def simulate(
         scheduler=scheduler,
         enough=enough,
     )
-    return Tally(medium, grid, sums.started, key, sums)
+    return Tally(medium, grid, sums.started, key, sums, illumination)
 
 
 def batch_photons(medium: Medium) -> int:
     """Photons of a batch of `simulate` in this medium."""
-    return BATCH_PHOTONS[_kernel(medium)]
+    return BATCH_PHOTONS[_kernel(medium, "searchlight")]
 
 
 def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
     """StoreError if `simulate` could not keep batches in that folder because of what is there; nothing is written."""
-    require_ours(folder, _made_by(medium, grid, seed))
+    require_ours(folder, _made_by(medium, grid, seed, "searchlight"))
 
 
 def is_store_of(folder: Path, medium: Medium, grid: Grid, seed: int) -> bool:
     """Whether the batches in that folder are of such a run, by whatever version and on whatever machine."""
-    return _made_by(medium, grid, seed).items() <= (manifest(folder) or {}).items()
+    return _made_by(medium, grid, seed, "searchlight").items() <= (manifest(folder) or {}).items()
 
 
 class _Enough:
     """Whether a run's sums so far are as precise as requested."""
 
-    def __init__(self, precision: Precision, medium: Medium, grid: Grid, seed: int) -> None:
+    def __init__(self, precision: Precision, medium: Medium, grid: Grid, seed: int, illumination: str) -> None:
         self._precision, self._medium, self._grid, self._seed = precision, medium, grid, seed
+        self._illumination = illumination
 
     def __call__(self, sums: Deposits) -> bool:
-        tally = Tally(self._medium, self._grid, sums.started, self._seed, sums)
+        tally = Tally(self._medium, self._grid, sums.started, self._seed, sums, self._illumination)
         return self._precision.is_reached(tally.quantity(self._precision.quantity))
 
 
-def _enough(precision: float | Precision, medium: Medium, grid: Grid, seed: int) -> _Enough:
+def _enough(precision: float | Precision, medium: Medium, grid: Grid, seed: int, illumination: str) -> _Enough:
     wanted = precision if isinstance(precision, Precision) else Precision(precision)
     require_quantity(wanted.quantity, grid)
-    return _Enough(wanted, medium, grid, seed)
+    return _Enough(wanted, medium, grid, seed, illumination)
 
 
-def _kernel(medium: Medium) -> ModuleType:
-    return matched_batch if medium.is_matched_isotropic_half_space else layered_batch
+def _kernel(medium: Medium, illumination: str) -> ModuleType:
+    is_matched = medium.is_matched_isotropic_half_space and illumination == "searchlight"
+    return matched_batch if is_matched else layered_batch
 
 
-def _made_by(medium: Medium, grid: Grid, seed: int) -> dict[str, object]:
+def _made_by(medium: Medium, grid: Grid, seed: int, illumination: str) -> dict[str, object]:
     """What decides which photons a batch holds and how they are counted."""
     return {
-        "kind": "simulate",
+        "kind": "simulate" if illumination == "searchlight" else f"simulate, {illumination} light",
         "medium": repr(medium),
         "seed": seed,
         "grid": grid.digest,
-        "batch_photons": batch_photons(medium),
+        "batch_photons": BATCH_PHOTONS[_kernel(medium, illumination)],
     }

@@ -35,7 +35,7 @@ class HalfSpace(NamedTuple):
     n: Array
     phase: Phase
     entry: Array
-    """Cosines of the light that has entered, to the normal and inside; see `_entry_cosines`, (STEPS + 1,)."""
+    """Cosines of the light that has entered, to the normal and inside; see `entry_cosines`, (STEPS + 1,)."""
 
 
 class HalfSpaceLanes(NamedTuple):
@@ -66,7 +66,7 @@ class HalfSpaceLanes(NamedTuple):
 def half_space(setting: Setting) -> HalfSpace:
     """What the kernel needs to know of a setting."""
     phase = HenyeyGreenstein(jnp.float32(setting.g))
-    return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(_entry_cosines(setting)))
+    return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(entry_cosines(setting)))
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpaceLanes:
@@ -153,7 +153,7 @@ def entering_cosine(xi: Array, entry: Array) -> Array:
     return lower + (upper - lower) * (at - step.astype(jnp.float32))
 
 
-def _entry_cosines(setting: Setting) -> NDArray[np.float32]:
+def entry_cosines(setting: Setting) -> NDArray[np.float32]:
     """Cosines inside at even steps of the cube root of probability, float32 (STEPS + 1,).
 
     Diffuse light that has entered has the density 2 mu T(mu) there, T being the transmittance of the surface, which

@@ -1,4 +1,4 @@
-"""One numbered batch of `simulate` in any layered medium, from the beam to the last end.
+"""One numbered batch of `simulate` in any layered medium, from the light's entry to the last end.
 
 A turn is a few flights inside the layers, then one step across interfaces for the photons that wait there, then
 roulette. What leaves, and what is absorbed by a layer, is kept by photon and added up in the order of their numbers at
@@ -20,7 +20,8 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
-from mcml_sim.tracing import deposits, layered_event, pool, rng
+from mcml_sim.media.setting import Setting
+from mcml_sim.tracing import deposits, half_space_event, layered_event, pool, rng
 from mcml_sim.tracing.bins import Axis, axis, groups
 from mcml_sim.tracing.deposits import Deposits
 from mcml_sim.tracing.layered_event import (
@@ -84,20 +85,31 @@ class PhotonFates(NamedTuple):
     """What each group left in each ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
 
 
-def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES) -> Deposits:
+def trace_batch(
+    medium: Medium,
+    grid: Grid,
+    seed: int,
+    batch: int,
+    photons: int,
+    lanes: int = LANES,
+    illumination: str = "searchlight",
+) -> Deposits:
     """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 512.
 
-    Photons enter with weight 1, below all specular reflection. A first layer of clear glass is behind them then:
-    `fresnel.specular_reflectance` has counted what it sends back.
+    Photons enter with weight 1, below all specular reflection. Where they are a beam a first layer of clear glass is
+    behind them then: `fresnel.specular_reflectance` has counted what it sends back.
     """
-    first = 1 if medium.layers[0].mu_t > 0 else 2
+    light = Setting(illumination, n=medium.layers[0].n / medium.n_above)
+    diffuse = illumination == "diffuse"
+    first = 1 if diffuse or medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):
         return _all_ballistic(grid, photons)
     unit = _unit(medium)
     bins, shape = _bins(medium, grid, unit, photons, lanes)
     key = jnp.asarray(rng.batch_key(seed, batch))
+    entry = jnp.asarray(half_space_event.entry_cosines(light) if diffuse else np.zeros(0, np.float32))
     with jax.enable_x64(True):
-        found = trace(key, jnp.int32(photons), jnp.int32(first), layered_event.stack(medium, unit), bins, shape)
+        found = trace(key, jnp.int32(photons), jnp.int32(first), entry, layered_event.stack(medium, unit), bins, shape)
     exits, sums, *tables = (np.asarray(part) for part in found)
     by_layer, by_cell = (table / float(bins.per_weight) for table in tables)
     return _deposits(exits, sums, by_layer.reshape(shape.groups, -1), by_cell, photons, grid)
@@ -105,11 +117,11 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
 
 @partial(jax.jit, static_argnames="shape", compiler_options=pool.COMPILER_OPTIONS)
 def trace(
-    key: Array, photons: Array, first: Array, stack: Stack, bins: LayeredBins, shape: KernelShape
+    key: Array, photons: Array, first: Array, entry: Array, stack: Stack, bins: LayeredBins, shape: KernelShape
 ) -> tuple[Array, Array, Array, Array]:
     """The first `photons` (int32) photons of a batch: exits, sums, and what was left by layer and by cell.
 
-    They start in the layer number `first` (int32).
+    They start in the layer number `first` (int32); `entry` as in `layered_event.enter`.
     """
     go = photons > 0
     angles = len(bins.cosines) > 0
@@ -124,7 +136,7 @@ def trace(
     )
 
     def enter(numbers: Array) -> LayeredLanes:
-        return layered_event.enter(numbers, first, followed)
+        return layered_event.enter(key, numbers, first, entry, followed)
 
     def turn(lanes: LayeredLanes, results: PhotonFates) -> tuple[LayeredLanes, PhotonFates]:
         most = round((1 - IDLE_SHARE) * len(lanes.layer))
@@ -135,7 +147,9 @@ def trace(
 
         before = (lanes, results.by_layer, results.by_cell), jnp.bool_(True)
         (lanes, by_layer, by_cell), _ = lax.while_loop(lambda state: state[1], step, before)
-        return lanes, _recorded(results, lanes, stack.layers, angles)._replace(by_layer=by_layer, by_cell=by_cell)
+        scattered = layered_event.is_scattered(lanes, entry)
+        results = _recorded(results, lanes, scattered, stack.layers, angles)
+        return lanes, results._replace(by_layer=by_layer, by_cell=by_cell)
 
     results = pool.follow(enter, turn, results, photons, shape.lanes)
     return _sorted(results, bins), _summed(results), results.by_layer, results.by_cell
@@ -190,7 +204,7 @@ def _units(left: Array, bins: LayeredBins) -> Array:
     return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
-def _recorded(results: PhotonFates, lanes: LayeredLanes, layers: int, angles: bool) -> PhotonFates:
+def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layers: int, angles: bool) -> PhotonFates:
     """Keep what became of the photons that have ended since the last time.
 
     The others write too, beyond the last photon: a branch that no processor can foresee costs more.
@@ -199,7 +213,7 @@ def _recorded(results: PhotonFates, lanes: LayeredLanes, layers: int, angles: bo
     number = jnp.where(counts, lanes.photon, BATCH_PHOTONS).astype(jnp.int32)
     transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
-    rho = jnp.where(transmitted & ~layered_event.is_scattered(lanes), BALLISTIC, rho)
+    rho = jnp.where(transmitted & ~scattered, BALLISTIC, rho)
     rho = jnp.where(lanes.layer == CUT, INSIDE, rho).astype(jnp.float32)
     weight = jnp.where(lanes.layer == ROULETTED, 0, jnp.where(transmitted, lanes.weight, -lanes.weight))
     cosines = results.cosines

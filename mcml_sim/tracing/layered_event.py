@@ -25,6 +25,7 @@ from mcml_sim.media import fresnel
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from mcml_sim.tracing import rng
+from mcml_sim.tracing.half_space_event import entering_cosine
 
 FLIGHTS = 5  # measured on the three-layer sample: from 4 to 7 it is the same within 3 %
 EVENTS_PER_TURN = FLIGHTS + 1  # the last one is the step across interfaces
@@ -39,6 +40,7 @@ FIRST_TOSS, MAX_EVENTS = 2**13, 2**18
 
 FARTHEST = 1e30  # free path in clear glass, in units of length: finite, so that no product of it is NaN
 SELECTED_LAYERS = 8  # up to here a chain of selects is faster than a gather
+ENTRY_EVENT = 2**32 - 1  # whose random words say where diffuse light comes from: no photon has so many events
 BACK, ON = -1.0, -2.0  # instead of n1 / n2: of a photon that roulette ends unless it leaves, whether it passes
 REFLECTED, ROULETTED, CUT = 0, -1, -2  # "layers" of photons that ended; transmitted ones are below the last layer
 
@@ -118,16 +120,24 @@ def stack(medium: Medium, unit: float) -> Stack:
     return Stack(phase=HenyeyGreenstein(arrays.pop("g")), **arrays)
 
 
-def enter(photon: Array, first: Array, followed: int) -> LayeredLanes:
-    """Photons on their way straight down from the top of the layer `first`, not scattered yet.
+def enter(key: Array, photon: Array, first: Array, entry: Array, followed: int) -> LayeredLanes:
+    """Photons on their way down from the top of the layer `first`, not scattered yet.
 
-    What they leave behind is followed in that many layers one by one; see LayeredLanes.absorbed.
+    They go straight down, or, where `entry` is no empty array but `half_space_event.entry_cosines`, in the plane y = 0
+    with those cosines: nothing is resolved by azimuth. What they leave behind is followed in that many layers one by
+    one; see LayeredLanes.absorbed.
     """
     zero = jnp.zeros(photon.shape, jnp.complex64)
+    down, heading = zero + jnp.complex64(1j), zero
+    if len(entry):
+        word, _, _ = rng.draw_three(key, photon, jnp.full_like(photon, ENTRY_EVENT))
+        cosine = entering_cosine(rng.uniform(word), entry)
+        down = lax.complex(jnp.zeros_like(cosine), cosine)
+        heading = lax.complex(jnp.sqrt((1 - cosine) * (1 + cosine)), jnp.zeros_like(cosine))
     return LayeredLanes(
         place=zero,
-        down=zero + jnp.complex64(1j),
-        heading=zero,
+        down=down,
+        heading=heading,
         weight=jnp.ones(photon.shape, jnp.float32),
         layer=jnp.full(photon.shape, first, jnp.int32),
         event=jnp.zeros_like(photon),
@@ -141,8 +151,10 @@ def inside(layer: Array, layers: int | Array) -> Array:
     return (layer > 0) & (layer <= layers)
 
 
-def is_scattered(lanes: LayeredLanes) -> Array:
-    """False where a photon is still on the line of the beam."""
+def is_scattered(lanes: LayeredLanes, entry: Array) -> Array:
+    """False where a photon is still on the line of the beam, or in the plane it came in; `entry` as in `enter`."""
+    if len(entry):
+        return (lanes.heading.imag != 0) | (lanes.place.imag != 0)
     return (lanes.heading != 0) | (lanes.place != 0)
 
 

@@ -146,9 +146,9 @@ def _setting(measured: Measured, light: str, n: float | None) -> Setting:
 
     if light not in options.LIGHTS:
         raise InputError(f"--light must be one of {', '.join(options.LIGHTS)}, got {light!r}")
-    if measured.medium is not None and light != options.LIGHTS[0]:
+    if measured.illumination not in (None, light):
         raise InputError(
-            f"--light must be {options.LIGHTS[0]} for {measured.source}, which was simulated so, got {light!r}"
+            f"--light must be {measured.illumination} for {measured.source}, which was simulated so, got {light!r}"
         )
     return Setting(light, measured.n or 1.0 if n is None else n)
 

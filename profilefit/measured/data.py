@@ -31,6 +31,7 @@ class Measured:
     photons    of the run that the rings come from, which correlates them (see `noise`); infinite if rows are
                independent
     medium     what a simulation was of, lengths in `unit`; None of what was measured
+    illumination  under which light it was; None of what was measured
     notes      what was left out or merged, for the reader
     """
 
@@ -48,6 +49,7 @@ class Measured:
     pooled: float = np.inf
     photons: float = np.inf
     medium: Medium | None = None
+    illumination: str | None = None
     notes: tuple[str, ...] = ()
 
     @property

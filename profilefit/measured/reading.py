@@ -51,7 +51,7 @@ def read_mco_profile(path: Path) -> Measured:
     notes = (f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",)
     return _counted(
         path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
-        "bounds: no photon weighs more than it entered with", True, found.run.medium, notes,
+        "bounds: no photon weighs more than it entered with", True, found.run.medium, "searchlight", notes,
     )  # fmt: skip
 
 
@@ -71,7 +71,7 @@ def read_npz_profile(path: Path) -> Measured:
     squares = error**2 + energy**2 / (found.photons - 1.0)
     return _counted(
         path, content, found.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
-        float(found.photons), "standard errors of the simulation", False, found.medium, (),
+        float(found.photons), "standard errors of the simulation", False, found.medium, found.illumination, (),
     )  # fmt: skip
 
 
@@ -86,6 +86,7 @@ def _counted(
     errors: str,
     bounded: bool,
     medium: Medium,
+    illumination: str,
     notes: tuple[str, ...],
 ) -> Measured:
     """Rings merged until each holds enough photons, from (n,) rings.
@@ -114,7 +115,8 @@ def _counted(
         notes = (*notes, merging)
     return Measured(
         str(path), hashlib.sha256(content).hexdigest(), inner, outer, whole / areas, spread / areas,
-        np.full(whole.size, np.inf), errors, UNIT, True, bounded, photons=photons, medium=medium, notes=notes,
+        np.full(whole.size, np.inf), errors, UNIT, True, bounded, photons=photons, medium=medium,
+        illumination=illumination, notes=notes,
     )  # fmt: skip
 
 

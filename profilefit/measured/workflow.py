@@ -37,8 +37,8 @@ def fit(
 
     data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
     law        its name, and which constants, as for `catalogue.load`
-    setting    illumination and surface; by default "searchlight" (a pencil beam, normal, collimated) on the surface of
-               the medium that was simulated
+    setting    illumination and surface; by default the light and the surface that were simulated, else "searchlight"
+               (a pencil beam, normal, collimated) and n = 1
     held       fixed quantities: alpha or A [-], l [unit of the data]
     total      the total reflectance A [-], if that was measured too
     scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
@@ -48,7 +48,11 @@ def fit(
     InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is an Answer that says so.
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
-    records, where = folder or catalogue.fits_folder(), setting or Setting(n=measured.n or 1.0)
+    records = folder or catalogue.fits_folder()
+    where = setting or Setting(measured.illumination or "searchlight", measured.n or 1.0)
+    if measured.illumination not in (None, where.illumination):
+        got = f"{measured.illumination} light, got {where.illumination} light to fit"
+        raise InputError(f"{measured.source}: a simulation of {got}")
     measured = _noted(measured, where)
     chosen = catalogue.load(law, constants, where, records)
     question = Question(chosen, _held(chosen, held or {}, scale), total, scale if isinstance(scale, Known) else None)

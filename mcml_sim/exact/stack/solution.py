@@ -39,7 +39,7 @@ from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.media import fresnel
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.medium import Layer, Medium
-from mcml_sim.media.setting import ILLUMINATIONS, Setting
+from mcml_sim.media.setting import Setting, require_illumination
 
 Floats = NDArray[np.float64]
 
@@ -141,8 +141,7 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
 def _require_solved(medium: Medium, illumination: str) -> None:
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
-    if illumination not in ILLUMINATIONS:
-        raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(illumination)}")
+    require_illumination(illumination)
     layers = medium.layers
     if len(layers) > MAX_LAYERS:
         raise InputError(f"a stack solved exactly must have at most {MAX_LAYERS} layers, got {len(layers)}")

@@ -39,10 +39,11 @@ class Bundles:
     """Bin of exit angle, or -1 where light is totally reflected."""
 
 
-def solve(medium, angles=18, nodes=4):
+def solve(medium, angles=18, nodes=4, diffuse=False):
     """Answer for a Medium whose layers share one index n, between equal media, in `angles` even bins of exit angle.
 
-    `nodes` Gauss points a bin, in the bin's own range of cosines inside.
+    `nodes` Gauss points a bin, in the bin's own range of cosines inside. Of cosine-weighted diffuse light, if that is
+    what comes in, nothing is told apart as ballistic.
     """
     n = medium.layers[0].n
     if any(layer.n != n for layer in medium.layers) or medium.n_above != medium.n_below:
@@ -54,14 +55,16 @@ def solve(medium, angles=18, nodes=4):
     for below in layers[1:]:
         inside = _add(inside, below)
     surface = fresnel.fresnel(relative, 1.0, bundles.mu)[0]
-    return _through_surfaces(inside, surface, bundles)
-
-
-def _through_surfaces(layer, surface, bundles):
-    """Shut the layer between two surfaces that reflect the share `surface` of each bundle from inside."""
-    specular = float(surface[-1])
     beam = np.zeros(bundles.mu.size)
-    beam[-1] = 1 - specular
+    beam[-1] = 1 - surface[-1]
+    if diffuse:
+        beam = (1 - surface) * 2 * relative**2 * bundles.mu * bundles.weights
+    return _through_surfaces(inside, surface, bundles, beam)
+
+
+def _through_surfaces(layer, surface, bundles, beam):
+    """Shut the layer between two surfaces that reflect the share `surface` of each bundle from inside."""
+    specular = 1 - beam.sum()
     # Light inside that goes down at the top, and up at the bottom: down = beam + S up_top, up = S down_bottom.
     (r_top, r_bottom, t_down, t_up), s = layer, np.diag(surface)
     unit = np.eye(beam.size)
