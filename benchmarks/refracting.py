@@ -39,7 +39,7 @@ MANY_ALPHAS, MANY_RADII = (
     np.geomspace(1e-3, 15.0, 256),
 )
 BARELY = 1 + 1e-12  # an index that hardly refracts
-WAVES = (1e-3, 0.5, 3.0, 8.0, 40.0, 3.0 * np.exp(0.25j * np.pi), 200.0 * np.exp(0.25j * np.pi))
+WAVES = (1e-3, 0.1, 0.5, 1.0, 3.0, 7.0)
 EDGES = np.append(0.0, np.geomspace(0.01, 10.0, 40))  # of rings of photons [mfp]
 LAYERS = Medium((Layer(1.4, 0.1, 2.0, 0.0, 0.5), Layer(1.4, 0.5, 0.5, 0.0, 0.7), Layer(1.4, 0.05, 1.5, 0.0)))
 PHOTONS = 10**8
@@ -57,7 +57,7 @@ def totals() -> float:
 
 
 def doubled() -> float:
-    """Largest relative change of the transform at a wave number with twice the nodes."""
+    """Largest relative change of the transform at a real wave number, the total first of all, with twice the nodes."""
     worst = 0.0
     with jax.enable_x64(True):
         for n in INDICES:
