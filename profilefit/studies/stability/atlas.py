@@ -14,7 +14,16 @@ from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
-from profilefit.studies.stability import fit_cases, gradients, halfspace, law_cells, map_cells, misuse, model_cells
+from profilefit.studies.stability import (
+    fit_cases,
+    gradients,
+    halfspace,
+    law_cells,
+    map_cells,
+    misuse,
+    model_cells,
+    refracting,
+)
 from profilefit.studies.stability.cells import Cells
 from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
@@ -142,6 +151,8 @@ def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]
     def of_exact() -> Findings:
         settings = SETTINGS[:1] if quick else SETTINGS
         cells = [each for s in settings for each in halfspace.cells_of(s, catalogue.normalisation(s, folder))]
+        if not quick:
+            cells += refracting.cells_of()
         return _part(EXACT, [*cells, *misuse.of_exact()])
 
     def of_solver() -> Findings:
