@@ -1,5 +1,6 @@
-"""docs/theory/refracting.md: its formulas as they stand there, by brute force, against each other and against the code."""
+"""docs/theory/refracting.md: its formulas as they stand there, by brute force, against each other and the code."""
 
+import itertools
 import re
 from functools import lru_cache
 from pathlib import Path
@@ -16,6 +17,7 @@ from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact import cone, single_scattering
 from mcml_sim.exact.stack import fluence
 from mcml_sim.media import fresnel
+from tests.site.test_theory import transform_of_formula as by_h_functions
 
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "theory" / "refracting.md"
 LIGHTS = ("searchlight", "diffuse")
@@ -24,8 +26,8 @@ RAY = np.exp(0.25j * np.pi)
 NORMAL = 4 * 1.4 / 2.4**2  # of light along the normal, the share that enters at n = 1.4
 
 NUMBERED = """
-image transmittance refracted paths-in-plane mirrored cone-kernels leaving cosines mirror
-path-cosine fractions loewner azimuth q-and-whole mirror-and-cone out-by-cosines resolvent refracted-sources
+image transmittance refracted-out paths-in-plane mirrored cone-kernels leaving cosines mirror
+path-cosine fractions loewner azimuth q-and-whole mirror-and-cone out-by-cosines refracted-sources resolvent
 orders books once once-searchlight once-diffuse shortest strength root
 path layers direct reflected upwards layers-sources layers-books
 """  # (1)-(9), (10)-(18), (19)-(26), (27)-(33)
@@ -85,7 +87,7 @@ def q_and_whole(x, k, n):
 
 
 def system(k, n, light, count=300):
-    """sqrt(w) q, sqrt(w) s and M of (17), x on the ray of k."""
+    """sqrt(w) q, sqrt(w) s and M of (17), (18), x on the ray of k."""
     turn = 1.0 if np.imag(k) == 0 else RAY
     last = np.arcsinh(3e3 * (1 + abs(k)))
     y = last * (np.arange(count) + 0.5) / count
@@ -103,7 +105,7 @@ def system(k, n, light, count=300):
 
 
 def transform_of_formula(alpha, k, n, light, count=300):
-    """R^ of (17)."""
+    """R^ of (18)."""
     q, s, matrix = system(k, n, light, count)
     value = alpha / np.pi * (q @ np.linalg.solve(np.eye(q.size) - alpha * matrix, s))
     return value.real if np.imag(k) == 0 else value
@@ -119,7 +121,7 @@ def reflectance(mu, n):
 def paths(k, indices, azimuths):
     """mu, cos(psi) and weights dmu of directions, psi in a quarter of the circle: the real part is the same in all."""
     cuts = sorted({0.0, 1.0, *map(critical, indices)})
-    rules = [double_exponential(low, high, 0.12, 3.3) for low, high in zip(cuts[:-1], cuts[1:], strict=True)]
+    rules = [double_exponential(low, high, 0.12, 3.3) for low, high in itertools.pairwise(cuts)]
     mu, dmu = (np.concatenate(part) for part in zip(*rules, strict=True))
     azimuths = azimuths if k else 1
     psi = (np.arange(azimuths) + 0.5) * np.pi / 2 / azimuths
@@ -127,7 +129,7 @@ def paths(k, indices, azimuths):
 
 
 def in_cells(edges, mu_a, mu_s, k, above, below, light, azimuths=10):
-    """int X mu_s phi dz, int mu_a phi dz, int X' mu_s phi dz and int mu_t phi_0 dz by (27), (28), (30), (31) and (32).
+    """int X mu_s phi dz, int mu_a phi dz, int X' mu_s phi dz, int mu_t phi_0 dz by (27)-(32), and what (33) rests on.
 
     phi is constant in cells between `edges`; `below` is None where there is no lower surface.
     """
@@ -153,7 +155,8 @@ def in_cells(edges, mu_a, mu_s, k, above, below, light, azimuths=10):
     source = 4 * above**2 * up if light == "diffuse" else beam_in_cells(edges, mu_t, above, below)
     phi = np.linalg.solve(np.diag(width) - operator * mu_s, source)
     lost = through @ (mu_s * phi) if closed else 0.0
-    return np.array([up @ (mu_s * phi), (mu_a * width) @ phi, lost, mu_t @ source])
+    unbalanced = np.abs(mu_t @ operator + up + through - width).max()  # of light scattered once more, at k = 0
+    return np.array([up @ (mu_s * phi), (mu_a * width) @ phi, lost, mu_t @ source, unbalanced])
 
 
 def beam_in_cells(edges, mu_t, above, below):
@@ -214,7 +217,7 @@ def test_a_plane_of_sources_is_a_bundle_of_paths(n, k, height):
 
 @pytest.mark.parametrize("n", [1.001, 1.4, 3.0])
 def test_transmittance_and_the_law_of_n_squared(n):
-    """(2) is Fresnel's from either side, and what enters is (18) at x = 0."""
+    """(2) is Fresnel's from either side, and what enters is (17) at x = 0."""
     outside = np.linspace(0.01, 1.0, 50)
     inside = np.sqrt(1 - (1 - outside**2) / n**2)
     np.testing.assert_allclose(transmittance(inside, n), 1 - fresnel.fresnel(n, 1.0, inside)[0], rtol=1e-9)
@@ -303,9 +306,16 @@ def test_mirror_and_cone_solve_the_half_space(light, k):
 
 
 @each_light
+@pytest.mark.parametrize(("alpha", "k"), [(0.5, 0.3), (0.9, 1.5)])
+def test_without_a_surface_it_is_the_half_space_by_its_h_functions(light, alpha, k):
+    """(18) at n = 1 against the formulas of the other page, which share nothing with it."""
+    assert transform_of_formula(alpha, k, 1.0, light, 400) == pytest.approx(by_h_functions(alpha, k, light), rel=3e-8)
+
+
+@each_light
 @pytest.mark.parametrize("n", [1.0, 1.4])
 def test_the_code_has_the_page_s_transform(light, n):
-    """On the real axis; without a surface the half space's own, by its H functions."""
+    """On the real axis."""
     found = exact.solve(half_space(0.8, n=n), light)
     for k in (0.05, 0.5, 3.0):
         assert found.transform(k) == pytest.approx(transform_of_formula(0.8, k, n, light, 400), rel=2e-8)
@@ -315,11 +325,11 @@ def test_the_code_has_the_page_s_transform(light, n):
 
 
 def test_the_code_s_matrix_is_the_page_s_and_its_powers_are_orders():
-    """(17), (19) on the ray, where no node is shared."""
+    """(18), (19) on the ray, where no node is shared."""
     k = 0.5j + 3.0 * RAY
     with jax.enable_x64(True):
-        matrix, leaving, source = (np.asarray(part) for part in cone.system(1.4, k, 160, 112))
-        series = np.asarray(cone.series(1.4, k, 40, 160, 112))
+        matrix, leaving, source = (np.asarray(part) for part in jax.jit(lambda k: cone.system(1.4, k, 160, 112))(k))
+        series = np.asarray(jax.jit(lambda k: cone.series(1.4, k, 40, 160, 112))(k))
     for index, light in enumerate(LIGHTS):
         q, s, m = system(k, 1.4, light)
         whole = 0.8 / np.pi * source[index] @ np.linalg.solve(np.eye(160) - 0.8 * matrix, leaving)
@@ -333,7 +343,7 @@ def test_the_code_s_matrix_is_the_page_s_and_its_powers_are_orders():
 def test_nothing_is_lost(light):
     """(20): in cells, and where nothing is absorbed."""
     edges, one = 40.0 * np.linspace(0.0, 1.0, 121) ** 2, np.ones(120)
-    out, absorbed, _, entered = in_cells(edges, 0.4 * one, 0.6 * one, 0.0, 1.4, None, light)
+    out, absorbed, _, entered, _ = in_cells(edges, 0.4 * one, 0.6 * one, 0.0, 1.4, None, light)
     given = NORMAL if light == "searchlight" else 2 * 1.4**2 * q_and_whole(np.zeros(1), 0.0, 1.4)[0][0].real
     assert entered == pytest.approx(given, rel=1e-7)
     assert out == pytest.approx(given - absorbed, rel=1e-7)
@@ -388,13 +398,12 @@ def test_light_scattered_once_under_a_searchlight():
             r / slope(critical(1.4)),
             40.0,
         )
-        first = shortest(1.4, "searchlight")
-        paths_too = number(
-            lambda y, r=r, first=first: once_by_path(first + y * y, 1.4, "searchlight") * np.exp(-(first + y * y) * r) * 2 * y,
-            0.0,
-            8.0,
-        )
-        assert paths_too / (2 * np.pi * r) == pytest.approx(beam / (4 * np.pi), rel=1e-7)
+
+        def by_path(y, r=r):
+            p = shortest(1.4, "searchlight") + y * y
+            return once_by_path(p, 1.4, "searchlight") * np.exp(-p * r) * 2 * y
+
+        assert number(by_path, 0.0, 8.0) / (2 * np.pi * r) == pytest.approx(beam / (4 * np.pi), rel=1e-7)
 
 
 @each_light
@@ -544,7 +553,8 @@ def test_the_code_has_the_page_s_layers(light, k):
 @each_light
 def test_no_light_is_lost_in_layers(light):
     """(33), and the same of a single scattering."""
-    out, absorbed, through, entered = plate_in_cells(0.0, light, 30)
+    out, absorbed, through, entered, unbalanced = plate_in_cells(0.0, light, 30)
+    assert unbalanced < 1e-9
     assert out + absorbed + through == pytest.approx(entered, rel=1e-7)
     share = NORMAL if light == "searchlight" else single_scattering.entered(Setting(light, n=1.4))
     assert entered + straight(0.0, light).sum() == pytest.approx(share, rel=1e-7)
