@@ -368,6 +368,15 @@ def test_the_profile_along_the_contour(light):
         assert (np.abs(error).max() < 2e-8) == is_right
 
 
+def test_light_ends_as_it_does_without_a_surface():
+    """e^{-kappa r} r^-2: the slope of r^2 R_d is kappa, up to 1/r^2, and that of other powers is not."""
+    kappa, r = exact.decay_rate(0.9), 50.0 * np.array([0.99, 1.01])
+    profile = exact.profile(r, 0.9, setting=Setting(n=1.4))
+    for power, is_right in ((2.0, True), (1.5, False), (3.0, False)):
+        slope_there = -np.diff(np.log(profile * r**power))[0] / np.diff(r)[0]
+        assert (abs(slope_there / kappa - 1) < 0.01) == is_right
+
+
 def once_by_path(p, n, light):
     """p f(p): (22), (23), per photon that entered, of paths p >= p_c."""
     if light == "searchlight":
@@ -509,17 +518,17 @@ def test_reflections_are_a_geometric_series():
     assert abs(out - (1 - a) * (other + b * whole**2 / other) / again) < 1e-14
 
 
-# Two layers under air, on a medium of index 1.2: mu_a, mu_s, thickness.
+# Two layers of index 1.4 under air or glass, on a medium of index 1.2: mu_a, mu_s, thickness.
 LAYERS = ((0.1, 2.0, 0.5), (0.5, 1.0, 0.7))
 PLATE = Medium(tuple(Layer(1.4, mu_a, mu_s, 0.0, height) for mu_a, mu_s, height in LAYERS), n_below=1.2)
 
 
-def plate_in_cells(k, light, cells):
+def plate_in_cells(k, light, cells, n_above=1.0):
     s = np.linspace(0.0, 1.0, cells + 1)
     graded = s * s * (3 - 2 * s)
     parts = [graded * LAYERS[0][2], LAYERS[0][2] + graded[1:] * LAYERS[1][2]]
     mu_a, mu_s = (np.repeat([layer[index] for layer in LAYERS], cells) for index in (0, 1))
-    return in_cells(np.concatenate(parts), mu_a, mu_s, k, 1.4, 1.4 / 1.2, light)
+    return in_cells(np.concatenate(parts), mu_a, mu_s, k, 1.4 / n_above, 1.4 / 1.2, light)
 
 
 @lru_cache
@@ -548,6 +557,14 @@ def test_the_code_has_the_page_s_layers(light, k):
         assert solved.transmittance == pytest.approx(found[2] + straight(k, light)[1], rel=5e-7)
     other = exact.solve(Medium(PLATE.layers[::-1], n_below=1.2), light).transform(k)
     assert other != pytest.approx(solved.transform(k), rel=1e-2)
+
+
+def test_the_code_has_the_page_s_layers_under_a_denser_medium():
+    found = without_cells(lambda cells: plate_in_cells(1.0, "searchlight", cells, 1.5), 15)[0]
+    a, b, optical = (0.1 / 2.9) ** 2, (0.2 / 2.6) ** 2, sum((one[0] + one[1]) * one[2] for one in LAYERS)
+    found += (1 - a) ** 2 * b * np.exp(-2 * optical) / (1 - a * b * np.exp(-2 * optical))
+    solved = exact.solve(Medium(PLATE.layers, n_above=1.5, n_below=1.2))
+    assert solved.transform(1.0) == pytest.approx(found, rel=5e-7)
 
 
 @each_light
