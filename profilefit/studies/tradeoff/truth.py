@@ -19,9 +19,9 @@ from mcml_sim import Grid, Medium, Setting, exact, half_space, simulate, simulat
 from mcml_sim.exact import table
 from mcml_sim.exact.stack import solution
 from mcml_sim.exact.transform import STANDARD, Rule
-from profilefit.studies.tradeoff import rings, scalar, stopwatch
+from profilefit.studies.tradeoff import annuli, scalar, stopwatch
+from profilefit.studies.tradeoff.annuli import ALPHAS, BREAKS, EDGES, EVEN, MATCHED, REFRACTING, STACK, WIDTH, Annuli
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
-from profilefit.studies.tradeoff.rings import ALPHAS, BREAKS, EDGES, EVEN, MATCHED, REFRACTING, STACK, WIDTH, Rings
 from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
 Floats = NDArray[np.float64]
@@ -68,7 +68,7 @@ Method = Callable[[int], RingEnergies]
 class Contestant:
     """A method with its effort, and the rings that it is to know."""
 
-    rings: Rings
+    annuli: Annuli
     method: str
     label: str
     run: Method
@@ -76,7 +76,7 @@ class Contestant:
 
     @property
     def key(self) -> str:
-        return f"{self.rings.panel}: {self.method}, {self.label}"
+        return f"{self.annuli.panel}: {self.method}, {self.label}"
 
 
 def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> TradeoffPart:
@@ -125,23 +125,25 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
         found.append(Contestant(MATCHED, EXACT, label, _exact(exact.SEARCHLIGHT, STANDARD.scaled(RULES[label]))))
     found.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(refracting, STANDARD)))
     found.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(refracting, STANDARD, anew=True)))
-    found += [Contestant(STACK, SIMULATE, _photons(n), _simulated(STACK, [rings.LAYERS], n), n) for n in sizes.simulate]
+    found += [
+        Contestant(STACK, SIMULATE, _photons(n), _simulated(STACK, [annuli.LAYERS], n), n) for n in sizes.simulate
+    ]
     found += [Contestant(STACK, EXACT, label, _exact_stack(label)) for label in STACK_NODES]
     return found, notes
 
 
 def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
-    middle, worst = zip(*(one.rings.errors(each.energy) for each in energies), strict=True)
-    stated = [each.stated[one.rings.judged] for each in energies if each.stated is not None]
-    if estimate and (one.rings, one.method, one.label) == (MATCHED, EXACT, AS_IS):
-        stated = [np.asarray(exact.error_estimate(rings.MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
+    middle, worst = zip(*(one.annuli.errors(each.energy) for each in energies), strict=True)
+    stated = [each.stated[one.annuli.judged] for each in energies if each.stated is not None]
+    if estimate and (one.annuli, one.method, one.label) == (MATCHED, EXACT, AS_IS):
+        stated = [np.asarray(exact.error_estimate(annuli.MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
     facts: dict[str, float | int | str] = {
         "photons": one.photons,
         "first_call": rates.first[one.key],
         "stated": float(np.sqrt(np.mean(np.square(stated)))) if stated else "",
     }
     seconds = WithSpread.of(rates.seconds(one.key))
-    return Point(one.rings.panel, one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
+    return Point(one.annuli.panel, one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
 
 
 def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
@@ -149,7 +151,7 @@ def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
     first: dict[str, float] = {}
     for one in found:
         more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
-        name = f"{one.method} ({one.rings.panel})"
+        name = f"{one.method} ({one.annuli.panel})"
         first[name] = first.get(name, 0.0) + max(more, 0.0)
     return first
 
@@ -166,7 +168,7 @@ def scalar_tracer(trace: Callable, photons: int) -> Method:
     return run
 
 
-def _simulated(case: Rings, media: list[Medium], photons: int) -> Method:
+def _simulated(case: Annuli, media: list[Medium], photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
@@ -198,13 +200,13 @@ def _exact(setting: Setting, rule: Rule, anew: bool = False) -> Method:
     def run(_: int) -> RingEnergies:
         if anew:
             table.made(float(setting.n), rule)
-        return RingEnergies(np.diff(rings.half_spaces(setting, rule), axis=1), None)
+        return RingEnergies(np.diff(annuli.half_spaces(setting, rule), axis=1), None)
 
     return run
 
 
 def _exact_stack(label: str) -> Method:
-    return lambda _: RingEnergies(np.diff(rings.stack(STACK_NODES[label]), axis=1), None)
+    return lambda _: RingEnergies(np.diff(annuli.stack(STACK_NODES[label]), axis=1), None)
 
 
 def _photons(number: int) -> str:

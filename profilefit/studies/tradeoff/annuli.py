@@ -1,4 +1,4 @@
-"""Rings whose energies every truth is asked for, of three media, and what is right of them."""
+"""Annuli whose energies every truth is asked for, of three media, and what is right of them."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ LAYERS = Medium((Layer(1.4, 0.2, 1.8, 0.0, 0.3), Layer(1.4, 0.02, 0.98, 0.0, 1.0
 
 
 @dataclass(frozen=True)
-class Rings:
-    """Rings of a medium at each albedo, or of one stack.
+class Annuli:
+    """Annuli of a medium at each albedo, or of one stack.
 
     panel, title  of their chart;  within  reference: energy within EDGES, (rows, rings + 1) [-];  whole  (rows, 1) [-]
     """
@@ -74,15 +74,15 @@ def stack(nodes: Nodes) -> Floats:
     return np.asarray(light.cdf(EDGES))[None] * light.reflectance
 
 
-def _of_half_space(panel: str, setting: Setting, finest: float) -> Rings:
+def _of_half_space(panel: str, setting: Setting, finest: float) -> Annuli:
     title = f"{EDGES.size - 1} annuli of a half space with n = {setting.n:g}, g = 0"
     reference = partial(half_spaces, setting, STANDARD.scaled(finest))
-    return Rings(panel, title, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None])
+    return Annuli(panel, title, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None])
 
 
 MATCHED = _of_half_space("rings", exact.SEARCHLIGHT, FINEST[0])
 REFRACTING = _of_half_space("refracting", Setting(n=1.4), FINEST[1])
-STACK = Rings(
+STACK = Annuli(
     "stack",
     f"{EDGES.size - 1} annuli of three layers with n = 1.4, g = 0",
     partial(stack, solution.FINE),
