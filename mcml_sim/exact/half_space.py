@@ -37,7 +37,7 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
 
     R^(0), which where n = 1 equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu)
     mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
-    n > 1 below 1e-8. Its derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
+    n > 1 below 3e-8. Its derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
     """
     _require_solved(setting)
     (albedo,) = _all_checked(alpha=alpha)

@@ -112,11 +112,14 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
 
     InputError on any other medium and illumination.
 
-    Relative error of the reflectance and the transmittance, and of the transform up to k = 5 / mfp: below 1e-7, mostly
-    1e-9. Where the index above is another the transform's grows to 5e-4 at k = 25 / mfp. That of the profile is below
-    1e-5 as far as R_d is more than 1e-3 of what it is at one mean free path. Where the index above is another it is
-    1e-4 at the radii at which light comes just from the next interface under the critical angle, 5e-4 closer than
-    0.1 mfp where the topmost layer is thinner than that, and 1e-3 in plates thinner than one mean free path.
+    Relative error of the reflectance, and of the transform up to k = 5 / mfp, and absolute error of the transmittance:
+    below 1e-7, mostly 1e-9, in layers of up to 1000 mfp (3e-7 under diffuse light if the index above is all but the
+    same); beyond, see `Solution.error`. Where the index above is another the transform's grows to 5e-4 at k = 25 / mfp.
+
+    That of the profile is below 1e-5 as far as R_d is more than 1e-3 of what it is at one mean free path. Where the
+    index above is another it is 1e-4 at the radii at which light comes just from the next interface under the critical
+    angle, 5e-4 closer than 0.1 mfp where the topmost layer is thinner than that, 1e-3 in plates of about one mean free
+    path, and up to 1e-2 at some radii in thinner ones.
 
     The first profile or cdf solves for some hundred k, which takes some seconds (twenty layers: half a minute); further
     radii cost little.
@@ -166,7 +169,8 @@ def _answer(medium: Medium, k: float, illumination: str, rule: Nodes) -> tuple[D
 
 def _transmitted(medium: Medium, illumination: str, rule: Nodes) -> float:
     here, answer = _answer(medium, 0.0, illumination, rule)
-    return float(here.weight @ (answer.phi * answer.down)) + fluence.straight_through(here, illumination, rule)
+    through = float(here.weight @ (answer.phi * answer.down)) + fluence.straight_through(here, illumination, rule)
+    return max(through, 0.0)  # below by rounding where hardly any light gets through
 
 
 def _specular(medium: Medium, illumination: str) -> float:

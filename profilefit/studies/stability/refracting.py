@@ -23,14 +23,14 @@ Floats = NDArray[np.float64]
 BARELY = 1.0 + 1e-9  # an index that hardly refracts
 SETTINGS = (Setting(n=BARELY), Setting(n=1.4), Setting("diffuse", n=3.0))
 # What the docstrings of `exact` and of `exact.solve` promise.
-BOUNDS = {PROFILE: 1e-7, CDF: 1e-7, REFLECTANCE_OF: 1e-7}
+BOUNDS = {PROFILE: 1e-7, CDF: 2e-7, REFLECTANCE_OF: 1e-7}
 SURE_ALPHA, SURE_X, NEAREST = (0.05, 0.999), (1e-3, 15.0), 1e-6
 AT_SOURCE = 1e-4  # relative, closer than NEAREST
 PLATE_ALPHA = (0.0, 0.05, 0.5, 0.9, 0.99, 0.999, 1.0 - 1e-6, 1.0)
 THICKNESS = (1e-3, 0.03, 0.5, 3.0, 30.0, 1e3)  # [mfp]
 PLATE_INDEX = (1.0, 1.4, 3.0)
 PROFILED = (1e-2, 1.5, 1e3)  # thicknesses, of alpha 0.9 and n = 1.4
-PROFILE_BOUND, THIN_BOUND, THIN, SEEN = 1e-5, 1e-3, 1.0, 1e-3  # SEEN of R_d at one mfp
+PROFILE_BOUND, THIN_BOUND, THIN, SEEN = 1e-5, 1e-2, 1.0, 1e-3  # SEEN of R_d at one mfp
 PLATE_X = (0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 100.0, 1e6, np.inf)
 
 
