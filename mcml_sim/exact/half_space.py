@@ -69,9 +69,12 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
     """
     _require_solved(setting)
     share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
-    n, light = setting.n, setting.illumination
-    traced = any(isinstance(one, jax.Array) for one in (share, albedo, n))
-    values = _radius_within(share, albedo, n, light) if traced else by_alpha(_radius, share, albedo, setting)
+    if any(isinstance(one, jax.Array) for one in (share, albedo, setting.n)):
+        # A number must stay one: as an array it would be an n to differentiate by, and 1 no longer be told from 1 + 0.
+        n, known = (setting.n, None) if is_traced(setting.n) else (None, setting.n)
+        values = _radius_within(share, albedo, n, known, setting.illumination)
+    else:
+        values = by_alpha(_radius, share, albedo, setting)
     return _scalar_or_array(values * length)
 
 
@@ -115,21 +118,33 @@ def _radius(transform: Transform, alpha: jax.Array, xi: jax.Array) -> jax.Array:
     return hankel.radius_within(transform, xi)
 
 
-@partial(jax.custom_jvp, nondiff_argnums=(3,))
-def _radius_within(xi: jax.Array, alpha: jax.Array, n: Any, illumination: str) -> jax.Array:
-    return by_alpha(_radius, xi, alpha, Setting(illumination, n))
+@partial(jax.custom_jvp, nondiff_argnums=(3, 4))
+def _radius_within(
+    xi: jax.Array, alpha: jax.Array, n: jax.Array | None, known: float | None, illumination: str
+) -> jax.Array:
+    """Under an index `n` by which it can be differentiated, or a `known` one."""
+    return by_alpha(_radius, xi, alpha, _setting(illumination, n, known))
 
 
 @_radius_within.defjvp
-def _radius_within_jvp(illumination: str, primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
+def _radius_within_jvp(
+    known: float | None, illumination: str, primals: tuple, tangents: tuple
+) -> tuple[jax.Array, jax.Array]:
     """Of the implicit function: cdf(x, alpha, n) = xi."""
+
     (xi, *where), (d_xi, *d_where) = primals, tangents
-    radius = _radius_within(xi, *where, illumination)
+    radius = _radius_within(xi, *where, known, illumination)
     x = jnp.where(xi == 1.0, 1.0, radius)
-    _, d_cdf = jax.jvp(lambda a, n: by_alpha(_cdf, x, a, Setting(illumination, n)), tuple(where), tuple(d_where))
+    _, d_cdf = jax.jvp(
+        lambda a, n: by_alpha(_cdf, x, a, _setting(illumination, n, known)), tuple(where), tuple(d_where)
+    )
     alpha, n = where
-    density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, Setting(illumination, n)))
+    density = jnp.where(xi == 1.0, jnp.inf, by_alpha(_ring_density, x, alpha, _setting(illumination, n, known)))
     return radius, (d_xi - d_cdf) / density
+
+
+def _setting(illumination: str, n: Any, known: Any) -> Setting:
+    return Setting(illumination, known if n is None else n)
 
 
 def _require_solved(setting: Setting) -> None:
