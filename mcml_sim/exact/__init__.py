@@ -42,12 +42,14 @@ from mcml_sim.exact.half_space import (
     quantile,
     reflectance,
 )
+from mcml_sim.exact.stack.depths import Nodes
 from mcml_sim.exact.stack.solution import Solution, solve
 
 __all__ = [
     "ARGUMENTS",
     "FINER",
     "SEARCHLIGHT",
+    "Nodes",
     "Solution",
     "cdf",
     "decay_rate",

@@ -29,7 +29,10 @@ NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
 
 @dataclass(frozen=True)
 class Nodes:
-    """Numbers of nodes: of a panel of depths, and of slopes and azimuths of slanted light where k = 0."""
+    """Numbers of nodes of `exact.solve`.
+
+    depth   of a panel of depths; slope, azimuth  directions of slanted light where k = 0, more of them elsewhere
+    """
 
     depth: int
     slope: int
