@@ -61,7 +61,7 @@ def simulate(
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
     enough = None if precision is None else _enough(precision, medium, grid, key, illumination)
-    light = {} if kernel is matched_batch else {"illumination": illumination}
+    light = {} if illumination == "searchlight" else {"illumination": illumination}
     read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
     sums = run_batches(
         partial(kernel.trace_batch, medium, grid, key, **light),
