@@ -20,7 +20,7 @@ STACK = layered_event.stack(Medium((Layer(1.4, 1, 9, 0.8, 5), Layer(1.4, 0, 2, -
 
 def lanes(direction=(0.0, 0.0, 1.0), z=0.5, layer=1, weight=1.0, event=0):
     """Many photons in one state; negative weights wait."""
-    pool = layered_event.enter(jnp.arange(NUMBER, dtype=jnp.uint32), layer, 0)
+    pool = layered_event.enter(KEY, jnp.arange(NUMBER, dtype=jnp.uint32), layer, jnp.empty(0), 0)
     ux, uy, uz = direction
     return pool._replace(
         down=jnp.full(NUMBER, z + 1j * uz, jnp.complex64),
