@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import ast
 import contextlib
+import gc
 import io
 import itertools
 import json
@@ -53,6 +54,15 @@ SHOWN = 8  # failures told in full
 # What no terminal and no source text is to get: control characters but the line feed, line ends, marks that turn the
 # direction of text, halves of characters.
 CONTROL = re.compile("[\0-\x09\x0b-\x1f\x7f-\x9f\u2028\u2029\u202a-\u202e\u2066-\u2069\ud800-\udfff]")
+
+
+@pytest.fixture(autouse=True, scope="module")
+def own_garbage():
+    """Collecting what earlier files left in a worker, gigabytes of it, takes a second: it is not in question here."""
+    gc.collect()
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 @pytest.fixture(autouse=True)
