@@ -131,7 +131,6 @@ def _radius_within_jvp(
     known: float | None, illumination: str, primals: tuple, tangents: tuple
 ) -> tuple[jax.Array, jax.Array]:
     """Of the implicit function: cdf(x, alpha, n) = xi."""
-
     (xi, *where), (d_xi, *d_where) = primals, tangents
     radius = _radius_within(xi, *where, known, illumination)
     x = jnp.where(xi == 1.0, 1.0, radius)

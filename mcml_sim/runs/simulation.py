@@ -61,6 +61,7 @@ def simulate(
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
     enough = None if precision is None else _enough(precision, medium, grid, key, illumination)
+    # The kernel of a matched half space traces beams only, and takes no light.
     light = {} if illumination == "searchlight" else {"illumination": illumination}
     read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
     sums = run_batches(

@@ -6,7 +6,7 @@ panels, where fluences go as z ln z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact.half_space import decay_rate
+from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
@@ -23,13 +24,14 @@ WAVES = 4.0  # 1/k, of the panels at surfaces
 DEEPEST = 40.0  # mean free paths beyond which an infinite layer has nothing but its slowest mode
 FADED = 30.0  # exponent by which light has faded where it is not followed any deeper
 DARK = 38.0  # optical depth beyond which e^-T is rounding
+FEWEST, MOST = 4, 100  # nodes
 GRADING = 2  # power of the distance to the end of a panel by which nodes crowd there
 NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
 
 
 @dataclass(frozen=True)
 class Nodes:
-    """Numbers of nodes of `exact.solve`.
+    """Numbers of nodes of `exact.solve`, 4 to 100; InputError on any others.
 
     depth   of a panel of depths; slope, azimuth  directions of slanted light where k = 0, more of them elsewhere
     """
@@ -37,6 +39,17 @@ class Nodes:
     depth: int
     slope: int
     azimuth: int
+
+    def __post_init__(self) -> None:
+        for field in fields(self):
+            checked_whole(field.name, getattr(self, field.name), FEWEST, MOST)
+
+    @property
+    def fewer(self) -> Nodes:
+        """Those that an error is estimated with: what they change is above it."""
+        return Nodes(
+            *(max(FEWEST, number) for number in (self.depth * 4 // 5, self.slope * 3 // 4, self.azimuth * 3 // 4))
+        )
 
 
 class Depths(NamedTuple):

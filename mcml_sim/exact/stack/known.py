@@ -28,7 +28,7 @@ from mcml_sim.media.medium import Layer, Medium
 
 Floats = NDArray[np.float64]
 
-SURFACES = Nodes(depth=1, slope=1, azimuth=1)  # of a stack whose depths nobody asks for
+SURFACES = Nodes(depth=4, slope=4, azimuth=4)  # of a stack whose depths nobody asks for
 LEAST = 1e-13  # of light to and fro
 MOST_TURNS = 10_000
 

@@ -45,7 +45,6 @@ Floats = NDArray[np.float64]
 
 MAX_LAYERS = 20
 STANDARD = Nodes(depth=20, slope=24, azimuth=24)
-COARSE = Nodes(depth=16, slope=18, azimuth=18)
 FINE = Nodes(depth=28, slope=32, azimuth=32)
 WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
@@ -125,10 +124,12 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
     radii cost little.
     """
     _require_solved(medium, illumination)
+    if not isinstance(nodes, Nodes):
+        raise InputError(f"nodes must be a mcml_sim.exact.Nodes, got {shown(nodes)}")
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
     waves = np.array([0.0, first.mu_t])
     fine = _each(lambda k: _reflected(medium, k, illumination, nodes), waves)
-    coarse = _each(lambda k: _reflected(medium, k, illumination, COARSE), waves)
+    coarse = _each(lambda k: _reflected(medium, k, illumination, nodes.fewer), waves)
     changes = np.abs(fine - coarse) / np.where(fine > 0, fine, 1.0)
     return Solution(
         medium,

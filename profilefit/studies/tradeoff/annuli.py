@@ -10,7 +10,7 @@ import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Layer, Medium, Setting, exact
+from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact import hankel
 from mcml_sim.exact.by_albedo import by_alpha, forget
 from mcml_sim.exact.stack import solution
@@ -33,11 +33,14 @@ LAYERS = Medium((Layer(1.4, 0.2, 1.8, 0.0, 0.3), Layer(1.4, 0.02, 0.98, 0.0, 1.0
 class Annuli:
     """Annuli of a medium at each albedo, or of one stack.
 
-    panel, title  of their chart;  within  reference: energy within EDGES, (rows, rings + 1) [-];  whole  (rows, 1) [-]
+    panel, title  of their chart;  media  a row each;  setting  light and n
+    within        reference: energy within EDGES, (rows, rings + 1) [-];  whole  (rows, 1) [-]
     """
 
     panel: str
     title: str
+    media: tuple[Medium, ...]
+    setting: Setting
     within: Callable[[], Floats]
     whole: Callable[[], Floats]
 
@@ -77,7 +80,10 @@ def stack(nodes: Nodes) -> Floats:
 def _of_half_space(panel: str, setting: Setting, finest: float) -> Annuli:
     title = f"{EDGES.size - 1} annuli of a half space with n = {setting.n:g}, g = 0"
     reference = partial(half_spaces, setting, STANDARD.scaled(finest))
-    return Annuli(panel, title, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None])
+    media = tuple(half_space(float(alpha), n=float(setting.n)) for alpha in ALPHAS)
+    return Annuli(
+        panel, title, media, setting, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None]
+    )
 
 
 MATCHED = _of_half_space("rings", exact.SEARCHLIGHT, FINEST[0])
@@ -85,6 +91,8 @@ REFRACTING = _of_half_space("refracting", Setting(n=1.4), FINEST[1])
 STACK = Annuli(
     "stack",
     f"{EDGES.size - 1} annuli of three layers with n = 1.4, g = 0",
+    (LAYERS,),
+    Setting(n=1.4),
     partial(stack, solution.FINE),
     lambda: np.array([[exact.solve(LAYERS).reflectance]]),
 )

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Grid, Medium, Setting, exact, half_space, simulate, simulate_orders
+from mcml_sim import Grid, exact, simulate, simulate_orders
 from mcml_sim.exact import table
 from mcml_sim.exact.stack import solution
 from mcml_sim.exact.transform import STANDARD, Rule
@@ -27,7 +27,7 @@ from profilefit.studies.tradeoff.stopwatch import Rates, Track
 Floats = NDArray[np.float64]
 AS_IS = "standard nodes"
 RULES = {"half the nodes": 0.5, AS_IS: 1.0, "twice the nodes": 2.0}
-STACK_NODES = {"fewer nodes": solution.COARSE, AS_IS: solution.STANDARD}
+STACK_NODES = {"fewer nodes": solution.STANDARD.fewer, AS_IS: solution.STANDARD}
 SCALAR, SIMULATE, ORDERS, EXACT = "scalar tracer", "simulate", "simulate_orders", "exact"
 AXES = f"time for all {ALPHAS.size} albedos, one core [s]", "relative error of the annuli's energies [-]"
 STACK_AXES = "time, one core [s]", AXES[1]
@@ -113,22 +113,18 @@ def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     if trace is None:
         notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
     else:
-        found += [Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size)
-                  for n in sizes.scalar]  # fmt: skip
-    refracting = Setting(n=1.4)
-    for case, light in ((MATCHED, exact.SEARCHLIGHT), (REFRACTING, refracting)):
-        media = [half_space(float(alpha), n=float(light.n)) for alpha in ALPHAS]
-        found += [Contestant(case, SIMULATE, _photons(n), _simulated(case, media, n), n * ALPHAS.size)
-                  for n in sizes.simulate]  # fmt: skip
-        found += [Contestant(case, ORDERS, _photons(n), by_orders(n, light), n) for n in sizes.orders]
+        for n in sizes.scalar:
+            found.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
+    for case in (MATCHED, REFRACTING, STACK):
+        for n in sizes.simulate:
+            found.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
+    for case in (MATCHED, REFRACTING):
+        found += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
     for label in sizes.rules:
-        found.append(Contestant(MATCHED, EXACT, label, _exact(exact.SEARCHLIGHT, STANDARD.scaled(RULES[label]))))
-    found.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(refracting, STANDARD)))
-    found.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(refracting, STANDARD, anew=True)))
-    found += [
-        Contestant(STACK, SIMULATE, _photons(n), _simulated(STACK, [annuli.LAYERS], n), n) for n in sizes.simulate
-    ]
-    found += [Contestant(STACK, EXACT, label, _exact_stack(label)) for label in STACK_NODES]
+        found.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
+    found.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
+    found.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
+    found += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
     return found, notes
 
 
@@ -168,13 +164,13 @@ def scalar_tracer(trace: Callable, photons: int) -> Method:
     return run
 
 
-def _simulated(case: Annuli, media: list[Medium], photons: int) -> Method:
+def _simulated(case: Annuli, photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
         runs = [
             simulate(medium, grid, photons, 1000 * seed + i, workers=1, progress=False).reflectance_r
-            for i, medium in enumerate(media)
+            for i, medium in enumerate(case.media)
         ]
         energy = np.array([np.asarray(one.value) for one in runs]) * grid.r_areas
         error = np.array([np.asarray(one.standard_error) for one in runs]) * grid.r_areas
@@ -183,30 +179,30 @@ def _simulated(case: Annuli, media: list[Medium], photons: int) -> Method:
     return run
 
 
-def by_orders(photons: int, setting: Setting = exact.SEARCHLIGHT) -> Method:
-    grid, case = Grid.from_edges(r=EDGES), MATCHED if setting.n == 1 else REFRACTING
+def by_orders(case: Annuli, photons: int) -> Method:
+    grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
-        found = simulate_orders(grid, photons, 1000 * seed + 500, setting=setting, workers=1, progress=False)
+        found = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
         energy = found.energy(ALPHAS)
         return RingEnergies(np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference)
 
     return run
 
 
-def _exact(setting: Setting, rule: Rule, anew: bool = False) -> Method:
+def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
     """`anew` makes the table of n, too, that is otherwise kept."""
 
     def run(_: int) -> RingEnergies:
         if anew:
-            table.made(float(setting.n), rule)
-        return RingEnergies(np.diff(annuli.half_spaces(setting, rule), axis=1), None)
+            table.made(float(case.setting.n), rule)
+        return RingEnergies(np.diff(annuli.half_spaces(case.setting, rule), axis=1), None)
 
     return run
 
 
-def _exact_stack(label: str) -> Method:
-    return lambda _: RingEnergies(np.diff(annuli.stack(STACK_NODES[label]), axis=1), None)
+def _exact_stack(nodes: exact.Nodes) -> Method:
+    return lambda _: RingEnergies(np.diff(annuli.stack(nodes), axis=1), None)
 
 
 def _photons(number: int) -> str:

@@ -143,6 +143,13 @@ def test_the_way_a_thin_plate_is_solved_is_the_other_in_thicker_ones(illuminatio
 
 
 @BOTH
+def test_fewer_nodes_state_the_larger_error_that_they_have(illumination):
+    right, few = (exact.solve(GLAZED, illumination, nodes) for nodes in (solution.FINE, exact.Nodes(6, 5, 5)))
+    assert abs(few.reflectance / right.reflectance - 1) < few.error
+    assert few.error > 1e3 * exact.solve(GLAZED, illumination).error
+
+
+@BOTH
 def test_a_white_half_space_sends_all_light_back(illumination):
     medium = Medium((Layer(1.4, 0.0, 1.0, 0.0, 0.5), Layer(1.4, 0.0, 3.0, 0.0)))
     found = exact.solve(medium, illumination)
@@ -237,6 +244,11 @@ def test_other_media_are_refused_by_name(medium, message):
 def test_other_arguments_are_refused_by_name():
     with pytest.raises(InputError, match="illumination must be one of searchlight, diffuse, got 'sun'"):
         exact.solve(MATCHED, "sun")
+    with pytest.raises(InputError, match=r"nodes must be a mcml_sim.exact.Nodes, got 20"):
+        exact.solve(MATCHED, nodes=20)
+    for bad in (0, -1, 101, 2.5, np.nan, "many"):
+        with pytest.raises(InputError, match="slope must be a whole number >= 4 and <= 100, got"):
+            exact.Nodes(20, bad, 24)
     found = exact.solve(MATCHED)
     for bad in (-1.0, np.nan, [1.0, -2.0], "far"):
         with pytest.raises(InputError, match="r must be a radius >= 0, got"):

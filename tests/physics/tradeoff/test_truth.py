@@ -47,7 +47,7 @@ def test_scalar_rings_are_unions_of_even_ones():
 
 def test_order_resolved_error_is_what_it_states(sidak):
     """Each ring within its own error; with the error stated ten times too small some are not."""
-    answer = truth.by_orders(20_000)(1)
+    answer = truth.by_orders(MATCHED, 20_000)(1)
     z = (answer.energy / MATCHED.reference - 1.0) / answer.stated
     judged = np.abs(z[MATCHED.judged])
     limit = sidak(judged.size)
