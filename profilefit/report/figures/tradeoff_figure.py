@@ -164,7 +164,7 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     figure.set_dpi(DPI)  # labels are placed for the pixels that they are saved with
     all_axes = figure.subplots(rows, 1, squeeze=False)[:, 0]
     for axes, panel in zip(all_axes, part.panels, strict=True):
-        draw(axes, panel)
+        draw(axes, panel, colours_of(part.points))
     _feet(figure, part, caption)
     figure.draw_without_rendering()
     figure.set_layout_engine("none")
@@ -173,10 +173,10 @@ def tradeoff_figure(part: TradeoffPart, caption: str, out: Path) -> list[Path]:
     return save(figure, out, f"tradeoff-{part.name}")
 
 
-def draw(axes: Axes, panel: Panel) -> None:
+def draw(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
+    """Draw a panel; `colours` of its methods, the same in all of a part's panels."""
     axes.set(xscale="log", yscale="log", xlabel=panel.cost, ylabel=panel.error)
     axes.set_title(panel.title)
-    colours = _colours(panel)
     for points in _lines(panel):
         axes.plot(*_xy(points), color=colours[points[0].method], lw=0.9, alpha=0.6, zorder=1)
     for point, standing in zip(panel.points, standings(panel.points), strict=True):
@@ -268,15 +268,16 @@ def _handle(standing: str, colour: str) -> Line2D:
 def _lines(panel: Panel) -> list[list[Point]]:
     if not panel.joined:
         return []
-    return [[p for p in panel.points if p.method == method] for method in _methods(panel)]
+    return [[p for p in panel.points if p.method == method] for method in _methods(panel.points)]
 
 
-def _methods(panel: Panel) -> list[str]:
-    return list(dict.fromkeys(point.method for point in panel.points))
+def _methods(points: Sequence[Point]) -> list[str]:
+    return list(dict.fromkeys(point.method for point in points))
 
 
-def _colours(panel: Panel) -> dict[str, str]:
-    return {method: LINES[i % len(LINES)] for i, method in enumerate(_methods(panel))}
+def colours_of(points: Sequence[Point]) -> dict[str, str]:
+    """By method; of a part's points, so that a method looks the same in all its panels."""
+    return {method: LINES[i % len(LINES)] for i, method in enumerate(_methods(points))}
 
 
 def _colour(standing: str) -> str:

@@ -55,7 +55,7 @@ def test_crowded_labels_say_so():
 
 def test_marks_say_where_points_stand():
     axes = canvas(4.0).subplots()
-    figure.draw(axes, PART.panels[0])
+    figure.draw(axes, PART.panels[0], figure.colours_of(PART.points))
     faces = {
         line.get_xdata()[0]: (line.get_marker(), line.get_markerfacecolor())
         for line in axes.get_lines()
