@@ -80,16 +80,29 @@ def source_strength(setting: Setting = SEARCHLIGHT) -> float:
 
 
 @lru_cache(maxsize=64)
+def reflected(setting: Setting = SEARCHLIGHT) -> float:
+    """Share of the light that arrives which leaves after exactly one scattering, over alpha [-]."""
+    _, weighted = transform_density(setting)
+    return float(entered(setting) * weighted.sum())
+
+
+def critical_rate(setting: Setting = SEARCHLIGHT) -> float:
+    """k_c [1/mfp], the least k at which light scattered once leaves: far away its R_d falls off as e^{-k_c r}.
+
+    Searchlight: cot(theta / 2) at the critical angle theta; diffuse: n. 1 where n <= 1.
+    """
+    n = max(setting.n, 1.0)
+    return n + float(np.sqrt((n - 1) * (n + 1))) if setting.illumination == "searchlight" else float(n)
+
+
+@lru_cache(maxsize=64)
 def transform_density(setting: Setting) -> tuple[Floats, Floats]:
     """Nodes k, and f(k) dk on them."""
     n, phase = setting.n, HenyeyGreenstein(setting.g)
-    sine = min(1 / n, 1.0)  # of the critical angle
-    cosine = np.sqrt((1 - sine) * (1 + sine))
+    critical = critical_rate(setting)
     if setting.illumination == "searchlight":
-        critical = np.sqrt((1 + cosine) / (1 - cosine)) if n > 1 else 1.0
         f = _searchlight(critical, n, phase)
     else:
-        critical = max(n, 1.0)
         f = _diffuse_matched(phase) if n == 1 else _diffuse(critical, n, phase)
     return critical + BEYOND_CRITICAL, f * K_STEP * BEYOND_CRITICAL
 

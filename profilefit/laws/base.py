@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import abc
 from dataclasses import fields, replace
-from typing import ClassVar, Self
+from typing import Any, ClassVar, Self
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -15,6 +15,12 @@ from numpy.typing import NDArray
 from mcml_sim.media.setting import Setting
 from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.evaluate import evaluated
+from profilefit.laws.surface import Surface
+
+
+def closed() -> Any:
+    """A field that is no constant: numbers known in closed form, None for those of the law's own setting."""
+    return eqx.field(default=None, metadata={"closed": True})
 
 
 class Constants(eqx.Module):
@@ -34,7 +40,16 @@ class Constants(eqx.Module):
     @classmethod
     def constant_names(cls) -> tuple[str, ...]:
         """The names of the constants, in the order of the flattened pytree."""
-        return tuple(f.name for f in fields(cls) if not f.metadata.get("static", False))
+        return tuple(f.name for f in fields(cls) if not (f.metadata.get("static") or f.metadata.get("closed")))
+
+    @classmethod
+    def at_one_index(cls) -> tuple[str, ...]:
+        """The constants that profiles of one refractive index tell apart: all, but of a law that spans indices."""
+        return cls.constant_names()
+
+    def under(self, surface: Surface | None) -> Self:
+        """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
+        return self if surface is None else replace(self, surface=surface)
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
@@ -49,6 +64,14 @@ class Constants(eqx.Module):
     def text_numbers(self) -> dict[str, float]:
         """Numbers that its shader source needs beside its constants."""
         return {}
+
+    def text_constants(self) -> dict[str, float]:
+        """The constants of its shader source: every constant, or what they come to at the law's index."""
+        return self.constants()
+
+    def folds(self) -> dict[str, dict[str, float]]:
+        """Of each constant of its shader source, the derivatives by its own constants."""
+        return {name: {name: 1.0} for name in self.constant_names()}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
         """The named constants as a vector."""

@@ -28,7 +28,7 @@ from profilefit.laws.diffusion import (
     grosjean,
 )
 from profilefit.laws.entry import ANY_INDEX, Entry
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 Floats = NDArray[np.float64]
 # Depth t = min(x, 1) sinh(v) resolves both t ~ x, where the distance turns, and t ~ 1; e^{-t} ends at e^{-40}.
@@ -58,7 +58,7 @@ class BeamDiffusion(DiffusionLaw):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational | None = eqx.field(static=True, default=None)
+    albedo: Normalisation | None = eqx.field(static=True, default=None)
     halves: int = eqx.field(static=True, default=2)
     entry = Entry(
         "beam_diffusion",

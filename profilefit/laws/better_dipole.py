@@ -24,7 +24,7 @@ from profilefit.laws.diffusion import (
     grosjean,
 )
 from profilefit.laws.entry import ANY_INDEX, CLAMPS, Entry, Text
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 
 class BetterDipole(DiffusionLaw):
@@ -41,7 +41,7 @@ class BetterDipole(DiffusionLaw):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational | None = eqx.field(static=True, default=None)
+    albedo: Normalisation | None = eqx.field(static=True, default=None)
     entry = Entry(
         "better_dipole", "better dipole", n=ANY_INDEX, text=Text("better_dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS)
     )

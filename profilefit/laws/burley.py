@@ -18,7 +18,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.entry import NEAR_CLAMPS, RATIONAL, Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 XIE = 2.5715
 """The c of Xie et al. (2020)."""
@@ -37,7 +37,7 @@ class NormalizedDiffusion(ProfileLaw):
     q is `falloff_rate(alpha)`, A the reflectance at alpha by `albedo` (held fixed). Infinite at r = 0.
     """
 
-    albedo: eqx.AbstractVar[Rational]
+    albedo: eqx.AbstractVar[Normalisation]
 
     @abc.abstractmethod
     def falloff_rate(self, alpha) -> Array:
@@ -85,7 +85,7 @@ class Burley(NormalizedDiffusion):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
     s0: float
     s1: float
     s2: float
@@ -128,7 +128,7 @@ class BurleyDiffuseMfp(NormalizedDiffusion):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
     s0: float
     s1: float
     s2: float

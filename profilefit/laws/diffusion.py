@@ -20,7 +20,7 @@ from mcml_sim.media import fresnel
 from profilefit.errors import SettingError
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(64)
 # ln x [mfp] that bracket every radius of use: nearer than 1e-11 or farther than 1e17 mfp nothing is drawn.
@@ -38,7 +38,7 @@ class DiffusionLaw(ProfileLaw):
     simulator's. `cdf` is a share of the law's own reflectance; `albedo` is not used.
     """
 
-    albedo: eqx.AbstractVar[Rational | None]
+    albedo: eqx.AbstractVar[Normalisation | None]
     own_reflectance = True
 
     def __check_init__(self) -> None:

@@ -14,7 +14,7 @@ from jax import Array
 from mcml_sim.media.setting import Setting
 from profilefit.laws.diffusion import TEXT_ENDS, TEXT_PARTS, DiffusionLaw, flux, flux_within
 from profilefit.laws.entry import ANY_INDEX, CLAMPS, Entry, Text
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 
 class Dipole(DiffusionLaw):
@@ -28,7 +28,7 @@ class Dipole(DiffusionLaw):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational | None = eqx.field(static=True, default=None)
+    albedo: Normalisation | None = eqx.field(static=True, default=None)
     entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:

@@ -44,6 +44,7 @@ class Text:
     parts   files that it needs, before it in order; ends files that need it
     clamps  arguments that the source replaces by others, in words
     count   how often its `//% for` blocks stand
+    prefix  of its names, if not its file's name
     """
 
     file: str
@@ -51,6 +52,7 @@ class Text:
     ends: tuple[str, ...] = WRAPPERS
     clamps: str = "none"
     count: int = 0
+    prefix: str = ""
 
 
 @dataclass(frozen=True)

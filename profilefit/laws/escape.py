@@ -10,7 +10,7 @@ from jax import Array
 
 from mcml_sim.exact import single_scattering
 from profilefit.laws.base import ProfileLaw
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 # Nearer to white than this share of absorption the series alone is right to 2.4e-5, and Newton's step would cancel.
 NEAR_WHITE = 0.08
@@ -37,7 +37,7 @@ def decay_rate(alpha) -> Array:
 class EscapeLaw(ProfileLaw):
     """A law whose cdf tends to 1 by itself, scaled to A by `albedo`: R_d = A `scaled_density` / (2 pi x)."""
 
-    albedo: eqx.AbstractVar[Rational]
+    albedo: eqx.AbstractVar[Normalisation]
 
     @abc.abstractmethod
     def scaled_density(self, x: Array, alpha: Array) -> Array:

@@ -23,7 +23,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.entry import CLAMPS, Entry, Text
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 MOST, DEFAULT = 8, 6
 """d'Eon and Luebke's skin has six."""
@@ -59,7 +59,7 @@ class Gaussians(ProfileLaw):
     space is not, and far away below any half space. Valid for alpha in [0, 1].
     """
 
-    albedo: eqx.AbstractVar[Rational]
+    albedo: eqx.AbstractVar[Normalisation]
     f1: eqx.AbstractVar[float]
     f2: eqx.AbstractVar[float]
     v1: eqx.AbstractVar[float]
@@ -173,7 +173,7 @@ def _law_class(count: int) -> type[Gaussians]:
         "__module__": __name__,
         "__qualname__": f"Gaussians{count}",
         "__doc__": f"A sum of {count} Gaussians, `Gaussians`.",
-        "__annotations__": {"setting": Setting, "albedo": Rational, **dict.fromkeys(names, float)},
+        "__annotations__": {"setting": Setting, "albedo": Normalisation, **dict.fromkeys(names, float)},
         "setting": eqx.field(static=True),
         "albedo": eqx.field(static=True),
         "count": classmethod(lambda cls: count),

@@ -16,9 +16,9 @@ from jax import Array
 
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
-from profilefit.laws.entry import CLAMPS, Entry, Range, Text
+from profilefit.laws.entry import CLAMPS, Entry, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 NEAREST = 1e-25  # x [mfp] that stands for 0: every quotient stays finite, x ln x is 0
 FARTHEST = 1e8  # x [mfp]: no light is left, and x^4 is finite in float32
@@ -56,13 +56,13 @@ class Local(NamedTuple):
 
 def density(x: Array, shape: Shape) -> Array:
     """S lambda = 2 pi x R_d / A [1/mfp]."""
-    here = _local(jnp.clip(x, NEAREST, FARTHEST), shape)
+    here = local(jnp.clip(x, NEAREST, FARTHEST), shape)
     return jnp.exp(-here.exponent) * here.ratio * here.hazard
 
 
 def cumulative(x: Array, shape: Shape) -> Array:
     """-ln S [-]."""
-    here = _local(jnp.clip(x, NEAREST, FARTHEST), shape)
+    here = local(jnp.clip(x, NEAREST, FARTHEST), shape)
     return here.exponent - jnp.log(here.ratio)
 
 
@@ -95,14 +95,15 @@ def radius_at(t: Array, growth: Array, shape: Shape, steps: int) -> Array:
 
 def _closer(x: Array, t: Array, shape: Shape) -> Array:
     near = jnp.clip(x, NEAREST, FARTHEST)
-    here = _local(near, shape)
+    here = local(near, shape)
     flight = 1.0 / here.hazard
     step = (t - here.exponent + jnp.log(here.ratio)) * flight
     y = -here.bend * flight * step
     return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
 
 
-def _local(x: Array, shape: Shape) -> Local:
+def local(x: Array, shape: Shape) -> Local:
+    """The curve at x [mfp], NEAREST to FARTHEST."""
     q, per_h = shape.h / x, 1.0 / shape.h
     numerator, denominator, above = 1.0 + x * (shape.a + x * shape.b), 1.0 + shape.c * x, 1.0 + q
     # One reciprocal for three quotients.
@@ -154,13 +155,14 @@ class Hazard(EscapeLaw):
     h = e^{h0 + h1 lambda_0 + h2 kappa}         a = a0 + a1 lambda_0 + a2 lambda_0^2
     c = (c0 + c1 lambda_0 + c2 kappa)^2         b = b0 + b1 lambda_0 + b2 lambda_0^2       [lambda_0, kappa in 1/mfp]
 
-    lambda_0 runs from 1/2 (alpha = 1) to 3.3 or 2.4 (alpha = 0; searchlight or diffuse light, n = 1): it is smooth in
-    sqrt(1 - alpha) and straightens the four shapes more than that or A does. Valid for alpha in [0, 1] and r in
-    [0, inf]. `albedo` is the map to A (held fixed). One exponential and one logarithm a profile.
+    lambda_0 runs from 1/2 (alpha = 1) to 3.3 or 2.4 (alpha = 0; searchlight or diffuse light): it is smooth in
+    sqrt(1 - alpha) and straightens the four shapes more than that or A does. Valid where nothing refracts (n > 1 is
+    `RefractingHazard`'s), for alpha in [0, 1] and r in [0, inf]. `albedo` is the map to A (held fixed). One exponential
+    and one logarithm a profile.
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
     h0: float
     h1: float
     h2: float
@@ -181,9 +183,8 @@ class Hazard(EscapeLaw):
             **{"h0": 1.5, "h1": -0.2, "h2": -0.2, "c0": 0.5, "c1": 0.3, "c2": 0.2},
             **{"a0": 0.5, "a1": -0.25, "a2": 0.04, "b0": 0.17, "b1": -0.2, "b2": 0.06},
         },
-        n=Range(1.0, 1.5),
         own=True,
-        text=Text("hazard", ("rational", "decay"), clamps=CLAMPS),
+        text=Text("hazard", ("rational", "decay", "survival"), clamps=CLAMPS),
     )
 
     def shape(self, alpha) -> Shape:
@@ -205,8 +206,8 @@ class Hazard(EscapeLaw):
 
     @property
     def sampler(self) -> HazardSampler:
-        """The inverse of the cdf, to 1e-4 in xi, in a fixed number of operations: one step where n = 1, else two."""
-        return HazardSampler(self, 1 if self.setting.n == 1.0 else 2)
+        """The inverse of the cdf, to 1e-4 in xi, in a fixed number of operations."""
+        return HazardSampler(self)
 
     @property
     def samplers(self) -> dict[str, Sampler]:
@@ -221,7 +222,7 @@ class HazardSampler(Sampler):
     where p and q are `GUESS`: right to first order at xi = 0, and x = t/kappa far away, as it must be.
     Step: the hazard around x is taken for lambda / (1 + y), a straight line in 1/lambda, and its integral for a cubic.
 
-    Error in xi at every alpha and xi, under both lights: one step 8e-5 where n = 1, 2e-3 where n = 1.5; two steps 2e-8.
+    Error in xi at every alpha and xi, under both lights: one step 8e-5, two steps 2e-8.
     """
 
     law: Hazard

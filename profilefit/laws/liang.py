@@ -17,7 +17,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 PROFILE_CONSTANTS = ("a1", "a2", "a3", "b0", "b1", "b2", "b3", "b4", "c1", "c2", "c3")
 INVERSE_CONSTANTS = ("g1", "g2", "g3", "g4", "h1", "h2", "h3")
@@ -44,7 +44,7 @@ class Liang(ProfileLaw):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
     a1: float
     a2: float
     a3: float

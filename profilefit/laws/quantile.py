@@ -18,7 +18,7 @@ from profilefit.laws.entry import CLAMPS, Entry, Range, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.liang import QUANTILES
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 
 # The scales of t of the two fractions in M: of the grid 2, 2.5, 3 and 0.3, 0.5, 0.7, 1 those of the least error that
 # serve both lights.
@@ -61,7 +61,7 @@ class Quantile(EscapeLaw):
     """
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
     a0: float
     a1: float
     a2: float

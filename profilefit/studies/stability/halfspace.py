@@ -18,7 +18,7 @@ from mcml_sim.exact.by_albedo import by_alpha
 from mcml_sim.exact.half_space import FINER
 from mcml_sim.exact.transform import Transform
 from mcml_sim.media.setting import Setting
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 from profilefit.studies.stability import layout
 from profilefit.studies.stability.cells import DIMMEST, Cells, absolute, judged, relative, steps_down, steps_up
 from profilefit.studies.stability.layout import CDF, FLOAT64, LENGTHS, PROFILE, REFLECTANCE_OF, SAMPLE, ArgumentAxis
@@ -32,7 +32,7 @@ NO_LIMIT = "closer than 1e-6 mfp under diffuse light R_d's limit is not known"
 NEAR_SOURCE = 1e-4  # of R_d closer than 1e-6 mfp, where its limit stands for it
 
 
-def cells_of(setting: Setting, normalisation: Rational) -> Iterator[Cells]:
+def cells_of(setting: Setting, normalisation: Normalisation) -> Iterator[Cells]:
     """Every function, over all arguments. Errors are those that more nodes show, or those of an identity."""
     alpha, x, xi = layout.alpha(np.float64), layout.radius(np.float64), layout.share(np.float64)
     low, high = LENGTHS[np.float64]
@@ -90,7 +90,7 @@ def _profile(setting: Setting, places: tuple[ArgumentAxis, ...], value: Floats) 
     )  # fmt: skip
 
 
-def _of_alpha(setting: Setting, alpha: ArgumentAxis, normalisation: Rational) -> Iterator[Cells]:
+def _of_alpha(setting: Setting, alpha: ArgumentAxis, normalisation: Normalisation) -> Iterator[Cells]:
     value, near = (
         np.asarray(exact.reflectance(alpha.values, setting)),
         np.asarray(normalisation.reflectance(alpha.values)),

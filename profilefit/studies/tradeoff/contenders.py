@@ -29,7 +29,7 @@ from profilefit.laws.burley import (
 from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 from profilefit.recipes import catalogue
 from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
 
@@ -56,14 +56,14 @@ class FastBurley(Fast, Burley):
     """In units of the mean free path."""
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
 
 
 class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
     """In units of the diffuse mean free path."""
 
     setting: Setting = eqx.field(static=True)
-    albedo: Rational = eqx.field(static=True)
+    albedo: Normalisation = eqx.field(static=True)
 
 
 class FastBurleySampler(BurleySampler):

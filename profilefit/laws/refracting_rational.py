@@ -1,0 +1,166 @@
+"""The map between alpha and A under every surface that refracts: both ends exact, and the light scattered once."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+
+from mcml_sim.media.setting import Setting
+from profilefit.laws.base import closed
+from profilefit.laws.entry import Entry, Range, Text
+from profilefit.laws.evaluate import evaluated
+from profilefit.laws.rational import Normalisation
+from profilefit.laws.surface import Number, Surface, surface_of
+
+REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
+STEPS = 4  # of Newton's method in the inverse: the root that they start from is right to a hundredth
+
+
+class Terms(NamedTuple):
+    """The map at one index: A / alpha = p (1 + b s + f s^2) / ((1 + s)(g0 + g1 s + g2 s^2 + g3 s^3)).
+
+    p = entered (1 - rho) [-];  m0 ... m3 those of the light scattered twice and more, alpha^2 M(s) / ((1 + s)^2 G(s))
+    """
+
+    p: Number
+    b: Number
+    c: Number
+    d: Number
+    f: Number
+    g: tuple[Number, Number, Number, Number]
+    m: tuple[Number, Number, Number, Number]
+
+
+class RefractingRational(Normalisation):
+    """A = t (1 - rho) R / (1 - rho R),  R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2),  s = sqrt(1 - alpha)
+
+    t is the share of the light that enters, rho that which the surface reflects back of cosine-weighted light from
+    inside: were all light inside cosine-weighted, R would be the reflectance without a surface, whatever n. What it is
+    not makes the constants depend on n, by mu_c = sqrt(1 - 1/n^2):
+
+    c = c0 + c1 mu_c + c2 mu_c^2 + c3 mu_c^3     d likewise     f = f0 + f1 mu_c
+
+    b follows from light scattered once, which is exact: A / alpha -> A_1 at alpha = 0. So A(0) = 0, the slope there and
+    A(1) = t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more than
+    t, and alpha(A > t) = 1. For n in (1, 1.6], under either light.
+
+    c0 ... c3, d0 ... d3, f0, f1  constants [-]
+    """
+
+    setting: Setting = eqx.field(static=True)
+    c0: float
+    c1: float
+    c2: float
+    c3: float
+    d0: float
+    d1: float
+    d2: float
+    d3: float
+    f0: float
+    f1: float
+    surface: Surface | None = closed()
+    entry = Entry(
+        "rational",
+        "rational map",
+        is_map=True,
+        records=("albedo-rational",),
+        start={  # within a hundredth of the exact map
+            **{"c0": 1.6, "c1": 0.1, "c2": 0.1, "c3": 0.1, "d0": 0.3, "d1": 1.0, "d2": 3.0, "d3": -2.0},
+            **{"f0": 0.03, "f1": 0.01},
+        },
+        n=REFRACTING,
+        own=True,
+        text=Text("refracting_rational", (), prefix="rational", clamps="A to the light that enters"),
+    )
+
+    @classmethod
+    def at_one_index(cls) -> tuple[str, ...]:
+        return ("c0", "d0", "f0")
+
+    def here(self) -> Surface:
+        """The closed numbers of its setting, or of those that it was put under."""
+        return self.surface or surface_of(self.setting)
+
+    def text_numbers(self) -> dict[str, float]:
+        """The share that enters, rho, and A_1 over alpha [-]."""
+        here = surface_of(self.setting)
+        return {"entered": here.entered, "trapped": here.trapped, "once": here.once}
+
+    def text_constants(self) -> dict[str, float]:
+        c, d, f = self.folded()
+        return {"c": float(c), "d": float(d), "f": float(f)}
+
+    def folds(self) -> dict[str, dict[str, float]]:
+        mu = surface_of(self.setting).cosine
+        powers = {letter: {f"{letter}{i}": mu**i for i in range(4)} for letter in "cd"}
+        return {**powers, "f": {f"f{i}": mu**i for i in range(2)}}
+
+    @property
+    def entered(self) -> float:
+        """t, the share of the light that enters [-]."""
+        return surface_of(self.setting).entered
+
+    def folded(self) -> tuple[Number, Number, Number]:
+        """c, d, f at its index."""
+        mu = self.here().cosine
+        c = self.c0 + mu * (self.c1 + mu * (self.c2 + mu * self.c3))
+        d = self.d0 + mu * (self.d1 + mu * (self.d2 + mu * self.d3))
+        return c, d, self.f0 + mu * self.f1
+
+    def terms(self) -> Terms:
+        """All that depends on n only."""
+        here = self.here()
+        (c, d, f), rho, once = self.folded(), here.trapped, here.once
+        p = here.entered * (1.0 - rho)
+        b = 2.0 * once / p * (1.0 + c + d) - 1.0 - f
+        g = 1.0 - rho, c - rho * (b - 1.0), d - rho * (f - b), rho * f
+        m0 = p - once * g[0]
+        m1 = m0 + p * b - once * (g[0] + g[1])
+        m2 = m1 + p * f - once * (g[1] + g[2])
+        return Terms(p, b, c, d, f, g, (m0, m1, m2, once * g[3]))
+
+    @evaluated
+    def reflectance(self, alpha) -> Array:
+        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
+        return alpha / self.albedo_over_reflectance(jnp.asarray(alpha))
+
+    @evaluated
+    def albedo_over_reflectance(self, alpha) -> Array:
+        """alpha / A [-], finite at alpha = 0 too."""
+        s, of = jnp.sqrt(1.0 - alpha), self.terms()
+        return (1.0 + s) * _cubic(of.g, s) / (of.p * (1.0 + s * (of.b + of.f * s)))
+
+    @evaluated
+    def scattered_again(self, alpha) -> Array:
+        """Reflectance by light scattered twice and more [-], A - alpha A_1 without its cancellation."""
+        s, of = jnp.sqrt(1.0 - alpha), self.terms()
+        return alpha**2 * _cubic(of.m, s) / ((1.0 + s) ** 2 * _cubic(of.g, s))
+
+    @evaluated
+    def alpha(self, reflectance) -> Array:
+        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
+        here, of = self.here(), self.terms()
+        share = jnp.minimum(reflectance / here.entered, 1.0)
+        inside = 1.0 - here.trapped * (1.0 - share)
+        light, dark = share / inside, (1.0 - here.trapped) * (1.0 - share) / inside  # R and 1 - R
+        # In s where A is large, in 1 - s where it is small, so that neither cancels.
+        s = _root(dark, 1.0 - of.b + light * of.c, of.b - of.f + light * of.d, of.f)
+        linear = 1.0 + of.b + of.f + light * (of.c + 2.0 * of.d)
+        y = _root(light * (1.0 + of.c + of.d), linear, -(of.b + 2.0 * of.f + light * of.d), of.f)
+        return jnp.where(share < 0.5, y * (2.0 - y), (1.0 - s) * (1.0 + s))
+
+
+def _cubic(terms: tuple[Number, Number, Number, Number], s: Array) -> Array:
+    return terms[0] + s * (terms[1] + s * (terms[2] + s * terms[3]))
+
+
+def _root(rest: Array, linear: Array, quadratic: Array, cubic: Number) -> Array:
+    """x >= 0 with rest = linear x + quadratic x^2 + cubic x^3: that of the quadratic, and Newton's method."""
+    x = 2.0 * rest / (linear + jnp.sqrt(jnp.maximum(linear**2 + 4.0 * quadratic * rest, 0.0)))
+    for _ in range(STEPS):
+        over = x * (linear + x * (quadratic + x * cubic)) - rest
+        x = x - over / (linear + x * (2.0 * quadratic + 3.0 * cubic * x))
+    return x

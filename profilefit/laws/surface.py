@@ -1,0 +1,55 @@
+"""What is known in closed form of a half space under a surface that refracts: numbers of the light and the index only.
+
+A fit to several indices gives arrays of them, one number for each profile; a law at one index has floats.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from jax import Array
+from numpy.typing import NDArray
+
+from mcml_sim.exact import single_scattering
+from mcml_sim.media.setting import Setting
+
+Number = float | Array | NDArray[np.float64]
+
+
+class Surface(NamedTuple):
+    """Closed numbers of one setting, or arrays of those of several.
+
+    cosine    mu_c = sqrt(1 - 1/n^2), of the critical angle inside [-]
+    trapped   rho, the share of cosine-weighted light from inside that the surface reflects back [-]
+    entered   of the light that arrives, the share that enters [-]
+    once      A_1, the reflectance by light scattered exactly once, over alpha [-]
+    source    lim 2 pi r R_d at r = 0, over alpha [1/mfp]
+    critical  k_c, with which light scattered once falls off [1/mfp]
+    """
+
+    cosine: Number
+    trapped: Number
+    entered: Number
+    once: Number
+    source: Number
+    critical: Number
+
+
+@lru_cache(maxsize=64)
+def surface_of(setting: Setting) -> Surface:
+    """The numbers of one setting, n >= 1 and g = 0."""
+    return Surface(
+        cosine=float(np.sqrt((setting.n - 1.0) * (setting.n + 1.0))) / setting.n,
+        trapped=1.0 - single_scattering.mean_transmittance(setting.n),
+        entered=single_scattering.entered(setting),
+        once=single_scattering.reflected(setting),
+        source=single_scattering.source_strength(setting),
+        critical=single_scattering.critical_rate(setting),
+    )
+
+
+def surfaces_of(settings: tuple[Setting, ...]) -> Surface:
+    """The numbers of several settings, each (k, 1)."""
+    return Surface(*(np.array(column)[:, None] for column in zip(*map(surface_of, settings), strict=True)))
