@@ -54,6 +54,7 @@ _ALL = (
     Measure("r2", "of r R_d", is_high=True),
     Measure("mse near", "of the nearer half of the trimmed range", unit="1/mfp²"),
     Measure("mse far", "of the farther half"),
+    Measure("largest", "max |law / exact − 1| of R_d", "largest error of R_d at a radius"),
     Measure("r2 near", "of the nearer half of the trimmed range", is_high=True),
     Measure("r2 far", "of the farther half", is_high=True),
     Measure("inversion_error", "max |cdf(r(ξ)) − ξ|", "error in xi", short="error", symbol="xi"),

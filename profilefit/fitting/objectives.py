@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.laws.surface import Surface, surfaces_of
 
 Values = Array | NDArray[np.float64]
 # A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
@@ -39,6 +40,8 @@ class Rings(eqx.Module):
     weight (m,) 1 where an albedo counts, else 0; limits (3,) weights of the energy limit, of the source limit
     and of rising with alpha
     xi (k,) shares of energy for quantiles
+    surface, surfaces  closed numbers of each profile (m, 1), and of each index (j, 1), profiles of one after those of
+    another; None where all belong to the law's own setting
     """
 
     alpha: Values
@@ -49,6 +52,8 @@ class Rings(eqx.Module):
     weight: Values
     limits: Values
     xi: Values
+    surface: Surface | None = None
+    surfaces: Surface | None = None
 
     @property
     def reflectance(self) -> Array:
@@ -68,14 +73,14 @@ def energy(law, rings: Rings) -> Array:
     The sum of squares of a profile's rings is the energy-weighted mean of (law/data - 1)^2. Two more rows an albedo
     hold the unscaled law to its limits: total energy A, and 2 pi r R_d -> alpha/2 at the source.
     """
-    alpha = rings.alpha[:, None]
+    alpha, law = rings.alpha[:, None], law.under(rings.surface)
     inside = law.unscaled_energy(rings.r_edges, alpha)
     data = jnp.where((rings.used > 0) & (rings.energy > 0), rings.energy, 1.0)
     weight = rings.used / jnp.sqrt(data * rings.reflectance[:, None])
     misfit = weight * (jnp.diff(inside, axis=-1) - rings.energy)
-    total = law.unscaled_energy(EVERYWHERE, rings.alpha) / rings.reflectance - 1.0
-    source = law.source_strength(rings.alpha) / (0.5 * rings.alpha) - 1.0
-    return jnp.concatenate([misfit, (rings.limits[0] * total)[:, None], (rings.limits[1] * source)[:, None]], axis=1)
+    total = law.unscaled_energy(EVERYWHERE, alpha) / rings.reflectance[:, None] - 1.0
+    source = law.source_strength(alpha) / (0.5 * alpha) - 1.0
+    return jnp.concatenate([misfit, rings.limits[0] * total, rings.limits[1] * source], axis=1)
 
 
 def relative(law, rings: Rings) -> Array:
@@ -86,7 +91,8 @@ def relative(law, rings: Rings) -> Array:
     cdf at all edges, `SHARE_WEIGHT` times as heavy, since `ks` must be that much smaller than `rel`. The
     last rows resist a law that falls with alpha next to white, ring by ring: absorption must not add light.
     """
-    alpha = rings.alpha[:, None]
+    fall = _fall(law, rings)
+    alpha, law = rings.alpha[:, None], law.under(rings.surface)
     inside = law.unscaled_energy(rings.r_edges, alpha)
     widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
     judged = (rings.r_edges[:-1] >= NEAREST * (1.0 - 1e-9)) & (rings.cdf[:, 1:] <= ENERGY_WITHIN)
@@ -97,13 +103,15 @@ def relative(law, rings: Rings) -> Array:
     )  # also where nothing counts: E^2 in a derivative must not underflow
     misfit = weight * (jnp.diff(inside, axis=-1) / data - 1.0)
     shares = inside / law.unscaled_energy(EVERYWHERE, alpha) - rings.cdf
-    falling = rings.limits[2] / np.sqrt(rings.alpha.size) * jnp.broadcast_to(_fall(law, rings), misfit.shape)
+    of_each = rings.alpha.size // len(fall)
+    falling = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(fall, of_each, axis=0)
     return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, falling], axis=1)
 
 
 def _fall(law, rings: Rings) -> Array:
-    """(n,) how far the energy of each ring falls short of rising with alpha next to white; 0 where it rises."""
-    inside = law.unscaled_energy(rings.r_edges, jnp.array(WHITEST)[:, None])
+    """(j, n) how far the energy of each ring falls short of rising with alpha next to white, at each of the indices; 0
+    where it rises."""
+    inside = law.under(rings.surfaces).unscaled_energy(rings.r_edges, jnp.array(WHITEST)[:, None, None])
     darker, white = jnp.diff(inside, axis=-1)
     lit = (darker > DARK) & (white > DARK)
     ratio = jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)
@@ -120,12 +128,12 @@ def radial(law, rings: Rings) -> Array:
 
 def albedo(law, rings: Rings) -> Array:
     """alpha(A) - alpha, unweighted over the albedos given."""
-    return (law.alpha(rings.reflectance) - rings.alpha)[:, None]
+    return law.under(rings.surface).alpha(rings.reflectance[:, None]) - rings.alpha[:, None]
 
 
 def reflectance(law, rings: Rings) -> Array:
     """A(alpha) - A, unweighted over the albedos given."""
-    return (law.reflectance(rings.alpha) - rings.reflectance)[:, None]
+    return law.under(rings.surface).reflectance(rings.alpha[:, None]) - rings.reflectance[:, None]
 
 
 def radius(law, rings: Rings) -> Array:
@@ -172,6 +180,7 @@ def rings_of(profiles: Profiles, used=None, limits=NO_LIMITS, xi=()) -> Rings:
         weight.astype(float),
         np.asarray(limits, float),
         np.asarray(xi, float),
+        *((surfaces_of(each), surfaces_of(tuple(dict.fromkeys(each)))) if (each := profiles.settings) else ()),
     )
 
 

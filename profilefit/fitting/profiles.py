@@ -5,7 +5,8 @@ The radius at which the paper trims a profile before fitting is found by the sea
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -91,6 +92,7 @@ class Profiles:
     beyond             (m,) energy reflected beyond the last edge [-]
     covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
+    indices            (m,) refractive indices, where profiles of several are fitted together; None for that of `setting`
     """
 
     alpha: Floats
@@ -103,6 +105,26 @@ class Profiles:
     setting: Setting
     photons: int | None = None
     covariance: Covariance | None = None
+    indices: Floats | None = None
+
+    @classmethod
+    def joined(cls, parts: Sequence[Profiles], setting: Setting) -> Profiles:
+        """Profiles without noise of several indices, each of the same albedos and rings, under the light of `setting`,
+        to which the record of a fit will belong."""
+        first = parts[0]
+        if not all(np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts):
+            raise InputError("profiles of several indices must have the same albedos and rings, got others")
+        rows = {
+            name: np.concatenate([getattr(one, name) for one in parts])
+            for name in ("alpha", "energy", "standard_error", "effective_samples", "beyond")
+        }
+        indices = np.repeat([one.setting.n for one in parts], first.alpha.size)
+        return cls(**rows, r_edges=first.r_edges, source=first.source, setting=setting, indices=indices)
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """The setting of each profile (m,), where they are of several indices; else none."""
+        return () if self.indices is None else tuple(replace(self.setting, n=float(n)) for n in self.indices)
 
     @classmethod
     def from_orders(cls, orders: Orders, alpha: ArrayLike, correlated: bool = True) -> Profiles:

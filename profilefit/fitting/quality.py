@@ -1,6 +1,7 @@
 """How far a law is from the exact profile: one name and one definition for each measure, used everywhere.
 
 rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l, r at 99.5 % of the energy]
+largest  the largest such error at a single radius
 ks       max over r of |cdf_law - cdf_exact|
 l1       half the integral of |2 pi r (R_law - R_exact)| over r, over A: misplaced energy
 mse, r2  of R'_d = r R_d on an even grid over [0, r'_max], the range of the trimming (6) of Liang et al.; `_halves` of
@@ -39,6 +40,7 @@ class Quality:
     r2: Floats
     mse_halves: Floats
     r2_halves: Floats
+    largest: Floats
 
 
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
@@ -80,7 +82,7 @@ def _truth(alpha: float, setting: Setting) -> _Truth:
 
 def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:
     truth = _truth(alpha, law.setting)
-    rel = np.mean(np.abs(law.profile(truth.r, alpha) / truth.profile - 1.0))
+    off = np.abs(law.profile(truth.r, alpha) / truth.profile - 1.0)
     law_cdf = law.cdf(truth.far, alpha)
     ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.
@@ -91,7 +93,7 @@ def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...
         for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))
     )
     mse_halves, r2_halves = zip(*halves, strict=True)
-    return float(rel), float(ks), float(l1), mse, r2, mse_halves, r2_halves
+    return float(off.mean()), float(ks), float(l1), mse, r2, mse_halves, r2_halves, float(off.max())
 
 
 @dataclass(frozen=True)
@@ -100,7 +102,8 @@ class AlbedoQuality:
 
     delta_A      max |A_law(alpha) - A| over alpha in [0, 1]; where it is NaN the law has no A, and counts as |A - 1|
     delta_alpha  max |alpha_law(A) - alpha|; largest_s max |sqrt(1 - alpha_law) / sqrt(1 - alpha) - 1|, alpha < 1
-    monotone     whether alpha_law rises all the way; at_one alpha_law(A = 1); fold A where it turns (1 if it does not)
+    monotone     whether alpha_law rises up to the largest A there is; at_one alpha_law there, which is A = 1 where
+                 nothing refracts; fold A where it turns (1 if it does not)
     """
 
     delta_A: float
@@ -112,7 +115,7 @@ class AlbedoQuality:
 
 
 def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
-    """Measure a map on 1000 albedos even in sqrt(1 - alpha), and its shape on reflectances even in [0, 1]."""
+    """Measure a map on 1000 albedos even in sqrt(1 - alpha), and its shape on even reflectances up to the largest."""
     s = (np.arange(1000) + 0.5) / 1000
     alpha = 1.0 - s**2
     truth = np.asarray(exact.reflectance(alpha, setting=law.setting))
@@ -120,7 +123,7 @@ def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
     mapped_alpha = np.asarray(law.alpha(truth))
     with np.errstate(invalid="ignore"):
         ratio = np.sqrt(1.0 - mapped_alpha) / s
-    even = np.linspace(0.0, 1.0, 20001)
+    even = np.linspace(0.0, law.reflectances.high, 20001)
     curve = np.asarray(law.alpha(even))
     rising = np.diff(curve) > 0
     fold = 1.0 if rising.all() else float(even[np.argmax(~rising)])
@@ -129,6 +132,6 @@ def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
         float(np.max(np.abs(mapped_alpha - alpha))),
         float(np.max(np.abs(np.nan_to_num(ratio, nan=np.inf) - 1.0))),
         bool(rising.all()),
-        float(law.alpha(1.0)),
+        float(law.alpha(even[-1])),
         fold,
     )

@@ -24,6 +24,11 @@ MAPS = {
     "van_de_hulst": "van_de_hulst.VanDeHulst",
     "chiang": "chiang.Chiang",
 }
+# Those that have another form where the surface refracts, which goes by the same name.
+REFRACTING = {
+    "hazard.Hazard": "refracting_hazard.RefractingHazard",
+    "rational.Rational": "refracting_rational.RefractingRational",
+}
 
 
 def profile_classes() -> "dict[str, Any]":
@@ -40,6 +45,12 @@ def home(place: str) -> "Any":
     """The class at a home in one of the tables: "module.Class" of this package, or of another by its whole name."""
     module, _, kind = place.rpartition(".")
     return getattr(import_module(module if "." in module else f"{__name__}.{module}"), kind)
+
+
+def at_index(kind: "Any", n: float) -> "Any":
+    """The class that a law or map of this class has at a refractive index: its own, or that for surfaces that refract."""
+    place = REFRACTING.get(f"{kind.__module__.rpartition('.')[2]}.{kind.__name__}")
+    return kind if n == 1.0 or place is None else home(place)
 
 
 def _classes(table: "Mapping[str, str]") -> "dict[str, Any]":

@@ -47,6 +47,13 @@ class Constants(eqx.Module):
         """The constants that profiles of one refractive index tell apart: all, but of a law that spans indices."""
         return cls.constant_names()
 
+    def at_index(self, n: float) -> Self:
+        """The same constants, and those of its map, at another refractive index of those that they span."""
+        given: dict[str, Any] = {"setting": replace(self.setting, n=n)}
+        if getattr(self, "albedo", None) is not None:
+            given["albedo"] = self.albedo.at_index(n)  # type: ignore[attr-defined]
+        return replace(self, **given)
+
     def under(self, surface: Surface | None) -> Self:
         """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
         return self if surface is None else replace(self, surface=surface)

@@ -214,6 +214,12 @@ class RefractingHazard(EscapeLaw):
         left = of.share * jnp.exp(-cumulative(x, of.once)) + (1.0 - of.share) * jnp.exp(-cumulative(x, of.again))
         return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - left, 0.0, 1.0), 1.0), 0.0)
 
+    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
+        return self.albedo.under(self.surface).reflectance(alpha) * self.scaled_cdf(x, alpha)
+
+    def source_strength(self, alpha: Array) -> Array:
+        return self.here().source * alpha
+
     @property
     def sampler(self) -> RefractingHazardSampler:
         """A part of the light by chance, and the inverse of its cdf, to 1e-7 in xi, in a fixed number of operations."""

@@ -11,9 +11,9 @@ from profilefit import laws
 from profilefit.errors import InputError, RecordError, SettingError, ShippedMap
 from profilefit.laws import gaussians, published
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation, Rational
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import record_setting
+from profilefit.recipes.record import covers, record_setting
 from profilefit.recipes.record_folder import SEARCHLIGHT, Folder, Records
 
 Law = TypeVar("Law", bound=Constants)
@@ -42,9 +42,9 @@ def load(
     """
     kind, records = _profile_law(name), Records.of(folder or fits_folder())
     values, where = _constants(kind, constants, _checked(setting), records)
-    if kind.own_reflectance:
-        return _made(kind, values, constants, setting=where)
-    return _made(kind, values, constants, setting=where, albedo=normalisation(where, records))
+    at = laws.at_index(kind, where.n)
+    given = {} if kind.own_reflectance else {"albedo": normalisation(where, records)}
+    return _made(at, values, constants, setting=where, **given)
 
 
 def albedo_law(
@@ -55,10 +55,10 @@ def albedo_law(
         raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
     values, where = _constants(kind, constants, _checked(setting), Records.of(folder or fits_folder()))
-    return _made(kind, values, constants, setting=where)
+    return _made(laws.at_index(kind, where.n), values, constants, setting=where)
 
 
-def normalisation(setting: Setting, folder: Folder | None = None) -> Rational:
+def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisation:
     """The map that scales profile laws to their reflectance; SettingError where the setting has none."""
     records = Records.of(folder or fits_folder())
     path = records.path_or_shipped(ALBEDO_RECORD, setting)
@@ -66,7 +66,8 @@ def normalisation(setting: Setting, folder: Folder | None = None) -> Rational:
         warnings.warn(
             f"no record {path.stem!r} in {str(records.folder)!r}: the shipped map serves", ShippedMap, stacklevel=3
         )
-    return _made(Rational, _of_record(records.read(path), setting, path.stem), path.stem, setting=setting)
+    kind = laws.at_index(Rational, setting.n)
+    return _made(kind, _of_record(records.read(path), setting, path.stem), path.stem, setting=setting)
 
 
 def key_of(name: str) -> str:
@@ -142,7 +143,7 @@ def _accepted(law: str) -> str:
 
 
 def _of_record(content: dict[str, Any], setting: Setting, name: str) -> dict[str, float]:
-    if record_setting(content) != setting:
+    if not covers(content, setting):
         raise SettingError(f"record {name} belongs to {record_setting(content)}, got a request for {setting}")
     try:
         return {key: float(value["regenerated"]) for key, value in content["constants"].items()}

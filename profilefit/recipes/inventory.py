@@ -14,7 +14,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws import published
 from profilefit.laws.entry import Entry
 from profilefit.recipes import catalogue
-from profilefit.recipes.record import record_name, record_setting
+from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
 
 Names = Sequence[str] | None
@@ -135,7 +135,7 @@ def _named(entry: Entry, which: str, law: Any, records: Records) -> Named:
 
 
 def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]:
-    return tuple(records.folder / f"{record_name(base, setting)}.json" for base in entry.records)
+    return tuple(records.folder / f"{records.name(base, setting)}.json" for base in entry.records)
 
 
 def _default(entry: Entry, has_constants: bool) -> str:

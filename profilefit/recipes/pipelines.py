@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -32,6 +32,8 @@ Floats = NDArray[np.float64]
 Made = tuple[dict[str, Any], Arrays]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
+# Indices that a law which spans them is judged at, fitted or not: from skin's surface to glass.
+JUDGED = (1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
 
 
 def needs_photons(recipe: Recipe) -> bool:
@@ -45,7 +47,12 @@ def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     content, arrays = _described(recipe, run, profiles, result)
     laws = {**_printed_laws(recipe, run), "regenerated": result.law}
     content["quality"] = {name: _albedo_quality(law, light) for name, law in laws.items()}
-    arrays |= {"reflectance": profiles.reflectance, "reflectance_error": profiles.standard_error.sum(axis=1)}
+    if recipe.indices:
+        each = {n: albedo_quality(result.law.at_index(n)).delta_A for n in _judged(recipe)}
+        content["quality"]["by_index"] = {"n": list(each), "delta_A": list(each.values())}
+    drawn = curves(profiles)
+    arrays |= {"reflectance": drawn["energy"].sum(axis=1) + drawn["beyond"]}
+    arrays |= {"reflectance_error": drawn["energy_error"].sum(axis=1)}
     return content | found, arrays
 
 
@@ -54,6 +61,8 @@ def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
     content["quality"] = _compare(recipe, run, result.law, light)
+    if recipe.indices:
+        content["quality"]["by_index"] = by_index(result.law, _judged(recipe))
     content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
     return content | found, arrays | curves(profiles)
 
@@ -134,6 +143,20 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
     return np.array(errors)
 
 
+def by_index(law: ProfileLaw, indices: Sequence[float]) -> dict[str, list[float]]:
+    """Worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at each n."""
+    alpha = albedo_values(QUALITY_ALBEDOS)
+    each = [profile_quality(law.at_index(n), alpha) for n in indices]
+    worst = {name: [float(np.max(getattr(one, name))) for one in each] for name in ("rel", "ks", "largest")}
+    return {"n": list(indices), **worst}
+
+
+def _judged(recipe: Recipe) -> tuple[float, ...]:
+    """The indices that a law which spans them is judged at: `JUDGED`, as far as the recipe reaches."""
+    low, high = recipe.span
+    return tuple(n for n in JUDGED if low < n <= high)
+
+
 def _fitted(recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | None) -> tuple[Fit, dict[str, Any]]:
     """The fit of a recipe, and what random starts and the other truth say of it."""
     start, found = starts.starting_law(recipe, run.out), {}
@@ -145,7 +168,12 @@ def _fitted(recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | 
             run.say(f"{recipe.name}: {tried.result}")
             result = _fit(recipe, profiles, start.with_vector(result.free, list(map(float, tried.best))))
     if recipe.check and light is not None:
-        found["crosscheck"] = crosscheck(result, profiles, light).content()
+        own, seen = result, profiles
+        if recipe.indices:  # photons are of one index: those constants that it tells apart, with the others held
+            at_one = replace(recipe, indices=())
+            seen = truth_of(at_one, None)
+            own = _fit(at_one, seen, result.law)
+        found["crosscheck"] = crosscheck(own, seen, light).content()
     return result, found
 
 
@@ -188,13 +216,13 @@ def _compare(recipe: Recipe, run: RecipeRun, law: Any, light: Orders | None) -> 
 
 
 def _profile_quality(law: ProfileLaw, alpha: Floats, light: Orders | None) -> Any:
-    if law.setting.is_matched_isotropic or light is None:
+    if law.setting.n >= 1.0 or light is None:
         return profile_quality(law, alpha)
     return quality_tally.profile_quality(law, light, alpha)
 
 
 def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
-    if law.setting.is_matched_isotropic or light is None:
+    if law.setting.n >= 1.0 or light is None:
         return albedo_quality(law)
     return quality_tally.albedo_quality(law, light)
 

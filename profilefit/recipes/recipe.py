@@ -21,6 +21,8 @@ CHECKS = ("", "orders")
 MOST_STARTS = 1000
 SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
 TRIMMED = ("r R_d", "R_d", "none")
+NEAR_MATCHED = 1.02  # laws in n are continued to 1 from here
+FEWEST_INDICES, LARGEST_INDEX = 4, 3.0  # coefficients are cubics in n; exact light is promised up to 3
 MFP = (1e-3, 1e3)  # beyond three decades a length is a slip of the pen
 FINEST = 0.0025  # the first edge of the run that rings are merged from [mfp]
 FEWEST_RINGS, MOST_RINGS = 3, 4000  # the run has 4000 even rings
@@ -111,6 +113,8 @@ class Recipe:
     """One fit, from its truth to its record. `held` are constants that stay at their starting value, and why.
 
     setting        the light and the surface; the constants belong to it and to no other
+    indices        refractive indices that a law which spans them is fitted to at once; the record says n = setting.n
+                   where it speaks of one
     check          "orders": fit the tracer's photons too, and compare with the fit to the exact half space
     random_starts  how many fits begin at random constants, to see whether one ends better
     """
@@ -123,6 +127,7 @@ class Recipe:
     truth: str
     start: str = "published"
     setting: Setting = SEARCHLIGHT
+    indices: tuple[float, ...] = ()
     check: str = ""
     random_starts: int = 0
     albedos: Albedos = Albedos(0.05, 0.995, 24)
@@ -132,6 +137,12 @@ class Recipe:
     held: tuple[str, ...] = ()
     note: str = ""
     path: Path = field(default=Path(), compare=False)
+
+    @property
+    def span(self) -> tuple[float, float]:
+        """The indices that its constants hold for: above the first, up to the last; and from 1 if the first is near."""
+        first, last = self.indices[0], self.indices[-1]
+        return (1.0 if first <= NEAR_MATCHED else first), last
 
     def problems(self) -> str | None:
         """What is impossible about it, in one line, or None."""
@@ -166,14 +177,27 @@ class Recipe:
         where = self.setting
         if where.g != 0:
             return f"setting.g must be 0: profiles are fitted to isotropic scattering, got {where.g!r}"
-        if self.truth == "exact" and not where.is_matched_isotropic:
-            return f"setting.n must be 1 where truth is 'exact' (use truth = \"orders\"), got {where.n!r}"
+        if self.truth == "exact" and not where.n >= 1:
+            return f"setting.n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got {where.n!r}"
+        if self.indices and (text := self._problems_of_indices()):
+            return text
         if self.pipeline in PAPERS and where != SEARCHLIGHT:
             return f"setting of pipeline {self.pipeline!r} must be {SEARCHLIGHT}, got {where}"
         if self.pipeline == "inverse" and not where.is_matched_isotropic:
             return f"setting.n of pipeline 'inverse' must be 1, got {where.n!r}"
         if self.albedos.spacing == "reflectance" and not where.is_matched_isotropic:
             return f"albedos.spacing must be 'alpha' or 'sqrt(1-alpha)' where setting.n is not 1, got {where.n!r}"
+        return None
+
+    def _problems_of_indices(self) -> str | None:
+        if self.truth != "exact" or self.pipeline not in ("albedo", "profile"):
+            return f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {self.truth!r}, {self.pipeline!r}"
+        if not all(1 < n <= LARGEST_INDEX for n in self.indices) or list(self.indices) != sorted(set(self.indices)):
+            return f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {list(self.indices)!r}"
+        if len(self.indices) < FEWEST_INDICES:
+            return f"indices must be at least {FEWEST_INDICES}, got {list(self.indices)!r}"
+        if self.setting.n not in self.indices:
+            return f"setting.n must be one of the indices {list(self.indices)!r}, got {self.setting.n!r}"
         return None
 
     def _problems_of_tests(self) -> str | None:

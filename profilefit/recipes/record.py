@@ -10,6 +10,7 @@ import hashlib
 import io
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from difflib import get_close_matches
 from importlib.metadata import version
 from pathlib import Path
@@ -110,6 +111,15 @@ def record_setting(content: Mapping[str, Any]) -> Setting:
         raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
 
 
+REFRACTING = "refracting"  # in the name of a record that holds for every index of a range
+
+
+def covers(content: Mapping[str, Any], setting: Setting) -> bool:
+    """Whether a record's constants hold for a setting: its own or, if they were fitted to several indices, one between."""
+    own, low, high = record_setting(content), *(content.get("indices") or (0.0, 0.0))
+    return own == setting or (low < setting.n <= high and own == replace(setting, n=own.n))
+
+
 def record_name(base: str, setting: Setting) -> str:
     """The record of another setting than Setting(): albedo-rational, -diffuse, -n1.4, -diffuse-n1.4, -g0.8."""
     usual, parts = Setting(), [base]
@@ -120,6 +130,11 @@ def record_name(base: str, setting: Setting) -> str:
     if setting.g != usual.g:
         parts.append(f"g{_shortest(setting.g)}")
     return "-".join(parts)
+
+
+def spanning_name(base: str, setting: Setting) -> str:
+    """The record for every index of a range, under the light of a setting: hazard-refracting, -diffuse-refracting."""
+    return f"{record_name(base, replace(setting, n=1.0))}-{REFRACTING}"
 
 
 def _shortest(value: float) -> str:

@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError, SettingError
 from profilefit.recipes import record
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import record_name, record_setting
+from profilefit.recipes.record import covers, record_name, record_setting, spanning_name
 
 SEARCHLIGHT = Setting()
 
@@ -63,17 +63,29 @@ class Records:
         """The settings that a record is there for, by its name for Setting()."""
         near = {name: self.read(path) for name, path in self.paths.items() if name.startswith(base)}
         found = {name: record_setting(content) for name, content in near.items()}
-        return tuple(setting for name, setting in found.items() if record_name(base, setting) == name)
+        return tuple(
+            setting
+            for name, setting in found.items()
+            if name in (record_name(base, setting), spanning_name(base, setting))
+        )
+
+    def name(self, base: str, setting: Setting) -> str:
+        """The name of the record of a setting: its own, that of a range of indices where there is such and none of its
+        own, and its own where there is neither."""
+        own, spanning = record_name(base, setting), self.folder / f"{spanning_name(base, setting)}.json"
+        if (self.folder / f"{own}.json").exists() or not spanning.exists():
+            return own
+        return spanning.stem if covers(self.read(spanning), setting) else own
 
     def path(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
         """The record of a setting, by its name for Setting().
 
         SettingError that lists the settings there are; RecordError where there is none at all.
         """
-        if (path := self.folder / f"{record_name(base, setting)}.json").exists():
+        if (path := self.folder / f"{self.name(base, setting)}.json").exists():
             return path
         if known := self.settings(base):
-            there = "; ".join(str(one) for one in known)
+            there = "; ".join(self._described(base, one) for one in known)
             raise SettingError(f"record {base} belongs to {there}, got a request for {setting}")
         raise RecordError(
             f"{path}: there is no such record; `profilefit regenerate {base} --out {self.folder}` makes it"
@@ -81,8 +93,13 @@ class Records:
 
     def path_or_shipped(self, base: str, setting: Setting = SEARCHLIGHT) -> Path:
         """The same, or the record that is shipped, where this folder has none of that setting."""
-        path = self.folder / f"{record_name(base, setting)}.json"
+        path = self.folder / f"{self.name(base, setting)}.json"
         return path if path.exists() else Records(fits_folder()).path(base, setting)
+
+    def _described(self, base: str, setting: Setting) -> str:
+        """A setting that there is a record for, in words."""
+        span = self.content(self.name(base, setting)).get("indices")
+        return str(setting).replace(f"n = {setting.n:g}", f"n in ({span[0]:g}, {span[1]:g}]") if span else str(setting)
 
 
 Folder = Path | Records

@@ -52,6 +52,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         "pipeline": recipe.pipeline,
         "note": recipe.note,
         "setting": recipe.setting,
+        **({"indices": recipe.span} if recipe.indices else {}),
         "protocol": {
             "albedos": recipe.albedos,
             "rings": recipe.rings,
@@ -59,6 +60,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
             "mfp": recipe.mfp,
             "start": recipe.start,
             "held": recipe.held,
+            **({"indices": recipe.indices} if recipe.indices else {}),
         },
         "truth": {"kind": recipe.truth},
         "preset": run.preset,

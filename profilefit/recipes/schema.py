@@ -79,7 +79,7 @@ ERRORS = {
     "jackknife_error": "jackknife",
 }
 # What a law is made of.
-NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "data_digest?": DIGEST}
+NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "indices?": PAIR, "data_digest?": DIGEST}
 CONSTANTS: Kinds = {
     "constants": TABLE,
     "constants.*": TABLE,
@@ -105,7 +105,7 @@ TOLD: Kinds = {
     "versions?.*": TEXT,
 }
 # A measure of laws by albedo, and one of maps as a whole.
-BY_ALBEDO = ("rel", "ks", "l1", "mse", "r2", "inversion_error", "rel_noise", "ks_noise")
+BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error", "rel_noise", "ks_noise")
 OF_MAP = {
     "delta_A": NUMBER,
     "delta_alpha": NUMBER,
@@ -164,6 +164,7 @@ PROTOCOL: Kinds = {
     "rings?.count": COUNT,
     "rings?.trim": TEXT,
     "held?": TEXTS,
+    "indices?": NUMBERS,
     "weighting": TABLE,
     "weighting.objective": TEXT,
     **{f"weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
@@ -197,6 +198,8 @@ FIT: Kinds = {
     "quality": TABLE,
     "quality.regenerated": TABLE,
     "quality.alpha?": NUMBERS,
+    "quality.by_index?": TABLE,
+    **{f"quality.by_index?.{name}?": NUMBERS for name in ("n", "rel", "ks", "largest", "delta_A")},
     **{f"quality.{one}?": TABLE for one in SETS},
     **{f"quality.{one}?.{name}?": NUMBERS for one in SETS for name in BY_ALBEDO},
     **{f"quality.{one}?.{name}_halves?": HALVES for one in SETS for name in ("mse", "r2")},

@@ -43,7 +43,8 @@ def law_class(recipe: Recipe) -> type[Constants]:
     known = _laws(recipe)
     if recipe.law not in known:
         raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
-    return known[recipe.law]
+    kind: type[Constants] = laws.at_index(known[recipe.law], recipe.setting.n)
+    return kind
 
 
 def require_known(recipe: Recipe) -> None:
@@ -58,6 +59,11 @@ def require_known(recipe: Recipe) -> None:
         raise RecipeError(
             f"{recipe.path}: start must be one of {', '.join(accepted) or '(none)'}, got {recipe.start!r}"
         )
+    spans = kind.at_one_index() != kind.constant_names()
+    if recipe.indices and not spans:
+        raise RecipeError(f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}")
+    if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
+        raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
     if objective and not free(recipe, kind):
         raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
     unknown = [name for name in recipe.held if name not in kind.constant_names()]
@@ -66,8 +72,10 @@ def require_known(recipe: Recipe) -> None:
 
 
 def free(recipe: Recipe, kind: type[Constants] | Constants) -> tuple[str, ...]:
-    """The constants that a recipe moves."""
-    return tuple(name for name in kind.seen_by(recipe.weighting.objective) if name not in recipe.held)
+    """The constants that a recipe moves; of a law that spans indices, at one index those that it tells apart."""
+    seen = kind.seen_by(recipe.weighting.objective)
+    told = seen if recipe.indices else kind.at_one_index()
+    return tuple(name for name in seen if name in told and name not in recipe.held)
 
 
 def starting_law(recipe: Recipe, folder: Path) -> Any:

@@ -113,13 +113,14 @@ def described(
 
 
 def curves(profiles: Profiles) -> Arrays:
-    """What the figures draw: the data with its errors."""
+    """What the figures draw: the data with its errors; of a fit to several indices, those of its own setting."""
+    own = slice(None) if profiles.indices is None else profiles.indices == profiles.setting.n
     return {
-        "alpha": profiles.alpha,
+        "alpha": profiles.alpha[own],
         "r_edges": profiles.r_edges,
-        "energy": profiles.energy,
-        "energy_error": profiles.standard_error,
-        "beyond": profiles.beyond,
+        "energy": profiles.energy[own],
+        "energy_error": profiles.standard_error[own],
+        "beyond": profiles.beyond[own],
     }
 
 

@@ -16,7 +16,7 @@ FEW_DIGITS = 0.01  # below it three decimals say too little
 ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
 # Measures by the table they stand in; for r2 the smallest is the worst.
 TABLES = (
-    ("rel", "ks", "l1"),
+    ("rel", "largest", "ks", "l1"),
     ("mse", "r2"),
     ("mse near", "mse far"),
     ("r2 near", "r2 far"),
