@@ -17,7 +17,7 @@ from rich.progress import Progress
 from benchmarks.interval_coverage import fitted
 from benchmarks.table import show
 from mcml_sim import Grid, simulate_orders
-from profilefit.fitting.chains import Moves, default_moves, posterior
+from profilefit.fitting.chains import EVOLUTION, Moves, posterior
 from profilefit.fitting.estimate import Fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.recipes import catalogue, inventory, recipe
@@ -27,20 +27,21 @@ LAWS = ("burley-whole", "liang-whole", "albedo-rational")
 SEED, PHOTONS, LONGEST = 43, 4 * 2**20, 40_000
 
 
-def moves() -> dict[str, Moves]:
+def moves() -> dict[str, Moves | None]:
     """What is compared, by name."""
     made = emcee.moves
     return {
         "stretch": ((made.StretchMove(), 1.0),),
         "walk": ((made.WalkMove(), 1.0),),
         "DE": ((made.DEMove(), 1.0),),
-        "DE 0.8, snooker 0.2": default_moves(),
+        "DE 0.8, snooker 0.2": EVOLUTION,
+        "Laplace 0.5, DE 0.4, snooker 0.1": None,  # the default
         "DE 0.5, stretch 0.5": ((made.DEMove(), 0.5), (made.StretchMove(), 0.5)),
         "KDE": ((made.KDEMove(), 1.0),),
     }
 
 
-def line(one: Fit, chosen: Moves, longest: int) -> tuple[str, ...]:
+def line(one: Fit, chosen: Moves | None, longest: int) -> tuple[str, ...]:
     """tau, ms an independent draw, acceptance and what the chain said."""
     posterior(one, "misfit", max_steps=100, moves=chosen)  # compiles
     start = time.perf_counter()

@@ -7,8 +7,9 @@ statistical   exp(-Q(theta*) / 2 s^2) with theta* = theta^ + C (theta - theta^):
 misfit        exp(-Q(theta) / 2 s^2), s^2 the misfit per degree of freedom: what the law's misfit leaves open if it were
               noise. It is not, so read it beside the fit's jackknife
 Priors are flat in the constants, each within ten times its size or its own misfit error, whichever is larger: a
-misfit that is blind to a constant leaves it to the prior, and the interval then shows it. Chains run until they are
-50 autocorrelation times long or say that they are not.
+misfit that is blind to a constant leaves it to the prior, and the interval then shows it. Chains start as draws of
+Laplace's approximation, propose such draws, and run until they are 50 autocorrelation times long or say that they are
+not.
 """
 
 from __future__ import annotations
@@ -26,12 +27,13 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import Fit, ResidualFunction, curvature
+from profilefit.fitting.estimate import Fit, ResidualFunction, curvature, scaled_inverse
 
 Floats = NDArray[np.float64]
 # emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
 LENGTHS = 50
 FIRST_LOOK = 1000  # steps after which the autocorrelation time is estimated first
+LAPLACE_LOOK = 250  # the same of `default_moves`, whose tau is below five wherever the approximation holds
 HALVINGS = 20
 PRIOR_WIDTH = 10.0
 LEVELS = (0.68, 0.95)
@@ -39,12 +41,37 @@ KEPT = 1000
 Moves = Sequence[tuple[emcee.moves.Move, float]]
 
 
-def default_moves() -> Moves:
-    """Differential evolution with snooker steps: a third of the evaluations of stretches (`benchmarks.moves`).
+# Differential evolution with snooker steps: a third of the evaluations of stretches (`benchmarks.moves`).
+EVOLUTION: Moves = ((emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2))
+# Degrees of freedom of Student's t: tails beyond a normal's, so that no walker stays for ever where few proposals fall,
+# and so few that forty constants still accept every other draw.
+FREEDOM = 20
+LAPLACE_SHARE = 0.5  # of the moves; the others walk where the density is nothing like its curvature at the optimum
 
-    With three or four constants draws from a kernel density take a third of these again.
+
+def laplace_move(centre: Floats, covariance: Floats) -> emcee.moves.MHMove:
+    """Proposals that do not depend on where a walker is: t about `centre` (p,), scaled to `covariance` (p, p).
+
+    Accepted by pi(x') q(x) / pi(x) q(x'), so what is sampled is the density and not the approximation to it.
     """
-    return (emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2)
+    root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
+
+    def log_q(white: Floats) -> Floats:
+        return -0.5 * (FREEDOM + white.shape[1]) * np.log1p(np.sum(white**2, axis=1) / FREEDOM)
+
+    def propose(points: Floats, random: Any) -> tuple[Floats, Floats]:
+        stretch = np.sqrt(FREEDOM / random.chisquare(FREEDOM, len(points)))
+        white = stretch[:, None] * random.standard_normal(points.shape)
+        before = np.linalg.solve(root, (points - centre).T).T
+        return centre + white @ root.T, log_q(before) - log_q(white)
+
+    return emcee.moves.MHMove(propose)
+
+
+def default_moves(centre: Floats, covariance: Floats) -> Moves:
+    """Half of them draws from Laplace's approximation: tau is a few steps wherever it is one. The others evolve."""
+    others = tuple((move, (1.0 - LAPLACE_SHARE) * weight) for move, weight in EVOLUTION)
+    return (laplace_move(centre, covariance), LAPLACE_SHARE), *others
 
 
 @dataclass(frozen=True)
@@ -73,21 +100,23 @@ def walk(
     seed: int,
     max_steps: int,
     kept: int,
-    moves: Moves | None = None,
+    moves: Moves = EVOLUTION,
+    first_look: int = FIRST_LOOK,
 ) -> Walk:
     """Sample from `start` (walkers, p) until the chain is 50 autocorrelation times long, or `max_steps`.
 
     log_density  of points (m, p), (m,), vectorised; -inf where there is none. A walker that starts there moves towards
                  `centre` (p,), by halves
     kept         how many draws to keep at most; moves emcee's, with their weights
+    first_look   steps after which the chain is judged first
     """
     start = start.copy()
     for _ in range(HALVINGS):
         outside = ~np.isfinite(log_density(start))
         start[outside] = 0.5 * (start[outside] + centre)
-    sampler = emcee.EnsembleSampler(*start.shape, log_density, vectorize=True, moves=list(moves or default_moves()))
+    sampler = emcee.EnsembleSampler(*start.shape, log_density, vectorize=True, moves=list(moves))
     sampler.random_state = np.random.RandomState(np.random.MT19937(np.random.SeedSequence(seed))).get_state()
-    tau, steps = _long_enough(sampler, start, max_steps)
+    tau, steps = _long_enough(sampler, start, min(first_look, max_steps), max_steps)
     enough = np.isfinite(tau) and steps >= LENGTHS * tau
     burn = int(min(steps // 2, 5 * tau if np.isfinite(tau) else steps // 2))
     keep = np.linspace(burn, steps - 1, max(min(kept // len(start), steps - burn), 1)).astype(int)
@@ -96,12 +125,13 @@ def walk(
     return Walk(samples, density, tau, float(np.mean(sampler.acceptance_fraction)), len(start), steps, result)
 
 
-def _long_enough(sampler: emcee.EnsembleSampler, start: Floats, max_steps: int) -> tuple[float, int]:
-    """Run in doubling stretches until the chain is long enough for its own autocorrelation time."""
-    steps, state = min(FIRST_LOOK, max_steps), start
+def _long_enough(sampler: emcee.EnsembleSampler, start: Floats, steps: int, max_steps: int) -> tuple[float, int]:
+    """Run `steps`, and in doubling stretches until the chain is long enough for its own autocorrelation time."""
+    state = start
     while True:
         state = sampler.run_mcmc(state, steps - sampler.iteration, progress=False)
-        tau = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
+        with np.errstate(invalid="ignore"):  # a walker that has not moved yet has no autocorrelation
+            tau = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
         if sampler.iteration >= max_steps or (np.isfinite(tau) and sampler.iteration >= LENGTHS * tau):
             return tau, sampler.iteration
         steps = min(2 * sampler.iteration, max_steps)
@@ -163,7 +193,7 @@ def posterior(
 ) -> Posterior:
     """Sample the constants of `fit`; `kind` "statistical" (photon noise) or "misfit" (the law's, taken for noise).
 
-    moves  emcee's, with their weights; by default those of `default_moves`
+    moves  emcee's, with their weights; by default `default_moves` about the optimum
     A chain that is not 50 autocorrelation times long after `max_steps` is returned with that result, not refused.
     """
     require_own_process()
@@ -174,7 +204,7 @@ def posterior(
         raise InputError(f"a posterior needs a fit that converged, got: {fit.result}")
     if max_steps < 1:
         raise InputError(f"max_steps must be at least 1, got {max_steps!r}")
-    covariance = fit.statistical if kind == "statistical" else fit.misfit
+    covariance = fit.statistical if kind == "statistical" else fit.variance * scaled_inverse(_positive_curvature(fit))
     if covariance is None:
         raise InputError("the truth of this fit has no photon noise: only kind='misfit' applies, got 'statistical'")
     density = _Density.of(fit, kind, covariance)
@@ -243,12 +273,14 @@ def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
     size = fit.solution.parameters.size
     walkers = max(4 * size, 32)
     generator = np.random.default_rng(seed)
+    centre = fit.solution.parameters
     root = np.linalg.cholesky(covariance + 1e-12 * np.diag(np.diag(covariance)))
-    start = fit.solution.parameters + generator.standard_normal((walkers, size)) @ root.T
+    start = centre + generator.standard_normal((walkers, size)) @ root.T
 
     def log_probability(points):
         with jax.enable_x64(True):
             return np.asarray(density(jnp.asarray(points)))
 
-    done = walk(log_probability, start, fit.solution.parameters, seed, max_steps, KEPT, moves)
+    chosen, look = (moves, FIRST_LOOK) if moves else (default_moves(centre, covariance), LAPLACE_LOOK)
+    done = walk(log_probability, start, centre, seed, max_steps, KEPT, chosen, look)
     return Posterior(kind, type(fit.law).__name__, fit.objective, fit.free, **vars(done))

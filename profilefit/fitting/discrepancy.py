@@ -24,9 +24,10 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-import optimistix as optx
 from jax import Array
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
+from scipy.optimize import minimize
 
 from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
 from profilefit.fitting.objectives import Rings
@@ -44,7 +45,9 @@ LEFT_OUT = 1e-3  # share of a variance that the rank of the photons' covariance 
 SEEN = 3.9  # gain in log likelihood that three parameters exceed by chance in one of twenty (chi^2 / 2)
 SHARES = 400  # nodes of an inverse cdf between which it is a straight line
 MAX_STEPS = 300
-TOLERANCE = 1e-3  # of ln amplitude and of the lengths: a hundredth of what data resolve
+TOLERANCE = 1e-3  # of the likelihood's slope by ln of amplitude and lengths: a hundredth of what data resolve
+FARTHEST = 12.0  # of ln amplitude from that of the residuals
+STEP = 1e-3  # in ln of amplitude and lengths, between gradients that make a curvature
 FOUND, NOT_SEEN = "found", "not seen: noise alone explains the residuals"
 FAILED = f"no convergence in {MAX_STEPS} steps: amplitude and lengths are where they stopped"
 
@@ -95,7 +98,7 @@ class Discrepancy:
     def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
         if not np.isfinite(length):  # a fit that sees no rings knows of no radius
             return np.ones((one.size, other.size))
-        return np.asarray(_matern(np.abs(one[:, None] - other), length))
+        return _matern(np.abs(one[:, None] - other) / length)
 
 
 FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
@@ -144,23 +147,18 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
 def of_residuals(data: Residuals) -> Discrepancy:
     """The process that makes these residuals likeliest."""
     u, s, y, slope, noise = _flat(data)
-    steps_u, steps_s = _scales(data.u), _scales(data.s)
-    limits = np.log(np.stack([steps_u, steps_s]))
-    begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), 0.0, 0.0])
-    with jax.enable_x64(True):
-        arrays = tuple(map(jnp.asarray, (u, s, y, slope, noise, limits)))
-        found, curved, worth, code = _likeliest(jnp.asarray(begin), arrays)
-        found, curved, worth = np.asarray(found), np.asarray(curved), float(worth)
-    amplitude = float(np.exp(found[0]))
-    length_u, length_s = np.exp(np.asarray(_lengths(found, limits)))
+    lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
+    begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
+    limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
+    found, curved, worth, converged = _likeliest(begin, limits, (_apart(u), _apart(s), y, slope, noise))
+    amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = _kernel(data.u, length_u), _kernel(data.s, length_s)
     across = data.influence, kernel_s, kernel_u, data.influence
     covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
-    result = (FOUND if gain > SEEN else NOT_SEEN) if int(code) == 0 else FAILED
-    shown_u = float(length_u) if data.u.size > 1 else np.nan
-    rms = float(np.sqrt(np.mean(y**2)))
-    facts = amplitude, amplitude * _error(curved), shown_u, float(length_s), gain, rms, result
+    result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED
+    shown_u = length_u if data.u.size > 1 else np.nan
+    facts = amplitude, amplitude * _error(curved), shown_u, length_s, gain, float(np.sqrt(np.mean(y**2))), result
     return Discrepancy(*facts, covariance, data.u, data.s, data.influence)
 
 
@@ -261,49 +259,62 @@ def _scales(x: Floats) -> Floats:
     return np.array([SHORTEST * np.min(np.diff(np.sort(x))), LONGEST * np.ptp(x)])
 
 
-def _lengths(theta, limits):
-    """ln of both lengths, kept between their limits."""
-    return limits[:, 0] + (limits[:, 1] - limits[:, 0]) / (1.0 + jnp.exp(-theta[1:]))
+def _apart(x: Floats) -> Floats:
+    return np.abs(x[:, None] - x)
 
 
 def _kernel(x: Floats, length: float) -> Floats:
-    return np.asarray(_matern(np.abs(x[:, None] - x), length))
+    return _matern(_apart(x) / length)
 
 
-def _matern(distance, length):
-    scaled = np.sqrt(3.0) * distance / length
-    return (1.0 + scaled) * jnp.exp(-scaled)
+def _matern(distance: Floats) -> Floats:
+    scaled = np.sqrt(3.0) * distance
+    return (1.0 + scaled) * np.exp(-scaled)
 
 
-def _loss(theta: Array, args) -> Array:
-    """Minus the restricted log likelihood."""
-    u, s, y, slope, noise, limits = args
-    length_u, length_s = jnp.exp(_lengths(theta, limits))
-    kernel = _matern(jnp.abs(u[:, None] - u), length_u) * _matern(jnp.abs(s[:, None] - s), length_s)
-    return _restricted(jnp.exp(2.0 * theta[0]) * (kernel + NUGGET * jnp.eye(y.size)) + noise, y, slope)
+def _bent(distance: Floats) -> Floats:
+    """d `_matern` / d ln length."""
+    scaled = np.sqrt(3.0) * distance
+    return scaled**2 * np.exp(-scaled)
 
 
-def _restricted(covariance: Array, y: Array, slope: Array) -> Array:
-    """Minus the log likelihood of `y` but for `slope` times anything (Patterson and Thompson's (3))."""
-    root = jnp.linalg.cholesky(covariance)
-    both = jax.scipy.linalg.solve_triangular(root, jnp.column_stack([slope, y]), lower=True)
-    white, rest = both[:, :-1], both[:, -1]
-    inner = jnp.linalg.cholesky(white.T @ white)
-    explained = jax.scipy.linalg.solve_triangular(inner, white.T @ rest, lower=True)
-    logs = jnp.sum(jnp.log(jnp.diag(root))) + jnp.sum(jnp.log(jnp.diag(inner)))
-    return logs + 0.5 * (rest @ rest - explained @ explained)
+def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floats]:
+    """Minus the restricted log likelihood at ln of amplitude and lengths, and its gradient (3,)."""
+    square, far_u, far_s = np.exp(2.0 * theta[0]), apart_u * np.exp(-theta[1]), apart_s * np.exp(-theta[2])
+    along_u, along_s = _matern(far_u), _matern(far_s)
+    kernel = square * (along_u * along_s + NUGGET * np.eye(y.size))
+    value, by_covariance = _restricted(kernel + noise, y, slope)
+    parts = 2.0 * kernel, square * _bent(far_u) * along_s, square * along_u * _bent(far_s)
+    return value, np.array([np.vdot(by_covariance, part) for part in parts])
 
 
-@eqx.filter_jit
-def _likeliest(begin, args):
-    """theta, the curvature of the loss there, the gain over noise alone, and 0 if it converged."""
-    solver: Any = optx.BFGS(TOLERANCE, TOLERANCE)
-    found: Any = optx.minimise(_loss, solver, begin, args, max_steps=MAX_STEPS, throw=False)
-    noise, y, slope = args[4], args[2], args[3]
-    floor = jnp.diag(jnp.where(jnp.diag(noise) > 0, 0.0, 1.0))
-    gain = _restricted(noise + floor, y, slope) - _loss(found.value, args)
-    converged = found.result == optx.RESULTS.successful
-    return found.value, jax.hessian(_loss)(found.value, args), gain, jnp.where(converged, 0, 1)
+def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
+    """Minus the log likelihood of `y` but for `slope` times anything (Patterson and Thompson's (3)), and its derivative
+    (k, k) by the covariance."""
+    root = np.linalg.cholesky(covariance)
+    back = solve_triangular(root, np.eye(y.size), lower=True)
+    across, triangle = np.linalg.qr(back @ slope)
+    seen = back.T @ across
+    inverse = back.T @ back - seen @ seen.T  # of what `slope` leaves
+    rest = inverse @ y
+    logs = np.sum(np.log(np.diag(root))) + np.sum(np.log(np.abs(np.diag(triangle))))
+    return float(logs + 0.5 * (y @ rest)), 0.5 * (inverse - np.outer(rest, rest))
+
+
+def _likeliest(begin: Floats, limits: Floats, args) -> tuple[Floats, Floats, float, bool]:
+    """theta, the curvature of the loss there, the gain over noise alone, and whether it converged.
+
+    A length at a limit is held there: it has no curvature.
+    """
+    options = {"gtol": TOLERANCE, "maxiter": MAX_STEPS}
+    found = minimize(_loss, begin, args, method="L-BFGS-B", jac=True, bounds=limits, options=options)
+    around = [[_loss(found.x + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
+    curved = np.array([(after - before) / (2.0 * STEP) for after, before in around])
+    free = (limits[:, 0] < found.x) & (found.x < limits[:, 1])
+    _, _, y, slope, noise = args
+    floor = np.diag(np.where(np.diag(noise) > 0, 0.0, 1.0))
+    gain = _restricted(noise + floor, y, slope)[0] - found.fun
+    return found.x, 0.5 * (curved + curved.T) * np.outer(free, free), gain, bool(found.success)
 
 
 @eqx.filter_jit

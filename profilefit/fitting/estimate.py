@@ -224,17 +224,23 @@ def _jackknife(problem: ResidualFunction, solution: Optimum, law: Constants, rin
 def sensitivity(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
     """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
     its data."""
-    with jax.enable_x64(True):
-        law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
-        hessian, mixed = _second_derivatives(problem, jnp.asarray(solution.parameters), law, rings)
-    return -np.einsum("pq,aiq->pai", scaled_inverse(np.asarray(hessian)), np.asarray(mixed))
+    hessian, mixed = _second_derivatives(problem, solution, law, rings)
+    return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
 
 
 def curvature(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
     """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
+    return _second_derivatives(problem, solution, law, rings)[0]
+
+
+def _second_derivatives(
+    problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings
+) -> tuple[Floats, Floats]:
+    """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p); one program."""
     with jax.enable_x64(True):
-        law = jax.tree.map(jnp.asarray, law)
-        return np.asarray(_hessian(problem, jnp.asarray(solution.parameters), law, rings))
+        law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
+        hessian, mixed = _curved(problem, jnp.asarray(solution.parameters), law, rings)
+    return np.asarray(hessian), np.asarray(mixed)
 
 
 def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
@@ -246,20 +252,13 @@ def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
 
 
 @eqx.filter_jit
-def _hessian(residual, vector, law, rings):
-    return jax.hessian(lambda theta: 0.5 * jnp.sum(residual(theta, (law, rings)) ** 2))(vector)
-
-
-@eqx.filter_jit
-def _second_derivatives(residual, vector, law, rings):
+def _curved(residual, vector, law, rings):
     def cost(theta, energies):
         data = eqx.tree_at(lambda tree: (tree.energy, tree.beyond), rings, (energies[:, :-1], energies[:, -1]))
         return 0.5 * jnp.sum(residual(theta, (law, data)) ** 2)
 
     energies = jnp.column_stack([jnp.asarray(rings.energy), jnp.asarray(rings.beyond)])
-    hessian = jax.jacfwd(jax.grad(cost))(vector, energies)
-    mixed = jax.jacfwd(jax.grad(cost, argnums=1))(vector, energies)
-    return hessian, mixed
+    return jax.jacfwd(jax.grad(cost, argnums=(0, 1)))(vector, energies)
 
 
 def _half_waves(table: Floats) -> float:
