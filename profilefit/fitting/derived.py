@@ -125,7 +125,7 @@ class AtAlbedo:
         unit = unit_energy(self.known.objective, self.energy[None], np.array([self.alpha]), EDGES)[0]
         unit = np.where(self.energy > 0, unit, 0.0)
         relative = self.slope / np.where(unit > 0, unit, 1.0)[:, None]
-        u, s = np.log(self.middle), np.full(n, np.sqrt(1.0 - self.alpha))
+        u, s = np.log(self.middle), off.places(np.full(n, self.alpha), self.known.law.setting)
         return off.law_covariance(u, s, np.where(unit[:, None] > 0, relative, 0.0)) * np.outer(unit, unit)
 
     @property
@@ -187,7 +187,9 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.off is not None:
-        spread = known.off.law_covariance(0.0 * albedos, np.sqrt(1.0 - albedos), slope[:, 0] / energy)
+        spread = known.off.law_covariance(
+            0.0 * albedos, known.off.places(albedos, known.law.setting), slope[:, 0] / energy
+        )
         model = value * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return Quantity(value, known.statistical_error(slope[:, 0]), model)
 

@@ -29,10 +29,12 @@ from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.optimize import minimize
 
+from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.laws.surface import surface_of
 from profilefit.laws.liang import QUANTILES
 
 Floats = NDArray[np.float64]
@@ -62,7 +64,8 @@ class Discrepancy:
     rms              of the residuals themselves [-], smaller than the amplitude: the fit has followed what it could
     covariance       (p, p) of the constants: their model error
     result           whether there is one, or what failed
-    u (g,), s (m,), influence (p, m, g): where delta was looked at, and d constants / d delta
+    u (g,), s (m,), influence (p, m, g): where delta was looked at, and d constants / d delta. Of a fit to several
+    indices s is (m, 2), a point in the plane of sqrt(1 - alpha) and rho (`laws.surface`)
     """
 
     amplitude: float
@@ -86,7 +89,7 @@ class Discrepancy:
         return {f"discrepancy_{name}": getattr(self, name) for name in KEPT}
 
     def law_covariance(self, u: Floats, s: Floats, slope: Floats) -> Floats:
-        """Covariance (k, k) of the law that was fitted, less the truth, at points (k,) of ln r and sqrt(1 - alpha).
+        """Covariance (k, k) of the law that was fitted, less the truth, at points (k,) of ln r and `places`.
 
         slope  (k, p) d law / d constants there, in what `unit` calls 1: where the fit follows delta, less is left
         """
@@ -95,10 +98,14 @@ class Discrepancy:
         followed = self.amplitude**2 * np.einsum("kp,pai,lai->kl", slope, self.influence, joint, optimize=True)
         return self.amplitude**2 * own - followed - followed.T + slope @ self.covariance @ slope.T
 
+    def places(self, alpha: Floats, setting: Setting) -> Floats:
+        """Where albedos (k,) of a setting lie in s."""
+        return _placed(alpha, np.full(len(alpha), surface_of(setting).trapped) if self.s.ndim > 1 else None)
+
     def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
         if not np.isfinite(length):  # a fit that sees no rings knows of no radius
-            return np.ones((one.size, other.size))
-        return _matern(np.abs(one[:, None] - other) / length)
+            return np.ones((len(one), len(other)))
+        return _matern(_apart(one, other) / length)
 
 
 FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
@@ -120,7 +127,7 @@ class Residuals:
     """Relative residuals of a law on groups of neighbouring rings.
 
     table      (m, g) law less data over what counts as 1 [-]; live where a group counts
-    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha)
+    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha), (m, 2) of that and rho where profiles are of several indices
     slope      (m, g, p) d table / d constants; noise (g, m, k) factors of the photons' relative covariance
     influence  (p, m, g) d constants / d delta, `delta` of all the rings of a group
     """
@@ -150,7 +157,7 @@ def of_residuals(data: Residuals) -> Discrepancy:
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = _likeliest(begin, limits, (_apart(u), _apart(s), y, slope, noise))
+    found, curved, worth, converged = _likeliest(begin, limits, (_apart(u, u), _apart(s, s), y, slope, noise))
     amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = _kernel(data.u, length_u), _kernel(data.s, length_s)
@@ -214,7 +221,13 @@ def _one_ring(profiles: Profiles, energy: Floats, slope: Floats, gain: Floats, l
 
 
 def _s(profiles: Profiles) -> Floats:
-    return np.sqrt(1.0 - profiles.alpha)
+    trapped = np.array([surface_of(setting).trapped for setting in profiles.settings])
+    return _placed(profiles.alpha, trapped if trapped.size else None)
+
+
+def _placed(alpha: Floats, trapped: Floats | None) -> Floats:
+    s = np.sqrt(1.0 - alpha)
+    return s if trapped is None else np.column_stack([s, trapped])
 
 
 def _groups(u: Floats, judged: Live) -> NDArray[np.intp]:
@@ -254,17 +267,18 @@ def _flat(data: Residuals):
 
 def _scales(x: Floats) -> Floats:
     """The shortest and the longest length worth looking at."""
-    if x.size < 2:
-        return np.ones(2)
-    return np.array([SHORTEST * np.min(np.diff(np.sort(x))), LONGEST * np.ptp(x)])
+    along = np.unique(x if x.ndim == 1 else x[:, 0])
+    return np.array([SHORTEST * np.min(np.diff(along)), LONGEST * np.ptp(along)]) if along.size > 1 else np.ones(2)
 
 
-def _apart(x: Floats) -> Floats:
-    return np.abs(x[:, None] - x)
+def _apart(one: Floats, other: Floats) -> Floats:
+    """Distances (k, l) of numbers, or of points in a plane."""
+    between = one[:, None] - other
+    return np.abs(between) if one.ndim == 1 else np.hypot(between[..., 0], between[..., 1])
 
 
 def _kernel(x: Floats, length: float) -> Floats:
-    return _matern(_apart(x) / length)
+    return _matern(_apart(x, x) / length)
 
 
 def _matern(distance: Floats) -> Floats:
@@ -326,9 +340,9 @@ def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
 
 
 def _energy(objective: str, law, rings: Rings) -> Array:
-    edges, alpha = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha)
+    edges, alpha, law = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha), law.under(rings.surface)
     if objective in ("albedo", "reflectance"):
-        return law.reflectance(alpha)[:, None]
+        return law.reflectance(alpha[:, None])
     if objective == "radial":
         r = 0.5 * (edges[1:] + edges[:-1])
         a, b, c = law.coefficients(alpha[:, None])

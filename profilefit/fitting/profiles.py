@@ -112,7 +112,9 @@ class Profiles:
         """Profiles without noise of several indices, each of the same albedos and rings, under the light of `setting`,
         to which the record of a fit will belong."""
         first = parts[0]
-        if not all(np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts):
+        if not all(
+            np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
+        ):
             raise InputError("profiles of several indices must have the same albedos and rings, got others")
         rows = {
             name: np.concatenate([getattr(one, name) for one in parts])

@@ -29,21 +29,23 @@ from profilefit.laws.refracting_rational import REFRACTING, RefractingRational
 from profilefit.laws.surface import Number, Surface, surface_of
 
 # First guesses of a radius: of light scattered once p, of the rest p, q, d and m; their error after a step is least.
+LEAST_W = 1e-3  # of -w [1/mfp]: h must be positive
 ONCE, AGAIN = 0.535, (0.378, 0.266, 0.596, 0.875)
 
 
 class Coefficients(NamedTuple):
-    """The law at one index: 12 constants of the light scattered again, h, a and b of that scattered once.
+    """The law at one index: m, a, b and c of the light scattered again, h, a and b of that scattered once.
 
     once_h [mfp], once_a [1/mfp], once_b [1/mfp^2]; the others as they stand in the class
     """
 
-    h0: Number
-    h1: Number
-    h2: Number
+    m0: Number
+    m1: Number
+    m2: Number
     a0: Number
     a1: Number
     a2: Number
+    a3: Number
     b0: Number
     b1: Number
     b2: Number
@@ -69,47 +71,56 @@ class RefractingHazard(EscapeLaw):
 
     Under a surface that refracts, light scattered once dies with the critical angle, e^{-k_c x}, and all other light
     with kappa(alpha); one hazard cannot follow both. A_1, k_c and the strength at the source lambda_1(0) = s_0 / A_1 are
-    exact. No other light is there at the source: lambda_2(0) = 0, kappa is exact again. With v = sqrt(1 - alpha) and
-    rho the share of cosine-weighted light from inside that the surface reflects back (`Surface`),
+    exact. No other light is there at the source: lambda_2(0) = 0, so that w = c - kappa - a, and kappa is exact again.
 
-    h = e^{h00 + h10 v + h22 rho^2 kappa}
-    a = a00 + a01 rho + (a10 + a11 rho) v + (a20 + a21 rho + a22 rho^2) v^2
-    b = b00 + b01 rho + b02 rho^2 + (b10 + b11 rho) v + b20 v^2
-    c = (c00 + c01 rho + c02 rho^2 + (c10 + c11 rho + c12 rho^2) v + (c20 + c22 rho^2) kappa)^2       of the rest
+    Next to the source that light grows as 2 pi x R_d -> 2 alpha^2 m x ln(1/x), m = e^{m0 + m1 (1 - alpha) + m2 (1 -
+    alpha)^2} smooth in alpha, which sets h = -w (A - alpha A_1) / (alpha^2 m): A and kappa go with v = sqrt(1 - alpha)
+    next to white, but R_d near the source does not. With rho the share of cosine-weighted light from inside that the
+    surface reflects back (`Surface`), the shapes of light scattered again are
+
+    a = a0 + a1 v + a2 v^2 + a3 kappa     b = b0 + b1 v + b2 v^2     c = (c0 + c1 v + c2 kappa)^2
+
+    m0 = m00 + m01 rho + m02 rho^2     m1 = m10                    m2 = m21 rho + m22 rho^2
+    a0 = a00 + a01 rho                 a1 = a10 + a11 rho          a2 = a20 + a21 rho        a3 = a31 rho + a32 rho^2
+    b0 = b00 + b01 rho                 b1 = b10 + b11 rho          b2 = b20 + b21 rho
+    c0 = c00 + c01 rho                 c1 = c10 + c12 rho^2        c2 = c20 + c21 rho + c22 rho^2
 
     and of light scattered once, whose shape hardly depends on n in units of 1 / lambda_1(0), y = k_c / lambda_1(0),
 
-    h lambda_1(0) = once_h y     a / lambda_1(0) = once_a0 + once_a1 y     b / lambda_1(0)^2 = once_b0 + once_b1 y
+    h lambda_1(0) = once_h y     a / lambda_1(0) = once_a0 + once_a1 y     b / lambda_1(0)^2 = (once_b0 + once_b1 y)^2
 
-    29 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 15. `albedo` is the
+    32 constants for every n in (1, 1.6], alpha in [0, 1] and r in [0, inf]; at one n they come to 16. `albedo` is the
     map to A (held fixed). Two exponentials and two logarithms a profile.
     """
 
     setting: Setting = eqx.field(static=True)
     albedo: RefractingRational = eqx.field(static=True)
-    h00: float
-    h10: float
-    h22: float
+    m00: float
+    m01: float
+    m02: float
+    m10: float
+    m21: float
+    m22: float
     a00: float
     a01: float
     a10: float
     a11: float
     a20: float
     a21: float
-    a22: float
+    a31: float
+    a32: float
     b00: float
     b01: float
-    b02: float
     b10: float
     b11: float
     b20: float
+    b21: float
     c00: float
     c01: float
-    c02: float
     c10: float
-    c11: float
     c12: float
     c20: float
+    c21: float
     c22: float
     once_h: float
     once_a0: float
@@ -121,12 +132,38 @@ class RefractingHazard(EscapeLaw):
         "hazard",
         "hazard",
         records=("hazard",),
-        start={  # within a tenth of the exact profile
-            **{"h00": -0.2, "h10": -0.2, "h22": -1.4, "a00": 0.46, "a01": -0.35, "a10": -0.55, "a11": 0.35},
-            **{"a20": 0.5, "a21": 1.2, "a22": -1.2, "b00": 0.12, "b01": -0.18, "b02": 0.06, "b10": -0.2},
-            **{"b11": 0.2, "b20": 0.05, "c00": 0.42, "c01": -0.2, "c02": 0.1, "c10": -0.9, "c11": 0.8},
-            **{"c12": -1.2, "c20": 0.7, "c22": 0.4, "once_h": 3.2, "once_a0": 0.8, "once_a1": -1.1},
-            **{"once_b0": 0.07, "once_b1": -0.16},
+        start={  # within a tenth of the exact profile, under either light
+            **{
+                "m00": -1.2,
+                "m01": -0.25,
+                "m02": -0.65,
+                "m10": -0.4,
+                "m21": 1.7,
+                "m22": -2.3,
+                "a00": 0.46,
+                "a01": -0.32,
+            },
+            **{"a10": -0.6, "a11": -6.3, "a20": 0.54, "a21": 3.0, "a31": 3.8, "a32": 0.5, "b00": 0.11, "b01": -0.11},
+            **{
+                "b10": -0.2,
+                "b11": 0.3,
+                "b20": 0.07,
+                "b21": -0.33,
+                "c00": 0.38,
+                "c01": -0.03,
+                "c10": -0.97,
+                "c12": -2.6,
+            },
+            **{
+                "c20": 0.72,
+                "c21": 0.48,
+                "c22": 2.0,
+                "once_h": 3.1,
+                "once_a0": 0.79,
+                "once_a1": -1.1,
+                "once_b0": 0.073,
+                "once_b1": -0.17,
+            },
         },
         n=REFRACTING,
         own=True,
@@ -136,7 +173,7 @@ class RefractingHazard(EscapeLaw):
     @classmethod
     def at_one_index(cls) -> tuple[str, ...]:
         return (
-            *("h00", "h10", "h22", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20"),
+            *("m00", "m10", "m21", "a00", "a10", "a20", "a31", "b00", "b10", "b20", "c00", "c10", "c20"),
             *("once_h", "once_a0", "once_b0"),
         )
 
@@ -150,14 +187,14 @@ class RefractingHazard(EscapeLaw):
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength
         return Coefficients(
-            *(self.h00, self.h10, self.h22 * rho**2),
-            *(self.a00 + self.a01 * rho, self.a10 + self.a11 * rho, self.a20 + rho * (self.a21 + rho * self.a22)),
-            *(self.b00 + rho * (self.b01 + rho * self.b02), self.b10 + self.b11 * rho, self.b20),
-            *(self.c00 + rho * (self.c01 + rho * self.c02), self.c10 + rho * (self.c11 + rho * self.c12)),
-            self.c20 + self.c22 * rho**2,
+            *(self.m00 + rho * (self.m01 + rho * self.m02), self.m10, rho * (self.m21 + rho * self.m22)),
+            *(self.a00 + self.a01 * rho, self.a10 + self.a11 * rho, self.a20 + self.a21 * rho),
+            rho * (self.a31 + rho * self.a32),
+            *(self.b00 + self.b01 * rho, self.b10 + self.b11 * rho, self.b20 + self.b21 * rho),
+            *(self.c00 + self.c01 * rho, self.c10 + self.c12 * rho**2, self.c20 + rho * (self.c21 + rho * self.c22)),
             self.once_h * y / strength,
             (self.once_a0 + self.once_a1 * y) * strength,
-            (self.once_b0 + self.once_b1 * y) * strength**2,
+            ((self.once_b0 + self.once_b1 * y) * strength) ** 2,
         )
 
     def text_numbers(self) -> dict[str, float]:
@@ -172,36 +209,33 @@ class RefractingHazard(EscapeLaw):
         here = surface_of(self.setting)
         rho, strength = float(here.trapped), float(here.source / here.once)
         y = float(here.critical) / strength
-        found = {
-            f"{letter}{i}": {
-                name: rho ** int(name[2])
-                for name in self.constant_names()
-                if name[0] == letter and name[1:2] == str(i)
-            }
-            for letter in "habc"
-            for i in range(3)
-        }
+        found: dict[str, dict[str, float]] = {}
+        for name in self.constant_names():
+            if not name.startswith("once"):  # letter, which of its coefficients, power of rho
+                found.setdefault(name[:2], {})[name] = rho ** int(name[2])
+        twice = 2.0 * float(self.once_b0 + self.once_b1 * y) * strength**2
         return {
             **found,
             "once_h": {"once_h": y / strength},
             "once_a": {"once_a0": strength, "once_a1": y * strength},
-            "once_b": {"once_b0": strength**2, "once_b1": y * strength**2},
+            "once_b": {"once_b0": twice, "once_b1": y * twice},
         }
 
     def parts(self, alpha) -> Parts:
         """Everything that depends on alpha only: once a material, or once a pixel where A is a texture."""
         here, of, albedo = self.here(), self.coefficients(), self.albedo.under(self.surface)
         v, kappa, zero = jnp.sqrt(1.0 - alpha), decay_rate(alpha), jnp.zeros_like(alpha)
-        h = jnp.exp(of.h0 + of.h1 * v + of.h2 * kappa)
-        a = of.a0 + v * (of.a1 + v * of.a2)
+        a = of.a0 + v * (of.a1 + v * of.a2) + of.a3 * kappa
         b = jnp.maximum(of.b0 + v * (of.b1 + v * of.b2), LEAST_B)
         c = (of.c0 + of.c1 * v + of.c2 * kappa) ** 2
+        w = jnp.minimum(c - kappa - a, -LEAST_W)
+        again, u = albedo.scattered_again(alpha), 1.0 - alpha
+        h = -w * again * jnp.exp(-(of.m0 + u * (of.m1 + u * of.m2)))
         strength = here.source / here.once
-        once_b = jnp.maximum(of.once_b, LEAST_B)
-        once = (here.critical, strength, strength - here.critical - of.once_a, of.once_h, of.once_a, once_b, 0.0)
+        once = (here.critical, strength, strength - here.critical - of.once_a, of.once_h, of.once_a, of.once_b, 0.0)
         return Parts(
             Shape(alpha * here.once, *(jnp.asarray(one) + zero for one in once)),
-            Shape(albedo.scattered_again(alpha), kappa, zero, c - kappa - a, h, a, b, c),
+            Shape(alpha**2 * again, kappa, zero, w, h, a, b, c),
             here.once * albedo.albedo_over_reflectance(alpha),
         )
 

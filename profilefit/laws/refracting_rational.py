@@ -135,9 +135,9 @@ class RefractingRational(Normalisation):
 
     @evaluated
     def scattered_again(self, alpha) -> Array:
-        """Reflectance by light scattered twice and more [-], A - alpha A_1 without its cancellation."""
+        """Reflectance by light scattered twice and more over alpha^2 [-]: A - alpha A_1 without its cancellation."""
         s, of = jnp.sqrt(1.0 - alpha), self.terms()
-        return alpha**2 * _cubic(of.m, s) / ((1.0 + s) ** 2 * _cubic(of.g, s))
+        return _cubic(of.m, s) / ((1.0 + s) ** 2 * _cubic(of.g, s))
 
     @evaluated
     def alpha(self, reflectance) -> Array:

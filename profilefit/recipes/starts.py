@@ -61,7 +61,9 @@ def require_known(recipe: Recipe) -> None:
         )
     spans = kind.at_one_index() != kind.constant_names()
     if recipe.indices and not spans:
-        raise RecipeError(f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}")
+        raise RecipeError(
+            f"{recipe.path}: indices are for a law that spans them, got {recipe.law!r} at n = {recipe.setting.n:g}"
+        )
     if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
         raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
     if objective and not free(recipe, kind):
