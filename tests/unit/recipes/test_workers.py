@@ -15,9 +15,10 @@ from profilefit.recipes.workers import Workers, cores
 
 # Starts two processes that would sleep for a minute, says who they are, and waits for them.
 SLEEPERS = """
-import time
+import signal, time
 from profilefit.recipes.workers import Workers
 if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & has ignored
     with Workers(2) as workers:
         print(*(process.pid for process in workers._started), flush=True)
         list(workers.each(time.sleep, [0.01, 0.01, 60, 60]))
