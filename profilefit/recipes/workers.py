@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import os
 import signal
-import sys
 import threading
 import traceback
 import warnings
@@ -20,7 +19,6 @@ from multiprocessing.connection import Connection, wait
 from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
-GRACE = 0.5  # [s]
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
@@ -33,7 +31,7 @@ def cores() -> int:
 class Workers:
     """So many processes; jobs are done here if that is one.
 
-    Leaving ends them, whatever they are at: they get half a second to put away what they are writing.
+    Leaving ends them at once, whatever they are at; what they write must be whole or absent whenever that is.
     """
 
     def __init__(self, processes: int) -> None:
@@ -51,12 +49,9 @@ class Workers:
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
         for process, pipe in zip(self._started, self._pipes, strict=True):
-            pipe.close()
-            process.terminate()
-        for process in self._started:
-            process.join(GRACE)
             process.kill()
             process.join()
+            pipe.close()
 
     def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
         """The number of each job and what `task` makes of it, as they come; jobs begin in their order.
@@ -94,7 +89,6 @@ def _received(pipe: Connection) -> Any:
 def _work(pipe: Connection) -> None:
     """Do jobs until nobody asks for one any more."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one that started this
-    signal.signal(signal.SIGTERM, lambda *_: sys.exit(1))
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(EOFError, BrokenPipeError):
         while True:

@@ -69,9 +69,8 @@ def test_records_are_the_same_bytes_whatever_the_processes(tmp_path):
     for processes in (1, 2, 3):
         run = RecipeRun("quick", 5, tmp_path / str(processes), tmp_path / "store", 200_000, lambda _: None, False)
         steps = regenerate.regenerate(recipes, run, processes=processes)
-        assert [step.name for step in steps[1:3]] == ["albedo-rational", "albedo-liang"] or processes > 1
         assert all(step.seconds > 0 for step in steps)
         assert {step.path.stem for step in steps if step.path} == set(names)
-    for name in (f"{name}.{suffix}" for name in names for suffix in ("json", "npz")):
-        one, *others = [(tmp_path / str(processes) / name).read_bytes() for processes in (1, 2, 3)]
-        assert others == [one, one], name
+    one, *others = [{p.name: p.read_bytes() for p in tmp_path.glob(f"{processes}/*.*")} for processes in (1, 2, 3)]
+    assert len(one) == 7  # what compares records has no arrays
+    assert others == [one, one]
