@@ -27,7 +27,7 @@ __all__ = ["app", "main"]
 HELP = """
 Closed-form profiles of subsurface scattering, fitted with error bars.
 
-  profilefit regenerate hazard --out mine  simulate, and fit anew: two minutes
+  profilefit regenerate hazard --out mine  simulate, and fit anew: a minute
   profilefit report --fits mine            constants, errors and quality
   profilefit export hazard --lang hlsl     the most accurate law, as a shader
   profilefit fit FILE.csv                  alpha and l of a measured profile"""

@@ -49,7 +49,8 @@ def regenerate(
 ) -> None:
     """Simulate light, refit the laws, write the records.
 
-    One record a recipe, in seconds or minutes each. Ctrl-C loses the batch in flight only: the same command resumes.
+    One record a recipe, in some seconds each, as many side by side as there are cores. Ctrl-C loses what is in flight
+    only: photons that are traced stay, and the same command resumes.
 
     \b
     Examples:
@@ -57,13 +58,14 @@ def regenerate(
       profilefit regenerate albedo-liang --photons 100000 --out mine
     """
     with interruptible(__name__):
-        from mcml_sim.cli.screen import notes, print_json
+        from mcml_sim.cli.screen import notes, print_json, put
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import is_watched
         from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
         from profilefit.recipes.run import RecipeRun
-        from profilefit.report.tables.summary_tables import outcome
+        from profilefit.recipes.workers import cores
+        from profilefit.report.tables.summary_tables import outcome, spent
 
     if not 0 <= seed <= MAX_SEED:
         raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")
@@ -82,7 +84,11 @@ def regenerate(
         say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=is_watched() and not quiet,
     )
-    written = regenerate_records(those, run)
+    steps = regenerate_records(those, run, processes=cores())
+    written = {step.name: step.path for step in steps if step.path}
+    if len(written) > 1:
+        put(spent({step.name: step.seconds for step in steps}, written), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
     if as_json:
-        print_json({path.stem: outcome(path) for path in written})
+        seconds = {step.name: round(step.seconds, 1) for step in steps}
+        print_json({name: {**outcome(path), "seconds": seconds[name]} for name, path in written.items()})

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -142,10 +142,15 @@ def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import tracked
+        from profilefit.recipes.workers import cores
         from profilefit.report import draw_all
 
     require_folder(out)
-    drawn, skipped = draw_all(folder, out, names, lambda plans: tracked(plans, "drawing", "figures", quiet=quiet))
+
+    def track(plans: Iterable[Any]) -> Iterator[Any]:
+        return tracked(plans, "drawing", "figures", quiet=quiet)
+
+    drawn, skipped = draw_all(folder, out, names, track, cores())
     said = notes(quiet)
     said.print(f"drew {len(drawn)} figures into {out}", markup=False)
     for line in skipped:

@@ -27,6 +27,7 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import minimize
 
 from mcml_sim.media.setting import Setting
@@ -303,13 +304,12 @@ def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floa
 
 
 def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
-    """Minus the log likelihood of `y` but for `slope` times anything (Patterson and Thompson's (3)), and its derivative
-    (k, k) by the covariance."""
+    """Minus log likelihood of `y` but for `slope` times anything (Patterson, Thompson's (3)), and d / d covariance."""
     root = np.linalg.cholesky(covariance)
-    back = solve_triangular(root, np.eye(y.size), lower=True)
-    across, triangle = np.linalg.qr(back @ slope)
-    seen = back.T @ across
-    inverse = back.T @ back - seen @ seen.T  # of what `slope` leaves
+    lower = np.tril(dpotri(root, lower=1)[0])  # of the inverse: a third of what solving for it takes
+    across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
+    seen = solve_triangular(root, across, lower=True, trans=1)
+    inverse = lower + np.tril(lower, -1).T - seen @ seen.T  # of what `slope` leaves
     rest = inverse @ y
     logs = np.sum(np.log(np.diag(root))) + np.sum(np.log(np.abs(np.diag(triangle))))
     return float(logs + 0.5 * (y @ rest)), 0.5 * (inverse - np.outer(rest, rest))

@@ -108,8 +108,8 @@ def _levenberg_marquardt(at: Callable[[Floats], tuple[Floats, Floats]], start: F
         there, slopes_there = at((here + move) * scale)
         steps += 1
         with np.errstate(invalid="ignore", over="ignore"):  # of a step to where there is no law
-            won = 0.5 * (there @ there - values @ values)
-            promised = 0.5 * (np.sum((slopes @ move + values) ** 2) - values @ values)
+            linear = values + slopes @ move
+            won, promised = there @ there - values @ values, linear @ linear - values @ values  # rounded alike
         if not won <= LEAST_WON * promised:
             size *= SHRINK
             continue

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from profilefit.recipes.workers import Workers
 from profilefit.report.figures.albedo_figure import albedo_figure
 from profilefit.report.figures.coefficient_figures import a_figure, b_figure, c_figure, constants_figure, has_printed
 from profilefit.report.figures.corner_figure import corner_figure
@@ -56,26 +57,37 @@ PAPER = (
 
 
 def draw_all(
-    folder: Path, out: Path, names: Sequence[str] | None = None, track: Track = iter
+    folder: Path, out: Path, names: Sequence[str] | None = None, track: Track = iter, processes: int = 1
 ) -> tuple[list[Path], list[str]]:
     """Draw every figure that the records in `folder` allow into folder `out`, as PNG and SVG.
 
     names  records: only figures that show one of them; all if None or empty
     track  is shown the progress: plans, as a list -> the same, as they are drawn
+    processes  how many draw, each a process of its own if not one
     Returns the files written, and a line for each figure left out, with the reason. Raises RecordError on a record
     that is damaged, OutputError where `out` cannot be written.
     """
     source = Source(folder)
-    drawn: list[Path] = []
+    possible: list[Plan] = []
     left_out: list[str] = []
-    for plan in track([plan for plan in plans(source) if plan.concerns(names or None)]):
+    for plan in (plan for plan in plans(source) if plan.concerns(names or None)):
         absent = [name for name in plan.needs if name not in source.paths]
         reason = f"{folder} has no record {', '.join(absent)}" if absent else plan.missing
         if reason:
             left_out.append(f"{plan.name}: {reason}")
         else:
-            drawn += plan.draw(source, out, name=plan.name)
-    return drawn, left_out
+            possible.append(plan)
+    drawn: dict[int, list[Path]] = {}
+    with Workers(min(processes, len(possible))) as workers:
+        task = partial(_drawn, source if processes == 1 else Source(folder), out)  # what is read travels with it
+        found = workers.each(task, possible)
+        for _ in track(possible):
+            number, drawn[number] = next(found)
+    return [path for number in range(len(possible)) for path in drawn[number]], left_out
+
+
+def _drawn(source: Source, out: Path, plan: Plan) -> list[Path]:
+    return plan.draw(source, out, name=plan.name)
 
 
 def plans(source: Source) -> tuple[Plan, ...]:

@@ -49,6 +49,17 @@ def outcome(path: Path) -> dict[str, Any]:
     return {**told, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 
 
+def spent(seconds: Mapping[str, float], paths: Mapping[str, Path]) -> RenderableType:
+    """Seconds of each record, and of the photons of each setting, with what came out of it."""
+    results = [_result(record.read(paths[name])) if name in paths else "" for name in seconds]
+    columns = {"record": list(seconds), "seconds": [f"{value:.1f}" for value in seconds.values()], "result": results}
+    return column_table("Where the seconds went", columns, left=("record", "result"))
+
+
+def _result(content: Content) -> str:
+    return str(content["fit"]["result"]) if "fit" in content else f"{len(content.get('readings', []))} readings"
+
+
 def truth(content: Content) -> str:
     """What a record was fitted to: the exact solution, or so many photons."""
     source = content.get("truth") or {}

@@ -14,7 +14,7 @@ from profilefit.studies.stability.atlas import FUNCTIONS
 from profilefit.studies.tradeoff.parts import PARTS
 
 FITS = catalogue.fits_folder()
-HEAVY = ("jax", "numpy", "scipy", "matplotlib", "moderngl", "optimistix")  # take seconds together, which no shell has
+HEAVY = ("jax", "numpy", "scipy", "matplotlib", "moderngl")  # take seconds together, which no shell has
 PATIENCE = 1.0  # [s] of processor time, so that a busy machine does not count
 
 

@@ -52,4 +52,25 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
         ("profile-n1.4", refracted),
         ("profile-diffuse", None),
     ]
-    assert [path.stem for path in written] == [name for name, _ in made]
+    assert [step.name for step in written] == [
+        f"photons: {refracted}",
+        f"photons: {diffuse}",
+        *(name for name, _ in made),
+    ]
+    assert [step.path.stem for step in written[2:]] == [name for name, _ in made]
+    assert [line.split(":")[0] for line in said[2:]] == [name for name, _ in made]
+
+
+@pytest.mark.slow
+def test_records_are_the_same_bytes_whatever_the_processes(tmp_path):
+    """Maps, a fit to photons, and what compares the records of all."""
+    names = ("albedo-liang", "albedo-rational", "burley-whole", "reproduction")
+    recipes = tuple(recipe.find(name, FITS) for name in names)
+    for processes in (1, 2, 3):
+        run = RecipeRun("quick", 5, tmp_path / str(processes), tmp_path / "store", 200_000, lambda _: None, False)
+        steps = regenerate.regenerate(recipes, run, processes=processes)
+        assert all(step.seconds > 0 for step in steps)
+        assert {step.path.stem for step in steps if step.path} == set(names)
+    one, *others = [{p.name: p.read_bytes() for p in tmp_path.glob(f"{processes}/*.*")} for processes in (1, 2, 3)]
+    assert len(one) == 7  # what compares records has no arrays
+    assert others == [one, one]

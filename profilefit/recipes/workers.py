@@ -1,0 +1,114 @@
+"""Processes that work side by side: each does one job after the other, and none outlives the one that started it.
+
+They are spawned, since the threads of JAX do not survive a fork, and nothing here imports JAX, so that all of them
+start at once. What a job warns of is warned of where it was asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+import traceback
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
+from functools import partial
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import Connection, wait
+from types import TracebackType
+from typing import Any, Self, TypeVar, cast
+
+Job = TypeVar("Job")
+Done = TypeVar("Done")
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Workers:
+    """So many processes; jobs are done here if that is one.
+
+    Leaving ends them at once, whatever they are at; what they write must be whole or absent whenever that is.
+    """
+
+    def __init__(self, processes: int) -> None:
+        self._processes = processes if processes > 1 else 0
+
+    def __enter__(self) -> Self:
+        context = get_context("spawn")
+        pairs = [context.Pipe() for _ in range(self._processes)]
+        self._pipes = [ours for ours, _ in pairs]
+        self._started = [context.Process(target=_work, args=(theirs,), daemon=True) for _, theirs in pairs]
+        for process, (_, theirs) in zip(self._started, pairs, strict=True):
+            process.start()
+            theirs.close()  # or the end of a process would not be seen
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        for process, pipe in zip(self._started, self._pipes, strict=True):
+            process.kill()
+            process.join()
+            pipe.close()
+
+    def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
+        """The number of each job and what `task` makes of it, as they come; jobs begin in their order.
+
+        An error of a job rises here; ChildProcessError if a process was ended from outside.
+        """
+        if not self._pipes:
+            yield from ((number, task(job)) for number, job in enumerate(jobs))
+            return
+        left, idle, at_work = list(enumerate(jobs)), list(self._pipes), dict[Any, int]()
+        while left or at_work:
+            while left and idle:
+                number, job = left.pop(0)
+                at_work[pipe := idle.pop(0)] = number
+                with suppress(BrokenPipeError):  # it has ended, as the next lines will see
+                    pipe.send(partial(task, job))
+            for ready in wait(list(at_work)):
+                number, pipe = at_work.pop(ready), cast("Connection", ready)
+                idle.append(pipe)
+                yield number, _received(pipe)
+
+
+def _received(pipe: Connection) -> Any:
+    try:
+        result, error, warned = pipe.recv()
+    except (EOFError, ConnectionResetError):
+        raise ChildProcessError("a process that fitted was ended from outside, for want of memory, say") from None
+    for one in warned:
+        warnings.warn(one, stacklevel=3)
+    if error is not None:
+        raise error
+    return result
+
+
+def _work(pipe: Connection) -> None:
+    """Do jobs until nobody asks for one any more."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one that started this
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    with suppress(EOFError, BrokenPipeError):
+        while True:
+            pipe.send(_done(pipe.recv()))
+
+
+def _done(job: Callable[[], Any]) -> tuple[Any, Exception | None, list[Warning | str]]:
+    """What a job gives, what went wrong, and what it warned of."""
+    with warnings.catch_warnings(record=True) as found:
+        warnings.simplefilter("always")
+        try:
+            result, error = job(), None
+        except Exception as raised:
+            raised.add_note(traceback.format_exc())  # the traceback itself stays here
+            result, error = None, raised
+    return result, error, [one.message for one in found]
+
+
+def _end_with_parent() -> None:
+    """Whoever started this may have been killed, and could not say so."""
+    if (parent := parent_process()) is not None:
+        parent.join()
+        os._exit(1)

@@ -1,0 +1,83 @@
+"""Processes side by side: what they give, what they say, and that none is left behind."""
+
+import math
+import operator
+import os
+import signal
+import subprocess
+import sys
+import time
+import warnings
+
+import pytest
+
+from profilefit.recipes.workers import Workers, cores
+
+# Starts two processes that would sleep for a minute, says who they are, and waits for them.
+SLEEPERS = """
+import signal, time
+from profilefit.recipes.workers import Workers
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & has ignored
+    with Workers(2) as workers:
+        print(*(process.pid for process in workers._started), flush=True)
+        list(workers.each(time.sleep, [0.01, 0.01, 60, 60]))
+"""
+
+
+@pytest.mark.parametrize("processes", [0, 1, 2, 3])
+def test_every_job_is_done_once_whatever_the_processes(processes):
+    with Workers(processes) as workers:
+        assert dict(workers.each(math.factorial, range(8))) == dict(enumerate(map(math.factorial, range(8))))
+        assert list(workers.each(operator.neg, [5])) == [(0, -5)]
+        assert list(workers.each(operator.neg, [])) == []
+        assert len(workers._started) == (processes if processes > 1 else 0)
+    assert not any(process.is_alive() for process in workers._started)
+
+
+@pytest.mark.parametrize("processes", [1, 2])
+def test_errors_and_warnings_come_here(processes):
+    with Workers(processes) as workers:
+        with pytest.warns(UserWarning, match="from a job"):
+            list(workers.each(warnings.warn, ["from a job"]))
+        with pytest.raises(OverflowError, match="math range error"):
+            list(workers.each(math.exp, [1.0, 1e9, 2.0]))
+    assert not any(process.is_alive() for process in workers._started)
+
+
+def test_a_process_that_is_ended_from_outside_is_missed():
+    with Workers(2) as workers, pytest.raises(ChildProcessError, match="ended from outside"):
+        list(workers.each(os._exit, [9, 9]))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+@pytest.mark.parametrize("by", ["SIGINT", "SIGTERM", "SIGKILL"])
+def test_no_process_outlives_the_one_that_started_it(by):
+    """Ctrl-C reaches all of them, a kill only the first."""
+    script = [sys.executable, "-c", SLEEPERS]
+    with subprocess.Popen(
+        script, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as one:
+        started = list(map(int, one.stdout.readline().split()))
+        assert len(started) == 2
+        time.sleep(1.0)
+        (os.killpg if by == "SIGINT" else os.kill)(one.pid, signal.Signals[by])
+        _, said = one.communicate(timeout=20)
+    assert one.returncode != 0
+    assert said.count("Traceback") == (by == "SIGINT")  # that of the first
+    deadline = time.monotonic() + 20
+    while time.monotonic() < deadline and any(map(_is_alive, started)):
+        time.sleep(0.05)
+    assert not any(map(_is_alive, started))
+
+
+def _is_alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return True
+
+
+def test_cores_are_those_that_this_process_may_use():
+    assert 1 <= cores() <= os.cpu_count()
