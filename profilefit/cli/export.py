@@ -33,6 +33,10 @@ def export(
             autocompletion=options.constants,
         ),
     ] = None,
+    n: Annotated[
+        float | None,
+        typer.Option("--n", help="Refractive index of the surface, if not that of the record: 1 to 1.6 for hazard."),
+    ] = None,
     name: Annotated[
         str | None,
         typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
@@ -46,8 +50,9 @@ def export(
     map that was not regenerated has its printed ones.
 
     \b
-    Example:
+    Examples:
       profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
+      profilefit export hazard-diffuse --n 1.37
     """
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
@@ -55,7 +60,7 @@ def export(
         from profilefit.shader import export as exported
 
     folder = records_folder(fits)
-    text = exported(find(what, folder, constants), folder, lang, name)
+    text = exported(find(what, folder, constants, n), folder, lang, name)
     if out is None:
         sys.stdout.write(text)
     else:

@@ -35,8 +35,8 @@ from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
-from profilefit.laws.surface import surface_of
 from profilefit.laws.liang import QUANTILES
+from profilefit.laws.surface import surface_of
 
 Floats = NDArray[np.float64]
 Live = NDArray[np.bool_]

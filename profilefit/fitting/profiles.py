@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -92,7 +93,7 @@ class Profiles:
     beyond             (m,) energy reflected beyond the last edge [-]
     covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
-    indices            (m,) refractive indices, where profiles of several are fitted together; None for that of `setting`
+    indices            (m,) refractive indices, where profiles of several are joined; None for that of `setting`
     """
 
     alpha: Floats
@@ -116,7 +117,7 @@ class Profiles:
             np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
         ):
             raise InputError("profiles of several indices must have the same albedos and rings, got others")
-        rows = {
+        rows: dict[str, Any] = {
             name: np.concatenate([getattr(one, name) for one in parts])
             for name in ("alpha", "energy", "standard_error", "effective_samples", "beyond")
         }

@@ -48,7 +48,7 @@ def home(place: str) -> "Any":
 
 
 def at_index(kind: "Any", n: float) -> "Any":
-    """The class that a law or map of this class has at a refractive index: its own, or that for surfaces that refract."""
+    """The class that a law or map has at a refractive index: this one, or that for surfaces that refract."""
     place = REFRACTING.get(f"{kind.__module__.rpartition('.')[2]}.{kind.__name__}")
     return kind if n == 1.0 or place is None else home(place)
 

@@ -56,7 +56,7 @@ class Constants(eqx.Module):
 
     def under(self, surface: Surface | None) -> Self:
         """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
-        return self if surface is None else replace(self, surface=surface)
+        return self if surface is None else replace(self, surface=surface)  # type: ignore[call-arg]
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:

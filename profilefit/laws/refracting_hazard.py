@@ -70,8 +70,8 @@ class RefractingHazard(EscapeLaw):
     """2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r/l
 
     Under a surface that refracts, light scattered once dies with the critical angle, e^{-k_c x}, and all other light
-    with kappa(alpha); one hazard cannot follow both. A_1, k_c and the strength at the source lambda_1(0) = s_0 / A_1 are
-    exact. No other light is there at the source: lambda_2(0) = 0, so that w = c - kappa - a, and kappa is exact again.
+    with kappa(alpha); one hazard cannot follow both. A_1, k_c and the strength at the source, lambda_1(0) = s_0 / A_1,
+    are exact. No other light is there at the source: lambda_2(0) = 0, so w = c - kappa - a, and kappa is exact again.
 
     Next to the source that light grows as 2 pi x R_d -> 2 alpha^2 m x ln(1/x), m = e^{m0 + m1 (1 - alpha) + m2 (1 -
     alpha)^2} smooth in alpha, which sets h = -w (A - alpha A_1) / (alpha^2 m): A and kappa go with v = sqrt(1 - alpha)
@@ -269,8 +269,8 @@ class RefractingHazardSampler(Sampler):
     """xi below the share of light scattered once draws a radius of that light, another one of the rest.
 
     Within a part xi is stretched to [0, 1] again, and -ln S(x) = t = -ln(1 - xi) solved by a guess and `steps` steps.
-    The guess is right to first order at t = 0 and far away. Step: sqrt(t) is the smooth function of x in both parts; its
-    slope around x is taken for f / (1 + y), a straight line in 1/f, and the integral for a cubic.
+    The guess is right to first order at t = 0 and far away. Step: sqrt(t) is the smooth function of x in both parts;
+    its slope around x is taken for f / (1 + y), a straight line in 1/f, and the integral for a cubic.
 
     Error in xi within a part, at every alpha, xi and n: one step 7e-4, two steps 2e-8.
     """

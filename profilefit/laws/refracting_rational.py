@@ -44,8 +44,8 @@ class RefractingRational(Normalisation):
     c = c0 + c1 mu_c + c2 mu_c^2 + c3 mu_c^3     d likewise     f = f0 + f1 mu_c
 
     b follows from light scattered once, which is exact: A / alpha -> A_1 at alpha = 0. So A(0) = 0, the slope there and
-    A(1) = t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more than
-    t, and alpha(A > t) = 1. For n in (1, 1.6], under either light.
+    A(1) = t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more
+    than t, and alpha(A > t) = 1. For n in (1, 1.6], under either light.
 
     c0 ... c3, d0 ... d3, f0, f1  constants [-]
     """

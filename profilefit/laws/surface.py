@@ -6,16 +6,14 @@ A fit to several indices gives arrays of them, one number for each profile; a la
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-from jax import Array
-from numpy.typing import NDArray
 
 from mcml_sim.exact import single_scattering
 from mcml_sim.media.setting import Setting
 
-Number = float | Array | NDArray[np.float64]
+Number = Any  # a float, or an array of jax or numpy
 
 
 class Surface(NamedTuple):

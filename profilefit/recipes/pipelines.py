@@ -48,7 +48,8 @@ def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     laws = {**_printed_laws(recipe, run), "regenerated": result.law}
     content["quality"] = {name: _albedo_quality(law, light) for name, law in laws.items()}
     if recipe.indices:
-        each = {n: albedo_quality(result.law.at_index(n)).delta_A for n in _judged(recipe)}
+        law: Any = result.law
+        each = {n: albedo_quality(law.at_index(n)).delta_A for n in _judged(recipe)}
         content["quality"]["by_index"] = {"n": list(each), "delta_A": list(each.values())}
     drawn = curves(profiles)
     arrays |= {"reflectance": drawn["energy"].sum(axis=1) + drawn["beyond"]}
@@ -143,7 +144,7 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
     return np.array(errors)
 
 
-def by_index(law: ProfileLaw, indices: Sequence[float]) -> dict[str, list[float]]:
+def by_index(law: Any, indices: Sequence[float]) -> dict[str, list[float]]:
     """Worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at each n."""
     alpha = albedo_values(QUALITY_ALBEDOS)
     each = [profile_quality(law.at_index(n), alpha) for n in indices]

@@ -191,7 +191,8 @@ class Recipe:
 
     def _problems_of_indices(self) -> str | None:
         if self.truth != "exact" or self.pipeline not in ("albedo", "profile"):
-            return f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {self.truth!r}, {self.pipeline!r}"
+            got = f"{self.truth!r}, {self.pipeline!r}"
+            return f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {got}"
         if not all(1 < n <= LARGEST_INDEX for n in self.indices) or list(self.indices) != sorted(set(self.indices)):
             return f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {list(self.indices)!r}"
         if len(self.indices) < FEWEST_INDICES:

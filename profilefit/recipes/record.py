@@ -115,8 +115,9 @@ REFRACTING = "refracting"  # in the name of a record that holds for every index 
 
 
 def covers(content: Mapping[str, Any], setting: Setting) -> bool:
-    """Whether a record's constants hold for a setting: its own or, if they were fitted to several indices, one between."""
-    own, low, high = record_setting(content), *(content.get("indices") or (0.0, 0.0))
+    """Whether a record's constants hold for a setting: its own or, if they span indices, one of these."""
+    own = record_setting(content)
+    low, high = content.get("indices") or (0.0, 0.0)
     return own == setting or (low < setting.n <= high and own == replace(setting, n=own.n))
 
 

@@ -21,11 +21,12 @@ from profilefit.errors import InputError
 from profilefit.laws import map_classes, profile_classes
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.entry import Text
-from profilefit.laws.rational import Rational
+from profilefit.laws.rational import Normalisation
 from profilefit.shader.languages import translated
 
 Numbers = dict[str, float]
 PLACEHOLDER = "LAW_"
+NORMALISED = "rational"  # the part that stands for the text of the map which normalises a law
 # A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before.
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
 # A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
@@ -45,7 +46,7 @@ DIGITS = 12  # of a constant, as in the records: numpy gives a law back to them,
 def prefix(law: Constants) -> str:
     """What the names of a law's text begin with, less the underscore."""
     text = _text(law)
-    return f"{text.file}{text.count}" if text.count else text.file
+    return f"{text.prefix or text.file}{text.count or ''}"
 
 
 def clamps(law: Constants) -> str:
@@ -64,16 +65,18 @@ def law_text(
     InputError for a law that has no text.
     """
     text = _text(law, ProfileLaw)
-    map_constants = _map_constants(law) if "rational" in text.parts else {}
-    constants = {**map_constants, **law.text_numbers(), **law.constants()}
-    files = [read_text(part) for part in ("common", *text.parts, text.file, *text.ends)]
+    albedo = _normalisation(law) if NORMALISED in text.parts else None
+    map_constants = _prefixed(albedo) if albedo else {}
+    constants = {**map_constants, **law.text_numbers(), **law.text_constants()}
+    own = {NORMALISED: _text(albedo).file} if albedo else {}
+    files = [read_text(own.get(part, part)) for part in ("common", *text.parts, text.file, *text.ends)]
     return _filled(files, name or prefix(law), constants, text.count, lang, told or {})
 
 
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
     """The map between alpha and A: NAME_alpha(A) and NAME_map_reflectance(alpha); arguments as for `law_text`."""
     text = _text(law, AlbedoLaw)
-    constants = {f"map_{key}": value for key, value in {**law.text_numbers(), **law.constants()}.items()}
+    constants = _prefixed(law)
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
     files = [read_text(part) for part in ("common", *text.parts, text.file)]
     return _filled(files, name or prefix(law), constants, 0, lang, remarks)
@@ -97,12 +100,17 @@ def _text(law: Constants, kind: type[Constants] = Constants) -> Text:
     raise InputError(f"law must be one that has a shader source ({has}), got {type(law).__name__}")
 
 
-def _map_constants(law: Any) -> Numbers:
-    """The constants of the map that normalises the law."""
+def _normalisation(law: Any) -> Normalisation:
+    """The map that normalises the law."""
     albedo = getattr(law, "albedo", None)
-    if not isinstance(albedo, Rational):
+    if not isinstance(albedo, Normalisation):
         raise InputError(f"albedo of {type(law).__name__} must be a Rational map to become a shader, got {albedo!r}")
-    return {"map_entered": albedo.entered, **{f"map_{key}": value for key, value in albedo.constants().items()}}
+    return albedo
+
+
+def _prefixed(albedo: AlbedoLaw) -> Numbers:
+    """The numbers of a map's text."""
+    return {f"map_{key}": value for key, value in {**albedo.text_numbers(), **albedo.text_constants()}.items()}
 
 
 def read_text(file: str) -> str:

@@ -4,18 +4,21 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from mcml_sim import __version__
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
-from profilefit.laws.base import AlbedoLaw
+from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder, Records
@@ -151,6 +154,8 @@ def _provenance(source: _Source, before: str) -> list[str]:
         lines.append("this record came with profilefit: the folder of the law's has none of this light and surface")
     fitted = content["protocol"]["albedos"]
     lines.append(f"fitted for alpha from {fitted['low']:g} to {fitted['high']:g}")
+    if span := content.get("indices"):
+        lines.append(f"fitted for every refractive index above {span[0]:g} up to {span[1]:g}")
     measured = content["quality"]["regenerated"]
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
     worst = [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]
@@ -166,13 +171,39 @@ def _remarks(named: Named, sources: Sequence[_Source]) -> dict[str, str]:
     remarks = {}
     start = "" if isinstance(named.law, AlbedoLaw) else "map_"
     for source in sources:
+        law = named.law.albedo if source.of == "map" and start else named.law
         before = start if source.of == "map" else ""
-        for name, constant in source.content["constants"].items():
-            found = [f"{constant[key]:.2g} ({word})" for key, word in ERRORS.items() if constant.get(key) is not None]
+        for name, errors in text_errors(law, source.content).items():
+            found = [f"{error:.2g} ({ERRORS[key]})" for key, error in errors.items()]
             remarks[before + name] = "+- " + ", +- ".join(found) if found else "held"
     if named.files:  # a record may hold a part of a law's constants
         remarks = {**dict.fromkeys(named.law.constant_names(), "as printed"), **remarks}
     return remarks
+
+
+def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[str, float]]:
+    """Each constant of a law's text that a record has made -> its standard errors there, by the keys of `ERRORS`.
+
+    A constant that several of the record's come to at the law's index has those of their covariance; a jackknife knows
+    none, and its errors are carried over as if they were independent.
+    """
+    recorded, found = content["constants"], dict[str, dict[str, float]]()
+    covariance = content.get("covariance", {})
+    names = covariance.get("names", [])
+    for name, slopes in law.folds().items():
+        own = {one: slope for one, slope in slopes.items() if one in recorded}
+        if not own:
+            continue
+        found[name] = {}
+        for key in ERRORS:
+            matrix = covariance.get(key.removesuffix("_error"))
+            known = [(slope, recorded[one].get(key)) for one, slope in own.items()]
+            if len(own) > 1 and matrix is not None:
+                along = np.array([own.get(one, 0.0) for one in names])
+                found[name][key] = float(np.sqrt(max(along @ np.array(matrix, float) @ along, 0.0)))
+            elif all(error is not None for _, error in known):
+                found[name][key] = math.hypot(*(slope * error for slope, error in known))
+    return found
 
 
 def _printed(named: Named) -> Any:
@@ -191,19 +222,20 @@ def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
         "made_by": f"profilefit {__version__}",
         "setting": {"illumination": law.setting.illumination, "n": law.setting.n, "g": law.setting.g},
         "units": "lengths in mean free paths 1 / (mu_s' + mu_a)",
-        "constants": law.constants(),
+        "constants": law.text_constants(),
         "printed_in": printed.source if printed else None,
-        "records": {source.path.stem: _record_data(source) for source in sources},
+        "records": {source.path.stem: _record_data(source, named.law) for source in sources},
     }
     if getattr(law, "albedo", None) is not None:
-        made["map"] = {"entered": law.albedo.entered, **law.albedo.constants()}
+        made["map"] = {"entered": law.albedo.entered, **law.albedo.text_numbers(), **law.albedo.text_constants()}
     return made
 
 
-def _record_data(source: _Source) -> dict[str, Any]:
+def _record_data(source: _Source, law: Any) -> dict[str, Any]:
     content = source.content
+    of = law.albedo if source.of == "map" and not isinstance(law, AlbedoLaw) else law
     errors = {
-        name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in content["constants"].items()
+        name: {EXPORTED.get(key, key): one.get(key) for key in ERRORS} for name, one in text_errors(of, content).items()
     }
     kept = {key: content.get(key) for key in ("title", "equations", "data_digest", "truth")}
     fitted = {key: content["protocol"]["albedos"][key] for key in ("low", "high")}
