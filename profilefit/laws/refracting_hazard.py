@@ -15,7 +15,6 @@ from profilefit.laws.entry import CLAMPS, Entry, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
 from profilefit.laws.hazard import (
     FARTHEST,
-    LEAST_B,
     NEAR_SOURCE,
     NEAREST,
     NO_LIGHT,
@@ -29,6 +28,7 @@ from profilefit.laws.refracting_rational import REFRACTING, RefractingRational
 from profilefit.laws.surface import Number, Surface, surface_of
 
 # First guesses of a radius: of light scattered once p, of the rest p, q, d and m; their error after a step is least.
+ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there
 LEAST_W = 1e-3  # of -w [1/mfp]: h must be positive
 ONCE, AGAIN = 0.535, (0.378, 0.266, 0.596, 0.875)
 
@@ -78,7 +78,8 @@ class RefractingHazard(EscapeLaw):
     next to white, but R_d near the source does not. With rho the share of cosine-weighted light from inside that the
     surface reflects back (`Surface`), the shapes of light scattered again are
 
-    a = a0 + a1 v + a2 v^2 + a3 kappa     b = b0 + b1 v + b2 v^2     c = (c0 + c1 v + c2 kappa)^2
+    a = a0 + a1 v + a2 v^2 + a3 kappa     c = (c0 + c1 v + c2 kappa)^2
+    b = (q + sqrt(q^2 + 1e-4)) / 2, q = b0 + b1 v + b2 v^2, positive and smooth
 
     m0 = m00 + m01 rho + m02 rho^2     m1 = m10                    m2 = m21 rho + m22 rho^2
     a0 = a00 + a01 rho                 a1 = a10 + a11 rho          a2 = a20 + a21 rho        a3 = a31 rho + a32 rho^2
@@ -226,7 +227,8 @@ class RefractingHazard(EscapeLaw):
         here, of, albedo = self.here(), self.coefficients(), self.albedo.under(self.surface)
         v, kappa, zero = jnp.sqrt(1.0 - alpha), decay_rate(alpha), jnp.zeros_like(alpha)
         a = of.a0 + v * (of.a1 + v * of.a2) + of.a3 * kappa
-        b = jnp.maximum(of.b0 + v * (of.b1 + v * of.b2), LEAST_B)
+        q = of.b0 + v * (of.b1 + v * of.b2)
+        b = 0.5 * (q + jnp.sqrt(q**2 + ROUND**2))
         c = (of.c0 + of.c1 * v + of.c2 * kappa) ** 2
         w = jnp.minimum(c - kappa - a, -LEAST_W)
         again, u = albedo.scattered_again(alpha), 1.0 - alpha

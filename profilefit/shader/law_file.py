@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import json
-import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -156,7 +155,8 @@ def _provenance(source: _Source, before: str) -> list[str]:
     lines.append(f"fitted for alpha from {fitted['low']:g} to {fitted['high']:g}")
     if span := content.get("indices"):
         lines.append(f"fitted for every refractive index above {span[0]:g} up to {span[1]:g}")
-    measured = content["quality"]["regenerated"]
+    measured = dict(content["quality"]["regenerated"])
+    measured |= content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]
     worst = [f"{one.words} at most {one.worst(measured[one.name]):.2g}" for one in known]
     if worst:
@@ -184,8 +184,8 @@ def _remarks(named: Named, sources: Sequence[_Source]) -> dict[str, str]:
 def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[str, float]]:
     """Each constant of a law's text that a record has made -> its standard errors there, by the keys of `ERRORS`.
 
-    A constant that several of the record's come to at the law's index has those of their covariance; a jackknife knows
-    none, and its errors are carried over as if they were independent.
+    A constant that several of the record's come to at the law's index has those of their covariance; a jackknife has
+    none, so that its errors are left out there.
     """
     recorded, found = content["constants"], dict[str, dict[str, float]]()
     covariance = content.get("covariance", {})
@@ -201,8 +201,8 @@ def text_errors(law: Constants, content: Mapping[str, Any]) -> dict[str, dict[st
             if len(own) > 1 and matrix is not None:
                 along = np.array([own.get(one, 0.0) for one in names])
                 found[name][key] = float(np.sqrt(max(along @ np.array(matrix, float) @ along, 0.0)))
-            elif all(error is not None for _, error in known):
-                found[name][key] = math.hypot(*(slope * error for slope, error in known))
+            elif len(own) == 1 and known[0][1] is not None:
+                found[name][key] = abs(known[0][0]) * known[0][1]
     return found
 
 

@@ -16,6 +16,7 @@ struct LAW_Shape {
 LAW_Shape LAW_shape(float alpha) {
     float v = sqrt(max(1.0 - alpha, 0.0));
     float kappa = pf_decay_rate(alpha);
+    float spread = LAW_b0 + v * (LAW_b1 + v * LAW_b2);
     float root = LAW_c0 + LAW_c1 * v + LAW_c2 * kappa;
     float again = LAW_map_again(alpha);
     PfCurve f;
@@ -30,7 +31,7 @@ LAW_Shape LAW_shape(float alpha) {
     s.kappa = kappa;
     s.source = 0.0;
     s.a = LAW_a0 + v * (LAW_a1 + v * LAW_a2) + LAW_a3 * kappa;
-    s.b = max(LAW_b0 + v * (LAW_b1 + v * LAW_b2), 1e-4);
+    s.b = 0.5 * (spread + sqrt(spread * spread + 1e-4));
     s.c = root * root;
     s.w = min(s.c - kappa - s.a, -1e-3);
     s.h = -s.w * again * exp(-(LAW_m0 + (1.0 - alpha) * (LAW_m1 + (1.0 - alpha) * LAW_m2)));

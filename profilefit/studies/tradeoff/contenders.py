@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax.numpy as jnp
@@ -30,13 +30,21 @@ from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
 from profilefit.laws.rational import Normalisation
+from profilefit.laws.refracting_hazard import RefractingHazard
 from profilefit.recipes import catalogue
 from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
 
 Setup = Callable[[Array], Any]
-Wanted = tuple[str, str, str]
-"""Label, law, constants."""
 YARDSTICK = "normalized diffusion"
+
+
+class Wanted(NamedTuple):
+    """A law with its constants, and the refractive index that it is timed and judged at."""
+
+    label: str
+    law: str
+    constants: str
+    n: float = 1.0
 
 
 class Fast(NormalizedDiffusion):
@@ -136,20 +144,21 @@ class QuantileContender(Contender):
 
 # What cannot be had is left out.
 WANTED: tuple[Wanted, ...] = (
-    (YARDSTICK, "burley", "published"),
-    ("normalized diffusion, refitted", "burley", "regenerated"),
-    ("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
-    ("Liang, printed", "liang", "published"),
-    ("Liang, corrected", "liang", "corrected"),
-    ("Liang, refitted", "liang", "regenerated"),
-    ("dipole", "dipole", "published"),
-    ("better dipole", "better_dipole", "published"),
-    ("beam diffusion", "beam_diffusion", "published"),
-    ("2 Gaussians", "gaussians:2", "regenerated"),
-    ("4 Gaussians", "gaussians:4", "regenerated"),
-    ("6 Gaussians", "gaussians:6", "regenerated"),
-    ("quantile", "quantile", "regenerated"),
-    ("hazard", "hazard", "regenerated"),
+    Wanted(YARDSTICK, "burley", "published"),
+    Wanted("normalized diffusion, refitted", "burley", "regenerated"),
+    Wanted("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
+    Wanted("Liang, printed", "liang", "published"),
+    Wanted("Liang, corrected", "liang", "corrected"),
+    Wanted("Liang, refitted", "liang", "regenerated"),
+    Wanted("dipole", "dipole", "published"),
+    Wanted("better dipole", "better_dipole", "published"),
+    Wanted("beam diffusion", "beam_diffusion", "published"),
+    Wanted("2 Gaussians", "gaussians:2", "regenerated"),
+    Wanted("4 Gaussians", "gaussians:4", "regenerated"),
+    Wanted("6 Gaussians", "gaussians:6", "regenerated"),
+    Wanted("quantile", "quantile", "regenerated"),
+    Wanted("hazard", "hazard", "regenerated"),
+    Wanted("hazard, n = 1.4", "hazard", "regenerated", 1.4),
 )
 
 
@@ -160,13 +169,14 @@ def contenders(folder: Path | None = None, wanted: Sequence[Wanted] | None = Non
     """
     found: list[Contender] = []
     left_out = []
-    for label, name, constants in wanted or WANTED:
+    for one in wanted or WANTED:
+        setting = None if one.n == 1.0 else Setting(n=one.n)
         try:
-            law = catalogue.load(name, constants, folder=folder)
+            law = catalogue.load(one.law, one.constants, setting, folder)
         except (InputError, RecordError) as error:
-            left_out.append(f"{label}: {error}")
+            left_out.append(f"{one.label}: {error}")
         else:
-            found += made(label, law)
+            found += made(one.label, law)
     if not any(one.name == YARDSTICK for one in found):
         raise InputError(f"laws must have {YARDSTICK} among them, which all times are over, got {left_out or wanted}")
     return found, left_out
@@ -187,6 +197,9 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
     elif isinstance(law, Hazard):
         yield _contender(label, law, law.sampler, law.shape)
         yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.shape, another=True)
+    elif isinstance(law, RefractingHazard):
+        yield _contender(label, law, law.sampler, law.parts)
+        yield _contender(f"{label}, one step", law, law.samplers["one step"], law.parts, another=True)
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):

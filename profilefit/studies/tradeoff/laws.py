@@ -31,7 +31,7 @@ RADII = 0.01, 10.0  # of the timed profiles [mfp]
 NANO = 1e9
 PARTS = ("profile", "sample", "both")
 TITLES = {"profile": "R$_d$ at a given radius", "both": "a radius drawn, and R$_d$ there"}
-QUICKLY = (YARDSTICK, "Liang, corrected", "hazard")
+QUICKLY = (YARDSTICK, "Liang, corrected", "hazard", "hazard, n = 1.4")
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ class ContenderResult:
 def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
-    found, left_out = contenders(folder, [one for one in WANTED if not quick or one[0] in QUICKLY])
+    found, left_out = contenders(folder, [one for one in WANTED if not quick or one.label in QUICKLY])
     if not quick:
         found.append(table_contender(MATERIAL))
     rows = measured(found, sizes, track)
