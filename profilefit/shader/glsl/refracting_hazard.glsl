@@ -2,7 +2,7 @@
 // 2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,  x = r/l, S and lambda as in PfCurve
 
 #ifndef HAZARD_STEPS
-#define HAZARD_STEPS 2 // of the inverse. 1 is cheaper, but right to 1e-3 in xi only
+#define HAZARD_STEPS 2 // of the inverse. 1 is cheaper: right to 1e-4 in xi, but density off by percents far out
 #endif
 
 struct LAW_Shape {
@@ -80,9 +80,14 @@ float LAW_radius(float xi, LAW_Shape s) {
     float t = -log(left);
     float t_first = 1.0 + 0.535 * t;
     float first = t * t_first / (curve.kappa * t_first + max(curve.source - curve.kappa, PF_NEAREST));
-    float stretch = 1.0 - 0.266 + 0.378 * t + 0.266 * PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
-    float rate = 0.875 * sqrt(0.596 * max(-curve.w, PF_NEAREST) / curve.h);
-    float x = PF_SELECT(share < s.share, first, sqrt(t * (t + 1.192)) * stretch / (curve.kappa * stretch + rate));
+    float growth = PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
+    float rate = 1.0898 * sqrt(1.8442 * max(-curve.w, PF_NEAREST) / curve.h);
+    float white = 0.7722 * min(rate * curve.c / max(curve.b, PF_NEAREST) * exp(-0.5 * curve.w * curve.h), 3.0);
+    float stretch = 1.0 - white + 1.0304 * t + white * growth;
+    float bent = max(1.0 - 0.1017 * sqrt(t), 0.1) / (1.0 + 0.189 * sqrt(t));
+    float slowest = rate * (1.0 + curve.kappa * (0.0172 - 0.1727 * curve.kappa));
+    float later = sqrt(t * (t + 3.6884)) * bent * max(stretch, 1e-3) / max(curve.kappa * stretch + slowest, 1e-3);
+    float x = PF_SELECT(share < s.share, first, later);
     for (int i = 0; i < HAZARD_STEPS; ++i) {
         float start = clamp(x, PF_NEAREST, PF_FARTHEST);
         PfLocal here = pf_local(start, curve);

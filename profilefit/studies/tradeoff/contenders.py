@@ -199,7 +199,7 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
         yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.shape, another=True)
     elif isinstance(law, RefractingHazard):
         yield _contender(label, law, law.sampler, law.parts)
-        yield _contender(f"{label}, one step", law, law.samplers["one step"], law.parts, another=True)
+        yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.parts, another=True)
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):
