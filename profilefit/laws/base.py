@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mcml_sim.media.setting import Setting
 from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.evaluate import evaluated
-from profilefit.laws.surface import Surface
+from profilefit.laws.surface import RefractingSurface
 
 
 def closed() -> Any:
@@ -54,7 +54,7 @@ class Constants(eqx.Module):
             given["albedo"] = self.albedo.at_index(n)  # type: ignore[attr-defined]
         return replace(self, **given)
 
-    def under(self, surface: Surface | None) -> Self:
+    def under(self, surface: RefractingSurface | None) -> Self:
         """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
         return self if surface is None else replace(self, surface=surface)  # type: ignore[call-arg]
 

@@ -25,7 +25,7 @@ from profilefit.laws.hazard import (
     local,
 )
 from profilefit.laws.refracting_rational import REFRACTING, RefractingRational
-from profilefit.laws.surface import Number, Surface, surface_of
+from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 # First guesses of a radius: of light scattered once p; of the rest p, q, d, m, and what bends them at small t and large
 # kappa. Their error after a step is least, over every alpha, n from 1.001 to 1.6 and both lights.
@@ -36,7 +36,7 @@ BEND = -0.1017, 0.189
 MOST_WHITE = 3.0  # keeps the guess finite in dark media, where the tail that it is made for is not reached
 
 
-class Coefficients(NamedTuple):
+class ShapeCoefficients(NamedTuple):
     """The law at one index: m, a, b and c of the light scattered again, h, a and b of that scattered once.
 
     once_h [mfp], once_a [1/mfp], once_b [1/mfp^2]; the others as they stand in the class
@@ -79,7 +79,7 @@ class RefractingHazard(EscapeLaw):
     Next to the source that light grows as 2 pi x R_d -> 2 alpha^2 m x ln(1/x), m = e^{m0 + m1 (1 - alpha) + m2 (1 -
     alpha)^2} smooth in alpha, which sets h = -w (A - alpha A_1) / (alpha^2 m): A and kappa go with v = sqrt(1 - alpha)
     next to white, but R_d near the source does not. With rho the share of cosine-weighted light from inside that the
-    surface reflects back (`Surface`), the shapes of light scattered again are
+    surface reflects back (`RefractingSurface`), the shapes of light scattered again are
 
     a = a0 + a1 v + a2 v^2 + a3 kappa     c = (c0 + c1 v + c2 kappa)^2
     b = (q + sqrt(q^2 + 1e-4)) / 2, q = b0 + b1 v + b2 v^2, positive and smooth
@@ -131,7 +131,7 @@ class RefractingHazard(EscapeLaw):
     once_a1: float
     once_b0: float
     once_b1: float
-    surface: Surface | None = closed()
+    surface: RefractingSurface | None = closed()
     entry = Entry(
         "hazard",
         "hazard",
@@ -181,16 +181,16 @@ class RefractingHazard(EscapeLaw):
             *("once_h", "once_a0", "once_b0"),
         )
 
-    def here(self) -> Surface:
+    def here(self) -> RefractingSurface:
         """The closed numbers of its setting, or of those that it was put under."""
         return self.surface or surface_of(self.setting)
 
-    def coefficients(self) -> Coefficients:
+    def coefficients(self) -> ShapeCoefficients:
         """What the constants come to at its index."""
         here = self.here()
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength
-        return Coefficients(
+        return ShapeCoefficients(
             *(self.m00 + rho * (self.m01 + rho * self.m02), self.m10, rho * (self.m21 + rho * self.m22)),
             *(self.a00 + self.a01 * rho, self.a10 + self.a11 * rho, self.a20 + self.a21 * rho),
             rho * (self.a31 + rho * self.a32),

@@ -1,4 +1,4 @@
-"""The hazard law under surfaces that refract: limits that it has by itself, and how near to exact light it is at every n."""
+"""The hazard law under surfaces that refract: limits that it has by itself, and how near to exact light it is."""
 
 from dataclasses import replace
 
