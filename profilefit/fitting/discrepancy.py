@@ -38,7 +38,8 @@ from profilefit.laws.surface import surface_of
 
 Floats = NDArray[np.float64]
 Live = NDArray[np.bool_]
-GROUPS = 20  # of rings along r: the process is smooth on that scale, and a matrix of its cube is inverted
+# Of rings along r: the process is smooth on that scale, and a matrix of as many rows as all have is inverted.
+GROUPS, FEWEST_GROUPS, MOST_ROWS = 20, 8, 1000
 # Lengths between a fraction of the spacing and a few times the range: beyond either the likelihood knows no more.
 SHORTEST, LONGEST = 0.5, 3.0
 LEFT_OUT = 1e-3  # share of a variance that the rank of the photons' covariance may leave out: noise of its own
@@ -175,7 +176,7 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     judged = counted & (data > 0) & (profiles.cdf[:, 1:] <= ENERGY_WITHIN)
     judged &= profiles.r_edges[1:] > NEAREST
     u = np.log(np.sqrt(profiles.r_edges[1:] * np.maximum(profiles.r_edges[:-1], 0.25 * profiles.r_edges[1:])))
-    group = _groups(u, np.any(judged, axis=0))
+    group = _groups(u, np.any(judged, axis=0), max(min(GROUPS, MOST_ROWS // profiles.alpha.size), FEWEST_GROUPS))
     member = (group[:, None] == np.unique(group)).astype(float)  # (n, g)
     unit = unit_energy(fit.objective, profiles.energy, profiles.alpha, profiles.r_edges)
     own, seen, live = energy * judged @ member, data * judged @ member, (judged @ member) > 0
@@ -224,10 +225,10 @@ def _placed(alpha: Floats, trapped: Floats | None) -> Floats:
     return s if trapped is None else np.column_stack([s, trapped])
 
 
-def _groups(u: Floats, judged: Live) -> NDArray[np.intp]:
+def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
     """The group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
     inner = u[judged]
-    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(GROUPS, inner.size) + 1)
+    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(number, inner.size) + 1)
     group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
     known = np.unique(group[judged])
     return known[np.abs(group[:, None] - known).argmin(axis=1)]
