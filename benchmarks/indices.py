@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -68,7 +67,8 @@ def main() -> None:
     with threadpool_limits(1, "blas"):
         rows = [row for name in RECIPES for row in spanned(name, JUDGED[::4] if quick else JUDGED)]
         rows += barely_refracting()
-    show("Worst errors over indices and held-out albedos", ("light", "law", "constants", "rel", "ks", "at one radius"), rows)
+    columns = ("light", "law", "constants", "rel", "ks", "at one radius")
+    show("Worst errors over indices and held-out albedos", columns, rows)
 
 
 if __name__ == "__main__":
