@@ -63,7 +63,7 @@ def relative_error(law: ProfileLaw, alpha: float, source: Origin | None) -> floa
         known = np.array(measured, float)
         where = [u_of(one) for one in source.quality["alpha"]]
         return float(np.interp(-u_of(min(max(alpha, DARKEST), WHITEST)), -np.array(where), known))
-    if not law.setting.is_matched_isotropic:
+    if not law.setting.is_solved:
         return None
     return float(profile_quality(law, [min(max(alpha, DARKEST), WHITEST)]).rel[0])
 

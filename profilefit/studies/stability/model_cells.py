@@ -27,7 +27,7 @@ ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
 
 def cells_of(one: Named, limits: Limits) -> Iterator[Cells]:
     """R_d, cdf and radii of a law whose setting has an exact profile; and what only the laws of Liang et al. have."""
-    if one.setting.is_matched_isotropic:
+    if one.setting.is_solved:
         yield from _against_exact(one, limits)
     if isinstance(one.law, Liang):
         yield unclipped(one, limits)

@@ -20,7 +20,7 @@ def hazard():
 @pytest.fixture(scope="session")
 def light(hazard):
     """Where the truth is the hazard law, so that it has no error of its own."""
-    return ReferenceLight(DIFFUSE, hazard, hazard.albedo)
+    return ReferenceLight(DIFFUSE, hazard)
 
 
 @pytest.fixture(scope="session")
