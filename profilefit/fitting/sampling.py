@@ -15,8 +15,9 @@ A sampler may draw one part of the light below some xi and another above it, whe
 have one radius, and the error of the inversion is taken to the nearer.
 
 All of it is integrated over xi by Gauss's rule between the places where r(xi) turns, stops, begins anew or crosses a
-radius at which the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to 1 - 2^-24: an
-exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a renderer meets.
+radius at which the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to
+1 - 2^-24: an exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a
+renderer meets.
 """
 
 from __future__ import annotations
@@ -236,6 +237,7 @@ def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) 
     """`jump`: t at which radii begin at 0 anew."""
     beside = np.concatenate([[jump], jump * (1.0 - BESIDE), jump * (1.0 + BESIDE)]) if jump < LAST else np.array([])
     beside = np.sort(beside[beside < LAST])
+    last = radius(beside[beside < jump][-1:]) if beside.size else []
     x = radius(SCAN)
     still = np.diff(x) == 0
     flats = _flats(radius, x, still)
@@ -244,7 +246,7 @@ def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) 
     turns = np.flatnonzero(step[1:] * step[:-1] < 0) + 1
     places = [_turn(radius, SCAN[i - 1], SCAN[i + 1], float(step[i - 1])) for i in turns]
     extremes = [float(radius(np.array([place]))[0]) for place in places]
-    levels = [float(x[0]), float(x[-1]), *extremes, *radius(beside[beside < jump][-1:]), *(flat[2] for flat in flats)]
+    levels = [float(x[0]), float(x[-1]), *extremes, *last, *(flat[2] for flat in flats)]
     crossings = [
         _crossing(radius, SCAN[i], SCAN[i + 1], level)
         for level in {*extremes, edge}

@@ -90,9 +90,7 @@ def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
     return next(same, None)
 
 
-def _recorded(
-    names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting
-) -> dict[str, float]:
+def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting) -> dict[str, float]:
     """What records state at a setting: of another index than their own what they measured around it."""
     found: dict[str, float] = {}
     for name in names:

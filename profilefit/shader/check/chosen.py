@@ -63,7 +63,9 @@ def regenerated(folder: Folder) -> Chosen:
     """All laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
     records = Records.of(folder)
     profiles, maps = inventory.all_profiles(records), inventory.albedo_laws(records, matched=False)
-    of_laws, of_maps = ([each for one in group if one.records for each in _spread(one, records)] for group in (profiles, maps))
+    of_laws, of_maps = (
+        [each for one in group if one.records for each in _spread(one, records)] for group in (profiles, maps)
+    )
     return of_laws, of_maps
 
 

@@ -33,6 +33,7 @@ from profilefit.shader.check.shader_law import ShaderLaw, Values
 from profilefit.shader.languages import translated
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 # Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
 STEP = 1e-4
 NEAREST_XI, FARTHEST_XI = 1e-4, 1.0 - 1e-5
@@ -65,21 +66,15 @@ class Twin:
         x = self.radius(xi, albedo)
         share = np.broadcast_to(_jump(shader.law, alpha)[:, None], x.shape)
         low, high = np.where(xi < share, 0.0, share), np.where(xi < share, share, 1.0)
-        density = 1.0 / self._slope(xi, albedo, low, high)
-        single = np.zeros(x.shape, bool)
-        if np.all(share == 1.0):
-            earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
-            single[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
-        else:
-            low, high = np.where(xi < share, share, 0.0), np.where(xi < share, 1.0, share)
-            other = self._searched(x, albedo, low, high)
-            density = density + 1.0 / self._slope(other, albedo, low, high)
-            for one in (xi - share) / np.where(xi < share, -share, 1.0 - share), (other - low) / (high - low):
-                inner = inner & (NEAREST_XI < one) & (one < FARTHEST_XI)
-            single |= True
+        density, held = 1.0 / self._slope(xi, albedo, low, high), _single(x)
+        if np.any(share < 1.0):
+            first, last = np.where(xi < share, share, 0.0), np.where(xi < share, 1.0, share)
+            other = self._searched(x, albedo, first, last)
+            density = density + 1.0 / self._slope(other, albedo, first, last)
+            held = _inside((xi - low) / (high - low)) & _inside((other - first) / (last - first))
         error = np.abs(shader.values(x, xi, albedo).pdf / density - 1.0)
         at = Arguments(albedo, x, xi, np.array(1.0))
-        return dense_grid.spread(error, single & inner, at, of_share=True)
+        return dense_grid.spread(error, held & inner, at, of_share=True)
 
     def _slope(self, xi: Floats, alpha: Floats, low: Floats, high: Floats) -> Floats:
         """dx/dxi, between the ends of what a part is drawn at."""
@@ -95,13 +90,25 @@ class Twin:
         return 0.5 * (low + high)
 
 
+def _single(x: Floats) -> Mask:
+    """Where no other xi of the grid draws the radius."""
+    found = np.zeros(x.shape, bool)
+    earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
+    found[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
+    return found
+
+
+def _inside(share: Floats) -> Mask:
+    """Where difference quotients of a part tell its slope."""
+    return np.asarray((share > NEAREST_XI) & (share < FARTHEST_XI))
+
+
 def _jump(law: ProfileLaw, alpha: Floats) -> Floats:
     """xi at which the law's text begins at x = 0 anew, 1 where it does not."""
     with jax.enable_x64(True):
         return np.asarray(dense_grid.drawn_by(law).jump(jnp.asarray(alpha)), float)
 
 
-Mask = NDArray[np.bool_]
 PROFILE, EVERYWHERE, CDF, SAMPLE, PDF, OWN = "R_d", "R_d everywhere", "cdf", "sample", "pdf", "pdf of the map"
 JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 

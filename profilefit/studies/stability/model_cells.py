@@ -43,7 +43,9 @@ def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
         drawn = np.asarray(law.sampler.sample(share, albedo))
         profile, cdf = np.asarray(law.profile(r, albedo)), np.asarray(law.cdf(r, albedo))
     reached = np.asarray(exact.cdf(np.where(drawn >= 0, drawn, np.inf), albedo, setting=setting))
-    if np.any(law.sampler.jump(alpha.values) < 1.0):  # two shares of the light draw one radius: the law's own nearer one
+    if np.any(
+        law.sampler.jump(alpha.values) < 1.0
+    ):  # two shares of the light draw one radius: the law's own nearer one
         reached += np.asarray(law.sampler.undone(drawn, share, albedo)) - np.asarray(law.cdf(drawn, albedo))
     truth = np.asarray(exact.profile(r, albedo, setting=setting))
     held = limits.valid.alpha.holds(albedo) if limits.valid.alpha else np.zeros_like(albedo, bool)
