@@ -112,10 +112,9 @@ def _curve(share) -> Beyond:
 
 @dataclass(frozen=True)
 class ReferenceLight:
-    """The light of a setting, exact; or that of a law, where the law is to be the truth."""
+    """The light of a setting, exact."""
 
     setting: Setting
-    law: ProfileLaw | None = None
 
     def alpha(self, reflectance: float) -> float:
         """Single-scattering albedo [-] of a reflectance A [-]."""
@@ -127,7 +126,7 @@ class ReferenceLight:
 
     def beyond(self, reflectance: float) -> Beyond:
         """F(d) of a reflectance A [-]."""
-        return beyond(self.alpha(reflectance), self.setting, self.law)
+        return beyond(self.alpha(reflectance), self.setting)
 
 
 def reference_light(setting: Setting) -> ReferenceLight:
