@@ -275,7 +275,7 @@ class Optical:
 
 
 def _checked(name: str, values: ArrayLike, low: float, high: float) -> Floats:
-    accepted = f"in [{low:g}, {high:g}]" if high < LARGEST else f">= {low:g} and finite"
+    accepted = f"in [{low:g}, {high:.9g}]" if high < LARGEST else f">= {low:g} and finite"
     numbers = checked_numbers(name, values, f"numbers {accepted}")
     outside = ~((numbers >= low) & (numbers <= high))
     if np.any(outside):

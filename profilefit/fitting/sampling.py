@@ -237,7 +237,7 @@ def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) 
     """`jump`: t at which radii begin at 0 anew."""
     beside = np.concatenate([[jump], jump * (1.0 - BESIDE), jump * (1.0 + BESIDE)]) if jump < LAST else np.array([])
     beside = np.sort(beside[beside < LAST])
-    last = radius(beside[beside < jump][-1:]) if beside.size else []
+    last: Floats | list[float] = radius(beside[beside < jump][-1:]) if beside.size else []
     x = radius(SCAN)
     still = np.diff(x) == 0
     flats = _flats(radius, x, still)

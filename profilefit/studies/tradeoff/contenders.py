@@ -195,11 +195,11 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
         own = FastBurleyDiffuseMfp(law.setting, law.albedo, **law.constants())
         yield _contender(label, own, own.sampler, partial(_burley_setup, own), law.sampler)
     elif isinstance(law, Hazard | RefractingHazard):
-        setup = law.shape if isinstance(law, Hazard) else law.parts
-        yield _contender(label, law, law.sampler, setup)
-        for steps, sampler in law.samplers.items():
-            if sampler != law.sampler:
-                yield _contender(f"{label}, {steps}", law, sampler, setup, another=True)
+        of_alpha: Setup = law.shape if isinstance(law, Hazard) else law.parts
+        yield _contender(label, law, law.sampler, of_alpha)
+        for steps, other in law.samplers.items():
+            if other != law.sampler:
+                yield _contender(f"{label}, {steps}", law, other, of_alpha, another=True)
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):
