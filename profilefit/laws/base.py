@@ -189,6 +189,20 @@ class Sampler(eqx.Module):
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         """Density in x = r/l of `scaled_sample(xi)`, xi uniform in [0, 1), atoms left out [1/mfp]."""
 
+    def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
+        """The uniform number that an exact inverse sends to x; of several the one nearest to xi."""
+        del xi
+        return self.law.scaled_cdf(x, alpha)
+
+    def jump(self, alpha: Array) -> Array:
+        """xi at which radii begin at 0 anew, as another part of the light is drawn; 1 where none does."""
+        return jnp.ones_like(alpha)
+
+    @evaluated
+    def undone(self, r, xi, alpha, mfp=1.0) -> Array:
+        """xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the error of the inversion. All broadcast."""
+        return self.scaled_undone(r / mfp, xi, alpha)
+
     @evaluated
     def sample(self, xi, alpha, mfp=1.0) -> Array:
         """Radius [length] for a uniform number xi in [0, 1). All broadcast."""

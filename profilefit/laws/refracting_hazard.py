@@ -62,11 +62,12 @@ class ShapeCoefficients(NamedTuple):
 
 class Parts(NamedTuple):
     """One material: the light scattered once and again, each a hazard curve whose `reflectance` is its own light;
-    `share` of the light is scattered once [-]."""
+    `share` of the light is scattered once, `rest` again [-]: 1 - share, which would cancel where the medium is dark."""
 
     once: Shape
     again: Shape
     share: Array
+    rest: Array
 
 
 class RefractingHazard(EscapeLaw):
@@ -238,19 +239,21 @@ class RefractingHazard(EscapeLaw):
         h = -w * again * jnp.exp(-(of.m0 + u * (of.m1 + u * of.m2)))
         strength = here.source / here.once
         once = (here.critical, strength, strength - here.critical - of.once_a, of.once_h, of.once_a, of.once_b, 0.0)
+        of_all = albedo.albedo_over_reflectance(alpha)
         return Parts(
             Shape(alpha * here.once, *(jnp.asarray(one) + zero for one in once)),
             Shape(alpha**2 * again, kappa, zero, w, h, a, b, c),
-            here.once * albedo.albedo_over_reflectance(alpha),
+            here.once * of_all,
+            alpha * again * of_all,
         )
 
     def scaled_density(self, x: Array, alpha: Array) -> Array:
         of = self.parts(alpha)
-        return of.share * density(x, of.once) + (1.0 - of.share) * density(x, of.again)
+        return of.share * density(x, of.once) + of.rest * density(x, of.again)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         of = self.parts(alpha)
-        left = of.share * jnp.exp(-cumulative(x, of.once)) + (1.0 - of.share) * jnp.exp(-cumulative(x, of.again))
+        left = of.share * jnp.exp(-cumulative(x, of.once)) + of.rest * jnp.exp(-cumulative(x, of.again))
         return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - left, 0.0, 1.0), 1.0), 0.0)
 
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
@@ -286,20 +289,31 @@ class RefractingHazardSampler(Sampler):
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         of = self.law.parts(alpha)
         is_once = xi < of.share
-        low, width = jnp.where(is_once, 0.0, of.share), jnp.where(is_once, of.share, 1.0 - of.share)
+        high, width = jnp.where(is_once, of.share, 1.0), jnp.where(is_once, of.share, of.rest)
         least = jnp.finfo(jnp.result_type(xi, float)).tiny
-        left = jnp.maximum((low + width - xi) / jnp.maximum(width, least), least)
+        left = jnp.maximum((high - xi) / jnp.maximum(width, least), least)
         shape = jax.tree.map(lambda once, again: jnp.where(is_once, once, again), of.once, of.again)
         left = jnp.minimum(left, 1.0)
         t = -jnp.log(left)
         x = drawn(t, (1.0 - left) / left / jnp.maximum(t, NEAREST), shape, is_once, self.steps)
         return jnp.where(xi < 1.0, x, jnp.inf)
 
+    def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
+        """Each part draws every radius once."""
+        of = self.law.parts(alpha)
+        once, again = (-jnp.expm1(-cumulative(x, shape)) for shape in (of.once, of.again))
+        first, second = of.share * once, of.share + of.rest * again
+        return jnp.where(jnp.abs(first - xi) < jnp.abs(second - xi), first, second)
+
+    def jump(self, alpha: Array) -> Array:
+        """The share of light scattered once."""
+        return self.law.parts(alpha).share
+
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         """Density of this very map: each part's, by the slope at the t that it sends to x."""
         of = self.law.parts(alpha)
         once, again = (_density(x, shape, shape is of.once, self.steps) for shape in (of.once, of.again))
-        return of.share * once + (1.0 - of.share) * again
+        return of.share * once + of.rest * again
 
 
 def drawn(t: Array, growth: Array, shape: Shape, is_once: Array | bool, steps: int) -> Array:

@@ -171,8 +171,8 @@ def _fitted(recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | 
     if recipe.check and light is not None:
         own, seen = result, profiles
         if recipe.indices:
-            # Photons are of one index: those constants that it tells apart are fitted, the others held. Nothing resists a
-            # law that falls with alpha: a resistance from one side only is no smooth function of the photons.
+            # Photons are of one index: those constants that it tells apart are fitted, the others held. Nothing resists
+            # a law that falls with alpha: a resistance from one side only is no smooth function of the photons.
             at_one = replace(recipe, indices=(), weighting=replace(recipe.weighting, rising=0.0))
             seen = truth_of(at_one, None)
             own = _fit(at_one, seen, result.law)

@@ -8,6 +8,7 @@
 struct LAW_Shape {
     float reflectance; // A [-]
     float share; // of it light scattered once [-]
+    float rest; // 1 - share, which would cancel where the medium is dark
     PfCurve once;
     PfCurve again;
 };
@@ -38,6 +39,7 @@ LAW_Shape LAW_shape(float alpha) {
     LAW_Shape shape;
     shape.reflectance = alpha * (LAW_map_once + alpha * again);
     shape.share = LAW_map_once / (LAW_map_once + alpha * again);
+    shape.rest = alpha * again / (LAW_map_once + alpha * again);
     shape.once = f;
     shape.again = s;
     return shape;
@@ -52,14 +54,14 @@ float LAW_density(float x, LAW_Shape s) {
     PfLocal first = pf_local(x, s.once);
     PfLocal later = pf_local(x, s.again);
     float light = s.share * exp(-first.exponent) * first.ratio * first.hazard;
-    return light + (1.0 - s.share) * exp(-later.exponent) * later.ratio * max(later.hazard, 0.0);
+    return light + s.rest * exp(-later.exponent) * later.ratio * max(later.hazard, 0.0);
 }
 
 // Share of the energy within x [-]
 float LAW_cumulated(float x, LAW_Shape s) {
     PfLocal first = pf_local(x, s.once);
     PfLocal later = pf_local(x, s.again);
-    float left = s.share * exp(-first.exponent) * first.ratio + (1.0 - s.share) * exp(-later.exponent) * later.ratio;
+    float left = s.share * exp(-first.exponent) * first.ratio + s.rest * exp(-later.exponent) * later.ratio;
     return clamp(1.0 - left, 0.0, 1.0);
 }
 
@@ -75,7 +77,7 @@ float LAW_radius(float xi, LAW_Shape s) {
     curve.a = PF_SELECT(share < s.share, s.once.a, s.again.a);
     curve.b = PF_SELECT(share < s.share, s.once.b, s.again.b);
     curve.c = PF_SELECT(share < s.share, s.once.c, s.again.c);
-    float inner = PF_SELECT(share < s.share, share / s.share, (share - s.share) / max(1.0 - s.share, PF_NEAREST));
+    float inner = PF_SELECT(share < s.share, share / s.share, (share - s.share) / max(s.rest, PF_NEAREST));
     float left = clamp(1.0 - inner, 1.0 - PF_MOST_XI, 1.0);
     float t = -log(left);
     float t_first = 1.0 + 0.535 * t;
