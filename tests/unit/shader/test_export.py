@@ -2,6 +2,7 @@
 
 import hashlib
 import json
+import re
 import shutil
 import subprocess
 import sys
@@ -64,32 +65,56 @@ print([float(v) for v in (h.hazard_profile(0.5, 0.9, 2.0), h.hazard_cdf(0.5, 0.9
 
 @pytest.mark.parametrize("lang", [lang for lang in LANGUAGES if lang != "json"])
 def test_every_constant_stands_there_with_its_errors_and_the_record_is_named(lang):
-    named = find("hazard-refracting", FITS)
+    named = find("hazard", FITS)
     text = export(named, FITS, lang)
-    content = json.loads((FITS / "hazard-refracting.json").read_text())
+    content = json.loads((FITS / "hazard.json").read_text())
     for name, constant in content["constants"].items():
         line = next(line for line in text.splitlines() if f"hazard_{name} =" in line)
         assert str(constant["regenerated"]) in line
         assert f"+- {constant['jackknife_error']:.2g} (jackknife)" in line
-        assert f"+- {constant['statistical_error']:.2g} (photons)" in line
-    for part in ("hazard_map_b", "pencil beam", "n = 1.4", content["data_digest"], "1/length^2", "from 0.04 to 0.999"):
+        assert f"+- {constant['model_error']:.2g} (model)" in line
+    for part in ("hazard_map_b", "pencil beam", "n = 1", content["data_digest"], "1/length^2", "from 0.04 to 0.999"):
         assert part in text
-    assert hashlib.sha256((FITS / "hazard-refracting.json").read_bytes()).hexdigest() in text
+    assert hashlib.sha256((FITS / "hazard.json").read_bytes()).hexdigest() in text
     assert "LAW_" not in text
     assert TARGETS[lang] in text.splitlines()[1]
     assert text.isascii()
 
 
-def test_data_hold_the_same(tmp_path):
-    made = json.loads(export(find("hazard-refracting", FITS), FITS, "json"))
+def test_constants_at_an_index_have_the_errors_that_those_of_the_record_give_them():
+    """By differences of each through the record's covariance."""
+    named = find("hazard-refracting", FITS, n=1.2)
+    text, law = export(named, FITS), named.law
     content = json.loads((FITS / "hazard-refracting.json").read_text())
-    assert made["constants"] == {name: one["regenerated"] for name, one in content["constants"].items()}
-    assert made["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
-    errors = made["records"]["hazard-refracting"]["errors"]
+    names, matrix = content["covariance"]["names"], np.array(content["covariance"]["model"])
+    here, values, step = law.text_constants(), law.constants(), 1e-6
+    moved = [law.with_vector((name,), [values[name] + step]).text_constants() for name in names]
+    for name, value in here.items():
+        slopes = np.array([(one[name] - value) / step for one in moved])
+        line = next(line for line in text.splitlines() if f"hazard_{name} =" in line)
+        assert float(line.split()[4].rstrip(";")) == pytest.approx(value, rel=1e-11)
+        error = re.search(r"\+- (\S+) \(model\)", line)
+        assert float(error[1]) == pytest.approx(np.sqrt(slopes @ matrix @ slopes), rel=0.06)  # two digits are printed
+    assert "n = 1.2" in text
+    assert "fitted for every refractive index above 1 up to 1.6" in text
+
+
+@pytest.mark.parametrize(
+    ("name", "numbers"), [("hazard", "entered b c d"), ("hazard-refracting", "entered trapped once c d f")]
+)
+def test_data_hold_the_same(name, numbers):
+    named = find(name, FITS)
+    made = json.loads(export(named, FITS, "json"))
+    assert made["constants"] == named.law.text_constants()
+    assert made["setting"] == {"illumination": "searchlight", "n": named.setting.n, "g": 0.0}
+    errors = made["records"][name]["errors"]
     assert {"statistical_error", "discretisation_error", "model_error"} <= set(errors["a0"])
-    assert errors["a0"]["statistical_error"] == content["constants"]["a0"]["statistical_error"]
-    assert set(made["map"]) == {"entered", "b", "c", "d"}
-    assert set(made["records"]) == {"hazard-refracting", "albedo-rational-refracting"}
+    assert set(made["map"]) == set(numbers.split())
+    assert set(made["records"]) == {name, name.replace("hazard", "albedo-rational")}
+    content = json.loads((FITS / f"{name}.json").read_text())
+    if name == "hazard":
+        assert made["constants"] == {name: one["regenerated"] for name, one in content["constants"].items()}
+        assert errors["a0"]["model_error"] == content["constants"]["a0"]["model_error"]
 
 
 def test_printed_constants_name_their_source_and_claim_no_error():
