@@ -24,6 +24,7 @@ MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon 
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
 LABEL_DISTANCE = 0.5  # of an axis name from its panel [inch]
+MOST = 12  # constants in one figure: more panels are too small to read
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
@@ -35,7 +36,11 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     """
     fitted = source.needed(record_name)
     samples = fitted.arrays[f"samples_{kind}"].astype(float)
-    names = fitted.content["covariance"]["names"]
+    names, held_back = fitted.content["covariance"]["names"], ""
+    if len(names) > MOST:
+        kept = _tightest(samples, MOST)
+        held_back = f"the {MOST} of {len(names)} constants that are best known, relative to their size"
+        samples, names = samples[:, kept], [names[place] for place in kept]
     constants = [fitted.content["constants"][name] for name in names]
     size = len(names)
     figure = canvas(8.0, layout="none")
@@ -48,8 +53,15 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     grid = np.array(figure.axes).reshape(size, size)
     _marks(grid, samples, constants)
     _axes(grid, names)
-    _caption(figure, samples, names, constants, f"{record_name}: spread by {MEANING[kind]}")
+    title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
+    _caption(figure, samples, names, constants, title)
     return save(figure, out, name or f"corner-{record_name}")
+
+
+def _tightest(samples: Floats, count: int) -> list[int]:
+    """Places of the constants whose draws spread least over their size, in order."""
+    spread = samples.std(axis=0) / np.abs(samples.mean(axis=0))
+    return sorted(np.argsort(spread)[:count].tolist())
 
 
 def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]]) -> None:
