@@ -5,7 +5,7 @@ the rows at both ends; `exact.js` puts polynomials of six points through both. B
 is right to 4e-6 for r within 99.5 % of the energy and the cdf to 1e-6 everywhere; nearer to white to 1e-4 and 1e-5.
 
 Under a surface that refracts the tables are coarser, and stand at a few indices, through which goes a polynomial over
-mu_c = sqrt(1 - 1/n^2): R_d is right to 5e-4 and the cdf to 5e-5 from n = 1.1 up, below it to 2e-3 and 2e-4 next to white.
+mu_c = sqrt(1 - 1/n^2): R_d is right to 5e-4 and the cdf to 5e-5 from n = 1.1 up, below it to 3e-3 and 3e-4 at the ends of alpha.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ ABOUT = (
 MEASURES = (
     "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the reflected light; ks: largest error "
     "of the cdf; edge: largest error within 3.5 l of an edge of light, as a share of A. The exact solution is a table, "
-    "right to 1e-5 where n = 1, to 5e-4 from n = 1.1 up, and to 2e-3 between."
+    "right to 1e-5 where n = 1, to 5e-4 from n = 1.1 up, and to 3e-3 between."
 )
 
 

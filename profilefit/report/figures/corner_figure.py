@@ -24,7 +24,7 @@ MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon 
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
 LABEL_DISTANCE = 0.5  # of an axis name from its panel [inch]
-MOST = 12  # constants in one figure: more panels are too small to read
+MOST, SHOWN = 18, 12  # constants of which a figure shows all: the panels of more are too small, so it shows so many
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
@@ -38,8 +38,8 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     samples = fitted.arrays[f"samples_{kind}"].astype(float)
     names, held_back = fitted.content["covariance"]["names"], ""
     if len(names) > MOST:
-        kept = _tightest(samples, MOST)
-        held_back = f"the {MOST} of {len(names)} constants that are best known, relative to their size"
+        kept = _most_correlated(samples, SHOWN)
+        held_back = f"the {SHOWN} of {len(names)} constants that\nare most correlated with another one"
         samples, names = samples[:, kept], [names[place] for place in kept]
     constants = [fitted.content["constants"][name] for name in names]
     size = len(names)
@@ -58,10 +58,11 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     return save(figure, out, name or f"corner-{record_name}")
 
 
-def _tightest(samples: Floats, count: int) -> list[int]:
-    """Places of the constants whose draws spread least over their size, in order."""
-    spread = samples.std(axis=0) / np.abs(samples.mean(axis=0))
-    return sorted(np.argsort(spread)[:count].tolist())
+def _most_correlated(samples: Floats, count: int) -> list[int]:
+    """Places of the constants that have the largest correlation with any other, in order."""
+    correlation = np.abs(np.corrcoef(samples, rowvar=False))
+    np.fill_diagonal(correlation, 0.0)
+    return sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:count].tolist())
 
 
 def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]]) -> None:
