@@ -1,11 +1,12 @@
 """The exact half space as small tables, rows of albedos, columns of radii: what `exact.js` computes from.
 
 ln(R_d l^2 / A) + kappa x and ln(cdf / x), x = r/l, at even u and ln x, where sqrt(1 - alpha) = 1 - (1 - u^3)^2 crowds
-the rows at both ends; `exact.js` puts polynomials of six points through both. Between the knots, for A up to 0.9999, R_d
-is right to 4e-6 for r within 99.5 % of the energy and the cdf to 1e-6 everywhere; nearer to white to 1e-4 and 1e-5.
+the rows at both ends; `exact.js` puts polynomials of six points through both. Between the knots, for A up to 0.9999,
+R_d is right to 4e-6 for r within 99.5 % of the energy and the cdf to 1e-6 everywhere; nearer to white to 1e-4 and 1e-5.
 
 Under a surface that refracts the tables are coarser, and stand at a few indices, through which goes a polynomial over
-mu_c = sqrt(1 - 1/n^2): R_d is right to 5e-4 and the cdf to 5e-5 from n = 1.1 up, below it to 3e-3 and 3e-4 at the ends of alpha.
+mu_c = sqrt(1 - 1/n^2): R_d is right to 5e-4 and the cdf to 5e-5 from n = 1.1 up, below it to 3e-3 and 3e-4, where light
+is scattered hardly at all or almost always.
 """
 
 from __future__ import annotations
@@ -45,7 +46,7 @@ def grid_of(setting: Setting) -> TableGrid:
 
 @lru_cache(maxsize=len(LIGHTS) * (1 + len(KNOTS)))
 def baked(setting: Setting) -> str:
-    """A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64. Seconds at a new index."""
+    """A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64. Seconds at a new n."""
     grid = grid_of(setting)
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, grid.rows) ** 3) ** 2
     alpha = np.maximum((1.0 - s) * (1.0 + s), LEAST_ALPHA)

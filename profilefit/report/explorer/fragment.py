@@ -21,8 +21,8 @@ LOWEST, HIGHEST = -2.5, 1.5  # log10 of the transport mean free path [mm] at the
 ABOUT = (
     "Each law runs here as the source that <code>profilefit export --lang glsl-es</code> writes, on this machine's "
     "graphics processor, against the exact half space, isotropic, under a surface of refractive index n. The law "
-    "hazard follows n, by the source that <code>--n</code> writes; any other was made for n = 1, and above it shows "
-    "what that leaves out."
+    "hazard follows n, by the source that <code>--n</code> writes; all others are of n = 1, and beside another n "
+    "show what that leaves out."
 )
 MEASURES = (
     "rel: mean relative error of R<sub>d</sub> for r from 0.01 l to 99.5 % of the reflected light; ks: largest error "

@@ -22,6 +22,6 @@ class Law {
   }
 
   labelAt(n) {
-    return this.follows(n) ? this.label : `${this.label} (made for n = 1)`;
+    return this.follows(n) ? this.label : `n = 1: ${this.label}`;
   }
 }

@@ -64,7 +64,9 @@ def law_pages(folder: Folder) -> list[Page]:
     records = Records.of(folder)
     profiles = sorted(all_profiles(records), key=lambda one: one.setting.n)  # that of n = 1 first
     laws = _grouped(profiles, lambda one: one.name.split(":")[0])
-    maps = _grouped(sorted(albedo_laws(records, matched=False), key=lambda one: one.setting.n), lambda one: MAP + one.name)
+    maps = _grouped(
+        sorted(albedo_laws(records, matched=False), key=lambda one: one.setting.n), lambda one: MAP + one.name
+    )
     return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
 
 
@@ -148,10 +150,15 @@ def _surface(one: Named) -> str:
 def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
     """The largest error of each measure: of its own records, or of a record that measured the printed set as well."""
     if one.records:
-        own = [{**contents[name]["quality"]["regenerated"], **by_index(contents[name])} for name in one.records]
+        own: list[Content] = [_of_record(contents[name]) for name in one.records]
     else:
         own = [values for _, values in _measured_sets(one, contents)]
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
+
+
+def _of_record(content: Content) -> Content:
+    """The measures of its constants; where they span indices, those of every index."""
+    return {**content["quality"]["regenerated"], **by_index(content)}
 
 
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:

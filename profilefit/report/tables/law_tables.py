@@ -171,7 +171,9 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
         return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
 
     def samplers() -> str:
-        return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder, matched=False)))))
+        return markdown_samplers(
+            list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder, matched=False))))
+        )
 
     claims = {"claims": lambda: markdown_claims(folder / EVIDENCE)}
     return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder), **claims}
@@ -179,7 +181,14 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
     """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    header = ("law", "constants", "light", "n", "number", *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")))
+    header = (
+        "law",
+        "constants",
+        "light",
+        "n",
+        "number",
+        *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")),
+    )
     rows = [
         (
             *_home(one),
@@ -194,10 +203,7 @@ def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
 def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
     """A line a sampler, each measure at its worst albedo."""
     header = ("law", "constants", "light", "n", "sampler", *_sampler_headers())
-    rows = [
-        (*_home(s.of), s.name, *_sampler_cells(s))
-        for s in sorted(measured, key=lambda s: _order(s.of.setting))
-    ]
+    rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
     return markdown_table(header, rows)
 
 

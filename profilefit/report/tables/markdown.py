@@ -163,8 +163,7 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
 
 
 def _short_quality(records: Mapping[str, Content]) -> str:
-    """A few laws under a searchlight by `rel` and `ks`, the worst first; of one that spans indices at that of its record.
-    """
+    """A few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
     searchlight = {name: c for name, c in records.items() if _is_searchlight(c) or _is_refracting(c)}
     found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     rows = [

@@ -67,12 +67,15 @@ def spark_table(content: Content) -> list[RenderableType]:
         "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
     }
     caption = "One logarithmic scale for each measure, from its least to its worst"
-    return [column_table("Errors over α" + at_index(content) + _failed(content), columns, caption, left=("", list(columns)[1]))]
+    return [
+        column_table(
+            "Errors over α" + at_index(content) + _failed(content), columns, caption, left=("", list(columns)[1])
+        )
+    ]
 
 
 def quality_tables(content: Content) -> list[RenderableType]:
-    """Measures by albedo for every set of constants, or those of an A -> alpha map; by index where several are spanned.
-    """
+    """Measures by albedo for every set of constants, or those of an A -> alpha map; by index where it spans several."""
     first = [index_table(content)] if by_index(content) else []
     if measures(content, "delta_A"):
         return [*first, _albedo_table(content)]
@@ -105,7 +108,9 @@ def _table(content: Content, group: list[str]) -> RenderableType:
             header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
     caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
-    return column_table("Quality at held-out albedos" + at_index(content) + _failed(content), columns, caption, left=("α",))
+    return column_table(
+        "Quality at held-out albedos" + at_index(content) + _failed(content), columns, caption, left=("α",)
+    )
 
 
 def _albedo_table(content: Content) -> RenderableType:

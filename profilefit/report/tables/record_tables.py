@@ -14,7 +14,16 @@ from rich.text import Text
 
 from mcml_sim.media.setting import Setting
 from profilefit.recipes.starts import SAME_COST
-from profilefit.report.records import TOTAL, Content, at_index, converged, index_words, known_errors, largest_error, z_score
+from profilefit.report.records import (
+    TOTAL,
+    Content,
+    at_index,
+    converged,
+    index_words,
+    known_errors,
+    largest_error,
+    z_score,
+)
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
 from profilefit.report.tables.evidence_tables import evidence_tables
 from profilefit.report.tables.quality_tables import quality_tables, spark_table
@@ -117,7 +126,9 @@ def derived_table(derived: Content, surface: str = "") -> RenderableType:
         "± photons": on_the_point([significant(error) for error in errors[0]]),
         "± model": on_the_point([significant(error) for error in errors[1]]),
     }
-    return column_table(title + surface, columns, "model: how far the law is from the truth; one standard error each", ("α",))
+    return column_table(
+        title + surface, columns, "model: how far the law is from the truth; one standard error each", ("α",)
+    )
 
 
 def fit_facts(content: Content) -> RenderableType:

@@ -20,7 +20,8 @@ SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longe
 FAILED = "FAILED"
 Records = Mapping[str, Content]
 CAPTION = (
-    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → regenerated. "
+    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
+    "regenerated. "
     "`profilefit report NAME` has constants, errors and quality by α."
 )
 

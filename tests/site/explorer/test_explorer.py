@@ -192,8 +192,8 @@ def test_a_law_made_for_one_index_says_so_under_another(explorer):
     found = chosen(explorer, "dipole", 1.4)
     assert np.all(found["rel"] > 0.1)
     explorer.evaluate("explorer.controls.show()")
-    assert "made for n = 1" in explorer.locator("[data-part='foreign']").inner_text()
-    assert explorer.locator("#explorer-law option:checked").inner_text() == "dipole (made for n = 1)"
+    assert "is of n = 1" in explorer.locator("[data-part='foreign']").inner_text()
+    assert explorer.locator("#explorer-law option:checked").inner_text() == "n = 1: dipole"
     chosen(explorer, "dipole")
     assert explorer.locator("[data-part='foreign']").is_hidden()
 
