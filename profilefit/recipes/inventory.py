@@ -62,10 +62,10 @@ def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> l
     return [*_whole_laws(records, names, matched), *_single(records, names, ("profile", "as-published"), matched)]
 
 
-def sampled_laws(folder: Folder, names: Names = None) -> list[Named]:
+def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[Named]:
     """Laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
     records = Records.of(folder)
-    return [*_whole_laws(records, names, True), *_single(records, names, ("inverse",), True)]
+    return [*_whole_laws(records, names, matched), *_single(records, names, ("inverse",), matched)]
 
 
 def all_profiles(folder: Folder) -> list[Named]:

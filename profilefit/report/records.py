@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from mcml_sim import exact
 from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
+from profilefit.fitting.measures import MEASURES
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.record import record_setting
@@ -66,6 +67,29 @@ def measured_sets(content: Content) -> list[str]:
 def measures(content: Content, measure: str) -> bool:
     """Whether a record knows this measure of its regenerated constants."""
     return measure in (content.get("quality") or {}).get("regenerated", {})
+
+
+def index_words(content: Content) -> str:
+    """The refractive index that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
+    span = content.get("indices")
+    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['n']:g}"
+
+
+def at_index(content: Content) -> str:
+    """In a title, the index at which a record that spans several is reported; nothing for others."""
+    return f", n = {content['setting']['n']:g}" if content.get("indices") else ""
+
+
+def by_index(content: Content) -> Mapping[str, list[float]]:
+    """The worst measures of a record at each index n that it was judged at; empty if it is of one."""
+    found: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
+    return found
+
+
+def regenerated_worst(content: Content, measure: str) -> float:
+    """The worst over alpha of the regenerated constants, and over n where a record spans indices."""
+    values = [content["quality"]["regenerated"][measure], by_index(content).get(measure, [])]
+    return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 
 
 Floats = NDArray[np.float64]

@@ -45,7 +45,7 @@ def test_a_page_says_what_its_record_says(pages):
         'load("hazard", setting=Setting("diffuse"',
     ):
         assert wanted in text
-    assert "profilefit export hazard-diffuse-n1.4 --lang glsl" in text
+    assert "profilefit export hazard-diffuse-refracting --lang glsl" in text
     assert f"| worst | {max(content['quality']['regenerated']['rel']):.2g}" in text
 
 

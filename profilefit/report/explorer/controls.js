@@ -36,6 +36,7 @@ class Controls {
       this.on(this.input(`A-${channel}`), (value) => state.set("reflectance", c, Number(value)));
       this.on(this.input(`l-${channel}`), (value) => state.set("mfp", c, short(10 ** Number(value))));
     });
+    this.on(this.input("n"), (value) => state.refract(Number(value)));
     this.on(this.input("radius"), (value) => { state.radius = short(Number((10 ** Number(value)).toPrecision(2))); });
     this.on(this.input("even"), (value) => { state.even = Number(value); });
   }
@@ -52,7 +53,7 @@ class Controls {
   show() {
     const { state } = this;
     const there = state.laws.filter((law) => law.light === state.law.light);
-    this.fill(this.input("law"), there.map((law) => [law.id, law.label]));
+    this.fill(this.input("law"), there.map((law) => [law.id, law.labelAt(state.n)]));
     this.input("law").value = state.law.id;
     this.input("material").value = state.material ? state.material.name : "";
     this.input("samples").value = String(state.samples);
@@ -62,6 +63,7 @@ class Controls {
       this.slide(`A-${channel}`, state.reflectance[c], state.reflectance[c].toFixed(3));
       this.slide(`l-${channel}`, Math.log10(state.mfp[c]), state.mfp[c].toPrecision(3));
     });
+    this.slide("n", state.n, state.n.toFixed(2));
     this.slide("radius", Math.log10(state.radius), `${state.radius} mm`);
     this.slide("even", state.even, `${Math.round(100 * state.even)} %`);
   }

@@ -1,4 +1,4 @@
-// The exact half space from a table: six-point Lagrange polynomials over u and over ln x, x = r/l [mfp], where
+// The exact half space from tables: six-point Lagrange polynomials over u and over ln x, x = r/l [mfp], where
 // sqrt(1 - alpha) = 1 - (1 - u^3)^2 crowds the rows at both ends.
 const POINTS = 6;
 const UNDER = [-120, 24, -12, 12, -24, 120];
@@ -34,9 +34,9 @@ function decayRate(alpha) {
 
 class ExactTable {
   // rows, columns: of the table; low, high: its x; floats: A / alpha of each row, then two tables of rows.
-  constructor({ rows, columns, low, high }, base64) {
+  constructor({ rows, columns, low, high }, floats) {
     Object.assign(this, { rows, columns, low, high });
-    const floats = floatsOf(base64), size = rows * columns;
+    const size = rows * columns;
     this.ratio = floats.subarray(0, rows);
     this.profile = floats.subarray(rows, rows + size);
     this.cdf = floats.subarray(rows + size, rows + 2 * size);
@@ -75,6 +75,30 @@ class ExactTable {
 
   curve(alpha) {
     return new ExactCurve(this, alpha);
+  }
+}
+
+// The tables of one light: of n = 1, and of every other n, by a polynomial over mu_c = sqrt(1 - 1/n^2) through knots.
+class ExactTables {
+  constructor({ grids, knots }, [matched, ...refracting]) {
+    Object.assign(this, { grids, knots, matched: new ExactTable(grids.matched, floatsOf(matched)) });
+    this.refracting = refracting.map(floatsOf);
+    this.found = [1, this.matched]; // the last that was asked for
+  }
+
+  at(n) {
+    if (n === 1) return this.matched;
+    if (this.found[0] !== n) this.found = [n, this.between(n)];
+    return this.found[1];
+  }
+
+  between(n) {
+    const cosine = (index) => Math.sqrt(1 - 1 / index ** 2), places = this.knots.map(cosine), place = cosine(n);
+    const weights = places.map((here) => places.reduce((product, other) =>
+      (other === here ? product : product * (place - other) / (here - other)), 1));
+    const floats = Float64Array.from(this.refracting[0], (_, i) =>
+      weights.reduce((sum, weight, k) => sum + weight * this.refracting[k][i], 0));
+    return new ExactTable(this.grids.refracting, floats);
   }
 }
 

@@ -7,8 +7,8 @@ class Explorer {
     const data = JSON.parse(root.querySelector("[data-part='data']").textContent);
     this.shaders = data.shaders;
     const tables = Object.fromEntries(Object.entries(data.tables).map(([light, floats]) =>
-      [light, new ExactTable(data.grid, floats)]));
-    const laws = data.laws.map((law) => ({ ...law, text: law.text.map((place) => data.lines[place]).join("\n") }));
+      [light, new ExactTables(data, floats)]));
+    const laws = data.laws.map((law) => new Law(law, data.lines, data.indices));
     this.state = new State({ ...data, laws, tables });
     this.canvas = root.querySelector("[data-part='ball']");
     this.results = new Results(root);
@@ -81,41 +81,42 @@ class Explorer {
     if (fault.hidden) this.show();
   }
 
-  // Only the law that is chosen.
+  // Only the law that is chosen, at its index.
   compile() {
-    const { device, shaders, state: { law } } = this;
-    if (this.programs && this.programs.law === law) return;
+    const { device, shaders, state: { law, n } } = this, text = law.textAt(n);
+    if (this.programs && this.programs.text === text) return;
     if (this.ball) this.ball.stop();
     if (this.programs) device.release(...PROGRAMS.map((name) => this.programs[name]));
     this.programs = null;
     const head = "#version 300 es\n", floats = "precision highp float;\n";
-    const by = (part) => device.program(`${law.label}: ${part}`, `${head}${law.text}\n${shaders[part]}`);
+    const by = (part) => device.program(`${law.label}: ${part}`, `${head}${text}\n${shaders[part]}`);
     this.programs = {
-      law, values: by("values"), edge: by("edge"), inside: by("inside"), ball: by("ball"),
+      text, values: by("values"), edge: by("edge"), inside: by("inside"), ball: by("ball"),
       show: device.program("balls", head + floats + shaders.show),
     };
-    this.root.querySelector("[data-part='text']").textContent = law.text;
+    this.root.querySelector("[data-part='text']").textContent = text;
   }
 
   show() {
-    const { state, device, programs } = this, { law, reflectance, mfp } = state;
-    const asked = [law.id, ...reflectance, ...mfp].join();
+    const { state, device, programs } = this, { law, n, reflectance, mfp } = state;
+    const asked = [law.id, n, ...reflectance, ...mfp].join();
     if (asked !== this.measuredFor) {
       this.measured = new Measurement(device, programs, state.table, state);
       this.measuredFor = asked;
     }
     this.results.draw(this.measured, state.view);
+    this.results.foreign(law, n);
     this.values = { law: law.id, ...this.measured };
     this.light();
   }
 
   light() {
-    const { samples, radius, even, towardLight, reflectance, mfp } = this.state;
-    const alpha = this.measured.channels.map((one) => one.alpha);
-    const scene = { alpha, mfp: [...mfp], reflectance: [...reflectance], radius, even, towardLight, samples };
+    const { samples, radius, even, towardLight, mfp } = this.state;
+    const [alpha, reflectance] = ["alpha", "reflectance"].map((key) => this.measured.channels.map((one) => one[key]));
+    const scene = { alpha, mfp: [...mfp], reflectance, radius, even, towardLight, samples };
     if (!this.ball) this.ball = new Ball(this.device);
     this.ball.resize();
-    const told = JSON.stringify([this.state.law.id, scene]);
+    const told = JSON.stringify([this.programs.text, scene]);
     if (told !== this.lit || this.ball.programs !== this.programs) this.ball.restart(this.programs, scene);
     this.lit = told;
   }

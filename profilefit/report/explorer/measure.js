@@ -15,8 +15,9 @@ function round125(value) {
 class Measurement {
   // programs: those of the law, of values.frag and edge.frag; state: A and mfp [mm] of each channel.
   constructor(device, programs, table, state) {
-    this.channels = state.reflectance.map((reflectance, c) => {
-      const alpha = table.alphaOf(reflectance), exact = table.curve(alpha);
+    const most = table.reflectance(1); // a surface that refracts keeps some light out
+    this.channels = state.reflectance.map((asked, c) => {
+      const reflectance = Math.min(asked, most), alpha = table.alphaOf(reflectance), exact = table.curve(alpha);
       return { reflectance, alpha, mfp: state.mfp[c], exact, outer: exact.quantile(WITHIN) };
     });
     this.profiles(device, programs.values);

@@ -24,6 +24,13 @@ class Results {
     this.table(measured.channels);
   }
 
+  // What is said of a law under an index that it was not made for.
+  foreign(law, n) {
+    this.part("foreign").hidden = law.follows(n);
+    this.part("foreign").textContent = `${law.label} is of n = 1, shown at the α of the exact half space of n = ${n}, whose `
+      + "surface keeps light in: compare hazard, which follows n.";
+  }
+
   profiles(channels, view) {
     const { title, of } = VIEWS[view];
     this.part("profile-title").innerHTML = subscripts(title);

@@ -3,23 +3,23 @@ const HASH = "#explorer?";
 const SAMPLES = [1, 4, 16, 64, 256, 1024]; // a pixel of the ball
 
 class State {
-  constructor({ laws, materials, tables, start }) {
-    Object.assign(this, { laws, materials, tables });
+  constructor({ laws, materials, tables, indices, start }) {
+    Object.assign(this, { laws, materials, tables, indices: [1, ...indices] });
     this.start = laws.find((law) => law.id === start) || laws[0];
     this.begin();
     this.read();
   }
 
   begin() {
-    Object.assign(this, { samples: 64, radius: 10, even: 0.05, view: "rr", turn: [-40, 35], law: this.start });
+    Object.assign(this, { samples: 64, radius: 10, even: 0.05, view: "rr", turn: [-40, 35], law: this.start, n: 1 });
     this.take(this.materials.find((one) => one.name === "skin1") || this.materials[0]);
   }
 
   get table() {
-    return this.tables[this.law.light];
+    return this.tables[this.law.light].at(this.n);
   }
 
-  // alpha and l of a measured material; A under this light.
+  // alpha and l of a measured material; A under this light and surface.
   take(material) {
     this.material = material;
     this.mfp = [...material.mfp];
@@ -34,6 +34,13 @@ class State {
 
   choose(law) {
     this.law = law;
+    if (this.material) this.take(this.material);
+  }
+
+  // The nearest index that the page knows.
+  refract(n) {
+    const off = (one) => Math.abs(one - n);
+    this.n = this.indices.reduce((best, one) => (off(one) < off(best) ? one : best));
     if (this.material) this.take(this.material);
   }
 
@@ -56,8 +63,8 @@ class State {
     const told = { law: this.law.id };
     if (this.material) told.material = this.material.name;
     else Object.assign(told, { A: this.reflectance.map(short).join(), l: this.mfp.map(short).join() });
-    const { samples, radius, even, view, turn } = this;
-    Object.assign(told, { samples, radius, even, view, turn: turn.join() });
+    const { samples, n, radius, even, view, turn } = this;
+    Object.assign(told, { samples, n, radius, even, view, turn: turn.join() });
     history.replaceState(null, "", HASH + Object.entries(told).map(([key, value]) => `${key}=${value}`).join("&"));
   }
 
@@ -66,6 +73,7 @@ class State {
     if (!location.hash.startsWith(HASH)) return false;
     this.begin(); // what it leaves out is as at the start
     const told = new URLSearchParams(location.hash.slice(HASH.length));
+    this.several(told.get("n"), 1, this.indices[this.indices.length - 1], ([n]) => this.refract(n), 1);
     this.choose(this.laws.find((law) => law.id === told.get("law")) || this.law);
     const material = this.materials.find((one) => one.name === told.get("material"));
     if (material) this.take(material);

@@ -24,6 +24,7 @@ MEANING = {"misfit": "the law's misfit taken for noise", "statistical": "photon 
 LEVELS = (1.0 - np.exp(-0.5), 1.0 - np.exp(-2.0))
 BINS = 20
 LABEL_DISTANCE = 0.5  # of an axis name from its panel [inch]
+MOST, SHOWN = 18, 12  # constants of which a figure shows all: the panels of more are too small, so it shows so many
 LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 
@@ -35,7 +36,11 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     """
     fitted = source.needed(record_name)
     samples = fitted.arrays[f"samples_{kind}"].astype(float)
-    names = fitted.content["covariance"]["names"]
+    names, held_back = fitted.content["covariance"]["names"], ""
+    if len(names) > MOST:
+        kept = _most_correlated(samples, SHOWN)
+        held_back = f"the {SHOWN} of {len(names)} constants that\nare most correlated with another one"
+        samples, names = samples[:, kept], [names[place] for place in kept]
     constants = [fitted.content["constants"][name] for name in names]
     size = len(names)
     figure = canvas(8.0, layout="none")
@@ -48,8 +53,16 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     grid = np.array(figure.axes).reshape(size, size)
     _marks(grid, samples, constants)
     _axes(grid, names)
-    _caption(figure, samples, names, constants, f"{record_name}: spread by {MEANING[kind]}")
+    title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
+    _caption(figure, samples, names, constants, title)
     return save(figure, out, name or f"corner-{record_name}")
+
+
+def _most_correlated(samples: Floats, count: int) -> list[int]:
+    """Places of the constants that have the largest correlation with any other, in order."""
+    correlation = np.abs(np.corrcoef(samples, rowvar=False))
+    np.fill_diagonal(correlation, 0.0)
+    return sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:count].tolist())
 
 
 def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]]) -> None:

@@ -29,7 +29,7 @@ SHOWN = (MEASURES["rel"], MEASURES["ks"])
 KINDS = {
     "searchlight": "pencil beam, n = 1",
     "diffuse": "diffuse light, n = 1",
-    "refracting": "refracting surfaces, against photons",
+    "refracting": "refracting surfaces, n = 1.4",
 }
 # Lines of one panel in turn, by colour and marker: never by colour alone. Printed constants are dashed.
 COLOURS, MARKERS = (BLUE, VERMILION, GREEN, ORANGE, PURPLE, SKY), "osv^Dx+<"

@@ -21,10 +21,10 @@ from profilefit.laws.entry import EVERYWHERE, Entry, Text
 from profilefit.recipes.inventory import Named, albedo_laws, all_profiles
 from profilefit.recipes.record import record_name, record_setting
 from profilefit.recipes.record_folder import Folder, Records
-from profilefit.report.records import SETS, TOTAL, Content, converged, known_errors, largest_error, z_score
+from profilefit.report.records import SETS, TOTAL, Content, by_index, converged, known_errors, largest_error, z_score
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
-from profilefit.report.tables.quality_tables import ROWS, albedo_number
+from profilefit.report.tables.quality_tables import INDEX_MEASURES, ROWS, albedo_number
 from profilefit.shader import emit
 
 PROFILE_MEASURES = ("rel", "ks", "l1", "inversion_error")
@@ -47,10 +47,12 @@ class Page:
     members: tuple[Named, ...]
 
     @property
-    def law_class(self) -> type:
-        """The class whose docstring says what the law is."""
+    def law_classes(self) -> tuple[type, ...]:
+        """The classes whose docstrings say what the law is: one, or another one of surfaces that refract."""
         name = self.members[0].name.partition(":")[0]
-        return home((MAPS if self.members[0].law.entry.is_map else PROFILES)[name])
+        whole = home((MAPS if self.members[0].law.entry.is_map else PROFILES)[name])
+        spanning = [type(one.law) for one in self.members if _spans(one)]
+        return tuple(dict.fromkeys([whole, *spanning]))
 
     @property
     def records(self) -> tuple[str, ...]:
@@ -60,8 +62,11 @@ class Page:
 def law_pages(folder: Folder) -> list[Page]:
     """Every law and map that loads with the records in `folder`, profile laws first."""
     records = Records.of(folder)
-    laws = _grouped(all_profiles(records), lambda one: one.name.split(":")[0])
-    maps = _grouped(albedo_laws(records, matched=False), lambda one: MAP + one.name)
+    profiles = sorted(all_profiles(records), key=lambda one: one.setting.n)  # that of n = 1 first
+    laws = _grouped(profiles, lambda one: one.name.split(":")[0])
+    maps = _grouped(
+        sorted(albedo_laws(records, matched=False), key=lambda one: one.setting.n), lambda one: MAP + one.name
+    )
     return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
 
 
@@ -69,8 +74,8 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
     """One page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
     parts = [
         f"# {page.title}",
-        f"```{{eval-rst}}\n.. autoclass:: {_constructor(page)}\n   :no-members:\n```",
-        _ranges(page.members[0].law.entry),
+        *(f"```{{eval-rst}}\n.. autoclass:: {_constructor(one)}\n   :no-members:\n```" for one in page.law_classes),
+        *dict.fromkeys(_ranges(one.law.entry) for one in page.members),
         _shader(page),
     ]
     if figure:
@@ -113,9 +118,14 @@ def _title(name: str) -> str:
     return f"{name.removeprefix(MAP)}, map between alpha and A" if name.startswith(MAP) else name
 
 
-def _constructor(page: Page) -> str:
+def _spans(one: Named) -> bool:
+    """Whether its constants hold for every index of a range."""
+    n = one.law.entry.n
+    return bool(one.records) and n.low < n.high
+
+
+def _constructor(kind: type) -> str:
     """The class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
-    kind = page.law_class
     names = [field.name for field in fields(kind)]
     return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
 
@@ -126,19 +136,29 @@ def _row(page: Page, one: Named, contents: Mapping[str, Content]) -> Sequence[st
         f"[{one.name}]({page.name}.md)",
         one.constants or "none",
         one.setting.illumination,
-        f"{one.setting.n:g}",
+        _surface(one),
         str(len(one.law.constant_names())),
         *(significant(worst.get(key)) for key in WORST),
     )
 
 
+def _surface(one: Named) -> str:
+    """n, or the indices that its constants span."""
+    return str(one.law.entry.n) if _spans(one) else f"{one.setting.n:g}"
+
+
 def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
     """The largest error of each measure: of its own records, or of a record that measured the printed set as well."""
     if one.records:
-        own = [contents[name]["quality"]["regenerated"] for name in one.records]
+        own: list[Content] = [_of_record(contents[name]) for name in one.records]
     else:
         own = [values for _, values in _measured_sets(one, contents)]
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
+
+
+def _of_record(content: Content) -> Content:
+    """The measures of its constants; where they span indices, those of every index."""
+    return {**content["quality"]["regenerated"], **by_index(content)}
 
 
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
@@ -155,6 +175,8 @@ def _loading(one: Named) -> str:
     """How Python and the shell get this very law."""
     call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
     lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
+    if _spans(one):
+        lines[0] += f" The same constants hold for every n in {one.law.entry.n}: `--n` and `Setting` choose."
     lines += ["", "```python", f"profilefit.{call}({', '.join(_arguments(one))})", "```"]
     command = _export(one)
     return "\n".join([*lines, "", "```", command, "```"] if command else lines)
@@ -199,7 +221,8 @@ def _shader(page: Page) -> str:
     if not isinstance(text, Text):
         return f"In a shader: no source; {text}."
     prefixes = dict.fromkeys(f"`{emit.prefix(one.law)}_…`" for one in page.members)
-    return f"In a shader: `profilefit/shader/glsl/{text.file}.glsl`, its names begin with {', '.join(prefixes)}."
+    files = dict.fromkeys(f"`profilefit/shader/glsl/{one.law.entry.text.file}.glsl`" for one in page.members)
+    return f"In a shader: {', '.join(files)}; names begin with {', '.join(prefixes)}."
 
 
 def _printed(one: Named, folder: Folder) -> str:
@@ -223,6 +246,7 @@ def _recorded(name: str, folder: Folder) -> str:
         f"**Record `{name}`**: {content['title']}. Equations: `{content['equations']}`",
         _fitted(content),
         _constants(content),
+        _by_index(content),
         _quality(content, content["quality"]["regenerated"]),
         _digests(content, path),
         f"```\nprofilefit regenerate {name}\n```",
@@ -277,6 +301,18 @@ def _quality(content: Content, values: Content) -> str:
     rows.append(("worst", *(significant(MEASURES[key].worst(values[key])) for key in measures)))
     meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in measures)
     return f"{markdown_table(('alpha', *measures), rows)}\n\n{meaning}."
+
+
+def _by_index(content: Content) -> str:
+    """The worst measures at each index that a record was judged at; what follows is at that of its setting."""
+    found = by_index(content)
+    if not found:
+        return ""
+    keys = [key for key in INDEX_MEASURES if key in found]
+    rows = [(f"{n:g}", *(significant(found[key][i]) for key in keys)) for i, n in enumerate(found["n"])]
+    meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in keys)
+    table = markdown_table(("n", *keys), rows)
+    return f"By refractive index, the worst albedo:\n\n{table}\n\n{meaning}.\n\nAt n = {content['setting']['n']:g}:"
 
 
 def _digests(content: Content, path: Path) -> str:

@@ -115,7 +115,7 @@ def measured(
     track    is shown the progress
     """
     records = Records.of(folder)
-    profiles, maps, sampled = (find(records, names) for find in (profile_laws, albedo_laws, sampled_laws))
+    profiles, maps, sampled = (find(records, names, False) for find in (profile_laws, albedo_laws, sampled_laws))
     profiles, sampled = (sorted(laws, key=lambda one: _order(one.setting)) for laws in (profiles, sampled))
     qualities = for_each(lambda one: measured_profile(one, alpha), profiles, track, "profiles")
     of_maps = for_each(measured_map, maps, track, "maps")
@@ -167,11 +167,13 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     """
 
     def laws() -> str:
-        found = profile_laws(folder)
+        found = profile_laws(folder, matched=False)
         return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
 
     def samplers() -> str:
-        return markdown_samplers(list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder)))))
+        return markdown_samplers(
+            list(chain.from_iterable(for_each(measured_samplers, sampled_laws(folder, matched=False))))
+        )
 
     claims = {"claims": lambda: markdown_claims(folder / EVIDENCE)}
     return {"laws": laws, "samplers": samplers, "check": lambda: markdown_check(folder), **claims}
@@ -179,12 +181,17 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
     """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
-    header = ("law", "constants", "light", "number", *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")))
+    header = (
+        "law",
+        "constants",
+        "light",
+        "n",
+        "number",
+        *(f"{m} {w}" for m in ("rel", "ks") for w in ("mean", "worst")),
+    )
     rows = [
         (
-            one.name,
-            one.constants or "none",
-            one.setting.illumination,
+            *_home(one),
             str(len(one.law.constant_names())),
             *(significant(of(getattr(quality, m))) for m in ("rel", "ks") for of in (np.mean, np.max)),
         )
@@ -195,12 +202,14 @@ def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
 
 def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
     """A line a sampler, each measure at its worst albedo."""
-    header = ("law", "constants", "light", "sampler", *_sampler_headers())
-    rows = [
-        (s.of.name, s.of.constants or "none", s.of.setting.illumination, s.name, *_sampler_cells(s))
-        for s in sorted(measured, key=lambda s: _order(s.of.setting))
-    ]
+    header = ("law", "constants", "light", "n", "sampler", *_sampler_headers())
+    rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
     return markdown_table(header, rows)
+
+
+def _home(one: Named) -> tuple[str, str, str, str]:
+    """Law, constants, light, n."""
+    return one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"
 
 
 def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Quality]) -> RenderableType:
@@ -224,6 +233,7 @@ def _profile_table(measure: str, setting: Setting, measured: Mapping[str, Qualit
 def _map_table(measured: Sequence[tuple[Named, AlbedoQuality]]) -> RenderableType:
     maps, qualities = [one for one, _ in measured], [quality for _, quality in measured]
     columns = {"map": [one.label for one in maps], "light": [one.setting.illumination for one in maps]}
+    columns["n"] = [f"{one.setting.n:g}" for one in maps]
     for header, measure in zip(MAP_HEADERS, OF_MAP, strict=True):
         columns[header] = [albedo_number(measure, getattr(quality, measure)) for quality in qualities]
     columns["α(0)"] = [albedo_number("at_one", one.law.alpha(0.0)) for one in maps]

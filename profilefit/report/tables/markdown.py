@@ -11,7 +11,18 @@ import numpy as np
 
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.recipes.paper.reproduction import LENGTH, PUBLISHED
-from profilefit.report.records import ERRORS, Content, converged, known_errors, largest_error, measured_sets, measures
+from profilefit.report.records import (
+    ERRORS,
+    Content,
+    at_index,
+    converged,
+    index_words,
+    known_errors,
+    largest_error,
+    measured_sets,
+    measures,
+    regenerated_worst,
+)
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.quality_tables import albedo_number
 
@@ -26,6 +37,7 @@ NAMES |= {"held against", "command"}
 MARKUP = re.compile(r"(?<!\\)[<|]")  # begins an element, or a column
 # What the README shows of all: the law in question and in use, the best sum of Gaussians, and the nearest.
 SHORT = {("liang", "published"), ("burley", "published"), ("gaussians-6", "regenerated"), ("hazard", "regenerated")}
+SHORT |= {("hazard-refracting", "regenerated")}
 
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
@@ -59,21 +71,28 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
 
 
 def markdown_hazard(records: Mapping[str, Content]) -> str:
-    """The constants of the hazard law in every setting, a record a column, and its worst errors there."""
+    """The constants of the hazard law in every setting, a record a column, and its worst errors there; first those of
+    n = 1, then those that span the indices of a surface that refracts."""
     fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
     fitted = {name: c for name, c in fits.items() if converged(c)}
-    if not fitted:
-        return ""
+    forms: dict[tuple[str, ...], dict[str, Content]] = {}
+    for name, content in sorted(fitted.items(), key=lambda item: bool(item[1].get("indices"))):
+        forms.setdefault(tuple(content["constants"]), {})[name] = content
+    return "\n\n".join(map(_hazard_constants, forms.values()))
+
+
+def _hazard_constants(fitted: Mapping[str, Content]) -> str:
+    """Records of the same constants, a column each."""
     names = next(iter(fitted.values()))["constants"]
-    fitted = {name: c for name, c in fitted.items() if c["constants"].keys() == names.keys()}
     rows = [
         (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
         for columns in [list(fitted.values())]
         for name in names
     ]
     for measure in ("rel", "ks"):
-        worst_of = (MEASURES[measure].worst(c["quality"]["regenerated"][measure]) for c in fitted.values())
+        worst_of = (regenerated_worst(c, measure) for c in fitted.values())
         rows.append((f"{measure}, worst", *map(significant, worst_of)))
+    rows.insert(0, ("n", *map(index_words, fitted.values())))
     return markdown_table(("constant", *fitted), rows)
 
 
@@ -144,11 +163,15 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
 
 
 def _short_quality(records: Mapping[str, Content]) -> str:
-    """A few laws under a searchlight by `rel` and `ks`, the worst first."""
-    searchlight = {name: c for name, c in records.items() if _is_searchlight(c)}
+    """A few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
+    searchlight = {name: c for name, c in records.items() if _is_searchlight(c) or _is_refracting(c)}
     found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     rows = [
-        (owner, which, *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])))
+        (
+            owner + at_index(records.get(owner, {})),
+            which,
+            *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])),
+        )
         for owner, which, values in sorted(found, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
     ]
     header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
@@ -205,6 +228,11 @@ def _is_of_the_paper(content: Content) -> bool:
 def _is_searchlight(content: Content) -> bool:
     setting = content.get("setting") or {}
     return (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
+
+
+def _is_refracting(content: Content) -> bool:
+    """Whether it spans the indices of a surface under a searchlight."""
+    return bool(content.get("indices")) and content["setting"]["illumination"] == "searchlight"
 
 
 def _fits(records: Mapping[str, Content]) -> dict[str, Content]:

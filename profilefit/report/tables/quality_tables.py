@@ -8,12 +8,13 @@ import numpy as np
 from rich.console import RenderableType
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
-from profilefit.report.records import Content, converged, measured_sets, measures
+from profilefit.report.records import Content, at_index, by_index, converged, measured_sets, measures, regenerated_worst
 from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
 
 SHORT = {"published": "print", "corrected": "corr.", "regenerated": "regen."}
 FEW_DIGITS = 0.01  # below it three decimals say too little
 ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
+INDEX_MEASURES = ("rel", "largest", "ks", "delta_A")
 # Measures by the table they stand in; for r2 the smallest is the worst.
 TABLES = (
     ("rel", "largest", "ks", "l1"),
@@ -34,11 +35,20 @@ def values_of(one: Content, measure: str) -> list[float] | None:
 
 
 def worst_measures(content: Content) -> dict[str, dict[str, float]]:
-    """Measure -> set of constants -> its worst over alpha; a failed fit has no regenerated law to measure."""
+    """Measure -> set of constants -> its worst over alpha, and over n where a record spans indices.
+
+    A failed fit has no regenerated law to measure.
+    """
     quality = content["quality"]
     names = [name for name in measured_sets(content) if name != "regenerated" or converged(content)]
     keys = [key for key in (*OF_PROFILE, "delta_A", "largest_s") if key in quality["regenerated"]]
-    return {key: {name: MEASURES[key].worst(quality[name][key]) for name in names} for key in keys}
+    return {key: {name: _worst(content, name, key) for name in names} for key in keys}
+
+
+def _worst(content: Content, name: str, key: str) -> float:
+    if name == "regenerated":
+        return regenerated_worst(content, key)
+    return MEASURES[key].worst(content["quality"][name][key])
 
 
 def spark_table(content: Content) -> list[RenderableType]:
@@ -57,16 +67,33 @@ def spark_table(content: Content) -> list[RenderableType]:
         "worst": on_the_point([significant(max(values)) for _, _, values in rows]),
     }
     caption = "One logarithmic scale for each measure, from its least to its worst"
-    return [column_table("Errors over α" + _failed(content), columns, caption, left=("", list(columns)[1]))]
+    return [
+        column_table(
+            "Errors over α" + at_index(content) + _failed(content), columns, caption, left=("", list(columns)[1])
+        )
+    ]
 
 
 def quality_tables(content: Content) -> list[RenderableType]:
-    """Measures by albedo for every set of constants, or those of an A -> alpha map."""
+    """Measures by albedo for every set of constants, or those of an A -> alpha map; by index where it spans several."""
+    first = [index_table(content)] if by_index(content) else []
     if measures(content, "delta_A"):
-        return [_albedo_table(content)]
+        return [*first, _albedo_table(content)]
     sets = [content["quality"][name] for name in measured_sets(content)]
     groups = [[key for key in group if all(values_of(one, key) is not None for one in sets)] for group in TABLES]
-    return [_table(content, group) for group in groups if group]
+    return [*first, *(_table(content, group) for group in groups if group)]
+
+
+def index_table(content: Content) -> RenderableType:
+    """The worst measures over alpha at each index that a record was judged at."""
+    found = by_index(content)
+    columns = {"n": [f"{n:g}" for n in found["n"]]}
+    for measure in INDEX_MEASURES:
+        if measure in found:
+            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in found[measure]])
+    known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in found]
+    caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
+    return column_table("By refractive index" + _failed(content), columns, caption, left=("n",))
 
 
 def _table(content: Content, group: list[str]) -> RenderableType:
@@ -81,7 +108,9 @@ def _table(content: Content, group: list[str]) -> RenderableType:
             header = f"{MEASURES[measure].header}\n{SHORT[name]}"
             columns[header] = on_the_point([_number(measure, value) for value in shown])
     caption = "; ".join(f"{MEASURES[measure].header}: {MEASURES[measure].meaning}" for measure in group)
-    return column_table("Quality at held-out albedos" + _failed(content), columns, caption, left=("α",))
+    return column_table(
+        "Quality at held-out albedos" + at_index(content) + _failed(content), columns, caption, left=("α",)
+    )
 
 
 def _albedo_table(content: Content) -> RenderableType:
@@ -89,7 +118,7 @@ def _albedo_table(content: Content) -> RenderableType:
     columns = {"": [MEASURES[measure].formula for measure in OF_MAP]}
     for name in measured_sets(content):
         columns[name] = [albedo_number(measure, quality[name][measure]) for measure in OF_MAP]
-    return column_table("Quality of the map" + _failed(content), columns)
+    return column_table("Quality of the map" + at_index(content) + _failed(content), columns)
 
 
 def albedo_number(measure: str, value: Any) -> str:

@@ -14,7 +14,16 @@ from rich.text import Text
 
 from mcml_sim.media.setting import Setting
 from profilefit.recipes.starts import SAME_COST
-from profilefit.report.records import TOTAL, Content, converged, known_errors, largest_error, z_score
+from profilefit.report.records import (
+    TOTAL,
+    Content,
+    at_index,
+    converged,
+    index_words,
+    known_errors,
+    largest_error,
+    z_score,
+)
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
 from profilefit.report.tables.evidence_tables import evidence_tables
 from profilefit.report.tables.quality_tables import quality_tables, spark_table
@@ -48,7 +57,7 @@ def record_tables(content: Content) -> list[RenderableType]:
         return _spaced([_title(content), *evidence_tables(content)])
     parts = [_title(content), constants_table(content), intervals_table(content)]
     if "derived" in content:
-        parts.append(derived_table(content["derived"]))
+        parts.append(derived_table(content["derived"], at_index(content)))
     parts.append(fit_facts(content))
     if "stages" in content:
         parts += stage_tables(content["stages"])
@@ -106,7 +115,7 @@ def intervals_table(content: Content) -> RenderableType:
     return column_table("Credible intervals (emcee)", cells, left=("", "from"))
 
 
-def derived_table(derived: Content) -> RenderableType:
+def derived_table(derived: Content, surface: str = "") -> RenderableType:
     """A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
     errors = derived["statistical"], derived["model"]
     both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
@@ -117,7 +126,9 @@ def derived_table(derived: Content) -> RenderableType:
         "± photons": on_the_point([significant(error) for error in errors[0]]),
         "± model": on_the_point([significant(error) for error in errors[1]]),
     }
-    return column_table(title, columns, "model: how far the law is from the truth; one standard error each", ("α",))
+    return column_table(
+        title + surface, columns, "model: how far the law is from the truth; one standard error each", ("α",)
+    )
 
 
 def fit_facts(content: Content) -> RenderableType:
@@ -209,7 +220,10 @@ def _title(content: Content) -> RenderableType:
 def _provenance(content: Content) -> list[Line]:
     setting = content["setting"]
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
-    light = f"{setting['illumination']}{beam}, n = {setting['n']:g}, g = {setting['g']:g}"
+    surface = f"every n in {index_words(content)}" if content.get("indices") else f"n = {setting['n']:g}"
+    light = f"{setting['illumination']}{beam}, {surface}, g = {setting['g']:g}"
+    if content.get("indices"):
+        light += f"; tables and figures are of n = {setting['n']:g} where they do not say another"
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
@@ -219,6 +233,8 @@ def _provenance(content: Content) -> list[Line]:
     if protocol.get("albedos"):
         a = protocol["albedos"]
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
+    if protocol.get("indices"):
+        lines.append(("indices", ", ".join(f"{n:g}" for n in protocol["indices"])))
     if protocol.get("rings"):
         lines.append(("bins", _rings(protocol["rings"])))
     if protocol.get("weighting"):

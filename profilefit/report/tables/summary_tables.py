@@ -16,11 +16,12 @@ from profilefit.report.tables.cells import ABSENT, column_table, significant, sp
 from profilefit.report.tables.evidence_tables import evidence_line
 from profilefit.report.tables.quality_tables import values_of, worst_measures
 
-SPARK = 12  # characters of a sparkline
+SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
 FAILED = "FAILED"
 Records = Mapping[str, Content]
 CAPTION = (
-    "Worst over α: as printed → corrected, where there is such a set → regenerated. "
+    "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
+    "regenerated. "
     "`profilefit report NAME` has constants, errors and quality by α."
 )
 
@@ -85,15 +86,15 @@ def _errors(title: str, records: Records, measure: str, more: Mapping[str, str])
     columns = _first(records)
     columns[header] = [_course(content, measure) for content in records.values()]
     columns |= {key: [_course(content, key, last=True) for content in records.values()] for key in more}
-    columns[f"{header} over α"] = [spark(row, ends, SPARK) for row in rows.values()]
-    return column_table(title, columns, left=("record", "truth", f"{header} over α"))
+    columns["over α"] = [spark(row, ends, SPARK) for row in rows.values()]
+    return column_table(title, columns, left=("record", "over α"))
 
 
 def _maps(records: Records) -> RenderableType:
     columns = _first(records)
     columns["max error of A"] = [_course(content, "delta_A") for content in records.values()]
     columns["of √(1 − α)"] = [_course(content, "largest_s") for content in records.values()]
-    return column_table("Maps between A and α", columns, left=("record", "truth"))
+    return column_table("Maps between A and α", columns, left=("record",))
 
 
 def _readings(records: Records) -> RenderableType:
@@ -102,7 +103,17 @@ def _readings(records: Records) -> RenderableType:
 
 
 def _first(records: Records) -> dict[str, list[str]]:
-    return {"record": list(records), "truth": [truth(content) for content in records.values()]}
+    return {
+        "record": list(records),
+        "n": [_indices(content) for content in records.values()],
+        "photons": [truth(content).removesuffix(" photons") for content in records.values()],
+    }
+
+
+def _indices(content: Content) -> str:
+    """n, or the largest where the constants hold for every n above 1 up to it."""
+    span = content.get("indices")
+    return f"≤ {span[1]:g}" if span else f"{content['setting']['n']:g}"
 
 
 def _course(content: Content, measure: str, last: bool = False) -> str:

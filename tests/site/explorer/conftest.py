@@ -5,7 +5,7 @@ import pytest
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import profile_laws
 from profilefit.report.explorer import explorer_section
-from profilefit.report.explorer.fragment import address
+from profilefit.report.explorer.offered import address
 
 PAGE = (
     '<!DOCTYPE html><html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">{}'

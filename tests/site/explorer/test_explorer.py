@@ -8,15 +8,18 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.fitting.quality import profile_quality
-from profilefit.recipes import catalogue
-from profilefit.report.explorer.fragment import first, offered
+from profilefit.recipes import catalogue, inventory
+from profilefit.report.explorer.offered import first, offered
 from profilefit.scenes.stage.picture import srgb_codes
 from profilefit.scenes.stage.step_edge import step_response
+from profilefit.shader.law_file import export
 
 pytestmark = pytest.mark.slow
 
 ROUNDING = 1e-5  # relative, of R_d in float32: `profilefit check` finds at most 2.3e-6; this is another float32
 TABLE = 2e-5  # of the exact solution between the knots of the explorer's table
+REFRACTED = 5e-4, 5e-5  # of R_d and of the cdf from n = 1.1 up, between the knots in n, too
+NEAR_ONE = 3e-3, 3e-4  # where n is less
 # One law of each kind: the first call of a law in Python takes as long as ten in the browser.
 COMPARED = (
     "hazard-diffuse",
@@ -28,6 +31,10 @@ COMPARED = (
     "better_dipole",
 )
 REFLECTANCE, MFP = [0.2, 0.6, 0.97], [0.4, 1.0, 2.5]
+CURVES = """([light, n, alphas, radii]) => alphas.map((alpha, i) => {
+  const curve = explorer.state.tables[light].at(n).curve(alpha);
+  return radii[i].map((x) => [curve.profile(x), curve.cdf(x), curve.edge(-x)]);
+})"""
 NO_WEBGL = "HTMLCanvasElement.prototype.getContext = () => null"
 
 
@@ -36,11 +43,12 @@ def explorer(open_shared_page, file):
     return open_shared_page(file)
 
 
-def chosen(page, law):
+def chosen(page, law, n=1.0):
     """What is measured of each channel after a choice of the law: arrays (channels, ...) by name, radii thinned out."""
     told = page.evaluate(
-        """([id, A, l]) => {
+        """([id, A, l, n]) => {
           const { state } = explorer;
+          state.refract(n);
           state.choose(state.laws.find((law) => law.id === id));
           [0, 1, 2].forEach((c) => { state.set("reflectance", c, A[c]); state.set("mfp", c, l[c]); });
           explorer.update();
@@ -48,7 +56,7 @@ def chosen(page, law):
           return explorer.values.channels.map(({ alpha, mfp, rel, ks, r, profile }) =>
             ({ alpha, mfp, rel, ks, r: some(r), profile: some(profile) }));
         }""",
-        [law, REFLECTANCE, MFP],
+        [law, REFLECTANCE, MFP, n],
     )
     return {key: np.array([one[key] for one in told]) for key in told[0]}
 
@@ -66,7 +74,7 @@ def pixels(page, part):
 
 
 def test_fragment_stands_alone(fragment):
-    assert len(fragment.encode()) < 600_000
+    assert len(fragment.encode()) < 1_500_000
     addresses = set(re.findall(r"https?://[^\s\"'<\\]*", fragment))
     assert addresses <= {"http://www.w3.org/1999/xlink"}
     ids = re.findall(r'\sid="([^"]*)"', fragment)
@@ -140,16 +148,69 @@ def test_table_is_the_exact_half_space(explorer, light):
     outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
     x = outer * np.geomspace(1e-4, 1.0, 20)
     told = explorer.evaluate(
-        """([light, alphas, radii]) => alphas.map((alpha, i) => {
-          const curve = explorer.state.tables[light].curve(alpha);
-          return radii[i].map((x) => [curve.profile(x), curve.cdf(x), curve.edge(-x)]);
-        })""",
-        [light, alpha[:, 0].tolist(), x.tolist()],
+        CURVES,
+        [light, 1, alpha[:, 0].tolist(), x.tolist()],
     )
     profile, cdf, edge = np.moveaxis(np.array(told), -1, 0)
     np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=TABLE)
     np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=TABLE)
     np.testing.assert_allclose(edge[:, ::4], step_response(-x[:, ::4], alpha, setting=setting), atol=TABLE)
+
+
+# A knot, near the lowest ones where the light changes fastest, and half-way between two of the others.
+@pytest.mark.parametrize(("n", "bounds"), [(1.4, REFRACTED), (1.34, REFRACTED), (1.16, REFRACTED), (1.04, NEAR_ONE)])
+@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+def test_table_is_the_exact_half_space_under_a_surface_that_refracts(explorer, light, n, bounds):
+    alpha, setting = np.array([0.03, 0.5, 0.9, 0.99, 0.9999, 1.0])[:, None], Setting(light, n)
+    outer = np.asarray(exact.quantile(0.995, alpha, setting=setting))
+    x = outer * np.geomspace(1e-3, 1.0, 20)
+    told = explorer.evaluate(CURVES, [light, n, alpha[:, 0].tolist(), x.tolist()])
+    profile, cdf, _ = np.moveaxis(np.array(told), -1, 0)
+    np.testing.assert_allclose(profile, exact.profile(x, alpha, setting=setting), rtol=bounds[0])
+    np.testing.assert_allclose(cdf, exact.cdf(x, alpha, setting=setting), atol=bounds[1])
+
+
+@pytest.mark.parametrize("name", ["hazard", "hazard-diffuse"])
+def test_hazard_follows_the_index_by_the_text_that_is_exported(explorer, fits, name):
+    light = "diffuse" if name.endswith("diffuse") else "searchlight"
+    for n in (1.02, 1.34, 1.6):
+        found = chosen(explorer, name, n)
+        named = inventory.find(f"{name}-refracting", fits, n=n)
+        assert explorer.locator("[data-part='text']").text_content() == export(named, fits, "glsl-es", "law")
+        truth = profile_quality(named.law, found["alpha"])
+        np.testing.assert_allclose(found["rel"], truth.rel, atol=REFRACTED[0])
+        np.testing.assert_allclose(found["ks"], truth.ks, atol=REFRACTED[1])
+        assert named.setting == Setting(light, n)
+        assert explorer.locator("[data-part='foreign']").is_hidden()
+    chosen(explorer, name)
+    assert explorer.locator("[data-part='text']").text_content() == export(
+        inventory.find(name, fits), fits, "glsl-es", "law"
+    )
+
+
+def test_a_law_made_for_one_index_says_so_under_another(explorer):
+    found = chosen(explorer, "dipole", 1.4)
+    assert np.all(found["rel"] > 0.1)
+    explorer.evaluate("explorer.controls.show()")
+    assert "is of n = 1" in explorer.locator("[data-part='foreign']").inner_text()
+    assert explorer.locator("#explorer-law option:checked").inner_text() == "n = 1: dipole"
+    chosen(explorer, "dipole")
+    assert explorer.locator("[data-part='foreign']").is_hidden()
+
+
+def test_the_index_is_a_slider_and_part_of_the_address(open_page, file):
+    page = open_page(file, fragment="#explorer?law=hazard&n=1.333&material=marble")
+    assert page.evaluate("[explorer.state.n, explorer.state.material.name]") == [1.34, "marble"]
+    before = page.evaluate("explorer.values.channels.map((one) => [one.alpha, one.reflectance])")
+    page.locator("#explorer-n").press("ArrowRight")
+    page.wait_for_function("location.hash.includes('n=1.36')")
+    assert page.locator("#explorer-n + output").inner_text() == "1.36"
+    after = page.evaluate("explorer.values.channels.map((one) => [one.alpha, one.reflectance])")
+    for (alpha, bright), (same, darker) in zip(before, after, strict=True):
+        assert same == pytest.approx(alpha, abs=1e-6)
+        assert darker < bright
+    page.locator("#explorer-n").press("End")
+    page.wait_for_function("explorer.values.channels[0].reflectance < 0.9 && location.hash.includes('n=1.6&')")
 
 
 def test_without_webgl_a_picture_stands_in(open_page, file):

@@ -72,13 +72,11 @@ def test_quality_reads_back_with_printed_sets_once():
             continue
         quality = FITS[row["record"]]["quality"]["regenerated"]
         if "rel mean" in row:
-            from_photons = FITS[row["record"]]["setting"]["n"] != 1
-            assert ("–" in row.values()) == from_photons  # which do not say mse and r2
-            for key in ("rel", "ks", "l1") if from_photons else ("rel", "ks", "l1", "mse"):
+            assert "–" not in row.values()
+            for key in ("rel", "ks", "l1", "mse"):
                 assert float(row[f"{key} mean"]) == pytest.approx(np.mean(quality[key]), rel=0.05)
                 assert float(row[f"{key} worst"]) == pytest.approx(np.max(quality[key]), rel=0.05)
-            if not from_photons:
-                assert float(row["r2 worst"]) == pytest.approx(np.min(quality["r2"]), abs=5e-5)
+            assert float(row["r2 worst"]) == pytest.approx(np.min(quality["r2"]), abs=5e-5)
         elif "max error of A" in row:
             assert float(row["max error of A"]) == pytest.approx(quality["delta_A"], rel=0.05)
             assert row["rises all the way"] == ("yes" if quality["monotone"] else "no")

@@ -248,4 +248,4 @@ def test_second_opinions_are_told():
     assert all(f"{count}: " in text for count in others)
     assert f"photons {check['result']}" in text
     assert f"in {check['rank']} directions" in text
-    assert "random starts" not in rendered([record_tables.fit_facts(RECORDS["hazard-n1.4"])], 100)
+    assert "random starts" not in rendered([record_tables.fit_facts(RECORDS["hazard-refracting"])], 100)
