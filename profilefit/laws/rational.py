@@ -59,6 +59,9 @@ class Rational(Normalisation):
     def entered(self) -> float:
         return 1.0
 
+    def text_numbers(self) -> dict[str, float]:
+        return {"entered": self.entered}
+
     @evaluated
     def reflectance(self, alpha) -> Array:
         """Total reflectance A [-] at single-scattering albedo alpha [-]."""
