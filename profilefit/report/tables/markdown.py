@@ -59,25 +59,21 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
 
 
 def markdown_hazard(records: Mapping[str, Content]) -> str:
-    """The constants of the hazard law, a record a column, and its worst errors there; n = 1 and n > 1 apart."""
+    """The constants of the hazard law in every setting, a record a column, and its worst errors there."""
     fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
     fitted = {name: c for name, c in fits.items() if converged(c)}
-    forms = sorted({tuple(c["constants"]) for c in fitted.values()}, key=len)
-    tables = ({name: c for name, c in fitted.items() if tuple(c["constants"]) == names} for names in forms)
-    return "\n\n".join(map(_one_hazard, tables))
-
-
-def _one_hazard(fitted: Mapping[str, Content]) -> str:
-    """Of records with the same constants; their errors are the worst of all indices, where there are several."""
+    if not fitted:
+        return ""
     names = next(iter(fitted.values()))["constants"]
+    fitted = {name: c for name, c in fitted.items() if c["constants"].keys() == names.keys()}
     rows = [
         (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
         for columns in [list(fitted.values())]
         for name in names
     ]
     for measure in ("rel", "ks"):
-        found = (c["quality"].get("by_index", c["quality"]["regenerated"])[measure] for c in fitted.values())
-        rows.append((f"{measure}, worst", *map(significant, map(MEASURES[measure].worst, found))))
+        worst_of = (MEASURES[measure].worst(c["quality"]["regenerated"][measure]) for c in fitted.values())
+        rows.append((f"{measure}, worst", *map(significant, worst_of)))
     return markdown_table(("constant", *fitted), rows)
 
 
