@@ -37,7 +37,7 @@ from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.choice import Choice, Predicted, cases, choose, laws
 from profilefit.studies.choose.requirements import Budget, Requirements
 
-SETTING = Setting("diffuse")
+SETTING, REFRACTING = Setting("diffuse"), Setting("diffuse", n=1.4)
 SCENES, QUICK, SEED = 30, 3, 1
 PIXELS = (0.1, 50.0)  # of the longest mean free path [pixels]
 RADII = (2.0, 50.0)  # of the cylinder [longest mean free path]
@@ -195,7 +195,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
         with opened() as context:
             print(f"on {renderer(context)}")
             if options.ratios:
-                options.ratios.write_text(cost.as_json(cost.measured(context, laws(SETTING))), encoding="utf-8")
+                ratios = cost.measured(context, {**laws(SETTING), **laws(REFRACTING)})
+                options.ratios.write_text(cost.as_json(ratios), encoding="utf-8")
                 return
             for name, scene in scenes(QUICK if options.quick else options.scenes, options.seed):
                 found.append(verified(context, name, scene))

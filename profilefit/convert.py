@@ -1,8 +1,8 @@
 """One medium in everybody's units: mean free paths, falloff lengths, coefficients, and the "radius" of each engine.
 
-The hub is `Optical(alpha, mfp)`, an isotropic medium under an index-matched surface. A colour is a function of alpha
-alone, and every length is the transport mean free path times a function of alpha alone, so each converts to and from
-the hub.
+The hub is `Optical(alpha, mfp)`, an isotropic medium under an index-matched surface; a colour under a surface that
+refracts has the alpha that `alpha_of` finds. A colour is a function of alpha (and n) alone, and every length is the
+transport mean free path times a function of alpha alone, so each converts to and from the hub.
 
 Three different lengths are called the diffuse mean free path (l the mean free path):
 
@@ -62,24 +62,25 @@ HDRP_REACH = float(brentq(lambda t: 0.25 * np.exp(-t) + 0.75 * np.exp(-t / 3.0) 
 UNREAL_MAGIC = 0.6
 
 
-def reflectance_of(alpha: ArrayLike, illumination: str) -> Floats:
-    """Exact total reflectance A [-] of a half space under "searchlight" or "diffuse" light."""
-    return np.asarray(exact.reflectance(alpha, Setting(illumination)), float)
+def reflectance_of(alpha: ArrayLike, illumination: str, n: float = 1.0) -> Floats:
+    """Exact total reflectance A [-] of a half space of index n >= 1 under "searchlight" or "diffuse" light."""
+    return np.asarray(exact.reflectance(alpha, Setting(illumination, n)), float)
 
 
-def alpha_of(reflectance: ArrayLike, illumination: str) -> Floats:
-    """The one single-scattering albedo with this A, which rises from 0 to 1 with alpha: any A in [0, 1] has one.
+def alpha_of(reflectance: ArrayLike, illumination: str, n: float = 1.0) -> Floats:
+    """The one single-scattering albedo with this A, which rises with alpha from 0 to what enters: 1 where n = 1.
 
     Inverts `reflectance_of` to 1e-12 for A <= 0.9995; beyond, the rounding of alpha itself moves A by up to 1e-8.
+    Lengths of other parametrisations belong to n = 1, whatever index alpha comes from.
     """
-    values = _checked("reflectance", reflectance, 0.0, 1.0)
-    setting = Setting(illumination)
+    setting = Setting(illumination, n)
+    values = _checked("reflectance", reflectance, 0.0, float(exact.reflectance(1.0, setting)))
     return np.vectorize(lambda value: _alpha(value, setting), otypes=[float])(values)
 
 
 def _alpha(reflectance: float, setting: Setting) -> float:
-    if reflectance in (0.0, 1.0):
-        return reflectance
+    if reflectance in (0.0, float(exact.reflectance(1.0, setting))):
+        return float(reflectance > 0.0)
     options = {"xtol": 1e-300, "rtol": TIGHTEST}
     if reflectance < MIDDLE:
         return float(brentq(lambda alpha: exact.reflectance(alpha, setting) - reflectance, 0.0, 1.0, **options))
@@ -262,9 +263,9 @@ class Optical:
         """Reduced scattering coefficient mu_s' = mu_s (1 - g) [1/length]."""
         return self.alpha / self.mfp
 
-    def reflectance(self, illumination: str) -> Floats:
-        """Total reflectance A [-] under "searchlight" or "diffuse" light."""
-        return reflectance_of(self.alpha, illumination)
+    def reflectance(self, illumination: str, n: float = 1.0) -> Floats:
+        """Total reflectance A [-] under "searchlight" or "diffuse" light, of index n >= 1."""
+        return reflectance_of(self.alpha, illumination, n)
 
     def length(self, name: str) -> Floats:
         """The length `name`, one of `BY_NAME` [length]; infinite where the medium has none."""
@@ -274,7 +275,7 @@ class Optical:
 
 
 def _checked(name: str, values: ArrayLike, low: float, high: float) -> Floats:
-    accepted = f"in [{low:g}, {high:g}]" if high < LARGEST else f">= {low:g} and finite"
+    accepted = f"in [{low:g}, {high:.9g}]" if high < LARGEST else f">= {low:g} and finite"
     numbers = checked_numbers(name, values, f"numbers {accepted}")
     outside = ~((numbers >= low) & (numbers <= high))
     if np.any(outside):

@@ -40,6 +40,11 @@ class Setting:
         """True where the surface does not refract and scattering has no preferred direction."""
         return self.n == 1.0 and self.g == 0.0
 
+    @property
+    def is_solved(self) -> bool:
+        """True where `mcml_sim.exact` has the half space."""
+        return self.n >= 1.0 and self.g == 0.0
+
     def __str__(self) -> str:
         n = str(self.n) if is_traced(self.n) else f"{self.n:g}"
         return f"{self.illumination}, n = {n}, g = {self.g:g}"

@@ -26,12 +26,10 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
-from scipy.linalg import solve_triangular
-from scipy.linalg.lapack import dpotri
-from scipy.optimize import minimize
 
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
+from profilefit.fitting.gaussian_process import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
@@ -40,17 +38,13 @@ from profilefit.laws.surface import surface_of
 
 Floats = NDArray[np.float64]
 Live = NDArray[np.bool_]
-GROUPS = 20  # of rings along r: the process is smooth on that scale, and a matrix of its cube is inverted
+# Of rings along r: the process is smooth on that scale, and a matrix of as many rows as all have is inverted.
+GROUPS, FEWEST_GROUPS, MOST_ROWS = 20, 8, 1000
 # Lengths between a fraction of the spacing and a few times the range: beyond either the likelihood knows no more.
 SHORTEST, LONGEST = 0.5, 3.0
-NUGGET = 1e-3  # of the amplitude's square, left to each ring alone: without it the finest scale decides on the largest
 LEFT_OUT = 1e-3  # share of a variance that the rank of the photons' covariance may leave out: noise of its own
 SEEN = 3.9  # gain in log likelihood that three parameters exceed by chance in one of twenty (chi^2 / 2)
 SHARES = 400  # nodes of an inverse cdf between which it is a straight line
-MAX_STEPS = 300
-TOLERANCE = 1e-3  # of the likelihood's slope by ln of amplitude and lengths: a hundredth of what data resolve
-FARTHEST = 12.0  # of ln amplitude from that of the residuals
-STEP = 1e-3  # in ln of amplitude and lengths, between gradients that make a curvature
 FOUND, NOT_SEEN = "found", "not seen: noise alone explains the residuals"
 FAILED = f"no convergence in {MAX_STEPS} steps: amplitude and lengths are where they stopped"
 
@@ -106,7 +100,7 @@ class Discrepancy:
     def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
         if not np.isfinite(length):  # a fit that sees no rings knows of no radius
             return np.ones((len(one), len(other)))
-        return _matern(_apart(one, other) / length)
+        return matern(apart(one, other) / length)
 
 
 FACTS = ("amplitude", "amplitude_error", "length_r", "length_s", "gain", "rms", "result")
@@ -158,10 +152,10 @@ def of_residuals(data: Residuals) -> Discrepancy:
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = _likeliest(begin, limits, (_apart(u, u), _apart(s, s), y, slope, noise))
+    found, curved, worth, converged = likeliest(begin, limits, (apart(u, u), apart(s, s), y, slope, noise))
     amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
-    kernel_u, kernel_s = _kernel(data.u, length_u), _kernel(data.s, length_s)
+    kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
     across = data.influence, kernel_s, kernel_u, data.influence
     covariance = amplitude**2 * np.einsum("pai,ab,ij,qbj->pq", *across, optimize=True)
     result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED
@@ -182,7 +176,7 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     judged = counted & (data > 0) & (profiles.cdf[:, 1:] <= ENERGY_WITHIN)
     judged &= profiles.r_edges[1:] > NEAREST
     u = np.log(np.sqrt(profiles.r_edges[1:] * np.maximum(profiles.r_edges[:-1], 0.25 * profiles.r_edges[1:])))
-    group = _groups(u, np.any(judged, axis=0))
+    group = _groups(u, np.any(judged, axis=0), max(min(GROUPS, MOST_ROWS // profiles.alpha.size), FEWEST_GROUPS))
     member = (group[:, None] == np.unique(group)).astype(float)  # (n, g)
     unit = unit_energy(fit.objective, profiles.energy, profiles.alpha, profiles.r_edges)
     own, seen, live = energy * judged @ member, data * judged @ member, (judged @ member) > 0
@@ -231,10 +225,10 @@ def _placed(alpha: Floats, trapped: Floats | None) -> Floats:
     return s if trapped is None else np.column_stack([s, trapped])
 
 
-def _groups(u: Floats, judged: Live) -> NDArray[np.intp]:
+def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
     """The group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
     inner = u[judged]
-    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(GROUPS, inner.size) + 1)
+    edges = np.linspace(inner.min(), inner.max() + 1e-9, min(number, inner.size) + 1)
     group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
     known = np.unique(group[judged])
     return known[np.abs(group[:, None] - known).argmin(axis=1)]
@@ -270,65 +264,6 @@ def _scales(x: Floats) -> Floats:
     """The shortest and the longest length worth looking at."""
     along = np.unique(x if x.ndim == 1 else x[:, 0])
     return np.array([SHORTEST * np.min(np.diff(along)), LONGEST * np.ptp(along)]) if along.size > 1 else np.ones(2)
-
-
-def _apart(one: Floats, other: Floats) -> Floats:
-    """Distances (k, l) of numbers, or of points in a plane."""
-    between = one[:, None] - other
-    return np.abs(between) if one.ndim == 1 else np.hypot(between[..., 0], between[..., 1])
-
-
-def _kernel(x: Floats, length: float) -> Floats:
-    return _matern(_apart(x, x) / length)
-
-
-def _matern(distance: Floats) -> Floats:
-    scaled = np.sqrt(3.0) * distance
-    return (1.0 + scaled) * np.exp(-scaled)
-
-
-def _bent(distance: Floats) -> Floats:
-    """d `_matern` / d ln length."""
-    scaled = np.sqrt(3.0) * distance
-    return scaled**2 * np.exp(-scaled)
-
-
-def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floats]:
-    """Minus the restricted log likelihood at ln of amplitude and lengths, and its gradient (3,)."""
-    square, far_u, far_s = np.exp(2.0 * theta[0]), apart_u * np.exp(-theta[1]), apart_s * np.exp(-theta[2])
-    along_u, along_s = _matern(far_u), _matern(far_s)
-    kernel = square * (along_u * along_s + NUGGET * np.eye(y.size))
-    value, by_covariance = _restricted(kernel + noise, y, slope)
-    parts = 2.0 * kernel, square * _bent(far_u) * along_s, square * along_u * _bent(far_s)
-    return value, np.array([np.vdot(by_covariance, part) for part in parts])
-
-
-def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
-    """Minus log likelihood of `y` but for `slope` times anything (Patterson, Thompson's (3)), and d / d covariance."""
-    root = np.linalg.cholesky(covariance)
-    lower = np.tril(dpotri(root, lower=1)[0])  # of the inverse: a third of what solving for it takes
-    across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
-    seen = solve_triangular(root, across, lower=True, trans=1)
-    inverse = lower + np.tril(lower, -1).T - seen @ seen.T  # of what `slope` leaves
-    rest = inverse @ y
-    logs = np.sum(np.log(np.diag(root))) + np.sum(np.log(np.abs(np.diag(triangle))))
-    return float(logs + 0.5 * (y @ rest)), 0.5 * (inverse - np.outer(rest, rest))
-
-
-def _likeliest(begin: Floats, limits: Floats, args) -> tuple[Floats, Floats, float, bool]:
-    """theta, the curvature of the loss there, the gain over noise alone, and whether it converged.
-
-    A length at a limit is held there: it has no curvature.
-    """
-    options = {"gtol": TOLERANCE, "maxiter": MAX_STEPS}
-    found = minimize(_loss, begin, args, method="L-BFGS-B", jac=True, bounds=limits, options=options)
-    around = [[_loss(found.x + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
-    curved = np.array([(after - before) / (2.0 * STEP) for after, before in around])
-    free = (limits[:, 0] < found.x) & (found.x < limits[:, 1])
-    _, _, y, slope, noise = args
-    floor = np.diag(np.where(np.diag(noise) > 0, 0.0, 1.0))
-    gain = _restricted(noise + floor, y, slope)[0] - found.fun
-    return found.x, 0.5 * (curved + curved.T) * np.outer(free, free), gain, bool(found.success)
 
 
 @eqx.filter_jit

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from mcml_sim.errors import InputError
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
-from profilefit.laws.surface import Surface, surfaces_of
+from profilefit.laws.surface import RefractingSurface, surfaces_of
 
 Values = Array | NDArray[np.float64]
 # A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
@@ -52,8 +52,8 @@ class Rings(eqx.Module):
     weight: Values
     limits: Values
     xi: Values
-    surface: Surface | None = None
-    surfaces: Surface | None = None
+    surface: RefractingSurface | None = None
+    surfaces: RefractingSurface | None = None
 
     @property
     def reflectance(self) -> Array:

@@ -11,9 +11,13 @@ leaves (2 pi r R_d / A). Then, xi uniform:
 A clip, r = min(g, r_max), draws r_max itself with a finite chance: an atom. No light leaves from a circle, so these
 samples weigh nothing, and the light beyond r_max is lost.
 
-All of it is integrated over xi by Gauss's rule between the places where r(xi) turns, stops or crosses a radius at which
-the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to 1 - 2^-24: an
-exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a renderer meets.
+A sampler may draw one part of the light below some xi and another above it, where radii begin at 0 anew: then two xi
+have one radius, and the error of the inversion is taken to the nearer.
+
+All of it is integrated over xi by Gauss's rule between the places where r(xi) turns, stops, begins anew or crosses a
+radius at which the integrand jumps: no random numbers. xi is taken as single-precision generators draw it, up to
+1 - 2^-24: an exponential sampler never goes beyond 17 of its lengths, and moments that diverge in theory are what a
+renderer meets.
 """
 
 from __future__ import annotations
@@ -40,6 +44,7 @@ LAST = 24.0 * np.log(2.0)
 SCAN = np.concatenate([[0.0], np.geomspace(1e-9, LAST, 4000)])
 SPLITS = np.concatenate([[0.0], np.geomspace(1e-6, LAST, 32)])
 NODES = 16
+BESIDE = np.geomspace(1e-9, 0.1, 9)  # of t, on either side of a jump: radii go to infinity before it
 ZOOM, ZOOMS = 65, 8  # a bracket shrinks by 32 each time: to rounding
 BATCH = 512  # calls have one shape, so that a compiled sampler compiles once
 LAST_SHARE = 0.999
@@ -49,7 +54,8 @@ LAST_SHARE = 0.999
 class SamplerQuality:
     """Measures of a sampler at each albedo (m,).
 
-    inversion_error  max over xi in [0, 0.999] of |cdf(sample(xi)) - xi|, the target's cdf [-]
+    inversion_error  max over xi in [0, 0.999] of |cdf(sample(xi)) - xi|, the target's cdf [-]; where one radius has two
+                     xi, `Sampler.undone` in place of the law's cdf
     missing          1 less the integral of pdf less the atom [-]: 0 if pdf is the sampler's
     atom             share of the samples at radii that are drawn with a finite chance [-]
     bias             relative error of even light (m,), and of light beyond a straight edge, `edge_bias`, with pdf
@@ -159,7 +165,9 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     def own(x: Floats) -> Floats:
         return _called(_pdf, sampler, x, alpha)
 
-    shape = _map(radius, edge)
+    with jax.enable_x64(True):
+        jump = float(sampler.jump(jnp.asarray(alpha)))
+    shape = _map(radius, edge, -np.log1p(-jump) if jump < 1.0 else np.inf)
     t, dt = _rule(shape.breaks)
     share = np.exp(-t) * dt
     x = radius(t)
@@ -175,7 +183,7 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     xi = np.linspace(0.0, LAST_SHARE, BATCH)
     return {
         "alpha": alpha,
-        "inversion_error": float(np.max(np.abs(target.cdf(_called(_sample, sampler, xi, alpha), alpha) - xi))),
+        "inversion_error": float(np.max(np.abs(_drawn_by(sampler, xi, alpha, target) - xi))),
         "missing": 1.0 - atom - _integral(own, shape.levels),
         "atom": atom,
         "bias": mean - 1.0,
@@ -184,6 +192,16 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
         "edge_bias_by_law_pdf": (float(share @ (by_law * lit)) + lost[1]) / beyond - 1.0,
         "variance": float(share @ weight**2) - mean**2,
     }
+
+
+def _drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floats:
+    """The xi that an exact inverse of the target's cdf sends to the radii drawn at xi."""
+    x = _called(_sample, sampler, xi, alpha)
+    with jax.enable_x64(True):
+        found = np.asarray(sampler.undone(x, xi, alpha))
+    if isinstance(target, LawTarget) and target.law is sampler.law:
+        return found
+    return found + target.cdf(x, alpha) - LawTarget(sampler.law).cdf(x, alpha)
 
 
 def _at_atoms(
@@ -215,22 +233,27 @@ def _ratio(above: Floats, below: Floats) -> Floats:
         return np.where(above > 0, above / np.maximum(below, 0.0), 0.0)
 
 
-def _map(radius: Callable[[Floats], Floats], edge: float) -> _Map:
+def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) -> _Map:
+    """`jump`: t at which radii begin at 0 anew."""
+    beside = np.concatenate([[jump], jump * (1.0 - BESIDE), jump * (1.0 + BESIDE)]) if jump < LAST else np.array([])
+    beside = np.sort(beside[beside < LAST])
+    last: Floats | list[float] = radius(beside[beside < jump][-1:]) if beside.size else []
     x = radius(SCAN)
     still = np.diff(x) == 0
     flats = _flats(radius, x, still)
     step = np.sign(np.diff(x))
+    step[(SCAN[:-1] <= jump) & (jump <= SCAN[1:])] = 0.0
     turns = np.flatnonzero(step[1:] * step[:-1] < 0) + 1
     places = [_turn(radius, SCAN[i - 1], SCAN[i + 1], float(step[i - 1])) for i in turns]
     extremes = [float(radius(np.array([place]))[0]) for place in places]
-    levels = [float(x[0]), float(x[-1]), *extremes, *(flat[2] for flat in flats)]
+    levels = [float(x[0]), float(x[-1]), *extremes, *last, *(flat[2] for flat in flats)]
     crossings = [
         _crossing(radius, SCAN[i], SCAN[i + 1], level)
         for level in {*extremes, edge}
         for i in np.flatnonzero(np.diff(np.sign(x - level)) != 0)
     ]
     ends = [end for low, high, _ in flats for end in (low, high)]
-    breaks = np.unique(np.concatenate([SPLITS, places, crossings, ends]))
+    breaks = np.unique(np.concatenate([SPLITS, beside, places, crossings, ends]))
     return _Map(breaks, np.unique([0.0, *levels]), flats)
 
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from mcml_sim.media.setting import Setting
 from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.evaluate import evaluated
-from profilefit.laws.surface import Surface
+from profilefit.laws.surface import RefractingSurface
 
 
 def closed() -> Any:
@@ -54,7 +54,7 @@ class Constants(eqx.Module):
             given["albedo"] = self.albedo.at_index(n)  # type: ignore[attr-defined]
         return replace(self, **given)
 
-    def under(self, surface: Surface | None) -> Self:
+    def under(self, surface: RefractingSurface | None) -> Self:
         """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
         return self if surface is None else replace(self, surface=surface)  # type: ignore[call-arg]
 
@@ -188,6 +188,20 @@ class Sampler(eqx.Module):
     @abc.abstractmethod
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         """Density in x = r/l of `scaled_sample(xi)`, xi uniform in [0, 1), atoms left out [1/mfp]."""
+
+    def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
+        """The uniform number that an exact inverse sends to x; of several the one nearest to xi."""
+        del xi
+        return self.law.scaled_cdf(x, alpha)
+
+    def jump(self, alpha: Array) -> Array:
+        """xi at which radii begin at 0 anew, as another part of the light is drawn; 1 where none does."""
+        return jnp.ones_like(alpha)
+
+    @evaluated
+    def undone(self, r, xi, alpha, mfp=1.0) -> Array:
+        """xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the error of the inversion. All broadcast."""
+        return self.scaled_undone(r / mfp, xi, alpha)
 
     @evaluated
     def sample(self, xi, alpha, mfp=1.0) -> Array:

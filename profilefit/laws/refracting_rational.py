@@ -13,7 +13,7 @@ from profilefit.laws.base import closed
 from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
-from profilefit.laws.surface import Number, Surface, surface_of
+from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
 STEPS = 4  # of Newton's method in the inverse: the root that they start from is right to a hundredth
@@ -61,7 +61,7 @@ class RefractingRational(Normalisation):
     d3: float
     f0: float
     f1: float
-    surface: Surface | None = closed()
+    surface: RefractingSurface | None = closed()
     entry = Entry(
         "rational",
         "rational map",
@@ -80,7 +80,7 @@ class RefractingRational(Normalisation):
     def at_one_index(cls) -> tuple[str, ...]:
         return ("c0", "d0", "f0")
 
-    def here(self) -> Surface:
+    def here(self) -> RefractingSurface:
         """The closed numbers of its setting, or of those that it was put under."""
         return self.surface or surface_of(self.setting)
 

@@ -16,7 +16,7 @@ from mcml_sim.media.setting import Setting
 Number = Any  # a float, or an array of jax or numpy
 
 
-class Surface(NamedTuple):
+class RefractingSurface(NamedTuple):
     """Closed numbers of one setting, or arrays of those of several.
 
     cosine    mu_c = sqrt(1 - 1/n^2), of the critical angle inside [-]
@@ -36,9 +36,9 @@ class Surface(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def surface_of(setting: Setting) -> Surface:
+def surface_of(setting: Setting) -> RefractingSurface:
     """The numbers of one setting, n >= 1 and g = 0."""
-    return Surface(
+    return RefractingSurface(
         cosine=float(np.sqrt((setting.n - 1.0) * (setting.n + 1.0))) / setting.n,
         trapped=1.0 - single_scattering.mean_transmittance(setting.n),
         entered=single_scattering.entered(setting),
@@ -48,6 +48,6 @@ def surface_of(setting: Setting) -> Surface:
     )
 
 
-def surfaces_of(settings: tuple[Setting, ...]) -> Surface:
+def surfaces_of(settings: tuple[Setting, ...]) -> RefractingSurface:
     """The numbers of several settings, each (k, 1)."""
-    return Surface(*(np.array(column)[:, None] for column in zip(*map(surface_of, settings), strict=True)))
+    return RefractingSurface(*(np.array(column)[:, None] for column in zip(*map(surface_of, settings), strict=True)))

@@ -23,6 +23,7 @@ from profilefit.laws import profile_classes
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.model import u_of
 from profilefit.measured.noise import Noise
+from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
 
 Floats = NDArray[np.float64]
@@ -36,7 +37,7 @@ DARKEST, WHITEST = 0.02, 0.9995  # albedos between which a law can be held again
 
 @dataclass(frozen=True)
 class Origin:
-    """The record whose constants a law has: its file and digest, and what it measured of the law."""
+    """The record whose constants a law has: its file and digest, and what it measured of the law in this setting."""
 
     path: Path
     digest: str
@@ -52,7 +53,8 @@ def origin(name: str, constants: str, setting: Setting, folder: Folder) -> Origi
         path = records.path(bases[0], setting)
     else:
         return None
-    quality = records.read(path).get("quality") or {}
+    content = records.read(path)
+    quality = (content.get("quality") or {}) if record_setting(content) == setting else {}
     return Origin(path, hashlib.sha256(path.read_bytes()).hexdigest(), quality)
 
 
@@ -63,7 +65,7 @@ def relative_error(law: ProfileLaw, alpha: float, source: Origin | None) -> floa
         known = np.array(measured, float)
         where = [u_of(one) for one in source.quality["alpha"]]
         return float(np.interp(-u_of(min(max(alpha, DARKEST), WHITEST)), -np.array(where), known))
-    if not law.setting.is_matched_isotropic:
+    if not law.setting.is_solved:
         return None
     return float(profile_quality(law, [min(max(alpha, DARKEST), WHITEST)]).rel[0])
 

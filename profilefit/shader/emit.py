@@ -49,6 +49,12 @@ def prefix(law: Constants) -> str:
     return f"{text.prefix or text.file}{text.count or ''}"
 
 
+def source(law: Constants) -> str:
+    """Which text it is: laws of one prefix may have several, as the hazard law has where the surface refracts."""
+    text = _text(law)
+    return f"{text.file}{text.count or ''}"
+
+
 def clamps(law: Constants) -> str:
     """What a law's text takes for another number than was given, in words."""
     return _text(law).clamps

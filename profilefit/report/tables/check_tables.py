@@ -42,11 +42,11 @@ def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str
     """A line a law and a line a map."""
     parts: list[RenderableType] = []
     if laws:
-        columns = {"law": [one.of.label for one in laws]}
+        columns = {"law": [one.of.label for one in laws], "n": _indices(laws)}
         columns |= _columns(LAW_COLUMNS, [_law_cells(one) for one in laws]) | _verdicts(laws)
         parts.append(column_table(f"Laws in float32, {device}", columns, CAPTION, left=("result",), fold=("law",)))
     if maps:
-        columns = {"map": [one.of.label for one in maps]}
+        columns = {"map": [one.of.label for one in maps], "n": _indices(maps)}
         columns |= _columns(MAP_COLUMNS, [_map_cells(one) for one in maps]) | _verdicts(maps)
         parts.append(column_table(f"Maps in float32, {device}", columns, left=("result",), fold=("map",)))
     return parts
@@ -64,7 +64,7 @@ def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
             "largest": [significant(spread.largest) for spread in spreads],
             "at": [spread.where for spread in spreads],
         }
-        parts.append(column_table(one.of.label, columns, _against_exact(one), left=("float32 error", "at")))
+        parts.append(column_table(_called(one), columns, _against_exact(one), left=("float32 error", "at")))
     return parts
 
 
@@ -87,7 +87,7 @@ def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
 
 def half_table(found: Sequence[HalfCheck]) -> RenderableType:
     """A line a law, a column for each thing that is stored in float16."""
-    columns = {"law": [one.of.label for one in found]}
+    columns = {"law": [_at_index(one.of) for one in found]}
     for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
         if any(name in one.rel for one in found):
             columns[name] = [
@@ -152,7 +152,7 @@ def content(
         "laws": [{**_check_content(one), "spreads": one.spreads} for one in laws],
         "maps": [_check_content(one) for one in maps],
         "costs": dict(costs),
-        "float16": {one.of.label: {"rel": one.rel, "ks": one.ks} for one in halves},
+        "float16": {_at_index(one.of): {"rel": one.rel, "ks": one.ks} for one in halves},
     }
     return dict(plain(whole))
 
@@ -173,8 +173,17 @@ def _check_content(one: LawCheck | MapCheck) -> dict[str, Any]:
 
 
 def _called(one: LawCheck | MapCheck) -> str:
-    """A label that distinguishes a map from the law of its name."""
-    return f"map {one.of.label}" if isinstance(one, MapCheck) and not one.of.records else one.of.label
+    """A label that distinguishes a map from the law of its name, and an index from others."""
+    name = _at_index(one.of)
+    return f"map {name}" if isinstance(one, MapCheck) and not one.of.records else name
+
+
+def _at_index(one: Named) -> str:
+    return one.label if one.setting.n == 1.0 else f"{one.label}, n = {one.setting.n:g}"
+
+
+def _indices(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> list[str]:
+    return [f"{one.of.setting.n:g}" for one in checks]
 
 
 def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, list[str]]:

@@ -101,7 +101,8 @@ def export_hint(choice: Choice) -> str:
     """How to get the shader source of what was chosen."""
     option = choice.nearest.option
     if option.law is not None:
-        return f"profilefit export {option.name} --lang glsl"
+        index = option.law.setting.n
+        return f"profilefit export {option.name} --lang glsl" + (f" --n {index:g}" if index != 1.0 else "")
     if is_filter(option):
         return "the filter's constants: --json, `filters`; its source: profilefit/scenes/skin/separable.frag"
     return "nothing to export: radiance is A E / pi"
@@ -166,8 +167,6 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
         + ("." if budget.ms is None else "; likely: the estimate is within the budget, the end of the range is not."),
         f"light: {setting.illumination}, n = {setting.n:g}.",
     ]
-    if (floor := reference_light(setting).floor) > 0:
-        lines.append(f"law: with what that for n = {setting.n:g} may be off from photons, {_percent(floor)} % of A.")
     return "\n".join([*lines, export_hint(choice)])
 
 

@@ -135,7 +135,9 @@ class Separable:
 @cache
 def albedo_of(reflectance: float, setting: Setting) -> float:
     """alpha of the exact half space of reflectance A [-]."""
-    share = min(max(reflectance, 0.0), 1.0)
+    share = max(reflectance, 0.0)
+    if share >= exact.reflectance(1.0, setting):  # a surface that refracts lets no more in
+        return 1.0
     return float(brentq(lambda alpha: float(exact.reflectance(alpha, setting)) - share, 0.0, 1.0))
 
 

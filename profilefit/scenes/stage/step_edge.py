@@ -74,8 +74,8 @@ def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
             raise SettingError(f"the law belongs to {law.setting}, got a request for {setting}")
         return LawTarget(law)
     where = setting or Setting()
-    if not where.is_matched_isotropic:
-        raise SettingError(f"the exact half space has n = 1 and g = 0, got {where}: give a law of that setting")
+    if not where.is_solved:
+        raise SettingError(f"the exact half space has n >= 1 and g = 0, got {where}: give a law of that setting")
     return ExactTarget(where)
 
 

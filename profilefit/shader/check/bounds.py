@@ -8,11 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.recipes.inventory import Named, albedo_laws, profile_laws
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
+from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.targets import albedo_values
 
@@ -59,11 +61,11 @@ def of_profile(one: Named, folder: Folder) -> ModelError:
     """
     records = Records.of(folder)
     owner = one if one.records else _regenerated(one, profile_laws(records, matched=False))
-    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, records)
+    found = _recorded(owner.records if owner else (), PROFILE_MEASURES, records, one.setting)
     source = " + ".join(owner.records) if owner and found else "measured here"
     held = {name for each in one.records for name in records.content(each)["constants"]}
     whole = not one.records or held >= set(one.law.constant_names())
-    if whole and "rel" not in found and one.setting.is_matched_isotropic:
+    if whole and "rel" not in found and one.setting.is_solved:
         quality = profile_quality(one.law, ALBEDOS)
         found |= {one: MEASURES[one].worst(getattr(quality, one)) for one in ("rel", "ks")}
     if not found:
@@ -75,10 +77,12 @@ def of_map(one: Named, folder: Folder) -> ModelError:
     """The errors of a map, likewise."""
     records = Records.of(folder)
     owner = one if one.records else _regenerated(one, albedo_laws(records, matched=False))
-    if owner is not None:
-        return ModelError(_recorded(owner.records, MAP_MEASURES, records), " + ".join(owner.records))
-    quality = albedo_quality(one.law)
-    return ModelError({name: getattr(quality, name) for name in MAP_MEASURES}, "measured here")
+    found = _recorded(owner.records, MAP_MEASURES, records, one.setting) if owner else {}
+    source = " + ".join(owner.records) if owner and found else "measured here"
+    if missing := [name for name in MAP_MEASURES if name not in found]:
+        quality = albedo_quality(one.law)
+        found |= {name: getattr(quality, name) for name in missing}
+    return ModelError(found, source)
 
 
 def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
@@ -86,12 +90,28 @@ def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
     return next(same, None)
 
 
-def _recorded(names: Sequence[str], measures: Sequence[str], records: Records) -> dict[str, float]:
+def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting) -> dict[str, float]:
+    """What records state at a setting: of another index than their own what they measured around it."""
     found: dict[str, float] = {}
     for name in names:
-        quality: dict[str, Any] = records.content(name).get("quality", {}).get("regenerated", {})
+        content = records.content(name)
+        quality: dict[str, Any] = content.get("quality", {})
         try:
-            found |= {one: MEASURES[one].worst(quality[one]) for one in measures if one in quality}
-        except (TypeError, ValueError):
+            if setting.n == record_setting(content).n:
+                own = quality.get("regenerated", {})
+                found |= {one: MEASURES[one].worst(own[one]) for one in measures if one in own}
+            else:
+                found |= _around(setting.n, quality["by_index"], measures)
+        except (KeyError, TypeError, ValueError):
             raise RecordError(f"record {name} is damaged: its quality has no numbers; regenerate it") from None
     return found
+
+
+def _around(n: float, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:
+    """Of an index that was measured its own, else the worse of both neighbours; nothing below the least."""
+    known = by_index["n"]
+    i = int(np.searchsorted(known, n))
+    if n < known[0]:
+        return {}
+    near = slice(i, i + 1) if i < len(known) and known[i] == n else slice(i - 1, i + 1)
+    return {one: float(np.max(by_index[one][near])) for one in measures if one in by_index}

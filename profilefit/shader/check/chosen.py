@@ -13,7 +13,7 @@ from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue, inventory
 from profilefit.recipes.inventory import Named
-from profilefit.recipes.record_folder import Folder
+from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check.half import HalfCheck, check_half
 from profilefit.shader.check.law_check import LawCheck, check_laws
 from profilefit.shader.check.law_cost import Cost, law_costs
@@ -22,6 +22,8 @@ from profilefit.shader.check.shader_law import half_extension, no_half
 from profilefit.shader.context import opened, renderer
 
 REGENERATED = "regenerated"
+# Indices that a law which spans them is checked at, of those: both ends and between.
+INDICES = (1.001, 1.02, 1.2, 1.4, 1.6)
 Chosen = tuple[list[Named], list[Named]]
 """Profile laws, and maps between A and alpha."""
 
@@ -58,9 +60,18 @@ def scope(names: Sequence[str] | None, constants: str | None) -> list[str] | str
 
 
 def regenerated(folder: Folder) -> Chosen:
-    """All laws and maps made of records, in every setting."""
-    profiles, maps = inventory.all_profiles(folder), inventory.albedo_laws(folder, matched=False)
-    return [one for one in profiles if one.records], [one for one in maps if one.records]
+    """All laws and maps made of records, in every setting; one that spans indices at each of `INDICES`."""
+    records = Records.of(folder)
+    profiles, maps = inventory.all_profiles(records), inventory.albedo_laws(records, matched=False)
+    of_laws, of_maps = (
+        [each for one in group if one.records for each in _spread(one, records)] for group in (profiles, maps)
+    )
+    return of_laws, of_maps
+
+
+def _spread(one: Named, records: Records) -> list[Named]:
+    low, high = records.content(one.label).get("indices") or (0.0, 0.0)
+    return [inventory.find(one.label, records, n=n) for n in INDICES if low < n <= high] or [one]
 
 
 def printed(constants: str, folder: Folder) -> Chosen:

@@ -149,14 +149,17 @@ def bad_numbers(count: Count) -> Bound:
     return Bound("bad numbers", count.total, 0, f"{count.where} ({count.kinds})" if count.total else "")
 
 
-def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask) -> Count:
+def counted(values: Values, at: Arguments, profiled: Mask, drawn: Mask, jump: Floats | float = 1.0) -> Count:
     """What must not be: R_d falls with r, the cdf rises, and so does the radius with xi.
 
     profiled  where profile and cdf count, drawn where radii and their pdf do; both as `Arguments.shape`
+    jump      xi (alphas, 1, 1) at which radii begin at 0 anew, 1 where none does
     """
     numbers, first = np.zeros(4, int), ""
     for name in ("profile", "cdf", "sample", "pdf"):
         kinds = _faults(name, getattr(values, name), at)
+        if name == "sample":
+            kinds[3][:, 1:] &= (at.xi[:, 1:] < jump - ULP) | (jump + ULP < at.xi[:, :-1])
         among = drawn if name in ("sample", "pdf") else profiled
         kinds[3][:, 1:] &= among[:, :-1]  # of two neighbours both count
         numbers += [int(np.sum(kind & among)) for kind in kinds]

@@ -14,6 +14,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
 
+import jax
+import jax.numpy as jnp
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
@@ -31,9 +33,11 @@ from profilefit.shader.check.shader_law import ShaderLaw, Values
 from profilefit.shader.languages import translated
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 # Half the width of the difference quotient, of xi or 1 - xi: its error is a hundred-millionth, rounding's less.
 STEP = 1e-4
 NEAREST_XI, FARTHEST_XI = 1e-4, 1.0 - 1e-5
+HALVINGS = 50
 
 
 class Twin:
@@ -53,23 +57,58 @@ class Twin:
         """|P_pdf dx/dxi - 1| of the GPU's P_pdf at the radii of the text's own map, where one xi draws a radius.
 
         alpha  (m,) [-]; lowest the least xi that is judged [-]
+        Where light is drawn in two parts the density is that of both: the other part's xi is searched for.
         """
         if alpha.size == 0:
             return None
         inner = (max(NEAREST_XI, lowest) < XI) & (XI < FARTHEST_XI)
         xi, albedo = np.broadcast_arrays(XI[None, :], alpha[:, None])
         x = self.radius(xi, albedo)
-        rest = np.minimum(xi, 1.0 - xi)
-        slope = (self.radius(xi + STEP * rest, albedo) - self.radius(xi - STEP * rest, albedo)) / (2.0 * STEP * rest)
-        earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
-        single = np.zeros(x.shape, bool)
-        single[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
-        error = np.abs(shader.values(x, xi, albedo).pdf * slope - 1.0)
+        share = np.broadcast_to(_jump(shader.law, alpha)[:, None], x.shape)
+        low, high = np.where(xi < share, 0.0, share), np.where(xi < share, share, 1.0)
+        density, held = 1.0 / self._slope(xi, albedo, low, high), _single(x)
+        if np.any(share < 1.0):
+            first, last = np.where(xi < share, share, 0.0), np.where(xi < share, 1.0, share)
+            other = self._searched(x, albedo, first, last)
+            density = density + 1.0 / self._slope(other, albedo, first, last)
+            held = _inside((xi - low) / (high - low)) & _inside((other - first) / (last - first))
+        error = np.abs(shader.values(x, xi, albedo).pdf / density - 1.0)
         at = Arguments(albedo, x, xi, np.array(1.0))
-        return dense_grid.spread(error, single & inner, at, of_share=True)
+        return dense_grid.spread(error, held & inner, at, of_share=True)
+
+    def _slope(self, xi: Floats, alpha: Floats, low: Floats, high: Floats) -> Floats:
+        """dx/dxi, between the ends of what a part is drawn at."""
+        rest = np.minimum(xi - low, high - xi)
+        return (self.radius(xi + STEP * rest, alpha) - self.radius(xi - STEP * rest, alpha)) / (2.0 * STEP * rest)
+
+    def _searched(self, x: Floats, alpha: Floats, low: Floats, high: Floats) -> Floats:
+        """xi between low and high at which x is drawn, by halves."""
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            below = self.radius(middle, alpha) < x
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return 0.5 * (low + high)
 
 
-Mask = NDArray[np.bool_]
+def _single(x: Floats) -> Mask:
+    """Where no other xi of the grid draws the radius."""
+    found = np.zeros(x.shape, bool)
+    earlier, later = np.maximum.accumulate(x, axis=1), np.minimum.accumulate(x[:, ::-1], axis=1)[:, ::-1]
+    found[:, 1:-1] = (x[:, 1:-1] > earlier[:, :-2]) & (x[:, 1:-1] < later[:, 2:])
+    return found
+
+
+def _inside(share: Floats) -> Mask:
+    """Where difference quotients of a part tell its slope."""
+    return np.asarray((share > NEAREST_XI) & (share < FARTHEST_XI))
+
+
+def _jump(law: ProfileLaw, alpha: Floats) -> Floats:
+    """xi at which the law's text begins at x = 0 anew, 1 where it does not."""
+    with jax.enable_x64(True):
+        return np.asarray(dense_grid.drawn_by(law).jump(jnp.asarray(alpha)), float)
+
+
 PROFILE, EVERYWHERE, CDF, SAMPLE, PDF, OWN = "R_d", "R_d everywhere", "cdf", "sample", "pdf", "pdf of the map"
 JUDGED = {"rel": PROFILE, "ks": CDF, "inversion_error": SAMPLE}
 
@@ -113,9 +152,10 @@ def check_law(
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:
         spreads[OWN] = own
-    inside = dense_grid.counted(found, at, profiled, drawn)
+    jump = _jump(one.law, at.alpha)
+    inside = dense_grid.counted(found, at, profiled, drawn, jump)
     everywhere = np.ones(at.shape, bool)
-    outside = dense_grid.counted(found, at, everywhere, everywhere).less(inside)
+    outside = dense_grid.counted(found, at, everywhere, everywhere, jump).less(inside)
     measured = _measured(shader, one, model)
     limits = _limits(model, rounding, measured, spreads)
     limits += [bad_numbers(inside), *validity.promised_by_profile(one, folder)]
@@ -152,15 +192,17 @@ def _of_quality(exact: Values, at: Arguments) -> Mask:
 
 
 def _misplaced(law: ProfileLaw, found: Values, exact: Values, at: Arguments) -> Floats:
-    """Share of the energy between the radius of float32 and that of float64 [-]."""
-    drawn = np.where(found.sample >= 0, found.sample, np.inf)
-    return np.abs(np.asarray(law.cdf(drawn, at.alpha, at.mfp)) - np.asarray(law.cdf(exact.sample, at.alpha, at.mfp)))
+    """Share of the energy between the radius of float32 and that of float64 [-], of the part that both are of."""
+    sampler = dense_grid.drawn_by(law)
+    there, drawn = exact.sample, np.where(found.sample >= 0, found.sample, np.inf)
+    mine, right = (np.asarray(sampler.undone(x, at.xi, at.alpha, at.mfp)) for x in (drawn, there))
+    return np.abs(mine - right)
 
 
 def _measured(shader: ShaderLaw, one: Named, model: ModelError) -> dict[str, float]:
     """The errors of the GPU's own numbers against the exact half space, of what the model error is known of."""
     found: dict[str, float] = {}
-    if not one.setting.is_matched_isotropic:
+    if not one.setting.is_solved:
         return found
     if model.get("rel") is not None:
         quality = profile_quality(shader, ALBEDOS)  # type: ignore[arg-type]  # it asks for no more than there is

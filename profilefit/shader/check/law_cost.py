@@ -72,11 +72,11 @@ def law_costs(context: moderngl.Context, laws: Sequence[Named], folder: Folder) 
 
 
 def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: ProfileLaw) -> dict[str, Cost]:
-    """The costs of each law's text, by `emit.prefix`: constants do not change them.
+    """The costs of each law's text, by `emit.source`: constants do not change them.
 
     yardstick  the law that is counted as 1
     """
-    texts = {emit.prefix(law): law for law in (yardstick, *laws)}
+    texts = {emit.source(law): law for law in (yardstick, *laws)}
     timed: dict[tuple[str, str], tuple[Floats, Floats]] = {}
     with ExitStack() as held:
         board = Board(context, SIZE)
@@ -86,7 +86,7 @@ def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: Prof
             loops = {name: _Loop(context, name, law, work) for name, law in texts.items()}
             for loop in loops.values():
                 held.callback(loop.release)
-            own = loops[emit.prefix(yardstick)]
+            own = loops[emit.source(yardstick)]
             timed |= {(name, work): loop.beside(own) for name, loop in loops.items()}
         check_errors(context, "the loops that are timed")
     return {
@@ -102,7 +102,8 @@ class _Loop:
     """One work of one law."""
 
     def __init__(self, context: moderngl.Context, name: str, law: ProfileLaw, work: str) -> None:
-        source = LOOP.format(text=emit.law_text(law), name=name, work=WORKS[work].replace("P_", f"{name}_"))
+        prefix = emit.prefix(law)
+        source = LOOP.format(text=emit.law_text(law), name=prefix, work=WORKS[work].replace("P_", f"{prefix}_"))
         self._context = context
         self._program = program(context, f"{name}: {work}", source)
         self._triangle = full_screen(context, self._program)

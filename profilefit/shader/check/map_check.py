@@ -61,7 +61,7 @@ def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str =
 
 def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
     """Largest errors against the exact half space, for albedos below 1 where the map holds [-]."""
-    if not shader.setting.is_matched_isotropic:
+    if not shader.setting.is_solved:
         return {}
     alpha = ALPHA[of_alpha.holds(ALPHA)]
     truth = np.asarray(exact.reflectance(alpha, setting=shader.setting))

@@ -1,20 +1,20 @@
-// A = t (1 - s)(1 + b s) / (1 + c s + d s^2), s = sqrt(1 - alpha); t is the share of the light that enters the surface.
+// A = (1 - s)(1 + b s) / (1 + c s + d s^2), s = sqrt(1 - alpha)
 float LAW_map_reflectance(float alpha) {
     float s = sqrt(max(1.0 - alpha, 0.0));
     // 1 - s as alpha / (1 + s): where alpha is small, the difference has no digits in float32.
-    return LAW_map_entered * alpha * (1.0 + LAW_map_b * s) / ((1.0 + s) * (1.0 + s * (LAW_map_c + LAW_map_d * s)));
+    return alpha * (1.0 + LAW_map_b * s) / ((1.0 + s) * (1.0 + s * (LAW_map_c + LAW_map_d * s)));
 }
 
 // alpha / A [-], finite at alpha = 0 too
 float LAW_map_alpha_over_reflectance(float alpha) {
     float s = sqrt(max(1.0 - alpha, 0.0));
-    return (1.0 + s) * (1.0 + s * (LAW_map_c + LAW_map_d * s)) / (LAW_map_entered * (1.0 + LAW_map_b * s));
+    return (1.0 + s) * (1.0 + s * (LAW_map_c + LAW_map_d * s)) / (1.0 + LAW_map_b * s);
 }
 
 // Single-scattering albedo alpha [-] for a total reflectance A [-]: the root s of a quadratic where A is large, and
 // 1 - s where it is small, so that neither cancels.
 float LAW_alpha(float reflectance) {
-    float share = clamp(reflectance / LAW_map_entered, 0.0, 1.0);
+    float share = clamp(reflectance, 0.0, 1.0);
     float bright_linear = 1.0 - LAW_map_b + share * LAW_map_c;
     float quadratic = LAW_map_b + share * LAW_map_d;
     float rest = 1.0 - share;

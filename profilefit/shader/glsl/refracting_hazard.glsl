@@ -2,12 +2,13 @@
 // 2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,  x = r/l, S and lambda as in PfCurve
 
 #ifndef HAZARD_STEPS
-#define HAZARD_STEPS 2 // of the inverse. 1 is cheaper, but right to 1e-3 in xi only
+#define HAZARD_STEPS 2 // of the inverse. 1 is cheaper: right to 1e-4 in xi, but density off by percents far out
 #endif
 
 struct LAW_Shape {
     float reflectance; // A [-]
     float share; // of it light scattered once [-]
+    float rest; // 1 - share, which would cancel where the medium is dark
     PfCurve once;
     PfCurve again;
 };
@@ -38,6 +39,7 @@ LAW_Shape LAW_shape(float alpha) {
     LAW_Shape shape;
     shape.reflectance = alpha * (LAW_map_once + alpha * again);
     shape.share = LAW_map_once / (LAW_map_once + alpha * again);
+    shape.rest = alpha * again / (LAW_map_once + alpha * again);
     shape.once = f;
     shape.again = s;
     return shape;
@@ -52,14 +54,14 @@ float LAW_density(float x, LAW_Shape s) {
     PfLocal first = pf_local(x, s.once);
     PfLocal later = pf_local(x, s.again);
     float light = s.share * exp(-first.exponent) * first.ratio * first.hazard;
-    return light + (1.0 - s.share) * exp(-later.exponent) * later.ratio * max(later.hazard, 0.0);
+    return light + s.rest * exp(-later.exponent) * later.ratio * max(later.hazard, 0.0);
 }
 
 // Share of the energy within x [-]
 float LAW_cumulated(float x, LAW_Shape s) {
     PfLocal first = pf_local(x, s.once);
     PfLocal later = pf_local(x, s.again);
-    float left = s.share * exp(-first.exponent) * first.ratio + (1.0 - s.share) * exp(-later.exponent) * later.ratio;
+    float left = s.share * exp(-first.exponent) * first.ratio + s.rest * exp(-later.exponent) * later.ratio;
     return clamp(1.0 - left, 0.0, 1.0);
 }
 
@@ -75,14 +77,19 @@ float LAW_radius(float xi, LAW_Shape s) {
     curve.a = PF_SELECT(share < s.share, s.once.a, s.again.a);
     curve.b = PF_SELECT(share < s.share, s.once.b, s.again.b);
     curve.c = PF_SELECT(share < s.share, s.once.c, s.again.c);
-    float inner = PF_SELECT(share < s.share, share / s.share, (share - s.share) / max(1.0 - s.share, PF_NEAREST));
+    float inner = PF_SELECT(share < s.share, share / s.share, (share - s.share) / max(s.rest, PF_NEAREST));
     float left = clamp(1.0 - inner, 1.0 - PF_MOST_XI, 1.0);
     float t = -log(left);
     float t_first = 1.0 + 0.535 * t;
     float first = t * t_first / (curve.kappa * t_first + max(curve.source - curve.kappa, PF_NEAREST));
-    float stretch = 1.0 - 0.266 + 0.378 * t + 0.266 * PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
-    float rate = 0.875 * sqrt(0.596 * max(-curve.w, PF_NEAREST) / curve.h);
-    float x = PF_SELECT(share < s.share, first, sqrt(t * (t + 1.192)) * stretch / (curve.kappa * stretch + rate));
+    float growth = PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
+    float rate = 1.0898 * sqrt(1.8442 * max(-curve.w, PF_NEAREST) / curve.h);
+    float white = 0.7722 * min(rate * curve.c / max(curve.b, PF_NEAREST) * exp(-0.5 * curve.w * curve.h), 3.0);
+    float stretch = 1.0 - white + 1.0304 * t + white * growth;
+    float bent = max(1.0 - 0.1017 * sqrt(t), 0.1) / (1.0 + 0.189 * sqrt(t));
+    float slowest = rate * (1.0 + curve.kappa * (0.0172 - 0.1727 * curve.kappa));
+    float later = sqrt(t * (t + 3.6884)) * bent * max(stretch, 1e-3) / max(curve.kappa * stretch + slowest, 1e-3);
+    float x = PF_SELECT(share < s.share, first, later);
     for (int i = 0; i < HAZARD_STEPS; ++i) {
         float start = clamp(x, PF_NEAREST, PF_FARTHEST);
         PfLocal here = pf_local(start, curve);

@@ -13,7 +13,6 @@ from profilefit.laws import profile_classes
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import record_name
 from profilefit.recipes.record_folder import Records
 from profilefit.studies.choose.case import Case, Option, filters, sampled
 from profilefit.studies.choose.cost import Milliseconds, Ratios, milliseconds
@@ -77,13 +76,13 @@ def affordable(one: Predicted, scene: Requirements) -> bool:
 def laws(setting: Setting) -> dict[str, ProfileLaw]:
     """Laws with a shader source and one record under this illumination, by the record's name.
 
-    The record is that of the setting, else that of a matched surface.
+    The record is one whose constants hold for the setting, else that of a matched surface.
     """
     records, found = Records(fits_folder()), {}
     for name, kind in profile_classes().items():
         for base in kind.entry.records if kind.entry.has_text else ():
-            own = setting if record_name(base, setting) in records.paths else Setting(setting.illumination)
-            if kind.entry.records == (base,) and (of := record_name(base, own)) in records.paths:
+            own = setting if records.name(base, setting) in records.paths else Setting(setting.illumination)
+            if kind.entry.records == (base,) and (of := records.name(base, own)) in records.paths:
                 found[of] = catalogue.load(name, setting=own, folder=records)
     return found
 

@@ -30,7 +30,7 @@ from profilefit.scenes.skin.scene import Head, head_scene
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import By, Stage, covering
 from profilefit.shader.context import renderer
-from profilefit.shader.emit import prefix
+from profilefit.shader.emit import source
 from profilefit.studies.choose.case import Option
 
 COVERED = (0.25, 0.50, 0.75)  # share of the screen [-]
@@ -87,7 +87,7 @@ class Ratios:
 
 def _key(option: Option) -> str:
     """The filter, or the law."""
-    return "separable" if option.law is None else prefix(option.law)
+    return "separable" if option.law is None else source(option.law)
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tu
         stage.draw(scene)
         frame = _least(stage, scene, SeparableFilter(), Sampling(YARDSTICK_TAPS), "frame")
         works: list[tuple[str, By, tuple[int, int]]] = [("separable", SeparableFilter(), TAPS)]
-        works += [(prefix(law), law, SAMPLES) for law in laws.values()]
+        works += [(source(law), law, SAMPLES) for law in laws.values()]
         lines = {}
         for key, law, numbers in works:
             times = [_least(stage, scene, law, Sampling(number), "scatter") / frame for number in numbers]

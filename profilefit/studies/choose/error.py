@@ -51,15 +51,13 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
     bias = found.mean(axis=1) - truth
     flat = _mean(option, plane, light, channel, x) - response(share, x, mfp, plane.radius, plane.window[0])
     curved = _mean(option, case, light, channel, x) - here
-    # A truth that is a law itself may be wrong by its floor, and in a direction that nobody knows.
-    floor = light.floor**2
 
     def rms(squares: Floats) -> float:
         return reflectance * float(np.sqrt(np.mean(squares)))
 
     return Error(
-        total=rms(bias**2 + noise * (1.0 - 1.0 / found.shape[1]) + floor),
-        model=rms(flat**2 + floor),
+        total=rms(bias**2 + noise * (1.0 - 1.0 / found.shape[1])),
+        model=rms(flat**2),
         curvature=rms((curved - flat) ** 2),
         pixel=rms((here - truth) ** 2),
         noise=rms(noise),

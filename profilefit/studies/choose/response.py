@@ -8,7 +8,7 @@ through, so that what lies within the arc s adds
 
 and the light at a place is the lit part of what is visible over all that is visible: half the cylinder.
 
-Right is the exact half space, or where a setting has no exact solution this project's own law for it.
+Right is the exact half space.
 """
 
 from __future__ import annotations
@@ -23,10 +23,8 @@ from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.laws.base import AlbedoLaw, ProfileLaw
-from profilefit.recipes import catalogue
-from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record_folder import Records
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.scenes.skin.law import DARKEST, albedo_of
 from profilefit.scenes.stage.step_edge import step_response
 
@@ -112,49 +110,28 @@ def _curve(share) -> Beyond:
     return Beyond(CubicSpline(u, np.log(np.maximum(share(NEAR * np.sinh(u)), FAINT))))
 
 
-STAND_IN = "hazard"
-
-
 @dataclass(frozen=True)
 class ReferenceLight:
-    """The light of a setting.
-
-    law    None where the half space has an exact solution;  albedo  its map, where there is a law
-    floor  how far F of that law may be from photons [-]: half of its record's worst `ks`, since of the energy within a
-           circle at most half crosses an edge; 0 where it is exact
-    """
+    """The light of a setting, exact."""
 
     setting: Setting
-    law: ProfileLaw | None = None
-    albedo: AlbedoLaw | None = None
-    floor: float = 0.0
 
     def alpha(self, reflectance: float) -> float:
         """Single-scattering albedo [-] of a reflectance A [-]."""
-        if self.albedo is None:
-            return max(albedo_of(reflectance, self.setting), DARKEST)
-        return max(float(self.albedo.alpha(reflectance)), DARKEST)
+        return max(albedo_of(reflectance, self.setting), DARKEST)
 
     def reflectance(self, alpha: float) -> float:
         """A [-] of a single-scattering albedo [-]."""
-        law = self.albedo
-        return float(exact.reflectance(alpha, self.setting) if law is None else law.reflectance(alpha))
+        return float(exact.reflectance(alpha, self.setting))
 
     def beyond(self, reflectance: float) -> Beyond:
         """F(d) of a reflectance A [-]."""
-        return beyond(self.alpha(reflectance), self.setting, self.law)
+        return beyond(self.alpha(reflectance), self.setting)
 
 
-@lru_cache(maxsize=16)
 def reference_light(setting: Setting) -> ReferenceLight:
-    """Of a setting that has a record; InputError that lists them."""
-    if setting.is_matched_isotropic:
-        return ReferenceLight(setting)
-    records = Records(fits_folder())
-    known = [one for one in records.settings(STAND_IN) if one.illumination == setting.illumination]
-    if setting not in known:
-        accepted = ", ".join(f"{one.n:g}" for one in sorted(known, key=lambda one: one.n))
-        raise InputError(f"index must be one of {accepted} under {setting.illumination} light, got {setting.n:g}")
-    measured = records.read(records.path(STAND_IN, setting))["quality"]["regenerated"]["ks"]
-    law = catalogue.load(STAND_IN, setting=setting, folder=records)
-    return ReferenceLight(setting, law, catalogue.normalisation(setting, records), 0.5 * float(max(measured)))
+    """Of a setting that laws with constants are there for; InputError where the index is none of theirs."""
+    low, high = 1.0, REFRACTING.high
+    if not low <= setting.n <= high:
+        raise InputError(f"index must be a refractive index in [{low:g}, {high:g}], got {setting.n:g}")
+    return ReferenceLight(setting)

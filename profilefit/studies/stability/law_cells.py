@@ -130,6 +130,9 @@ def _classed(
 ) -> tuple[Floats, Codes]:
     """Errors and classes of what a format made of the arguments of `right`."""
     error, wrong_way = _error(name, value, reference, right), _wrong_way(name, value, right.at)
+    if name == SAMPLE and wrong_way is not None:  # where another part of the light begins, radii begin anew
+        xi, ulp = right.at.xi.values[:, None], float(np.finfo(right.at.dtype).eps)
+        wrong_way[:, 1:] &= (xi[1:] < right.jump - ulp) | (right.jump + ulp < xi[:-1])
     return error, judged(value, reference, error, bound, inside, dtype, right.dim(name, reference), wrong_way)
 
 

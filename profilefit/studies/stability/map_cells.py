@@ -64,7 +64,7 @@ def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
         for arithmetic in (FLOAT64, FLOAT32, TEXT32, TEXT16):
             yield _computed(one, name, arithmetic, limit, span)
     yield from _kept_in_half(one, spans[1])
-    if one.setting.is_matched_isotropic:
+    if one.setting.is_solved:
         yield from _against_exact(one, *spans, model)
 
 

@@ -27,7 +27,7 @@ ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
 
 def cells_of(one: Named, limits: Limits) -> Iterator[Cells]:
     """R_d, cdf and radii of a law whose setting has an exact profile; and what only the laws of Liang et al. have."""
-    if one.setting.is_matched_isotropic:
+    if one.setting.is_solved:
         yield from _against_exact(one, limits)
     if isinstance(one.law, Liang):
         yield unclipped(one, limits)
@@ -43,6 +43,10 @@ def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
         drawn = np.asarray(law.sampler.sample(share, albedo))
         profile, cdf = np.asarray(law.profile(r, albedo)), np.asarray(law.cdf(r, albedo))
     reached = np.asarray(exact.cdf(np.where(drawn >= 0, drawn, np.inf), albedo, setting=setting))
+    if np.any(
+        law.sampler.jump(alpha.values) < 1.0
+    ):  # two shares of the light draw one radius: the law's own nearer one
+        reached += np.asarray(law.sampler.undone(drawn, share, albedo)) - np.asarray(law.cdf(drawn, albedo))
     truth = np.asarray(exact.profile(r, albedo, setting=setting))
     held = limits.valid.alpha.holds(albedo) if limits.valid.alpha else np.zeros_like(albedo, bool)
     draws = limits.valid.drawn.holds(albedo) if limits.valid.drawn else np.zeros_like(albedo, bool)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from typing import Any
 
 import numpy as np
@@ -61,12 +62,27 @@ class Right:
         lost = (self.at.arguments[2] < least) | ((self._x > 0) & (self._x < 4.0 * tiny))
         return ((np.abs(scaled) < least) | lost) & (reference != 0)
 
+    @property
+    def jump(self) -> Floats:
+        """xi (m, 1, 1) below which one part of the light is drawn, and above it another; 1 where there is one part."""
+        share = getattr(self._shape, "share", None)
+        return np.ones((1, 1, 1)) if share is None else np.asarray(share, float)
+
     def misplaced(self, value: Floats) -> Floats:
-        """Share of the energy between a drawn radius and the right one [-]."""
+        """Share of the energy between a drawn radius and the right one [-], of the part that both are of."""
         with np.errstate(all="ignore"):
             x = np.where(value >= 0, value, np.inf).astype(EXTENDED) / self._mfp
-            here, there = (self._text.call("cumulated", each, self._shape) for each in (x, self._radius()))
+            here, there = (self._undone(each) for each in (x, self._radius()))
             return np.asarray(np.abs(here - there), float)
+
+    def _undone(self, x: NDArray) -> NDArray:
+        """The uniform number that draws x, of two the nearer."""
+        shape = self._shape
+        if not hasattr(shape, "share"):
+            return np.asarray(self._text.call("cumulated", x, shape))
+        once, again = (self._text.call("cumulated", x, _of_part(shape, part)) for part in (1.0, 0.0))
+        first, second = shape.share * once, shape.share + shape.rest * again
+        return np.where(np.abs(first - self._xi) < np.abs(second - self._xi), first, second)
 
     def _known_at(self, value: NDArray) -> NDArray:
         """NaN beyond the radius at which texts stop, where no light is left."""
@@ -92,6 +108,13 @@ class Right:
 
     def _radius(self) -> NDArray:
         return np.asarray(self._text.call("radius", self._xi, self._shape))
+
+
+def _of_part(shape: Any, share: float) -> Any:
+    """The shape of a law whose light is all of its first part, or of its second."""
+    part = copy(shape)
+    part.share, part.rest = EXTENDED(share), EXTENDED(1.0 - share)
+    return part
 
 
 LEAST_X = dense_grid.LEAST_X

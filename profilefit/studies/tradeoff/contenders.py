@@ -194,12 +194,12 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
     elif isinstance(law, BurleyDiffuseMfp):
         own = FastBurleyDiffuseMfp(law.setting, law.albedo, **law.constants())
         yield _contender(label, own, own.sampler, partial(_burley_setup, own), law.sampler)
-    elif isinstance(law, Hazard):
-        yield _contender(label, law, law.sampler, law.shape)
-        yield _contender(f"{label}, two steps", law, law.samplers["two steps"], law.shape, another=True)
-    elif isinstance(law, RefractingHazard):
-        yield _contender(label, law, law.sampler, law.parts)
-        yield _contender(f"{label}, one step", law, law.samplers["one step"], law.parts, another=True)
+    elif isinstance(law, Hazard | RefractingHazard):
+        of_alpha: Setup = law.shape if isinstance(law, Hazard) else law.parts
+        yield _contender(label, law, law.sampler, of_alpha)
+        for steps, other in law.samplers.items():
+            if other != law.sampler:
+                yield _contender(f"{label}, {steps}", law, other, of_alpha, another=True)
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):

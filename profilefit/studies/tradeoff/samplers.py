@@ -110,7 +110,7 @@ class WeighedSampler:
 def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time every sampler, and judge it both ways."""
     quick = sizes.trials <= QUICK.trials
-    wanted = [one for one in WANTED if (one[0] in QUICKLY if quick else one[0] not in LIKE_OTHERS)]
+    wanted = [one for one in WANTED if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
     found, left_out = contenders(folder, wanted)
     found += [_uniform(one) for one in found if isinstance(one.law, Hazard) and not one.another]
     counted = {one.name: laws.counts(one)["both"].transcendental for one in found}

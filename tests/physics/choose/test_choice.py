@@ -89,4 +89,9 @@ def test_a_curve_below_the_pixels_is_not_looked_at(scene):
 
 def test_laws_of_a_setting():
     assert list(laws(Setting("diffuse"))) == ["burley-whole-diffuse", "hazard-diffuse", "quantile-diffuse"]
-    assert list(laws(Setting("diffuse", n=1.4))) == ["burley-whole-diffuse", "hazard-diffuse-n1.4", "quantile-diffuse"]
+    for n in (1.02, 1.37, 1.6):
+        found = laws(Setting("diffuse", n=n))
+        assert list(found) == ["burley-whole-diffuse", "hazard-diffuse-refracting", "quantile-diffuse"]
+        assert {name: law.setting.n for name, law in found.items()} == dict.fromkeys(found, 1.0) | {
+            "hazard-diffuse-refracting": n
+        }

@@ -5,9 +5,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from mcml_sim import Setting
 from profilefit.errors import InputError
+from profilefit.scenes.stage.step_edge import step_response
 from profilefit.studies.choose.case import NOTHING, STEEPEST, Case, Option, Within
+from profilefit.studies.choose.choice import laws
 from profilefit.studies.choose.error import error
+from profilefit.studies.choose.response import reference_light
 
 WITHIN = Within()
 
@@ -32,10 +36,23 @@ def test_own_law_has_noise_only(light, case, hazard):
     assert found[1].total == pytest.approx(np.hypot(found[1].noise, found[1].pixel), rel=0.2)
 
 
-def test_a_truth_that_may_be_off_counts(light, case):
-    found = error(NOTHING, case, replace(light, floor=0.05), WITHIN)
-    own = error(NOTHING, case, light, WITHIN)
-    assert found.total == pytest.approx(np.hypot(own.total, 0.05 * 0.6), rel=1e-6)
+@pytest.mark.slow
+def test_light_under_a_surface_is_exact():
+    """The law of its index misses what its record says of it; one of a matched surface ten times that."""
+    setting, case = Setting("diffuse", n=1.37), Case((0.6, 0.4, 0.2), (1.0, 0.7, 0.5), pixel=0.25)
+    light, found = reference_light(setting), laws(setting)
+    own, matched = (
+        error(Option("sampled", 64, law=found[name]), case, light, WITHIN)
+        for name in ("hazard-diffuse-refracting", "quantile-diffuse")
+    )
+    assert own.model < 5e-4 < 5e-3 < matched.model
+    x = np.array([0.1, 1.0])
+    np.testing.assert_allclose(
+        light.beyond(0.6)(x), 1.0 - step_response(x, light.alpha(0.6), setting=setting), atol=2e-5
+    )
+    assert reference_light(setting).alpha(1.0) == 1.0  # no surface that refracts is white
+    with pytest.raises(InputError, match=r"index must be a refractive index in \[1, 1.6\], got 1.61"):
+        reference_light(Setting(n=1.61))
 
 
 def test_large_pixels_and_curves_are_named(light, case):

@@ -86,7 +86,7 @@ WRONG = [
     ("mfp = 0.5", 'mfp = "0.5"', r"\[material.blue\] mfp must be .* got '0.5'"),
     ("mfp = 0.5", "mfp = 0.5\ncolour = 1", r"\[material.blue\] keys must be of reflectance, mfp, got 'colour'"),
     ("[material]", "[material]\nlight = 'sun'", r"\[material\] light must be one of searchlight, diffuse, got 'sun'"),
-    ("[material]", "[material]\nindex = 1.7", r"\[material\] index must be one of 1, 1.3, 1.4, 1.5 .* got 1.7"),
+    ("[material]", "[material]\nindex = 1.7", r"\[material\] index must be a refractive index in \[1, 1.6\], got 1.7"),
     ("[material]", "[material]\nname = 'skin1'", r"\[material\] name must be left out where red, green, blue are"),
     ("[tolerance]\nerror = 0.01", "", r"table \[tolerance\] is missing"),
     ("error = 0.01", "error = 0.01\nmfp = -1", r"\[tolerance\] mfp must be a number > 0, got -1"),

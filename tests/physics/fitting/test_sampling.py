@@ -5,6 +5,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
+import profilefit
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.fitting.sampling import (
@@ -17,6 +18,7 @@ from profilefit.fitting.sampling import (
     sampler_quality,
 )
 from profilefit.laws.base import ProfileLaw, Sampler
+from profilefit.laws.refracting_hazard import RefractingHazardSampler
 
 ALPHA = 0.9
 STEP = 2.0**-24  # what the last step of xi leaves out
@@ -61,6 +63,28 @@ class Clipped(Sampler):
 
     def scaled_pdf(self, x, alpha):
         return jnp.where(x < self.farthest, self.law.sampler.scaled_pdf(x, alpha), 0.0)
+
+
+class Longer(RefractingHazardSampler):
+    """Radii of both parts a hundredth too long, whatever its density says."""
+
+    def scaled_sample(self, xi, alpha):
+        return 1.01 * super().scaled_sample(xi, alpha)
+
+
+def test_a_mixture_is_judged_part_by_part():
+    """Against the plainest rule over xi, which knows nothing of parts; radii that are too long are found."""
+    law = profilefit.load("hazard", setting=Setting("diffuse", n=1.4))
+    found, wrong = (sampler_quality(one, ALPHA) for one in (law.samplers["two steps"], Longer(law, 2)))
+    assert found.inversion_error[0] < 2e-8
+    assert 1e-3 < wrong.inversion_error[0] < 0.01
+    for what in ("missing", "bias", "edge_bias", "bias_by_law_pdf", "edge_bias_by_law_pdf"):
+        assert abs(getattr(found, what)[0]) < 1e-6
+    xi = (np.arange(128 * BATCH) + 0.5) / (128 * BATCH)
+    x = in_batches(lambda part: Longer(law, 2).sample(part, ALPHA), xi)
+    lit = np.mean(lit_beyond_edge(x, 1.0)) / edge_light(LawTarget(law), ALPHA, 1.0) - 1.0
+    assert wrong.edge_bias_by_law_pdf[0] == pytest.approx(lit, abs=2e-5)
+    assert lit > 1e-3
 
 
 def test_an_exact_inverse_has_no_error(burley):

@@ -25,6 +25,18 @@ def test_reflectance_there_and_back(light):
 
 
 @LIGHTS
+@pytest.mark.parametrize("n", [1.001, 1.37, 1.6])
+def test_reflectance_there_and_back_under_a_surface(light, n):
+    """What does not enter is never reflected: no A beyond that of a white medium has an albedo."""
+    white = reflectance_of(1.0, light, n)
+    values = white * np.array([0.0, 1e-9, 0.01, 0.3, 0.9, 1.0])
+    np.testing.assert_allclose(reflectance_of(alpha_of(values, light, n), light, n), values, rtol=0, atol=1e-12)
+    assert alpha_of(0.5, light, n) != pytest.approx(alpha_of(0.5, light), abs=1e-5)
+    with pytest.raises(InputError, match=r"reflectance must be in \[0, 0\.[89]\d*\], got 1"):
+        alpha_of(1.0, light, n)
+
+
+@LIGHTS
 def test_beyond_there_rounding_of_alpha_is_what_limits(light):
     error = reflectance_of(alpha_of(1 - 1e-7, light), light) - (1 - 1e-7)
     assert 1e-12 < abs(error) < 1e-8

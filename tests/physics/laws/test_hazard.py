@@ -125,16 +125,6 @@ def test_inverse_in_a_fixed_number_of_steps(law, steps, error):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("setting", [Setting(n=1.5), Setting("diffuse", n=1.4)], ids=str)
-def test_a_surface_that_refracts_takes_two_steps(setting):
-    law = load("hazard", setting=setting)
-    xi = np.linspace(0, 0.999, 200)
-    missed = [np.abs(law.cdf(one.sample(xi, INNER[:, None]), INNER[:, None]) - xi) for one in law.samplers.values()]
-    assert law.sampler.steps == 2
-    assert np.max(missed[0]) > 1e-4 > 1e-7 > np.max(missed[1])
-
-
-@pytest.mark.slow
 def test_density_of_the_sampler_is_its_own(law):
     """d xi / dx of the map itself, by differences; the law's own density differs from it by parts in a thousand."""
     xi, step = np.linspace(0.01, 0.99, 99), 1e-6

@@ -9,7 +9,7 @@ import profilefit
 from mcml_sim import exact
 from profilefit.errors import InputError
 from profilefit.studies.tradeoff import contenders, laws
-from profilefit.studies.tradeoff.contenders import table_contender
+from profilefit.studies.tradeoff.contenders import Wanted, table_contender
 
 
 @pytest.mark.slow
@@ -45,7 +45,7 @@ def test_fast_pdf_is_that_of_the_law():
 
 
 def test_what_cannot_be_had_is_left_out_by_name():
-    wanted = ((contenders.YARDSTICK, "burley", "published"), ("absent", "gaussians", "no-such-set"))
+    wanted = (Wanted(contenders.YARDSTICK, "burley", "published"), Wanted("absent", "gaussians", "no-such-set"))
     found, left_out = contenders.contenders(wanted=wanted)
     assert [one.name for one in found] == [contenders.YARDSTICK, f"{contenders.YARDSTICK}, Xie's sampler"]
     assert len(left_out) == 1

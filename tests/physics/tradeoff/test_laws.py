@@ -28,7 +28,7 @@ def test_time_is_over_the_yardsticks_in_each_turn():
 
 @pytest.mark.slow
 def test_rows_become_points():
-    wanted = [one for one in contenders.WANTED if one[0] in (contenders.YARDSTICK, "Liang, corrected")]
+    wanted = [one for one in contenders.WANTED if one.label in (contenders.YARDSTICK, "Liang, corrected")]
     found, _ = contenders.contenders(wanted=wanted)
     rows = laws.measured(found, SMALL)
     profile, both = (laws.points_of(rows, part) for part in laws.TITLES)

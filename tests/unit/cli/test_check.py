@@ -11,7 +11,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import stale
-from profilefit.shader.check.chosen import scope
+from profilefit.shader.check.chosen import INDICES, scope
 
 FITS = catalogue.fits_folder()
 
@@ -19,41 +19,47 @@ FITS = catalogue.fits_folder()
 @pytest.fixture
 def folder(tmp_path):
     """Records of one surface, to be changed."""
-    for name in ("hazard-n1.4", "albedo-rational-n1.4"):
+    for name in ("hazard-refracting", "albedo-rational-refracting"):
         shutil.copy(FITS / f"{name}.json", tmp_path)
     return tmp_path
 
 
 @pytest.mark.slow
 def test_a_good_law_passes_in_100_columns(command, opengl):
-    status, out, err = command("check", "hazard-n1.4", "albedo-rational-n1.4", "--precision", "float16")
+    status, out, err = command("check", "hazard-refracting", "albedo-rational-refracting", "--precision", "float16")
     assert status == 0, err
     assert err == ""
     lines = out.splitlines()
     assert max(map(len, lines)) <= 100
-    assert sum(line.split()[:1] == ["hazard-n1.4"] and line.split()[-1] == "pass" for line in lines) == 1
-    assert sum(line.split()[:1] == ["albedo-rational-n1.4"] and line.split()[-1] == "pass" for line in lines) == 1
-    assert lines[-1] == "2 laws or maps: all pass"
+    for name in ("hazard-refracting", "albedo-rational-refracting"):
+        rows = [line.split() for line in lines if line.split()[:1] == [name]]
+        assert [(row[1], row[-1]) for row in rows if row[-1] == "pass"] == [(f"{n:g}", "pass") for n in INDICES]
+    assert lines[-1] == f"{2 * len(INDICES)} laws or maps: all pass"
     assert "burley" in out  # what costs are counted in
     assert "float16 arithmetic: not offered by" in out or "arithmetic" in out
 
 
 @pytest.mark.slow
 def test_json_has_all_of_it_and_is_what_a_folder_keeps(command, opengl):
-    status, out, err = command("check", "albedo-rational-n1.4", "hazard-n1.4", "--json", "--out", "kept")
+    status, out, err = command("check", "albedo-rational-refracting", "hazard-refracting", "--json", "--out", "kept")
     found = json.loads(out)
     assert (status, err) == (0, "wrote kept/check.json\n")
     assert Path("kept/check.json").read_text(encoding="utf-8") == out
     assert next(iter(found)) == "made"
-    assert found["made"]["command"] == "profilefit check albedo-rational-n1.4 hazard-n1.4 --json --out kept"
+    assert found["made"]["command"] == "profilefit check albedo-rational-refracting hazard-refracting --json --out kept"
     assert not stale(found["made"], FITS)
-    assert found["of"] == ["albedo-rational-n1.4", "hazard-n1.4"], "not all there is"
+    assert found["of"] == ["albedo-rational-refracting", "hazard-refracting"], "not all there is"
     assert found["passed"] is True
-    (law,), (mapped,) = found["laws"], found["maps"]
-    assert (law["constants"], mapped["constants"]) == ("hazard-n1.4", "albedo-rational-n1.4")
+    assert (
+        [one["setting"]["n"] for one in found["laws"]]
+        == [one["setting"]["n"] for one in found["maps"]]
+        == list(INDICES)
+    )
+    law, mapped = found["laws"][0], found["maps"][0]
+    assert (law["constants"], mapped["constants"]) == ("hazard-refracting", "albedo-rational-refracting")
     assert set(law["spreads"]["R_d"]) == {"half", "most", "largest", "where"}
     assert all(bound["value"] <= bound["limit"] for bound in law["bounds"])
-    assert set(found["costs"]) == {"burley", "hazard"}
+    assert set(found["costs"]) == {"burley", "refracting_hazard"}
 
 
 @pytest.mark.parametrize(
@@ -72,14 +78,14 @@ def test_a_part_is_not_told_as_the_whole(names, constants, told):
 @pytest.mark.slow
 def test_a_record_whose_bound_is_broken_is_status_1(command, opengl, folder):
     """A record that claims a model a million times as good as it is."""
-    path = folder / "hazard-n1.4.json"
+    path = folder / "hazard-refracting.json"
     content = json.loads(path.read_text())
-    content["quality"]["regenerated"]["rel"] = [1e-8 * value for value in content["quality"]["regenerated"]["rel"]]
+    content["quality"]["by_index"]["rel"][-1] *= 1e-8
     path.write_text(json.dumps(content))
-    status, out, _ = command("check", "hazard-n1.4", "--fits", str(folder))
+    status, out, _ = command("check", "hazard-refracting", "--fits", str(folder))
     assert status == 1
-    assert "FAIL hazard-n1.4: float32 rel: " in out
-    assert out.splitlines()[-1] == "1 law or map: 1 fail"
+    assert "FAIL hazard-refracting, n = 1.6: float32 rel: " in out
+    assert out.splitlines()[-1] == f"{len(INDICES)} laws or maps: 1 fail"
 
 
 @pytest.mark.slow
@@ -132,7 +138,7 @@ def blind(tmp_path):
 
 @pytest.mark.slow
 def test_no_opengl_is_one_line_and_status_2(blind):
-    done = blind("check", "hazard-n1.4")
+    done = blind("check", "hazard-refracting")
     assert (done.returncode, done.stdout) == (2, "")
     assert done.stderr.startswith("profilefit: no OpenGL 3.3 without a window")
     assert done.stderr.count("\n") == 1

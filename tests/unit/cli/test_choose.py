@@ -40,11 +40,11 @@ def test_the_example():
 
 @pytest.mark.slow
 def test_nothing_serves(tmp_path):
-    """Exit status 1, and the nearest; refracting skin, whose truth is a law."""
+    """Exit status 1, and the nearest; refracting skin."""
     text = SKIN.read_text(encoding="utf-8").partition("# Skin as two layers")[0]
     path = tmp_path / "scene.toml"
     path.write_text(text.replace("error = 0.02", "error = 0.002").replace("index = 1.0", "index = 1.4"), "utf-8")
     found = run(path)
     assert found.exit_code == 1
     assert found.stdout.startswith("No option meets 0.20 % within 5 ms: the most accurate in the budget is ")
-    assert "law: with what that for n = 1.4 may be off from photons" in found.stdout
+    assert "light: diffuse, n = 1.4." in found.stdout

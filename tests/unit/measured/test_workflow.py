@@ -48,11 +48,12 @@ def test_what_is_known_goes_in(near):
 
 def test_a_simulation_brings_its_own_surface():
     simulated = read(DATA / "half_space.mco")
-    oily = replace(simulated, medium=half_space(0.9, n=1.37))
-    with pytest.raises(SettingError, match=r"belongs to .*, got a request for searchlight, n = 1.37"):
+    oily = replace(simulated, medium=half_space(0.9, n=1.67))
+    with pytest.raises(SettingError, match=r"belongs to .* n in \(1, 1.6\].*, got a request for searchlight, n = 1.67"):
         fit(oily)
-    with pytest.raises(SettingError, match=r"belongs to .*, got a request for searchlight, n = 1.38"):
-        fit(oily, setting=Setting(n=1.38))
+    found = fit(oily, setting=Setting(n=1.38), walk=False).found
+    assert found.question.law.setting.n == 1.38
+    assert "the file's n is 1.67, fitted as n = 1.38" in found.data.notes
 
 
 @pytest.mark.parametrize(

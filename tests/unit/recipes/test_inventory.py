@@ -3,7 +3,7 @@
 import pytest
 
 from mcml_sim import Setting
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import InputError, RecordError, SettingError
 from profilefit.laws.base import AlbedoLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import albedo_laws, find, profile_laws, sampled_laws
@@ -14,10 +14,10 @@ FITS = catalogue.fits_folder()
 @pytest.mark.parametrize(
     ("name", "constants", "law", "setting", "records"),
     [
-        ("hazard-diffuse-n1.4", None, "hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-n1.4",)),
+        ("hazard-diffuse-refracting", None, "hazard", Setting("diffuse", n=1.4), ("hazard-diffuse-refracting",)),
         ("liang-whole", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
         ("liang-as-published", None, "liang", Setting(), ("liang-as-published",)),
-        ("albedo-rational-n1.3", None, "rational", Setting(n=1.3), ("albedo-rational-n1.3",)),
+        ("albedo-rational-refracting", None, "rational", Setting(n=1.4), ("albedo-rational-refracting",)),
         ("liang", None, "liang", Setting(), ("liang-whole", "liang-inverse-whole")),
         ("gaussians", None, "gaussians:6", Setting(), ("gaussians-6",)),
         ("burley", "published:diffuse", "burley", Setting("diffuse"), ()),
@@ -43,15 +43,28 @@ def test_every_record_of_a_fit_is_found_and_is_what_it_says():
             assert again.setting == one.setting
 
 
-def test_refracting_surfaces_are_left_out_where_the_exact_profile_is_needed():
+def test_a_law_that_spans_indices_is_found_at_each():
+    for n in (1.0, 1.001, 1.37):
+        found = find("hazard-diffuse", FITS, n=n)
+        assert found.setting == Setting("diffuse", n=n)
+        assert found.records == ("hazard-diffuse" if n == 1.0 else "hazard-diffuse-refracting",)
+    with pytest.raises(SettingError, match=r"n in \(1, 1.6\].* got a request for diffuse, n = 1.61, g = 0"):
+        find("hazard-diffuse", FITS, n=1.61)
+    with pytest.raises(SettingError, match=r"published constants of burley belong to searchlight, n = 1"):
+        find("burley", FITS, "published", n=1.4)
+
+
+def test_refracting_surfaces_are_left_out_where_laws_are_compared():
     settings = {one.setting for one in profile_laws(FITS)}
     assert settings == {Setting(), Setting("diffuse")}
     assert Setting(n=1.4) in {one.setting for one in profile_laws(FITS, matched=False)}
 
 
 def test_what_is_not_there_is_named(tmp_path):
-    with pytest.raises(InputError, match=r"'hazzard-n1.4'; did you mean hazard-n1.4, .*\? `profilefit report` lists"):
-        find("hazzard-n1.4", FITS)
+    with pytest.raises(
+        InputError, match=r"'hazzard-diffuse'; did you mean hazard-diffuse, .*\? `profilefit report` lists"
+    ):
+        find("hazzard-diffuse", FITS)
     with pytest.raises(InputError, match=r"got 'Chiang'; did you mean chiang, "):
         find("Chiang", FITS)
     with pytest.raises(InputError, match=r"map or record, got 'zzz'; laws: liang, .* `profilefit report` lists"):
@@ -60,8 +73,8 @@ def test_what_is_not_there_is_named(tmp_path):
         find("reproduction", FITS)
     with pytest.raises(InputError, match=r"constants must be one of regenerated, published, .* got 'mine'"):
         find("liang", FITS, "mine")
-    with pytest.raises(InputError, match=r"constants of a record are its own: .* published, got 'hazard-n1.4'"):
-        find("hazard-n1.4", FITS, "published")
+    with pytest.raises(InputError, match=r"constants of a record are its own: .* published, got 'hazard-refracting'"):
+        find("hazard-refracting", FITS, "published")
 
 
 def test_what_was_not_regenerated_has_its_only_printed_constants_unless_others_are_asked_for():

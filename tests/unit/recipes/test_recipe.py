@@ -12,7 +12,7 @@ from profilefit.laws import map_classes, profile_classes
 from profilefit.recipes import pipelines
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.recipe import available, find, read
-from profilefit.recipes.record import record_name
+from profilefit.recipes.record import record_name, spanning_name
 from profilefit.recipes.schema import PIPELINES
 from profilefit.recipes.starts import require_known
 
@@ -232,7 +232,7 @@ def test_a_setting_is_read_and_is_the_searchlight_by_default(write):
         (["g = 1.0"], "[setting]: g must be a mean cosine in (-1, 1), got 1.0"),
         (["g = 0.5"], "setting.g must be 0: profiles are fitted to isotropic scattering, got 0.5"),
         (["eta = 1.4"], "[setting]: unknown key 'eta', accepted: illumination, n, g"),
-        (["n = 1.4"], "setting.n must be 1 where truth is 'exact' (use truth = \"orders\"), got 1.4"),
+        (["n = 0.9"], "setting.n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got 0.9"),
     ],
     ids=str,
 )
@@ -273,10 +273,36 @@ def test_each_pipeline_takes_the_settings_that_it_can_judge(write):
 def test_shipped_recipes_are_named_after_their_setting(path):
     """So the catalogue finds their records, and no other."""
     recipe = read(path)
-    suffix = record_name("", recipe.setting)
+    suffix = (spanning_name if recipe.indices else record_name)("", recipe.setting)
     assert path.stem.endswith(suffix)
     if not suffix:
         assert not re.search(r"-diffuse|-n\d", path.stem)
+
+
+@pytest.mark.parametrize(
+    ("indices", "words"),
+    [
+        ("[1.1, 1.2, 1.4]", "indices must be at least 4, got [1.1, 1.2, 1.4]"),
+        ("[1.0, 1.1, 1.2, 1.4]", "indices must rise, each in (1, 3], got [1.0, 1.1, 1.2, 1.4]"),
+        ("[1.1, 1.1, 1.2, 1.4]", "indices must rise, each in (1, 3], got [1.1, 1.1, 1.2, 1.4]"),
+        ("[1.1, 1.2, 1.3, 1.5]", "setting.n must be one of the indices [1.1, 1.2, 1.3, 1.5], got 1.4"),
+        ('["a"]', "indices must be a list of finite numbers"),
+    ],
+)
+def test_indices_that_a_law_cannot_span(write, indices, words):
+    text = with_setting("n = 1.4")
+    assert "[setting]" in text
+    with pytest.raises(RecipeError, match=re.escape(words)):
+        read(write(f"indices = {indices}\n{text}"))
+
+
+def test_indices_are_read_and_photons_have_one(write):
+    text = f"indices = [1.02, 1.2, 1.4, 1.6]\n{with_setting('n = 1.4')}"
+    found = read(write(text))
+    assert (found.indices, found.span) == ((1.02, 1.2, 1.4, 1.6), (1.0, 1.6))
+    assert read(write(text.replace("1.02", "1.1"))).span == (1.1, 1.6)
+    with pytest.raises(RecipeError, match=r"indices need truth = \"exact\" and pipeline 'albedo' or 'profile'"):
+        read(write(text.replace('"exact"', '"orders"')))
 
 
 def test_checks_and_random_starts(write):

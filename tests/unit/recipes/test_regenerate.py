@@ -39,14 +39,14 @@ def test_each_setting_is_traced_once_and_only_if_a_recipe_needs_it(tmp_path):
     recipes = (
         replace(profile, name="profile-n1.4", setting=refracted),
         replace(profile, name="profile-diffuse", truth="exact", setting=diffuse),
-        recipe.find("albedo-rational-n1.4", FITS),
+        replace(exactly, name="albedo-n1.4", truth="orders", setting=refracted),
         exactly,
         replace(exactly, name="checked", setting=diffuse, check="orders"),
     )
     written = regenerate.regenerate(recipes, run, {"albedo": pipeline, "profile": pipeline})
     assert [line for line in said if "photons:" in line] == [f"1e+03 photons: {one}" for one in (refracted, diffuse)]
     assert made == [
-        ("albedo-rational-n1.4", refracted),
+        ("albedo-n1.4", refracted),
         ("albedo-rational", None),
         ("checked", diffuse),
         ("profile-n1.4", refracted),

@@ -11,7 +11,7 @@ from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.solver import CONVERGED, Optimum
 from profilefit.laws import published
-from profilefit.laws.rational import Rational
+from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.recipes import catalogue, recipe, starts
 from profilefit.recipes.targets import truth_of
 
@@ -102,7 +102,7 @@ def test_all_random_starts_of_a_smooth_law_find_the_optimum(normalisation):
     profiles = Profiles(
         alpha, np.array([0.0, 1e3]), truth[:, None], none, none + np.inf, none[:, 0], "exact", Setting()
     )
-    begin = replace(normalisation, **Rational.entry.start)
+    begin = replace(normalisation, **type(normalisation).entry.start)
     own = fit(profiles, begin, "reflectance")
     told = starts.random_starts(own, begin, 10, seed=5)
     assert told.result == starts.OWN_IS_BEST
@@ -118,9 +118,9 @@ def test_the_starting_law_belongs_to_the_recipes_setting(tmp_path):
     law = starts.starting_law(chosen, tmp_path)
     assert law.constants() == published.constants("burley", "published")
     assert (law.setting, law.albedo.setting) == (chosen.setting, chosen.setting)
-    mapped = starts.starting_law(recipe.find("albedo-rational-n1.4", FITS), tmp_path)
+    mapped = starts.starting_law(recipe.find("albedo-rational-refracting", FITS), tmp_path)
     assert mapped.setting == Setting(n=1.4)
-    assert mapped.constants() == Rational.entry.start
+    assert mapped.constants() == RefractingRational.entry.start
 
 
 @pytest.mark.parametrize(

@@ -18,7 +18,7 @@ GOOD, BAD = Bound("float32 rel", 1e-6, 1e-4), Bound("float32 ks", 0.02, 0.001, "
 COSTS = {"hazard": Cost(dict.fromkeys(WORKS, 3.0), dict.fromkeys(WORKS, 2.5))}
 
 
-def law(*bounds, name="hazard-n1.4"):
+def law(*bounds, name="hazard-refracting"):
     spread = Spread(1e-7, 2e-7, 3e-7, "r/l 2, α 0.5")
     rounding = {"rel": 1e-6, "ks": 2e-7, "inversion_error": 4e-7}
     spreads = {PROFILE: spread, CDF: spread, SAMPLE: spread, OWN: spread}
@@ -27,7 +27,7 @@ def law(*bounds, name="hazard-n1.4"):
 
 
 def mapped(*bounds):
-    one = inventory.find("albedo-rational-n1.4", FITS)
+    one = inventory.find("albedo-rational-refracting", FITS)
     errors = {"delta_A": 1e-7, "delta_alpha": 2e-7}
     return MapCheck(one, ModelError({"delta_A": 4e-4}, one.label), errors, {}, NONE, Count(0, 0, 0, 7), bounds, {})
 
@@ -41,10 +41,22 @@ def shown(parts):
 
 def test_a_line_a_law_says_whether_it_passes():
     text = shown(check_tables.check_tables([law(GOOD), law(GOOD, BAD)], [mapped(GOOD)], "a device"))
-    rows = [line.split() for line in text.splitlines() if "-n1.4" in line]
-    assert rows[0] == ["hazard-n1.4", "0.049", "1.0e-06", "0.0096", "2.0e-07", "4.0e-07", "2.0e-07", "0", "0", "pass"]
+    rows = [line.split() for line in text.splitlines() if "-refracting" in line]
+    assert rows[0] == [
+        "hazard-refracting",
+        "1.4",
+        "0.049",
+        "1.0e-06",
+        "0.0096",
+        "2.0e-07",
+        "4.0e-07",
+        "2.0e-07",
+        "0",
+        "0",
+        "pass",
+    ]
     assert rows[1][-1] == "FAIL"
-    assert rows[2] == ["albedo-rational-n1.4", "0.00040", "1.0e-07", "–", "2.0e-07", "0", "7", "pass"]
+    assert rows[2] == ["albedo-rational-refracting", "1.4", "0.00040", "1.0e-07", "–", "2.0e-07", "0", "7", "pass"]
     assert "a device" in text
 
 
@@ -52,13 +64,13 @@ def test_a_record_that_says_nothing_of_the_sampler_shows_nothing_of_it():
     one = law(GOOD)
     del one.spreads[SAMPLE], one.spreads[OWN]
     text = shown(check_tables.check_tables([one], [], "a device"))
-    assert next(line for line in text.splitlines() if "-n1.4" in line).split()[5:7] == ["–", "–"]
+    assert next(line for line in text.splitlines() if "-refracting" in line).split()[6:8] == ["–", "–"]
 
 
 def test_broken_bounds_are_lines_that_say_where_and_by_how_much():
     lines = [line.plain for line in check_tables.verdict_lines([law(GOOD, BAD), law(GOOD), mapped(GOOD)])]
     assert lines == [
-        "FAIL hazard-n1.4: float32 ks: 0.02 at r/l 2, α 0.5; bound 0.001, 20 times that",
+        "FAIL hazard-refracting, n = 1.4: float32 ks: 0.02 at r/l 2, α 0.5; bound 0.001, 20 times that",
         "3 laws or maps: 1 fail",
     ]
     assert [line.plain for line in check_tables.verdict_lines([law(GOOD)])] == ["1 law or map: all pass"]
@@ -67,9 +79,9 @@ def test_broken_bounds_are_lines_that_say_where_and_by_how_much():
 def test_the_readme_has_laws_maps_broken_bounds_and_costs():
     text = check_tables.markdown_checks([law(GOOD, BAD)], [mapped(GOOD)], COSTS, "a device")
     laws, maps, broken, costs, device = text.split("\n\n")
-    assert laws.splitlines()[2].split()[1:6] == ["hazard-n1.4", "|", "searchlight", "|", "1.4"]
+    assert laws.splitlines()[2].split()[1:6] == ["hazard-refracting", "|", "searchlight", "|", "1.4"]
     assert maps.splitlines()[2].split()[-2:] == ["pass", "|"]
-    assert broken.startswith("- `hazard-n1.4`: float32 ks: 0.02")
+    assert broken.startswith("- `hazard-refracting, n = 1.4`: float32 ks: 0.02")
     assert costs.splitlines()[2].split("|")[1:3] == [" hazard ", " 3.0 (2.50)  "]
     assert [name.strip() for name in costs.splitlines()[0].split("|")[2:-1]] == [f"{work}, ns" for work in WORKS]
     assert device.startswith("On a device. model: the record's error")

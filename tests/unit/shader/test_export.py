@@ -64,9 +64,9 @@ print([float(v) for v in (h.hazard_profile(0.5, 0.9, 2.0), h.hazard_cdf(0.5, 0.9
 
 @pytest.mark.parametrize("lang", [lang for lang in LANGUAGES if lang != "json"])
 def test_every_constant_stands_there_with_its_errors_and_the_record_is_named(lang):
-    named = find("hazard-n1.4", FITS)
+    named = find("hazard-refracting", FITS)
     text = export(named, FITS, lang)
-    content = json.loads((FITS / "hazard-n1.4.json").read_text())
+    content = json.loads((FITS / "hazard-refracting.json").read_text())
     for name, constant in content["constants"].items():
         line = next(line for line in text.splitlines() if f"hazard_{name} =" in line)
         assert str(constant["regenerated"]) in line
@@ -74,22 +74,22 @@ def test_every_constant_stands_there_with_its_errors_and_the_record_is_named(lan
         assert f"+- {constant['statistical_error']:.2g} (photons)" in line
     for part in ("hazard_map_b", "pencil beam", "n = 1.4", content["data_digest"], "1/length^2", "from 0.04 to 0.999"):
         assert part in text
-    assert hashlib.sha256((FITS / "hazard-n1.4.json").read_bytes()).hexdigest() in text
+    assert hashlib.sha256((FITS / "hazard-refracting.json").read_bytes()).hexdigest() in text
     assert "LAW_" not in text
     assert TARGETS[lang] in text.splitlines()[1]
     assert text.isascii()
 
 
 def test_data_hold_the_same(tmp_path):
-    made = json.loads(export(find("hazard-n1.4", FITS), FITS, "json"))
-    content = json.loads((FITS / "hazard-n1.4.json").read_text())
+    made = json.loads(export(find("hazard-refracting", FITS), FITS, "json"))
+    content = json.loads((FITS / "hazard-refracting.json").read_text())
     assert made["constants"] == {name: one["regenerated"] for name, one in content["constants"].items()}
     assert made["setting"] == {"illumination": "searchlight", "n": 1.4, "g": 0.0}
-    errors = made["records"]["hazard-n1.4"]["errors"]
+    errors = made["records"]["hazard-refracting"]["errors"]
     assert {"statistical_error", "discretisation_error", "model_error"} <= set(errors["a0"])
     assert errors["a0"]["statistical_error"] == content["constants"]["a0"]["statistical_error"]
     assert set(made["map"]) == {"entered", "b", "c", "d"}
-    assert set(made["records"]) == {"hazard-n1.4", "albedo-rational-n1.4"}
+    assert set(made["records"]) == {"hazard-refracting", "albedo-rational-refracting"}
 
 
 def test_printed_constants_name_their_source_and_claim_no_error():
@@ -115,7 +115,7 @@ def test_a_printed_map_names_its_own_source():
 
 
 def test_two_media_share_a_shader_and_each_may_be_included_twice(context):
-    skin, wax = find("hazard-diffuse", FITS), find("hazard-n1.4", FITS)
+    skin, wax = find("hazard-diffuse", FITS), find("hazard-refracting", FITS)
     texts = [export(skin, FITS, name="skin"), export(wax, FITS, name="wax"), export(skin, FITS, name="skin")]
     head = "#version 330\n" + "".join(texts)
     calls = "skin_profile(0.5, 0.9, 2.0), wax_profile(0.5, 0.9, 2.0)"
@@ -145,7 +145,7 @@ def test_the_first_two_lines_hold_nothing_from_outside():
 
 
 def test_constants_by_the_path_of_their_record_are_those_by_its_name():
-    for name in ("hazard-diffuse", "burley-whole", "gaussians-6", "albedo-rational-n1.4"):
+    for name in ("hazard-diffuse", "burley-whole", "gaussians-6", "albedo-rational-refracting"):
         law = find(name, FITS).name
         by_name, by_path = (
             export(found, FITS)

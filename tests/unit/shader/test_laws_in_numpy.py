@@ -99,7 +99,7 @@ def test_the_twin_is_the_law(label):
 
 @pytest.mark.slow
 def test_two_steps_of_hazard_draw_its_density():
-    law = LAWS["hazard-n1.3"]
+    law = LAWS["hazard"]
     with jax.enable_x64(True):
         own = np.asarray(jax.jit(law.samplers["two steps"].pdf)(jnp.asarray(X[:, ::4]), jnp.asarray(ALPHA)))
     made = twin(text_of(law))["law_pdf"](X[:, ::4], ALPHA, 1.0)

@@ -1,5 +1,7 @@
 """Right texts pass; a wrong constant, sign or density, or a number that is none, does not."""
 
+import json
+
 import numpy as np
 import pytest
 
@@ -8,7 +10,7 @@ from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import Bound
-from profilefit.shader.check.chosen import chosen, printed, regenerated
+from profilefit.shader.check.chosen import INDICES, chosen, printed, regenerated
 from profilefit.shader.check.half import ALPHA, REFLECTANCE, check_half
 from profilefit.shader.check.law_check import OWN, check_law, check_laws
 from profilefit.shader.check.law_cost import WORKS, costs
@@ -16,8 +18,9 @@ from profilefit.shader.check.map_check import check_map
 from profilefit.shader.check.shader_law import Values
 
 FITS = catalogue.fits_folder()
-HAZARD = inventory.find("hazard-n1.4", FITS)  # photons judge it: no exact profile is computed
-RATIONAL = inventory.find("albedo-rational-n1.4", FITS)
+HAZARD = inventory.find("hazard", FITS)
+REFRACTING = inventory.find("hazard-refracting", FITS, n=1.2)
+RATIONAL = inventory.find("albedo-rational-refracting", FITS)
 
 
 @pytest.fixture(scope="module")
@@ -33,7 +36,7 @@ def names(found):
 def test_a_regenerated_law_passes_with_room(context, exact):
     found = check_law(context, HAZARD, FITS, exact=exact)
     assert names(found) == []
-    assert found.model.source == "hazard-n1.4"
+    assert found.model.source == "hazard"
     assert found.inside.total == found.outside.total == 0
     assert 0 < found.rounding["rel"] < 1e-5
     assert 0 < found.spreads[OWN].half < 1e-6
@@ -67,10 +70,53 @@ def test_an_error_in_the_text_breaks_its_bound(context, exact, old, new, broken)
     assert broken in names(found)
 
 
+@pytest.fixture(scope="module")
+def refracting():
+    """The law of two parts in float64 on the whole grid."""
+    return dense_grid.reference(REFRACTING.law, dense_grid.arguments())
+
+
+def test_a_law_of_two_parts_passes_with_room(context, refracting):
+    """Its radii begin anew where the other part does, and its density is that of both."""
+    found = check_law(context, REFRACTING, FITS, exact=refracting)
+    assert names(found) == []
+    assert found.inside.total == found.outside.total == 0
+    assert max(found.rounding.values()) < 1e-6  # float32
+    assert 0 < found.spreads[OWN].most < 1e-5
+    assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "broken"),
+    [
+        ("s.w = min(s.c", "s.w = min(1.02 * s.c", "float32 rel"),
+        ("shape.rest = alpha", "shape.rest = 1.01 * alpha", "float32 ks"),
+        ("float inner = PF_SELECT(share", "float inner = PF_SELECT(share + 0.01", "bad numbers"),
+        ("max(s.rest, PF_NEAREST)", "max(1.01 * s.rest, PF_NEAREST)", "float32 inversion_error"),
+        ("return hazard_density(x, s);", "return 1.01 * hazard_density(x, s);", f"{OWN}, 99 % of it"),
+        ("return hazard_density(x, s);", "return s.rest * hazard_density(x, s);", f"{OWN}, 99 % of it"),
+    ],
+)
+def test_an_error_in_a_text_of_two_parts_breaks_its_bound(context, refracting, old, new, broken):
+    text = emit.law_text(REFRACTING.law)
+    assert text.count(old) == 1
+    assert broken in names(check_law(context, REFRACTING, FITS, text.replace(old, new), refracting))
+
+
+def test_an_index_between_has_the_worse_of_its_neighbours_errors():
+    """By hand from the record; nearer to 1 than all that it has measured, the law itself is."""
+    content = json.loads((FITS / "hazard-refracting.json").read_text())
+    known = {n: rel for n, rel in zip(*(content["quality"]["by_index"][key] for key in ("n", "rel")), strict=True)}
+    for n, near in ((1.2, (1.2,)), (1.25, (1.2, 1.3)), (1.4, (1.4,)), (1.55, (1.5, 1.6)), (1.6, (1.6,))):
+        found = bounds.of_profile(inventory.find("hazard-refracting", FITS, n=n), FITS)
+        assert found.values["rel"] == max(known[one] for one in near)
+        assert found.source == "hazard-refracting"
+
+
 def test_a_map_passes_and_a_wrong_sign_does_not(context):
     assert names(check_map(context, RATIONAL, FITS)) == []
     text = emit.map_text(RATIONAL.law)
-    wrong = text.replace("1.0 + rational_map_b * s", "1.0 - rational_map_b * s")
+    wrong = text.replace("1.0 + s * (rational_map_b", "1.0 - s * (rational_map_b")
     assert wrong != text
     assert "float32 delta_A" in names(check_map(context, RATIONAL, FITS, wrong))
 
@@ -93,11 +139,14 @@ def test_what_the_paper_promises_is_judged_of_its_constants_alone():
 @pytest.mark.slow
 def test_names_choose_laws_and_maps():
     laws, maps = regenerated(FITS)
-    assert {"hazard", "hazard-diffuse-n1.5", "liang-whole", "liang-inverse-as-published"} <= {o.label for o in laws}
-    assert len({one.label for one in (*laws, *maps)}) == len(laws) + len(maps)
-    assert {one.setting.n for one in chosen(["hazard"], "regenerated", FITS)[0]} == {1.0, 1.3, 1.4, 1.5}
+    assert {"hazard", "hazard-diffuse-refracting", "liang-whole", "liang-inverse-as-published"} <= {
+        o.label for o in laws
+    }
+    assert len({(one.label, one.setting.n) for one in (*laws, *maps)}) == len(laws) + len(maps)
+    assert {one.setting.n for one in chosen(["hazard"], "regenerated", FITS)[0]} == {1.0, *INDICES}
+    assert [one.setting.n for one in chosen(["hazard-refracting"], None, FITS)[0]] == list(INDICES)
     assert [one.label for one in chosen(["gaussians"], "regenerated", FITS)[0]] == ["gaussians-6"]
-    assert len(chosen(["rational"], "regenerated", FITS)[1]) == 8
+    assert len(chosen(["rational"], "regenerated", FITS)[1]) == 2 + 2 * len(INDICES)
     assert {one.name for one in printed("published", FITS)[0]} == {"liang", "burley", "burley_diffuse_mfp"}
     with pytest.raises(InputError, match="name must be a law, map or record"):
         chosen(["nothing"], "regenerated", FITS)
@@ -160,8 +209,8 @@ def test_the_grid_has_both_ends():
 @pytest.mark.slow
 def test_costs_are_counted_in_normalized_diffusion(context):
     yardstick = catalogue.load("burley", "published")
-    found = costs(context, [HAZARD.law], yardstick)
-    assert set(found) == {"burley", "hazard"}
+    found = costs(context, [HAZARD.law, REFRACTING.law], yardstick)
+    assert set(found) == {"burley", "hazard", "refracting_hazard"}
     assert found["burley"].ratio == dict.fromkeys(WORKS, 1.0)
     assert all(value > 0 for cost in found.values() for value in (*cost.ns.values(), *cost.ratio.values()))
 
