@@ -136,7 +136,7 @@ class Measured:
         columns = np.unique(np.concatenate(self._columns))
         fine = (factor * columns[:, None] + np.arange(factor)).ravel()
         pixels = np.stack([np.full(len(fine), self.size[1] * factor // 2), fine], axis=1)
-        light = gathered(scene, view, self.case.mfp, self.setting.illumination, pixels).light
+        light = gathered(scene, view, self.case.mfp, self.setting, pixels).light
         answer = np.full((self.size[0], 3), np.nan)
         answer[columns] = light.reshape(len(columns), factor, 3).mean(axis=1)
         return answer

@@ -61,6 +61,16 @@ def worst(place: str, scale: float = 1.0):
     return lambda numbers: max(at(numbers, place)) / scale
 
 
+def by_index(what: str, scale: float = 1.0):
+    """The largest of all records, indices and albedos, over what a unit is; of those that have such a figure."""
+
+    def read(numbers: Any) -> float:
+        found = [one["quality"]["by_index"] for one in numbers["records"].values()]
+        return max(max(one[what]) for one in found if what in one) / scale
+
+    return read
+
+
 def times(place: str, over: str):
     """One figure over another."""
     return lambda numbers: at(numbers, place) / at(numbers, over)
@@ -165,6 +175,13 @@ RECORDS = Run(
 SCALAR = "compiled scalar tracers in MCML's manner, one core with AVX-512"
 RUNS = (
     RECORDS,
+    Run("profilefit report hazard-refracting hazard-diffuse-refracting albedo-rational-refracting "
+        "albedo-rational-diffuse-refracting", "", "exact half space under surfaces of n = 1.02 to 1.6", EXACT, (
+        ("refracting-error", "≤ 0.6 %", by_index("rel", 0.01),
+         "error of R_d by hazard where n > 1, mean over radii, worst of 24 albedos, 9 indices and both lights"),
+        ("refracting-map-error", "≤ 5e-05", by_index("delta_A"),
+         "largest error of A by the rational map where n > 1, 9 indices and both lights"),
+    )),
     Run("python -m benchmarks.laws", "", "exact half space; time of normalized diffusion, exact inverse", TURNS, (
         ("hazard-nearer", "≥ 40", times("normalized diffusion.rel.worst", "hazard.rel.worst"),
          "worst error of R_d by normalized diffusion over that by hazard"),

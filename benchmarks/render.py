@@ -1,7 +1,7 @@
 """What the render shows: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
 
-    python -m benchmarks.render errors|table2|fig14|variance|pictures|choices [--quick] [--size WxH]
-                                [--figure FILE] [--json FILE] [--reference FILE]
+    python -m benchmarks.render errors|table2|fig14|variance|pictures|choices|refracting
+                                [--quick] [--size WxH] [--figure FILE] [--json FILE] [--reference FILE]
 
 Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. The exact picture takes
 minutes: `--reference FILE` keeps it there for the next time. README.md beside this file says what the numbers mean.
@@ -18,7 +18,7 @@ from pathlib import Path
 
 import moderngl
 
-from benchmarks import render_errors, render_pictures, render_table2, render_variance
+from benchmarks import render_errors, render_pictures, render_refracting, render_table2, render_variance
 from benchmarks.render_laws import contenders, variants
 from benchmarks.render_view import judged
 from profilefit.errors import ShaderError
@@ -87,8 +87,19 @@ def choices(context: moderngl.Context, options: argparse.Namespace) -> dict:
     return _drawn(context, options, render_pictures.choices, ("the hazard law",))
 
 
+def refracting(context: moderngl.Context, options: argparse.Namespace) -> dict:
+    """Three laws of a surface that refracts: profiles, a head by each, and how far it is from the exact one."""
+    size = options.size or render_refracting.SIZE
+    with render_refracting.judged_head(context, size, options.reference) as judge:
+        found = render_refracting.shots(judge, 1 if options.quick else render_refracting.SEEDS)
+        render_refracting.report(found)
+        if options.figure:
+            render_refracting.draw(judge, found, options.figure)
+        return render_refracting.as_json(found)
+
+
 WHAT: dict[str, Callable[[moderngl.Context, argparse.Namespace], dict]] = {
-    one.__name__: one for one in (errors, table2, fig14, variance, pictures, choices)
+    one.__name__: one for one in (errors, table2, fig14, variance, pictures, choices, refracting)
 }
 
 

@@ -1,4 +1,4 @@
-"""The picture that the render is judged by: a close view of the head, the exact answer, two measures of error."""
+"""The picture that a render is judged by: a view of the head, the exact answer, two measures of error."""
 
 from __future__ import annotations
 
@@ -13,11 +13,13 @@ import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim import Setting
 from profilefit.scenes.skin import truth as integral
 from profilefit.scenes.skin.chart import Judge
 from profilefit.scenes.skin.scene import EXPOSURE, FACE, Head, head_scene
 from profilefit.scenes.skin.truth import exitance_of, own_error
 from profilefit.scenes.stage.buffers import Buffers
+from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Rgb
@@ -43,18 +45,30 @@ class Judged(Judge):
 
 
 @contextmanager
-def judged(context: moderngl.Context, size: tuple[int, int], kept: Path | None, quick: bool) -> Iterator[Judged]:
-    """The view at a size [pixels]. The reference takes minutes: `kept` is where it lies, or will.
+def judged(
+    context: moderngl.Context,
+    size: tuple[int, int],
+    kept: Path | None,
+    quick: bool,
+    scene: Head | None = None,
+    scale: float = 1.0,
+    setting: Setting = DIFFUSE,
+) -> Iterator[Judged]:
+    """A view at a size [pixels]. The reference takes minutes: `kept` is where it lies, or will.
 
-    quick  leaves out the error of the reference itself
+    quick  leaves out the error of the reference itself;  scene  the close view, if none
+    scale  mean free paths over those of the material, for a head of 1 / scale its size [-]
+    setting  of the exact answer
     """
-    scene = head_scene(camera=CLOSE)
+    scene = scene or head_scene(camera=CLOSE)
+    red, green, blue = scene.material.mfp
+    mfp = scale * red, scale * green, scale * blue
     with Stage(context, size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()
-        error = None if quick else _own_error(context, scene, size)
-        truth = _kept(kept, buffers, scene.material.mfp)
-        yield Judged(stage, scene.material.mfp, truth, buffers.mask > 0.5, error)
+        error = None if quick else _own_error(context, scene, mfp, setting, size)
+        truth = _kept(kept, buffers, mfp, setting)
+        yield Judged(stage, mfp, truth, buffers.mask > 0.5, error)
 
 
 def shown(exitance: NDArray[np.floating]) -> Floats:
@@ -63,23 +77,24 @@ def shown(exitance: NDArray[np.floating]) -> Floats:
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
 
 
-def _kept(path: Path | None, buffers: Buffers, mfp: Rgb) -> Floats:
+def _kept(path: Path | None, buffers: Buffers, mfp: Rgb, setting: Setting) -> Floats:
     seen_by = (
         *(np.asarray(getattr(buffers, field.name)).tobytes() for field in fields(buffers)),
         np.array(mfp).tobytes(),
+        str(setting).encode(),
     )
     digest = hashlib.sha256(b"".join((REFERENCE.read_bytes(), *seen_by))).hexdigest()
     if path is not None and path.exists():
         with np.load(path) as content:
             if str(content["digest"]) == digest:
                 return content["truth"]
-    truth = exitance_of(buffers, mfp)
+    truth = exitance_of(buffers, mfp, setting)
     if path is not None:
         np.savez_compressed(path, truth=truth, digest=digest)
     return truth
 
 
-def _own_error(context: moderngl.Context, scene: Head, size: tuple[int, int]) -> TruthError:
+def _own_error(context: moderngl.Context, scene: Head, mfp: Rgb, setting: Setting, size: tuple[int, int]) -> TruthError:
     with Stage(context, (2 * size[0], 2 * size[1])) as fine:
         fine.draw(scene)
-        return own_error(fine.buffers(), scene.material.mfp)
+        return own_error(fine.buffers(), mfp, setting)

@@ -38,7 +38,7 @@ class Translucent:
 
 
 def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
-    """A material of Jensen et al. (2001), table 1; its A is that of the exact half space in a matched setting."""
+    """A material of Jensen et al. (2001), table 1; its A is that of the exact half space in a setting."""
     if name not in BY_NAME:
         raise InputError(f"material must be one of {', '.join(BY_NAME)}, got {name!r}")
     alpha = np.array(BY_NAME[name].alpha)

@@ -19,6 +19,7 @@ from profilefit.scenes.skin.material import Translucent, plain, skin, translucen
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.skin.truth import exitance_of, own_error
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.picture import Drawn, to_srgb
@@ -37,14 +38,17 @@ class Head(Scene):
 FACE = Camera(eye=(-95.0, 20.0, 690.0), target=(0.0, -6.0, 0.0), height=290.0)
 
 
-def head_scene(material: str = "skin1", camera: Camera = FACE, detail: int = 1, columns: int = 2048) -> Head:
+def head_scene(
+    material: str = "skin1", camera: Camera = FACE, detail: int = 1, columns: int = 2048, setting: Setting = DIFFUSE
+) -> Head:
     """A head under grazing light with a thin band before it; all of one material, freckles and stubble on the face.
 
     detail  of the meshes, a whole number >= 1;  columns  of the skin's texture
+    setting  in which the material has its A
     """
     if detail < 1:
         raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
-    what = translucent(material)
+    what = translucent(material, setting)
     face = skin(what.reflectance, columns)
     even = plain(what.reflectance)
     pale = plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), 0.9))

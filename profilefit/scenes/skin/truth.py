@@ -2,10 +2,10 @@
 
     L_c(o) = A_c(o) sum_i W_ci E_c(i) / sum_i W_ci,   W_ci = int over the surface in pixel i of R_d(|P - P_o|) / A_c dS
 
-Conventions: R_d is the exact profile at the reflectance A_c(o) of the gathering point o and the mean free path of the
-channel; distances are straight lines; only what the view sees counts, and the weights are normalised over it (`share`,
-their sum, says how much of the profile's energy it holds: 1 on an endless plane); a pixel shows the parallelogram of
-its footprint in its tangent plane, with one irradiance all over.
+Conventions: R_d is the exact profile of a setting at the reflectance A_c(o) of the gathering point o and the mean free
+path of the channel; distances are straight lines; only what the view sees counts, and the weights are normalised over
+it (`share`, their sum, says how much of the profile's energy it holds: 1 on an endless plane); a pixel shows the
+parallelogram of its footprint in its tangent plane, with one irradiance all over.
 
 W of the own pixel, where R_d is infinite, is an integral of the cdf along the edge of its parallelogram; neighbours are
 divided by Gauss points, all others taken at their middle. All pairs count, near and far.
@@ -23,8 +23,10 @@ import numpy as np
 from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
 from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.surface import Surface, View, seen
@@ -55,11 +57,11 @@ class Gathered:
 
 
 def gathered(
-    surface: Surface, view: View, mfp: ArrayLike, illumination: str = "diffuse", pixels: ArrayLike | None = None
+    surface: Surface, view: View, mfp: ArrayLike, setting: Setting = DIFFUSE, pixels: ArrayLike | None = None
 ) -> Gathered:
     """The reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 
-    mfp  of the three channels (3,), in the unit of the positions;  illumination  "diffuse" or "searchlight"
+    mfp  of the three channels (3,), in the unit of the positions
     Raises InputError. 26 000 visible pixels take about a minute on a core, 100 MiB.
     """
     lengths = np.asarray(mfp, float)
@@ -71,7 +73,7 @@ def gathered(
     for start in range(0, len(chosen), AT_ONCE):
         part = chosen[start : start + AT_ONCE]
         light[start : start + AT_ONCE], share[start : start + AT_ONCE] = _some(
-            surface, scene, numbers, lengths, illumination, part
+            surface, scene, numbers, lengths, setting, part
         )
     if pixels is not None:
         return Gathered(light, share)
@@ -81,7 +83,7 @@ def gathered(
 
 
 def refined(
-    fine: Surface, view: View, mfp: ArrayLike, illumination: str, pixels: ArrayLike, factor: int = 2
+    fine: Surface, view: View, mfp: ArrayLike, setting: Setting, pixels: ArrayLike, factor: int = 2
 ) -> tuple[Floats, Floats]:
     """Light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
 
@@ -92,18 +94,18 @@ def refined(
     chosen = _chosen(coarse, pixels)
     inside = np.stack(np.meshgrid(range(factor), range(factor), indexing="ij"), axis=-1).reshape(-1, 2)
     parts = (factor * chosen[:, None] + inside).reshape(-1, 2)
-    mean = gathered(fine, view, mfp, illumination, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
-    return mean, gathered(coarse, view.coarsened(factor), mfp, illumination, chosen).light - mean
+    mean = gathered(fine, view, mfp, setting, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
+    return mean, gathered(coarse, view.coarsened(factor), mfp, setting, chosen).light - mean
 
 
-def exitance_of(buffers: Buffers, mfp: ArrayLike) -> Floats:
-    """(h, w, 3) radiant exitance of a picture under diffuse light: the reference; Lambert's where nothing scatters."""
-    light = gathered(*seen(buffers), mfp, "diffuse").light
+def exitance_of(buffers: Buffers, mfp: ArrayLike, setting: Setting = DIFFUSE) -> Floats:
+    """(h, w, 3) radiant exitance of a picture in diffuse light: the reference; Lambert's where nothing scatters."""
+    light = gathered(*seen(buffers), mfp, setting).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
 
-def own_error(fine: Buffers, mfp: ArrayLike) -> TruthError:
+def own_error(fine: Buffers, mfp: ArrayLike, setting: Setting = DIFFUSE) -> TruthError:
     """What half the pixel's side changes in `exitance_of`, over its mean [-], at some pixels of an even-sized picture.
 
     fine  the same picture with pixels of half the side
@@ -111,7 +113,7 @@ def own_error(fine: Buffers, mfp: ArrayLike) -> TruthError:
     surface, view = seen(fine)
     inside = np.argwhere(surface.coarsened(2).mask)
     chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
-    mean, difference = refined(surface, view, mfp, "diffuse", chosen)
+    mean, difference = refined(surface, view, mfp, setting, chosen)
     share = np.abs(difference) / np.mean(mean)
     half, most = np.quantile(share, (0.5, 0.9)).tolist()
     return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
@@ -200,14 +202,14 @@ def _some(
     scene: _Scene,
     numbers: NDArray[np.int64],
     mfp: Floats,
-    illumination: str,
+    setting: Setting,
     chosen: NDArray[np.int64],
 ) -> tuple[Floats, Floats]:
     """Light and share of up to AT_ONCE points (m, 3); the last one fills the shape that was compiled."""
     full = np.concatenate([chosen, np.repeat(chosen[-1:], AT_ONCE - len(chosen), axis=0)])
     rows, columns = full.T
     reflectance = surface.reflectance[rows, columns]
-    curves = exact_table(illumination).curves(reflectance.ravel())
+    curves = exact_table(setting).curves(reflectance.ravel())
     around = np.stack([numbers[r : r + 2 * NEAR + 1, c : c + 2 * NEAR + 1].ravel() for r, c in full])
     visible = around[:, around.shape[1] // 2]
     across, along = np.asarray(scene.across)[visible], np.asarray(scene.along)[visible]

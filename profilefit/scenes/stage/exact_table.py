@@ -25,6 +25,9 @@ STEP = 1.0 / 12  # of ln x
 ALBEDOS = 257
 LEAST_ALPHA = 1e-9  # stands for 0, where R_d / A has a limit
 FAINT = 60.0  # kappa x from which on R_d, below e^-60, is continued by its own asymptote, x^-2 e^(-kappa x)
+LEAST_REFRACTED = (
+    5e-16  # R_d l^2 / alpha up to which it is too where a surface refracts: exact light has no digits there
+)
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Curves:
 
 @dataclass(frozen=True)
 class ExactTable:
-    """The splines under one light: (s, ln x) -> ln(R_d l^2 / A) + kappa x, and ln(cdf / x); A -> s, s -> kappa."""
+    """The splines of one setting: (s, ln x) -> ln(R_d l^2 / A) + kappa x, and ln(cdf / x); A -> s, s -> kappa."""
 
     y: Floats
     profile: RectBivariateSpline
@@ -82,13 +85,13 @@ class ExactTable:
         return np.stack([left, rise, 3.0 * span - 2.0 * rise - next_rise, rise + next_rise - 2.0 * span], axis=-1)
 
 
-@lru_cache(maxsize=2)
-def exact_table(illumination: str) -> ExactTable:
-    """The table of a light, "searchlight" or "diffuse", built once: seconds. InputError for another.
+@lru_cache(maxsize=4)
+def exact_table(setting: Setting) -> ExactTable:
+    """The table of a light and a surface, built once: seconds.
 
-    Relative error below 1e-5 of R_d for x in [1e-5, 3000] where x^2 R_d l^2 / A > 1e-10, and of the cdf everywhere.
+    Relative error below 1e-5 of R_d for x in [1e-5, 3000] where x^2 R_d l^2 / A > 1e-10, and of the cdf everywhere;
+    where the surface refracts, below 1e-3 of R_d where x^2 R_d l^2 / A > 1e-8, and 1e-7 of the whole in the cdf.
     """
-    setting = Setting(illumination)
     y = np.log(NEAREST) + STEP * np.arange(int(np.ceil(np.log(FARTHEST / NEAREST) / STEP)) + 1)
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, ALBEDOS) ** 3) ** 2
     alpha = np.maximum(1.0 - s * s, LEAST_ALPHA)
@@ -101,13 +104,20 @@ def exact_table(illumination: str) -> ExactTable:
 
 
 def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
-    """ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint: kappa x > FAINT [-]."""
+    """ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint [-]."""
     path = np.asarray(exact.decay_rate(alpha))[:, None] * np.exp(y)
-    last = np.sum(path <= FAINT, axis=1) - 1
-    held = np.minimum(np.arange(y.size), last[:, None])
-    there = np.take_along_axis(path, held, axis=1)
+    held = _held(path <= FAINT)
     profile = np.asarray(exact.profile(np.exp(y[held]), alpha[:, None], setting=setting))
-    return np.log(profile) + there - 2.0 * (y - y[held])
+    if setting.n != 1.0:
+        held = _held((path <= FAINT) & (profile > LEAST_REFRACTED * alpha[:, None]))
+        profile = np.take_along_axis(profile, held, axis=1)
+    return np.log(profile) + np.take_along_axis(path, held, axis=1) - 2.0 * (y - y[held])
+
+
+def _held(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Of each column itself, or the last before all that is faint."""
+    last = np.where(bright.all(axis=1), bright.shape[1], np.argmin(bright, axis=1)) - 1
+    return np.minimum(np.arange(bright.shape[1]), last[:, None])
 
 
 def _cubic(coefficients: Floats, x: Floats) -> Floats:

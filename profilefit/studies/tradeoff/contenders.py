@@ -248,7 +248,7 @@ class Tabulated:
 
     def curves(self, alpha: float) -> Curves:
         """The cubics of one albedo."""
-        return exact_table(self.setting.illumination).curves([float(exact.reflectance(alpha, self.setting))])
+        return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
 
     def profile(self, r: ArrayLike, alpha: float) -> Floats:
         """R_d [1/mfp^2] at radii (n,) [mfp], looked up in float32: its rounding is nearly all of the error."""

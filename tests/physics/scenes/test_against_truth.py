@@ -8,6 +8,7 @@ import pytest
 import profilefit
 from profilefit.scenes.skin.scene import FACE, head_scene
 from profilefit.scenes.skin.truth import gathered
+from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface import seen
@@ -42,7 +43,7 @@ def errors(context, law, drawn, size, mfp, seeds=SEEDS, area=True, stretch=1.0):
     rows, columns = pixels.T
     whole = surface.reflectance[rows, columns] * surface.irradiance[surface.mask].mean(axis=0)
     found = np.array(runs)[:, rows, columns] / whole
-    truth = gathered(surface, camera, mfp, "diffuse", pixels).light / whole
+    truth = gathered(surface, camera, mfp, DIFFUSE, pixels).light / whole
     return found.mean(axis=0) - truth, found.std(axis=0, ddof=1) / np.sqrt(seeds)
 
 

@@ -3,16 +3,16 @@
 import numpy as np
 import pytest
 
-from mcml_sim import Setting, exact
+from mcml_sim import exact
 from profilefit.errors import InputError
 from profilefit.scenes.skin.truth import gathered, own_share, refined
 from profilefit.scenes.stage import buffers
+from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.exact_table import exact_table
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.scenes.stage.surface import Surface, View, seen
 
 VIEW = View(*np.diag([1.0, 1.0, -1.0]), pixel=0.5)
-DIFFUSE = Setting("diffuse")
 MFP = np.array([1.5, 0.8, 2.2])
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(10)
 
@@ -56,9 +56,7 @@ def own_patch(side, other, density):
 def double_loop(surface, view, mfp, setting, pixels):
     """Every pair by itself, with profiles from `exact`."""
     across, along = view.footprint(surface.position, surface.normal)
-    alpha = (
-        exact_table(setting.illumination).curves(surface.reflectance.ravel()).alpha.reshape(surface.reflectance.shape)
-    )
+    alpha = exact_table(setting).curves(surface.reflectance.ravel()).alpha.reshape(surface.reflectance.shape)
     light = np.zeros((len(pixels), 3))
     share = np.zeros((len(pixels), 3))
     for k, o in enumerate(map(tuple, pixels)):
@@ -81,10 +79,10 @@ def test_is_the_double_loop():
     """Neighbours by 4 x 4 and 2 x 2 Gauss points, others by one: 2e-4 at pixels of 0.23 to 0.6 mfp."""
     surface, pixels = hill(3, 16), np.array([[0, 1], [2, 15]])
     light, share = double_loop(surface, VIEW, MFP, DIFFUSE, pixels)
-    found = gathered(surface, VIEW, MFP, "diffuse", pixels)
+    found = gathered(surface, VIEW, MFP, DIFFUSE, pixels)
     np.testing.assert_allclose(found.light, light, rtol=2e-4)
     np.testing.assert_allclose(found.share, share, rtol=2e-4)
-    other = gathered(surface, VIEW, 1.01 * MFP, "diffuse", pixels)
+    other = gathered(surface, VIEW, 1.01 * MFP, DIFFUSE, pixels)
     assert np.max(np.abs(other.share / share - 1.0)) > 2e-3
 
 
@@ -102,8 +100,8 @@ def test_step_edge_is_the_integral():
     surface, view = seen(buffers.step_edge((64, 64), 0.5, [0.1, 0.3, 0.5]))
     pixels = np.stack([np.full(17, 32), np.arange(24, 41)], axis=1)
     x = surface.position[32, 24:41, 0]
-    found = gathered(surface, view, np.ones(3), "diffuse", pixels)
-    alpha = exact_table("diffuse").curves([0.1, 0.3, 0.5]).alpha
+    found = gathered(surface, view, np.ones(3), DIFFUSE, pixels)
+    alpha = exact_table(DIFFUSE).curves([0.1, 0.3, 0.5]).alpha
     share = found.light / [0.1, 0.3, 0.5]
     assert np.max(np.abs(share - step_response(x[:, None], alpha, setting=DIFFUSE))) < 1e-4
     assert np.all(np.abs(found.share - 1.0) < 1e-3)
@@ -135,7 +133,7 @@ def test_no_light_crosses_a_gap_in_depth():
 
 def test_own_pixel_holds_its_disc():
     """A square as large as a disc, and a long strip, which holds the light within its width."""
-    curves = exact_table("diffuse").curves([0.6])
+    curves = exact_table(DIFFUSE).curves([0.6])
     square = own_share(curves, np.array([[0.0, 0.3, 0.0]]), np.array([[0.3, 0.0, 0.0]]))
     assert square == pytest.approx(curves.share(np.array([[0.3 / np.pi**0.5]]))[0], rel=0.01)
     wide = own_share(curves, np.array([[1.0, 0.0, 0.0]]), np.array([[30.0, 200.0, 0.0]]))
@@ -147,8 +145,8 @@ def test_own_pixel_holds_its_disc():
 def test_refined_says_what_coarse_pixels_cost():
     fine, view = seen(buffers.step_edge((48, 48), 0.25, [0.3, 0.5, 0.7]))
     pixels = np.array([[12, 11], [12, 12], [12, 15]])
-    light, change = refined(fine, view, np.ones(3), "diffuse", pixels)
-    coarse = gathered(fine.coarsened(2), view.coarsened(2), np.ones(3), "diffuse", pixels)
+    light, change = refined(fine, view, np.ones(3), DIFFUSE, pixels)
+    coarse = gathered(fine.coarsened(2), view.coarsened(2), np.ones(3), DIFFUSE, pixels)
     np.testing.assert_allclose(coarse.light - light, change, atol=1e-15)
     assert 1e-4 < np.max(np.abs(change)) < 0.02
 
@@ -161,5 +159,3 @@ def test_misuse():
         gathered(surface, VIEW, MFP, pixels=[[4, 0]])
     with pytest.raises(InputError, match="pixels must be pairs"):
         gathered(surface, VIEW, MFP, pixels=[[1.0, 2.0]])
-    with pytest.raises(InputError, match="illumination must be one of"):
-        gathered(surface, VIEW, MFP, "sun")
