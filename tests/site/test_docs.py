@@ -18,7 +18,7 @@ import mcml_sim
 import profilefit
 from mcml_sim.cli.app import app as mcml_sim_cli
 from profilefit import cli
-from profilefit.recipes import inventory
+from profilefit.recipes import inventory, recipe
 from profilefit.shader.law_file import export
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -143,6 +143,11 @@ def test_the_shader_that_is_printed_compiles(tmp_path):
     path.write_text(f"#version 330\n{law}{(EXAMPLES / 'scatter.glsl').read_text()}{main}", encoding="utf-8")
     told = subprocess.run(["glslangValidator", path], capture_output=True, text=True, check=False)
     assert told.returncode == 0, told.stdout
+
+
+def test_the_recipe_that_is_printed_is_one():
+    skin = recipe.read(EXAMPLES / "gaussians-skin.toml")
+    assert (skin.law, skin.truth, skin.setting.n) == ("gaussians:4", "exact", 1.4)
 
 
 SRUN = """#!/bin/sh
