@@ -13,6 +13,7 @@ from profilefit.errors import OutputError, RecordError
 from profilefit.recipes import catalogue
 from profilefit.report import draw_all
 from profilefit.report.figures.canvas import only
+from profilefit.report.figures.corner_figure import corner_figure
 from profilefit.report.figures.record_figures import PAPER, plans
 from profilefit.report.figures.residual_figure import energy_within
 from profilefit.report.records import DRAWS, Source, coefficients
@@ -118,6 +119,19 @@ def test_a_corner_is_drawn_without_a_jackknife(tmp_path):
     with only("svg"):
         files, _ = draw_all(folder, tmp_path / "out", ["albedo-liang"])
     assert tmp_path / "out" / f"{SMALL_CORNER}.svg" in files
+
+
+def test_a_corner_of_many_constants_shows_the_most_correlated(source, tmp_path):
+    with only("svg"):
+        (file,) = corner_figure("hazard-refracting", source, tmp_path)
+    svg, samples = file.read_text(encoding="utf-8"), source.needed("hazard-refracting").arrays["samples_misfit"]
+    shown = [name for name in source.content("hazard-refracting")["covariance"]["names"] if f">{name}</text>" in svg]
+    assert len(shown) == 12
+    assert "the 12 of 32 constants" in svg
+    names = source.content("hazard-refracting")["covariance"]["names"]
+    joint = np.abs(np.corrcoef(samples.astype(float), rowvar=False)) - np.eye(len(names))
+    first, second = np.unravel_index(joint.argmax(), joint.shape)
+    assert {names[first], names[second]} <= set(shown)
 
 
 def test_residuals_of_a_profile_are_those_of_its_rings(source):

@@ -1,6 +1,7 @@
 """The README's tables read back to the numbers of the records."""
 
 import copy
+import re
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ import pytest
 from profilefit.recipes import catalogue, record
 from profilefit.report import markdown_constants, markdown_quality
 from profilefit.report.records import converged, largest_error
+from profilefit.report.tables.markdown import sections
 
 RECORDS = {name: record.read(path) for name, path in record.available(catalogue.fits_folder()).items()}
 FITS = {name: content for name, content in RECORDS.items() if "constants" in content}
@@ -82,3 +84,11 @@ def test_quality_reads_back_with_printed_sets_once():
             assert row["rises all the way"] == ("yes" if quality["monotone"] else "no")
         else:
             assert float(row["inversion error worst"]) == pytest.approx(np.max(quality["inversion_error"]), rel=0.05)
+
+
+def test_the_short_table_and_the_hazard_s_constants_say_which_index():
+    found = sections(RECORDS)
+    assert "| hazard-refracting, n = 1.4 |" in found["short"]
+    of_one, spanning = found["hazard"].split("\n\n")
+    assert re.search(r"^\| n +\| 1 +\| 1 +\|$", of_one, re.MULTILINE)
+    assert re.search(r"^\| n +\| \(1, 1.6\] +\| \(1, 1.6\] +\|$", spanning, re.MULTILINE)

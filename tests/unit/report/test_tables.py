@@ -5,6 +5,7 @@ import io
 import math
 from collections import Counter
 
+import numpy as np
 import pytest
 from rich.console import Console
 
@@ -249,3 +250,19 @@ def test_second_opinions_are_told():
     assert f"photons {check['result']}" in text
     assert f"in {check['rank']} directions" in text
     assert "random starts" not in rendered([record_tables.fit_facts(RECORDS["hazard-refracting"])], 100)
+
+
+@pytest.mark.parametrize("name", ["hazard-refracting", "albedo-rational-diffuse-refracting"])
+def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
+    content = RECORDS[name]
+    found = content["quality"]["by_index"]
+    lines = rendered(record_tables.record_tables(content), 100).splitlines()
+    start = next(i for i, line in enumerate(lines) if line.startswith("By refractive index"))
+    rows = [line.split() for line in lines[start + 2 : start + 2 + len(found["n"])]]
+    keys = [key for key in ("rel", "largest", "ks", "delta_A") if key in found]
+    for i, row in enumerate(rows):
+        assert [float(cell) for cell in row] == pytest.approx([found[key][i] for key in ("n", *keys)], rel=0.06)
+    assert any("every n in (1, 1.6]" in line for line in lines)
+    assert any(line.startswith("Quality") and line.rstrip().endswith(", n = 1.4") for line in lines)
+    worst = quality_tables.worst_measures(content)[keys[0]]["regenerated"]
+    assert worst == max(*found[keys[0]], *np.atleast_1d(content["quality"]["regenerated"][keys[0]]))
