@@ -177,10 +177,7 @@ class RefractingHazard(EscapeLaw):
 
     @classmethod
     def at_one_index(cls) -> tuple[str, ...]:
-        return (
-            *("m00", "m10", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20"),
-            *("once_h", "once_a0", "once_b0"),
-        )
+        return ("m00", "m10", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20")
 
     def here(self) -> RefractingSurface:
         """The closed numbers of its setting, or of those that it was put under."""
