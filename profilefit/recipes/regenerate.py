@@ -53,8 +53,8 @@ def regenerate(
     """
     for recipe in recipes:
         starts.require_known(recipe)
-    # Those with random starts take longest: begun first, none is left over when all others are done.
-    ordered = sorted(recipes, key=lambda r: (_stage(r), -r.random_starts))
+    # Those that span indices, and those with random starts, take longest: none is left when all others are done.
+    ordered = sorted(recipes, key=lambda r: (_stage(r), not r.indices, -r.random_starts))
     lights: dict[Setting, Orders] = {}
     steps = []
     for setting in dict.fromkeys(recipe.setting for recipe in ordered if needs_photons(recipe)):
