@@ -146,7 +146,7 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
 
 def by_index(law: Any, indices: Sequence[float]) -> dict[str, list[float]]:
     """Worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at each n."""
-    alpha = albedo_values(QUALITY_ALBEDOS)[::2]
+    alpha = albedo_values(QUALITY_ALBEDOS)
     each = [profile_quality(law.at_index(n), alpha) for n in indices]
     worst = {name: [float(np.max(getattr(one, name))) for one in each] for name in ("rel", "ks", "largest")}
     return {"n": list(indices), **worst}

@@ -17,7 +17,8 @@ ROWS = 9  # albedos shown, of those in the record; mean and worst are over all
 INDEX_MEASURES = ("rel", "largest", "ks", "delta_A")
 # Measures by the table they stand in; for r2 the smallest is the worst.
 TABLES = (
-    ("rel", "largest", "ks", "l1"),
+    ("rel", "ks", "l1"),
+    ("largest",),
     ("mse", "r2"),
     ("mse near", "mse far"),
     ("r2 near", "r2 far"),

@@ -139,8 +139,8 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         (("nothing.csv",), "nothing.csv: expected a file that can be read, got: No such file"),
         ((PHANTOM, "--law", "hazzard"), "law must be one of liang, burley"),
         (
-            (PHANTOM, "--n", "1.37"),
-            "got a request for searchlight, n = 1.37, g = 0; --n and --light choose one of these",
+            (PHANTOM, "--n", "1.7"),
+            "got a request for searchlight, n = 1.7, g = 0; --n and --light choose one of these",
         ),
         ((PHANTOM, "--n", "-1"), "n must be a refractive index > 0"),
         ((PHANTOM, "--light", "sun"), "--light must be one of searchlight, diffuse, got 'sun'"),

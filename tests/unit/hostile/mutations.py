@@ -443,7 +443,14 @@ def _other_sizes(rng: random.Random, whole: bytes) -> bytes:
 def records() -> dict[str, Any]:
     """Shipped records of every kind, the one of readings cut to a few."""
     names = (
-        *("albedo-rational", "albedo-liang", "albedo-rational-diffuse-n1.4", "burley-whole", "gaussians-2", "quantile"),
+        *(
+            "albedo-rational",
+            "albedo-liang",
+            "albedo-rational-diffuse-refracting",
+            "burley-whole",
+            "gaussians-2",
+            "quantile",
+        ),
         *("hazard", "hazard-diffuse", "liang-inverse-whole", "liang-as-published", "reproduction"),
     )
     found = {name: json.loads((ROOT / "fits" / f"{name}.json").read_text(encoding="utf-8")) for name in names}

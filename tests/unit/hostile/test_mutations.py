@@ -480,7 +480,7 @@ def test_exports_and_tables_of_ten_thousand(part, elsewhere):
 @pytest.mark.parametrize("part", range(5))
 def test_pages_of_fifty(part, elsewhere):
     """Of the records whose figures are soonest drawn; the arrays of every third are mutated, too."""
-    soon = {"albedo-rational", "albedo-liang", "albedo-rational-diffuse-n1.4", "gaussians-2", "burley-whole"}
+    soon = {"albedo-rational", "albedo-liang", "albedo-rational-diffuse-refracting", "gaussians-2", "burley-whole"}
     faults, made, seeds = list[str](), 0, itertools.count(ALL + part, 5)
     while made < 10:
         seed = next(seeds)

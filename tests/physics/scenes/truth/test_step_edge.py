@@ -94,4 +94,4 @@ def test_misuse():
     with pytest.raises(SettingError, match="the law belongs to searchlight"):
         step_response(1.0, 0.5, setting=DIFFUSE, law=profilefit.load("hazard"))
     with pytest.raises(SettingError, match="give a law of that setting"):
-        step_response(1.0, 0.5, setting=Setting(n=1.4))
+        step_response(1.0, 0.5, setting=Setting(n=0.9))
