@@ -7,6 +7,7 @@ numbers that are not near 1, one reciprocal for the rational part.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import NamedTuple
 
 import equinox as eqx
@@ -137,6 +138,25 @@ def early_share(x: Array, q: Array, per_h: Array, rest: Array) -> tuple[Array, A
 # Closer to the source than this many roots of a rounding [mfp] the map's density is the law's, to second order in x,
 # where a slope of a slope would be rounding only; and where no light is left but a white medium's.
 NEAR_SOURCE, NO_LIGHT = 10.0, 0.1 * FARTHEST
+
+
+def map_density(x: Array, shape: Shape, mapped: Callable[[Array], Array]) -> Array:
+    """Density in x [1/mfp] of a map t = -ln(1 - xi) -> x: its slope where two steps of Newton's method find x."""
+
+    def slope(t):
+        return jax.jvp(mapped, (t,), (jnp.ones_like(t),))
+
+    nearest = NEAR_SOURCE * float(jnp.finfo(jnp.result_type(x, float)).eps) ** 0.5
+    law = density(x, shape)
+    inner = (x > nearest) & (x < NO_LIGHT)
+    x = jnp.clip(x, nearest, NO_LIGHT)
+    t = cumulative(x, shape)
+    for _ in range(2):
+        there, rate = slope(t)
+        t = jnp.maximum(t + (x - there) / rate, NEAREST)
+    return jnp.where(inner, jnp.exp(-t) / slope(t)[1], law)
+
+
 # 1 + a x + b x^2 must have no zero, which a parabola through small b would give it somewhere [1/mfp^2].
 LEAST_B = 1e-4
 
@@ -232,21 +252,6 @@ class HazardSampler(Sampler):
         return radius(xi, self.law.shape(alpha), self.steps)
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        """Density of this very map: its slope at the xi that it sends to x, which two steps of Newton's method find."""
+        """Density of this very map."""
         shape = self.law.shape(alpha)
-
-        def mapped(t):
-            return radius_at(t, growth(t), shape, self.steps)
-
-        def slope(t):
-            return jax.jvp(mapped, (t,), (jnp.ones_like(t),))
-
-        nearest = NEAR_SOURCE * float(jnp.finfo(jnp.result_type(x, float)).eps) ** 0.5
-        law = density(x, shape)
-        inner = (x > nearest) & (x < NO_LIGHT)
-        x = jnp.clip(x, nearest, NO_LIGHT)
-        t = cumulative(x, shape)
-        for _ in range(2):
-            there, rate = slope(t)
-            t = jnp.maximum(t + (x - there) / rate, 0.0)
-        return jnp.where(inner, jnp.exp(-t) / slope(t)[1], law)
+        return map_density(x, shape, lambda t: radius_at(t, growth(t), shape, self.steps))

@@ -13,7 +13,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler, closed
 from profilefit.laws.entry import CLAMPS, Entry, Text
 from profilefit.laws.escape import EscapeLaw, decay_rate
-from profilefit.laws.hazard import FARTHEST, NEAR_SOURCE, NEAREST, NO_LIGHT, Shape, cumulative, density, growth, local
+from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density, growth, local, map_density
 from profilefit.laws.refracting_rational import REFRACTING, RefractingRational
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
@@ -298,10 +298,13 @@ class RefractingHazardSampler(Sampler):
         return self.law.parts(alpha).share
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
-        """Density of this very map: each part's, by the slope at the t that it sends to x."""
+        """Density of this very map: each part's own."""
         of = self.law.parts(alpha)
-        once, again = (_density(x, shape, shape is of.once, self.steps) for shape in (of.once, of.again))
-        return of.share * once + of.rest * again
+
+        def own(shape: Shape, is_once: bool) -> Array:
+            return map_density(x, shape, lambda t: drawn(t, growth(t), shape, is_once, self.steps))
+
+        return of.share * own(of.once, True) + of.rest * own(of.again, False)
 
 
 def drawn(t: Array, growth: Array, shape: Shape, is_once: Array | bool, steps: int) -> Array:
@@ -330,20 +333,3 @@ def _closer(x: Array, t: Array, shape: Shape) -> Array:
     step = 2.0 * root * (jnp.sqrt(t) - root) * flight
     y = (here.hazard / (2.0 * spent) - here.bend * flight) * step
     return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)
-
-
-def _density(x: Array, shape: Shape, is_once: bool, steps: int) -> Array:
-    """d xi / dx of `drawn`: its slope where two steps of Newton's method find x."""
-
-    def slope(t):
-        return jax.jvp(lambda u: drawn(u, growth(u), shape, is_once, steps), (t,), (jnp.ones_like(t),))
-
-    nearest = NEAR_SOURCE * float(jnp.finfo(jnp.result_type(x, float)).eps) ** 0.5
-    law = density(x, shape)
-    inner = (x > nearest) & (x < NO_LIGHT)
-    x = jnp.clip(x, nearest, NO_LIGHT)
-    t = cumulative(x, shape)
-    for _ in range(2):
-        there, rate = slope(t)
-        t = jnp.maximum(t + (x - there) / rate, NEAREST)
-    return jnp.where(inner, jnp.exp(-t) / slope(t)[1], law)
