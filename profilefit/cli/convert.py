@@ -29,6 +29,7 @@ def convert(
     alpha: Annotated[str | None, typer.Option(help="Single-scattering albedo mu_s' / (mu_s' + mu_a).")] = None,
     reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
     illumination: Annotated[str | None, typer.Option(help=f"Of --reflectance and --falloff: {LIGHTS_HELP}.")] = None,
+    n: Annotated[float, typer.Option("--n", help="Refractive index of the surface that A is of.")] = 1.0,
     mu_a: Annotated[
         str | None, typer.Option(help="Absorption coefficient, with --mu-s; colour and length in one.")
     ] = None,
@@ -73,6 +74,7 @@ def convert(
     Examples:
       profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm
       profilefit convert --alpha 0.95 --dmfp 3mm --json
+      profilefit convert --reflectance .8 --illumination diffuse --n 1.4 --mfp 1.2mm
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen
@@ -103,14 +105,14 @@ def convert(
     if mu_a is not None and mu_s is not None:
         medium, unit = _of_coefficients(mu_a, mu_s, given)
     else:
-        medium, unit = _of_length(_albedo(alpha, reflectance, illumination), given)
+        medium, unit = _of_length(_albedo(alpha, reflectance, illumination, n), given)
     if as_json:
-        print_json(content(medium, unit))
+        print_json(content(medium, unit, n))
     else:
-        screen().print(convert_table(medium, unit))
+        screen().print(convert_table(medium, unit, n))
 
 
-def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None) -> Floats:
+def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None, n: float) -> Floats:
     if alpha is not None:
         return _numbers("--alpha", alpha)[0]
     if illumination is None:
@@ -118,7 +120,7 @@ def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None
     with interruptible(__name__):
         from profilefit.convert import alpha_of
 
-    return alpha_of(_numbers("--reflectance", reflectance or "")[0], illumination)
+    return alpha_of(_numbers("--reflectance", reflectance or "")[0], illumination, n)
 
 
 def _of_length(alpha: Floats, given: dict[str, str]) -> tuple[Optical, str]:

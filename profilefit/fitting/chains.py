@@ -34,6 +34,7 @@ Floats = NDArray[np.float64]
 LENGTHS = 50
 FIRST_LOOK = 1000  # steps after which the autocorrelation time is estimated first
 LAPLACE_LOOK = 250  # the same of `default_moves`, whose tau is below five wherever the approximation holds
+PILOT = 200  # steps from draws of Laplace's approximation, of which the later half makes the proposals of the chain
 HALVINGS = 20
 PRIOR_WIDTH = 10.0
 LEVELS = (0.68, 0.95)
@@ -281,6 +282,12 @@ def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
         with jax.enable_x64(True):
             return np.asarray(density(jnp.asarray(points)))
 
-    chosen, look = (moves, FIRST_LOOK) if moves else (default_moves(centre, covariance), LAPLACE_LOOK)
-    done = walk(log_probability, start, centre, seed, max_steps, KEPT, chosen, look)
+    chosen, look = moves, FIRST_LOOK
+    if not moves:
+        # What the walkers themselves have spread to proposes better than a curvature that holds near the optimum only.
+        near = default_moves(centre, covariance)
+        pilot = walk(log_probability, start, centre, seed, min(PILOT, max_steps), PILOT * walkers, near)
+        start = pilot.samples[-walkers:]
+        chosen, look = default_moves(pilot.samples.mean(axis=0), np.cov(pilot.samples.T)), LAPLACE_LOOK
+    done = walk(log_probability, start, centre, seed + 1, max_steps, KEPT, chosen, look)
     return Posterior(kind, type(fit.law).__name__, fit.objective, fit.free, **vars(done))

@@ -3,7 +3,7 @@
 statistical   what another run's photons would change: the closed-form covariance of the ring energies carried to the
               constants through the exact derivative of the optimum (implicit function theorem, full Hessian), so it
               holds for a law that is not the truth (the sandwich of White, Econometrica 50, 1982)
-misfit        what the law's misfit leaves open if its residuals were independent noise: Levenberg-Marquardt's
+misfit        what the law's misfit leaves open if its residuals were independent noise: least squares'
               s^2 (J^T J)^-1; the process that they are in truth is `fitting.discrepancy`'s
 jackknife     how much the constants move when the fit does not see a sixth of the albedos: a misfit is no noise, its
               neighbours repeat each other, and then this is the larger and the honest number

@@ -1,7 +1,7 @@
-"""Nonlinear least squares by Levenberg and Marquardt: parameters scaled, in float64, one problem or a batch of them.
+"""Nonlinear least squares by a trust region: parameters scaled, in float64, one problem or a batch of them.
 
 Only residuals and their Jacobian are compiled, as one small program for each law and shape of data; the steps between
-are numpy. A loop that is compiled takes as long to compile as a fit, for each number of problems anew.
+are scipy's. A loop that is compiled takes as long to compile as a fit, for each number of problems anew.
 
 A failure is a result, not an exception: `Optimum.result` is "converged" or says what happened and what to try.
 """
@@ -10,26 +10,26 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import least_squares
 
 Floats = NDArray[np.float64]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
 MAX_STEPS = 200
+NOT_FINITE = "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
 STALLED, NO_MISFIT = 0.03, 1e-8
 # Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
 ORTHOGONAL = 1e-7
-# Of what a step promises to take from the cost, what it must take at least, and what makes the next one longer.
-LEAST_WON, WELL_WON = 0.01, 0.99
-SHRINK, GROW = 0.25, 3.5
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Optimum:
 
     parameters  (p,) the minimiser, in the caller's units
     residuals   (n,) there; jacobian (n, p) d residual / d parameter
-    steps       Levenberg-Marquardt steps taken
+    steps       points at which the residuals were asked for
     result      "converged", or what failed and what to try next
     """
 
@@ -75,7 +75,7 @@ def solve(residual: Callable, start: ArrayLike, data: object = None) -> Optimum:
             values, jacobian = _linearise(residual, parameters, arrays)
             return np.asarray(values), np.asarray(jacobian)
 
-        return _levenberg_marquardt(at, np.asarray(start, np.float64))
+        return _least_squares(at, np.asarray(start, np.float64))
 
 
 def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> tuple[Optimum, ...]:
@@ -93,61 +93,47 @@ def _linearise(residual, parameters, data):
     return residual(parameters, data), jax.jacfwd(residual)(parameters, data)
 
 
-def _levenberg_marquardt(at: Callable[[Floats], tuple[Floats, Floats]], start: Floats) -> Optimum:
-    """Damped Gauss-Newton steps (J^T J + 1/size) step = -J^T r, `at` the residuals r and J of constants.
+def _least_squares(at: Callable[[Floats], tuple[Floats, Floats]], start: Floats) -> Optimum:
+    """From `start` (p,), `at` the residuals and the Jacobian of constants.
 
-    A step counts if it takes away a hundredth of what the linear problem promises; the size is that of Gould et al.
-    (4OR 3, 2005). Constants span four decades, so they are scaled by their start: damping treats them alike.
+    Constants span four decades, so they are scaled by their start: the trust region treats them alike.
     """
     scale = np.where(start == 0, 1.0, np.abs(start))
-    here, size, code, steps = start / scale, 1.0, 1, 1
-    values, jacobian = at(start)
-    while steps < MAX_STEPS and np.all(np.isfinite(values)):
-        slopes = jacobian * scale
-        move = _damped(slopes, values, size)
-        there, slopes_there = at((here + move) * scale)
-        steps += 1
-        with np.errstate(invalid="ignore", over="ignore"):  # of a step to where there is no law
-            linear = values + slopes @ move
-            won, promised = there @ there - values @ values, linear @ linear - values @ values  # rounded alike
-        if not won <= LEAST_WON * promised:
-            size *= SHRINK
-            continue
-        size *= GROW if won < WELL_WON * promised < 0 else 1.0
-        ended = _is_small(move, here + move) and _is_small(there - values, there)
-        here, values, jacobian = here + move, there, slopes_there
-        if ended:
-            code = 0
-            break
-    found = here * scale
-    return Optimum(found, values, jacobian, steps, _explain(code, found, values, jacobian))
+
+    @lru_cache(maxsize=2)
+    def linear(here: bytes) -> tuple[Floats, Floats]:
+        values, jacobian = at(np.frombuffer(here) * scale)
+        # A step to where there is no slope is one to take back, which residuals say that are not finite.
+        return values if np.all(np.isfinite(jacobian)) else np.full_like(values, np.nan), jacobian * scale
+
+    begin = start / scale
+    if not np.all(np.isfinite(linear(begin.tobytes())[0])):
+        return Optimum(start, *at(start), 1, NOT_FINITE)
+    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # of constants that run away
+        found = least_squares(
+            lambda here: linear(here.tobytes())[0], begin, lambda here: linear(here.tobytes())[1],
+            xtol=RELATIVE_TOLERANCE, ftol=None, gtol=None, max_nfev=MAX_STEPS,
+        )  # fmt: skip
+    jacobian = found.jac / scale
+    return Optimum(found.x * scale, found.fun, jacobian, found.nfev, _explain(found.success, found.fun, jacobian))
 
 
-def _damped(slopes: Floats, values: Floats, size: float) -> Floats:
-    """The step; none that is a number where rounding has left no system to solve, which asks for more damping."""
-    try:
-        return np.asarray(-np.linalg.solve(slopes.T @ slopes + np.eye(slopes.shape[1]) / size, slopes.T @ values))
-    except np.linalg.LinAlgError:
-        return np.full(slopes.shape[1], np.nan)
-
-
-def _is_small(change: Floats, what: Floats) -> bool:
-    return bool(np.all(np.abs(change) < RELATIVE_TOLERANCE * (1.0 + np.abs(what))))
-
-
-def _explain(code: int, parameters: Floats, values: Floats, jacobian: Floats) -> str:
-    if not np.all(np.isfinite(parameters)) or not np.all(np.isfinite(values)):
-        return "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
-    if code and _steepness(values, jacobian) > ORTHOGONAL:
+def _explain(ended: bool, values: Floats, jacobian: Floats) -> str:
+    steepness = _steepness(values, jacobian)
+    if not ended and steepness > ORTHOGONAL:
         return f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
-    if _steepness(values, jacobian) > STALLED:
+    if steepness > STALLED and np.linalg.norm(values) > NO_MISFIT:
         return "stalled beside an optimum, at the edge of where the law is defined: start elsewhere"
     return CONVERGED
 
 
 def _steepness(values: Floats, jacobian: Floats) -> float:
     """The largest cosine between the residuals and a column of the Jacobian: none is left at an optimum."""
-    lengths = np.linalg.norm(jacobian, axis=0) * np.linalg.norm(values)
-    if not np.all(np.isfinite(lengths)) or np.linalg.norm(values) < NO_MISFIT:
-        return 0.0
-    return float(np.max(np.abs(jacobian.T @ values) / np.where(lengths > 0, lengths, 1.0)))
+    return float(np.max(np.abs(_unit(jacobian).T @ _unit(values))))
+
+
+def _unit(columns: Floats) -> Floats:
+    """Columns of length 1, or 0; the largest number is divided by first, since squares of small ones would be 0."""
+    for size in (lambda c: np.max(np.abs(c), axis=0), lambda c: np.linalg.norm(c, axis=0)):
+        columns = columns / np.where(size(columns) > 0, size(columns), 1.0)
+    return columns

@@ -39,15 +39,15 @@ class RefractingRational(Normalisation):
 
     t is the share of the light that enters, rho that which the surface reflects back of cosine-weighted light from
     inside: were all light inside cosine-weighted, R would be the reflectance without a surface, whatever n. What it is
-    not makes the constants depend on n, by mu_c = sqrt(1 - 1/n^2):
+    not makes the constants depend on n, by q = mu_c^(2/3), mu_c = sqrt(1 - 1/n^2): A changes fastest next to n = 1.
 
-    c = c0 + c1 mu_c + c2 mu_c^2 + c3 mu_c^3     d likewise     f = f0 + f1 mu_c
+    c = c0 + c1 q + c2 q^2 + c3 q^3 + c4 q^4     d likewise, up to d5 q^5     f = f0 + f1 q
 
     b follows from light scattered once, which is exact: A / alpha -> A_1 at alpha = 0. So A(0) = 0, the slope there and
     A(1) = t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more
-    than t, and alpha(A > t) = 1. For n in (1, 1.6], under either light; nearer to 1 than 1.01 A is off by up to 4e-4.
+    than t, and alpha(A > t) = 1. For n in (1, 1.6], under either light.
 
-    c0 ... c3, d0 ... d3, f0, f1  constants [-]
+    c0 ... c4, d0 ... d5, f0, f1  constants [-]
     """
 
     setting: Setting = eqx.field(static=True)
@@ -55,10 +55,13 @@ class RefractingRational(Normalisation):
     c1: float
     c2: float
     c3: float
+    c4: float
     d0: float
     d1: float
     d2: float
     d3: float
+    d4: float
+    d5: float
     f0: float
     f1: float
     surface: RefractingSurface | None = closed()
@@ -68,8 +71,8 @@ class RefractingRational(Normalisation):
         is_map=True,
         records=("albedo-rational",),
         start={  # within a hundredth of the exact map
-            **{"c0": 1.6, "c1": 0.1, "c2": 0.1, "c3": 0.1, "d0": 0.3, "d1": 1.0, "d2": 3.0, "d3": -2.0},
-            **{"f0": 0.03, "f1": 0.01},
+            **{"c0": 1.6, "c1": 0.1, "c2": 0.1, "c3": 0.1, "c4": 0.1, "f0": 0.03, "f1": 0.01},
+            **{"d0": 0.4, "d1": 0.5, "d2": 1.0, "d3": 0.5, "d4": 0.1, "d5": -0.1},
         },
         n=REFRACTING,
         own=True,
@@ -94,9 +97,8 @@ class RefractingRational(Normalisation):
         return {"c": float(c), "d": float(d), "f": float(f)}
 
     def folds(self) -> dict[str, dict[str, float]]:
-        mu = surface_of(self.setting).cosine
-        powers = {letter: {f"{letter}{i}": mu**i for i in range(4)} for letter in "cd"}
-        return {**powers, "f": {f"f{i}": mu**i for i in range(2)}}
+        q = surface_of(self.setting).cosine ** (2 / 3)
+        return {x: {one: q ** int(one[1]) for one in self.constant_names() if one[0] == x} for x in "cdf"}
 
     @property
     def entered(self) -> float:
@@ -105,10 +107,10 @@ class RefractingRational(Normalisation):
 
     def folded(self) -> tuple[Number, Number, Number]:
         """c, d, f at its index."""
-        mu = self.here().cosine
-        c = self.c0 + mu * (self.c1 + mu * (self.c2 + mu * self.c3))
-        d = self.d0 + mu * (self.d1 + mu * (self.d2 + mu * self.d3))
-        return c, d, self.f0 + mu * self.f1
+        q = self.here().cosine ** (2 / 3)
+        c = self.c0 + q * (self.c1 + q * (self.c2 + q * (self.c3 + q * self.c4)))
+        d = self.d0 + q * (self.d1 + q * (self.d2 + q * (self.d3 + q * (self.d4 + q * self.d5))))
+        return c, d, self.f0 + q * self.f1
 
     def terms(self) -> Terms:
         """All that depends on n only."""

@@ -1,7 +1,6 @@
 """Least squares in the three coordinates, from starts that a coarse search of the data finds.
 
-MINPACK's successor in scipy and not `fitting.solver`: that one compiles a whole Levenberg-Marquardt around the law,
-which pays for a batch of fits and makes one fit wait nine seconds for a tenth of a millisecond's work.
+scipy's trust region with bounds, which `fitting.solver` has not: coordinates of bad data run away.
 
 A failure is a result: `Minimum.result` is "converged" or says what happened and what to try.
 """

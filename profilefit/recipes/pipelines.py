@@ -32,8 +32,8 @@ Floats = NDArray[np.float64]
 Made = tuple[dict[str, Any], Arrays]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
-# Indices that a law which spans them is judged at, fitted or not: from skin's surface to glass.
-JUDGED = (1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
+# Indices that a law which spans them is judged at, fitted or not: from next to none to glass.
+JUDGED = (1.001, 1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
 
 
 def needs_photons(recipe: Recipe) -> bool:

@@ -30,11 +30,10 @@ class ConventionRow:
     values: Floats
 
 
-def _rows(medium: Optical) -> list[ConventionRow]:
+def _rows(medium: Optical, n: float) -> list[ConventionRow]:
+    what = "exact, index-matched" if n == 1 else f"exact, n = {n:g}"
     colour = [
-        ConventionRow(
-            f"reflectance_{light}", "reflectance A", light, 0, "exact, index-matched", medium.reflectance(light)
-        )
+        ConventionRow(f"reflectance_{light}", "reflectance A", light, 0, what, medium.reflectance(light, n))
         for light in ILLUMINATIONS
     ]
     return [
@@ -46,14 +45,14 @@ def _rows(medium: Optical) -> list[ConventionRow]:
     ]
 
 
-def content(medium: Optical, unit: str) -> dict[str, str | Floats | None]:
-    """The same by name, for --json; what a channel has not is not finite."""
-    return {"unit": unit or None} | {row.name: row.values for row in _rows(medium)}
+def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, str | float | Floats | None]:
+    """The same by name, for --json; what a channel has not is not finite. n is the index that A is of."""
+    return {"unit": unit or None, "n": n} | {row.name: row.values for row in _rows(medium, n)}
 
 
-def convert_table(medium: Optical, unit: str) -> RenderableType:
-    """A line a convention, a column a channel; unit is that of length, or ""."""
-    rows = _rows(medium)
+def convert_table(medium: Optical, unit: str, n: float = 1.0) -> RenderableType:
+    """A line a convention, a column a channel; unit is that of length, or "". n is the index that A is of."""
+    rows = _rows(medium, n)
     cells = np.array([[_cell(value) for value in row.values] for row in rows])
     columns = {"": [row.title for row in rows]}
     for i in range(cells.shape[1]):
@@ -67,6 +66,8 @@ def convert_table(medium: Optical, unit: str) -> RenderableType:
     }
     sources = dict.fromkeys(one.source for one in LENGTHS if one.source)
     caption = [f"Sources: {'; '.join(sources)}.", f"{SEARCHLIGHT}."]
+    if n != 1:
+        caption += ["Lengths of engines are paired with A of the same albedo under an index-matched surface."]
     if NONE in cells:
         caption += [f"{NONE}: without absorption (alpha = 1) there is no diffuse mean free path."]
     return column_table("One medium in every convention", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))

@@ -15,10 +15,10 @@ LAW_Shape LAW_shape(float alpha) {
     PfCurve s;
     s.kappa = pf_decay_rate(alpha);
     s.source = LAW_source * LAW_map_alpha_over_reflectance(alpha);
-    float root = LAW_c0 + LAW_c1 * s.source + LAW_c2 * s.kappa;
+    float root = LAW_c0 + LAW_c1 * s.source + s.kappa * (LAW_c2 + s.kappa * LAW_c3);
     s.h = exp(LAW_h0 + LAW_h1 * s.source + LAW_h2 * s.kappa);
     s.a = LAW_a0 + s.source * (LAW_a1 + s.source * LAW_a2);
-    s.b = max(LAW_b0 + s.source * (LAW_b1 + s.source * LAW_b2), 1e-4);
+    s.b = max(LAW_b0 + s.source * (LAW_b1 + s.source * LAW_b2) + LAW_b3 * s.kappa, 1e-4);
     s.c = root * root;
     s.w = s.source - s.kappa - s.a + s.c;
     LAW_Shape shape;

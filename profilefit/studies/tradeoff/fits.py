@@ -1,6 +1,6 @@
 """Fits: seconds against how far photon noise moves the law of Liang et al. from where it would be without noise.
 
-Three ways to its constants from the same rings and photons: Levenberg-Marquardt on all profiles at once; the paper's
+Three ways to its constants from the same rings and photons: least squares on all profiles at once; the paper's
 two stages, its form at each albedo and then laws through the coefficients; emcee, whose answer is the posterior mean.
 Each is compared with what the very same way makes of the exact profiles, since a law that is not the truth ends
 elsewhere under another weighting: misfit is no error here. The error is the change of ring energies over the exact
@@ -41,7 +41,7 @@ EDGES = np.linspace(0.0, 20.0, 101)  # of what is fitted, even, as in the paper 
 RINGS = np.geomspace(NEAREST, 100.0, 81)  # of what is judged [mfp]
 TRIMMED, EPSILON = "r R_d", 0.005  # (6), as in the recipe liang-as-published
 HELD = ("a3", "c2")  # exponents that trade against their amplitudes; so held in the recipe too
-ALL_AT_ONCE, TWO_STAGES, EMCEE = "Levenberg-Marquardt", "two stages", "emcee"
+ALL_AT_ONCE, TWO_STAGES, EMCEE = "least squares", "two stages", "emcee"
 
 
 @dataclass(frozen=True)

@@ -43,15 +43,15 @@ def test_light_scattered_again_is_the_rest(setting):
     assert np.all(law.scattered_again(np.linspace(0, 1, 101)) > 0)
 
 
-@pytest.mark.parametrize("n", [1.02, 1.2, 1.37, 1.6])
+@pytest.mark.parametrize("n", [1.001, 1.02, 1.2, 1.37, 1.6])
 @pytest.mark.parametrize("light", ["searchlight", "diffuse"])
 def test_near_exact_light_at_every_index(light, n):
     law = albedo_law("rational", setting=Setting(light, n))
     quality = albedo_quality(law)
-    assert quality.delta_A < 5e-5
+    assert quality.delta_A < 4e-5
     assert quality.monotone
     alpha = np.array([0.2, 0.5, 0.8, 0.95, 0.99])
     twin = [surface.reflectance(one, law.setting) for one in alpha]
     np.testing.assert_allclose(law.reflectance(alpha), twin, atol=6e-5)
-    other = albedo_law("rational", setting=Setting(light, n - 0.01))  # the negative control
-    assert np.max(np.abs(other.reflectance(alpha) - exact.reflectance(alpha, setting=law.setting))) > 5e-4
+    other = albedo_law("rational", setting=Setting(light, max(n - 0.01, 1.0003)))  # the negative control
+    assert np.max(np.abs(other.reflectance(alpha) - exact.reflectance(alpha, setting=law.setting))) > 2e-4

@@ -60,15 +60,30 @@ def test_what_every_channel_has_is_not_explained_away(command):
 
 def test_json_has_every_convention_and_null_for_none(table):
     found = table("--alpha", "0.5,1", "--mfp", "2cm")
-    assert set(BY_NAME) | {"unit", "alpha", "reflectance_searchlight", "reflectance_diffuse", "mu_a", "mu_s"} == set(
-        found
-    )
+    colours = {"alpha", "n", "reflectance_searchlight", "reflectance_diffuse", "mu_a", "mu_s"}
+    assert set(BY_NAME) | {"unit"} | colours == set(found)
     assert found["unit"] == "cm"
     assert found["mfp"] == [2.0, 2.0]
     assert found["mu_a"] == [0.25, 0.0]
     assert found["dmfp"][1] is None
     assert found["dmfp"][0] == pytest.approx(2.0)  # sqrt(1.5 / 1.5) l
     assert table("--alpha", "0.5", "--mfp", "2")["unit"] is None
+
+
+def test_a_colour_of_a_surface_that_refracts(table, command):
+    words = ("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
+    found = table(*words, "--n", "1.4")
+    assert found["alpha"] == pytest.approx(alpha_of([0.8], "diffuse", 1.4), rel=1e-12)
+    assert found["reflectance_diffuse"] == pytest.approx([0.8], rel=1e-10)
+    matched = table("--alpha", repr(found["alpha"][0]), "--mfp", "1.2mm")
+    same = set(BY_NAME) | {"unit", "mu_a", "mu_s"}  # of the medium, whatever lies on it
+    assert {key: found[key] for key in same} == {key: matched[key] for key in same}
+    assert found["alpha"][0] - table(*words)["alpha"][0] > 0.005  # the same colour is another medium
+    assert "exact, n = 1.4" in command(*words, "--n", "1.4")[1]
+    for n, why in (("0.9", "n >= 1"), ("nan", "n must be a refractive index"), ("1.4", "must be in [0, 0.923")):
+        status, out, err = command("--reflectance", "0.99", *words[2:], "--n", n)
+        assert (status, out, len(err.splitlines())) == (2, "", 1)
+        assert why in err
 
 
 @pytest.mark.parametrize("name", list(BY_NAME))
