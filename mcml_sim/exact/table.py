@@ -130,7 +130,7 @@ def _total_of(w: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Ar
 def made(n: float, rule: Rule, slope: bool = False) -> Table:
     """The table of one n > 1, or its derivative by n, in seconds."""
     with jax.enable_x64(True), jax.core.eval_context():
-        lines = np.stack([_line(n, group, line.k, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
+        lines = np.stack([_line(n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
         lines = np.concatenate([lines, _totals(n, rule, slope)[:, :, None]], axis=2)
         ray = _ray(rule.line).k
         last = np.abs(ray) > MIDDLE
@@ -154,9 +154,9 @@ def shapes(rule: Rule) -> Table:
     return Table(*made_of)
 
 
-def _line(n: float, group: int, k: Complexes, rule: Rule, slope: bool) -> Complexes:
+def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Complexes:
     """The polynomials of a group: (2, k, degree)."""
-    z = _nodes(rule.degree)
+    z, own = _nodes(rule.degree), line.k[line.dk != 0]
 
     def values(part: Complexes) -> Complexes:
         first, last = (np.asarray(_root(jnp.asarray(ALPHAS[group + end]), part)) for end in (0, 1))
@@ -164,7 +164,8 @@ def _line(n: float, group: int, k: Complexes, rule: Rule, slope: bool) -> Comple
         alpha = (1.0 - w * w) / (1.0 - np.asarray(_root(jnp.ones(()), part))[:, None] ** 2)
         return _resolvents(n, part, alpha, rule.depth, rule.angles, slope)
 
-    return _polynomials(_in_chunks(values, k))
+    found = _polynomials(_in_chunks(values, own))
+    return np.pad(found, ((0, 0), (0, line.k.size - own.size), (0, 0)), mode="edge")
 
 
 def _totals(n: float, rule: Rule, slope: bool) -> Complexes:

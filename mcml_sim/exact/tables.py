@@ -27,7 +27,7 @@ from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 
 LEAST = 1.0 + 1e-9  # n of the least surface that refracts
-VERSION = 1  # of what `table.made` puts into a table
+VERSION = 2  # of what `table.made` puts into a table
 MOST_BYTES = 1 << 26  # of a file that is read
 
 

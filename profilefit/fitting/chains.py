@@ -279,8 +279,10 @@ def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
     start = centre + generator.standard_normal((walkers, size)) @ root.T
 
     def log_probability(points):
+        block = walkers // 4  # which the moves ask for; all of them, or half of them, would compile anew
+        full = np.pad(points, ((0, -len(points) % block), (0, 0)), mode="edge").reshape(-1, block, size)
         with jax.enable_x64(True):
-            return np.asarray(density(jnp.asarray(points)))
+            return np.concatenate([np.asarray(density(jnp.asarray(part))) for part in full])[: len(points)]
 
     chosen, look = moves, FIRST_LOOK
     if not moves:

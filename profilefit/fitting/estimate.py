@@ -239,8 +239,10 @@ def _second_derivatives(
     """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p); one program."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
-        hessian, mixed = _curved(problem, jnp.asarray(solution.parameters), law, rings)
-    return np.asarray(hessian), np.asarray(mixed)
+        here = jnp.asarray(solution.parameters)
+        columns = [_curved(problem, here, along, law, rings) for along in np.eye(here.size)]
+    hessian, mixed = (np.stack([np.asarray(one) for one in each], axis=-1) for each in zip(*columns, strict=True))
+    return hessian, mixed
 
 
 def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
@@ -252,13 +254,16 @@ def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
 
 
 @eqx.filter_jit
-def _curved(residual, vector, law, rings):
+def _curved(residual, vector, along, law, rings):
+    """One column of both: all at once would compile as long as a fit."""
+
     def cost(theta, energies):
         data = eqx.tree_at(lambda tree: (tree.energy, tree.beyond), rings, (energies[:, :-1], energies[:, -1]))
         return 0.5 * jnp.sum(residual(theta, (law, data)) ** 2)
 
     energies = jnp.column_stack([jnp.asarray(rings.energy), jnp.asarray(rings.beyond)])
-    return jax.jacfwd(jax.grad(cost, argnums=(0, 1)))(vector, energies)
+    slopes = jax.grad(cost, argnums=(0, 1))
+    return jax.jvp(lambda theta: slopes(theta, energies), (vector,), (along,))[1]
 
 
 def _half_waves(table: Floats) -> float:

@@ -69,7 +69,7 @@ class Optimum:
 def solve(residual: Callable, start: ArrayLike, data: object = None) -> Optimum:
     """Minimise |residual(parameters, data)|^2 from `start` (p,); `data` is any pytree of arrays."""
     with jax.enable_x64(True):
-        arrays = jax.tree.map(jnp.asarray, data)
+        arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
 
         def at(parameters: Floats) -> tuple[Floats, Floats]:
             values, jacobian = _linearise(residual, parameters, arrays)

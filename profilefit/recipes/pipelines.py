@@ -152,6 +152,13 @@ def by_index(law: Any, indices: Sequence[float]) -> dict[str, list[float]]:
     return {"n": list(indices), **worst}
 
 
+def surfaces(recipe: Recipe) -> tuple[float, ...]:
+    """The indices above 1 whose exact light a recipe takes."""
+    if recipe.truth != "exact":
+        return ()
+    return tuple(n for n in {recipe.setting.n, *recipe.indices, *(_judged(recipe) if recipe.indices else ())} if n > 1)
+
+
 def _judged(recipe: Recipe) -> tuple[float, ...]:
     """The indices that a law which spans them is judged at: `JUDGED`, as far as the recipe reaches."""
     low, high = recipe.span

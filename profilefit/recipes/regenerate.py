@@ -13,10 +13,10 @@ from typing import Any
 import jax
 from threadpoolctl import threadpool_limits
 
-from mcml_sim import Orders, Setting
+from mcml_sim import Orders, Setting, exact
 from mcml_sim.runs.progress import tracked
 from profilefit.recipes import record, starts
-from profilefit.recipes.pipelines import PIPELINES, Made, Pipeline, needs_photons
+from profilefit.recipes.pipelines import PIPELINES, Made, Pipeline, needs_photons, surfaces
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.run import RecipeRun
 from profilefit.recipes.workers import Workers
@@ -29,10 +29,10 @@ _RECIPES = itertools.count(1)  # of this process
 
 @dataclass(frozen=True)
 class Step:
-    """What a run did: a record, or the photons of a setting.
+    """What a run did: a record, or the light of a setting.
 
-    name     of the recipe, or the setting; path of the record, None for photons
-    seconds  that it took; those of a recipe without its photons
+    name     of the recipe, or the setting; path of the record, None for light
+    seconds  that it took; those of a recipe without its light
     """
 
     name: str
@@ -61,6 +61,11 @@ def regenerate(
         begin = time.perf_counter()
         lights[setting] = run.light(setting)
         steps.append(Step(f"photons: {setting}", time.perf_counter() - begin))
+    # Both lights take the same solution of a surface, which recipes side by side would both make.
+    for n in sorted({n for recipe in ordered for n in surfaces(recipe)}):
+        begin = time.perf_counter()
+        exact.reflectance(1.0, Setting(n=n))
+        steps.append(Step(f"exact light: n = {n:g}", time.perf_counter() - begin))
     with Workers(min(processes, len(ordered))) as workers:
         fitted = _fitted(workers, ordered, run, lights, pipelines or PIPELINES)
         return steps + list(tracked(fitted, "fitting", "recipes", len(ordered), run.progress is False))
