@@ -127,7 +127,8 @@ def walk(
 
 
 def _long_enough(sampler: emcee.EnsembleSampler, start: Floats, steps: int, max_steps: int) -> tuple[float, int]:
-    """Run `steps`, and in doubling stretches until the chain is long enough for its own autocorrelation time."""
+    """Run `steps`, and on until the chain is long enough for its own autocorrelation time, looking at most at each
+    doubling."""
     state = start
     while True:
         state = sampler.run_mcmc(state, steps - sampler.iteration, progress=False)
@@ -135,7 +136,8 @@ def _long_enough(sampler: emcee.EnsembleSampler, start: Floats, steps: int, max_
             tau = float(np.max(sampler.get_autocorr_time(quiet=True, tol=0)))
         if sampler.iteration >= max_steps or (np.isfinite(tau) and sampler.iteration >= LENGTHS * tau):
             return tau, sampler.iteration
-        steps = min(2 * sampler.iteration, max_steps)
+        wanted = 1.1 * LENGTHS * tau if np.isfinite(tau) else np.inf  # tau itself grows with the chain
+        steps = int(min(np.ceil(wanted), 2 * sampler.iteration, max_steps))
 
 
 @dataclass(frozen=True)
