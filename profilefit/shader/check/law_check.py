@@ -38,6 +38,7 @@ Mask = NDArray[np.bool_]
 STEP = 1e-4
 NEAREST_XI, FARTHEST_XI = 1e-4, 1.0 - 1e-5
 HALVINGS = 50
+LEAST_SHARE = 1e-9  # of a part of the light, which is rounding in a black medium
 
 
 class Twin:
@@ -70,8 +71,10 @@ class Twin:
         if np.any(share < 1.0):
             first, last = np.where(xi < share, share, 0.0), np.where(xi < share, 1.0, share)
             other = self._searched(x, albedo, first, last)
-            density = density + 1.0 / self._slope(other, albedo, first, last)
-            held = _inside((xi - low) / (high - low)) & _inside((other - first) / (last - first))
+            both = last - first > LEAST_SHARE
+            with np.errstate(divide="ignore", invalid="ignore"):  # of a part that is none
+                density = density + np.where(both, 1.0 / self._slope(other, albedo, first, last), 0.0)
+                held = _inside((xi - low) / (high - low)) & (~both | _inside((other - first) / (last - first)))
         error = np.abs(shader.values(x, xi, albedo).pdf / density - 1.0)
         at = Arguments(albedo, x, xi, np.array(1.0))
         return dense_grid.spread(error, held & inner, at, of_share=True)
