@@ -144,10 +144,14 @@ def early_share(x: Array, q: Array, per_h: Array, rest: Array) -> tuple[Array, A
 # Closer to the source than this many roots of a rounding [mfp] the map's density is the law's, to second order in x,
 # where a slope of a slope would be rounding only; and where no light is left but a white medium's.
 NEAR_SOURCE, NO_LIGHT = 10.0, 0.1 * FARTHEST
+LAST_DRAWN = 37.0  # of -ln(1 - xi): a float64 xi that is less than 1 draws no radius farther out
 
 
 def map_density(x: Array, shape: Shape, mapped: Callable[[Array], Array]) -> Array:
-    """Density in x [1/mfp] of a map t = -ln(1 - xi) -> x: its slope where two steps of Newton's method find x."""
+    """Density in x [1/mfp] of a map t = -ln(1 - xi) -> x: its slope where two steps of Newton's method find x.
+
+    The law's own where no xi draws a radius.
+    """
 
     def slope(t):
         return jax.jvp(mapped, (t,), (jnp.ones_like(t),))
@@ -157,6 +161,7 @@ def map_density(x: Array, shape: Shape, mapped: Callable[[Array], Array]) -> Arr
     inner = (x > nearest) & (x < NO_LIGHT)
     x = jnp.clip(x, nearest, NO_LIGHT)
     t = cumulative(x, shape)
+    inner &= t < LAST_DRAWN
     for _ in range(2):
         there, rate = slope(t)
         t = jnp.maximum(t + (x - there) / rate, NEAREST)

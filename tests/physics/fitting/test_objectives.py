@@ -220,6 +220,9 @@ def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
     """A law whose energy is (2 - alpha) times another's falls by 1e-5 over the last 1e-5 of albedo."""
 
     class Falling:
+        def under(self, surfaces):
+            return self
+
         def unscaled_energy(self, x, alpha):
             return burley.unscaled_energy(x, 0.9 + 0 * alpha) * (2 - alpha)
 

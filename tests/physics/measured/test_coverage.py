@@ -188,11 +188,12 @@ def test_simulated_tissue_and_what_similarity_costs(tmp_path):
     assert not straight.misfit.detected
     whole, far = found[0.9, None], found[0.9, 0.2]
     assert whole.misfit.detected
-    assert whole.values["mu_a"] == pytest.approx(0.182, rel=0.03)
-    assert whole.values["mu_s'"] == pytest.approx(9.56, rel=0.03)
-    assert not far.misfit.detected, "nothing in the data shows it"
-    assert far.values["mu_a"] == pytest.approx(0.139, rel=0.05)
-    assert far.values["mu_s'"] == pytest.approx(12.3, rel=0.05)
+    assert whole.values["mu_a"] == pytest.approx(0.187, rel=0.03)
+    assert whole.values["mu_s'"] == pytest.approx(9.55, rel=0.03)
+    assert far.misfit.detected
+    assert far.misfit.relative < 0.02, "which a law of larger error would not see"
+    assert far.values["mu_a"] == pytest.approx(0.134, rel=0.05)
+    assert far.values["mu_s'"] == pytest.approx(12.9, rel=0.05)
 
 
 def test_a_white_medium_has_an_upper_limit_of_absorption():
