@@ -1,6 +1,6 @@
 """What the constants of the hazard law are worth: its recipes fitted with fewer and fewer of them.
 
-    python -m benchmarks.constants [--quick]       # four minutes on two cores; --quick: two
+    python -m benchmarks.constants [--quick]       # two minutes on two cores; --quick: at three indices
 
 The constants that are left out are 0. Where surfaces refract: without terms quadratic in rho, the share of light that
 the surface reflects back inside; without any, one set of shapes for all indices. Where n = 1: without those for the
@@ -46,7 +46,7 @@ def refitted(name: str, indices: tuple[float, ...]) -> Iterator[Row]:
         begun = start.with_vector(held, [0.0] * len(held))
         limits = (0.0, 0.0, chosen.weighting.rising)
         law = fit(profiles, begun, chosen.weighting.objective, free, limits=limits, jackknife=False).law
-        laws = [law.at_index(n) for n in indices] if chosen.indices else [law]
+        laws = [law.at_index(one) for one in indices] if chosen.indices else [law]
         yield chosen.setting.illumination, n, label, str(len(free)), *_worst(laws)
 
 

@@ -291,7 +291,7 @@ def _walk(density, covariance, fit, kind, seed, max_steps, moves) -> Posterior:
         # What the walkers themselves have spread to proposes better than a curvature that holds near the optimum only.
         near = default_moves(centre, covariance)
         pilot = walk(log_probability, start, centre, seed, min(PILOT, max_steps), PILOT * walkers, near)
-        start = pilot.samples[-walkers:]
-        chosen, look = default_moves(pilot.samples.mean(axis=0), np.cov(pilot.samples.T)), LAPLACE_LOOK
+        start, spread = pilot.samples[-walkers:], np.atleast_2d(np.cov(pilot.samples.T))
+        chosen, look = default_moves(pilot.samples.mean(axis=0), spread), LAPLACE_LOOK
     done = walk(log_probability, start, centre, seed + 1, max_steps, KEPT, chosen, look)
     return Posterior(kind, type(fit.law).__name__, fit.objective, fit.free, **vars(done))

@@ -64,6 +64,7 @@ def regenerate(
     # Both lights take the same solution of a surface, which recipes side by side would both make.
     for n in sorted({n for recipe in ordered for n in surfaces(recipe)}):
         begin = time.perf_counter()
+        run.say(f"exact light: n = {n:g}")
         exact.reflectance(1.0, Setting(n=n))
         steps.append(Step(f"exact light: n = {n:g}", time.perf_counter() - begin))
     with Workers(min(processes, len(ordered))) as workers:

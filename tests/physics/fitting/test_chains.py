@@ -37,7 +37,7 @@ class Line(AlbedoLaw):
         return self.u + self.v * alpha
 
 
-def fitted_line(seed, law):
+def fitted_line(seed, law, free=None):
     """A fit to twelve noisy points whose photon noise is correlated, and nothing like their misfit."""
     rng = np.random.default_rng(seed)
     alpha = np.linspace(0.1, 0.9, 12)
@@ -56,12 +56,19 @@ def fitted_line(seed, law):
         1000,
         Covariance(factor, energy, 1000, 0.0),
     )
-    return fit(profiles, law, "reflectance")
+    return fit(profiles, law, "reflectance", free=free)
 
 
 @pytest.fixture(scope="module")
 def line_fit():
     return fitted_line(8, Line(Setting()))
+
+
+def test_one_constant_has_a_chain_too():
+    one = fitted_line(8, Line(Setting()), free=("u",))
+    found = posterior(one, "misfit")
+    assert found.result == "converged"
+    assert np.std(found.samples) == pytest.approx(np.sqrt(one.misfit[0, 0]), rel=0.1)
 
 
 def whitened(samples, covariance):
