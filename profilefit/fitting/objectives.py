@@ -27,9 +27,9 @@ EVERYWHERE = 1e9
 # An error of the cdf weighs as much as a relative error of the profile twenty times its size.
 SHARE_WEIGHT = 20.0
 NO_LIMITS = (0.0, 0.0, 0.0)
-# Near white the profile close to its source changes with 1 - alpha only, while A and kappa go with its root: two
-# albedos this near to white see the sign of the root's term, and their rise must be more than this (relative).
-WHITEST, LEAST_RISE = (1.0 - 1e-5, 1.0), 4e-5
+# Next to white A and kappa go with v = sqrt(1 - alpha), exact R_d at one radius with v^2 only. What a law has in v must
+# not be light that absorption adds: its slope in ln R_d, seen this near to white, must be less than -`LEAST_FALL`.
+NEXT_TO_WHITE, LEAST_FALL = 1e-8, 3e-3
 DARK = 1e-12  # energy of a ring that holds none
 
 
@@ -91,7 +91,7 @@ def relative(law, rings: Rings) -> Array:
     cdf at all edges, `SHARE_WEIGHT` times as heavy, since `ks` must be that much smaller than `rel`. The
     last rows resist a law that falls with alpha next to white, ring by ring: absorption must not add light.
     """
-    fall = _fall(law, rings)
+    added = _added_light(law, rings)
     alpha, law = rings.alpha[:, None], law.under(rings.surface)
     inside = law.unscaled_energy(rings.r_edges, alpha)
     widths = jnp.diff(jnp.log(jnp.maximum(rings.r_edges, rings.r_edges[1])))
@@ -103,19 +103,18 @@ def relative(law, rings: Rings) -> Array:
     )  # also where nothing counts: E^2 in a derivative must not underflow
     misfit = weight * (jnp.diff(inside, axis=-1) / data - 1.0)
     shares = inside / law.unscaled_energy(EVERYWHERE, alpha) - rings.cdf
-    of_each = rings.alpha.size // len(fall)
-    falling = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(fall, of_each, axis=0)
-    return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, falling], axis=1)
+    of_each = rings.alpha.size // len(added)
+    added = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(added, of_each, axis=0)
+    return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, added], axis=1)
 
 
-def _fall(law, rings: Rings) -> Array:
-    """(j, n) how far the energy of each ring falls short of rising with alpha next to white, at each of the indices; 0
-    where it rises."""
-    inside = law.under(rings.surfaces).unscaled_energy(rings.r_edges, jnp.array(WHITEST)[:, None, None])
-    darker, white = jnp.diff(inside, axis=-1)
+def _added_light(law, rings: Rings) -> Array:
+    """(j, n) d ln E / d sqrt(1 - alpha) of each ring next to white plus `LEAST_FALL`, at each index; 0 if negative."""
+    alpha = jnp.array([1.0 - NEXT_TO_WHITE, 1.0])[:, None, None]
+    darker, white = jnp.diff(law.under(rings.surfaces).unscaled_energy(rings.r_edges, alpha), axis=-1)
     lit = (darker > DARK) & (white > DARK)
-    ratio = jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)
-    return jnp.where(lit, jnp.maximum(jnp.log(ratio) + LEAST_RISE, 0.0), 0.0)
+    slope = jnp.log(jnp.where(lit, darker, 1.0) / jnp.where(lit, white, 1.0)) / np.sqrt(NEXT_TO_WHITE)
+    return jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
 
 
 def radial(law, rings: Rings) -> Array:

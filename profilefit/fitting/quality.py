@@ -72,12 +72,12 @@ def _truth(alpha: float, setting: Setting) -> _Truth:
     outer = float(exact.quantile(ENERGY_WITHIN, alpha, setting=setting))
     r = np.geomspace(NEAREST, outer, RADII)
     far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
-    profile = np.asarray(exact.profile(r, alpha, setting=setting))
     walked = np.append(r, outer + np.arange(1, 9) / 8)  # (6) may stop one stride beyond
-    cut = trimmed_radius(walked, walked * np.asarray(exact.profile(walked, alpha, setting=setting)))
+    profile = np.asarray(exact.profile(walked, alpha, setting=setting))
+    cut = trimmed_radius(walked, walked * profile)
     even = (np.arange(RADII) + 0.5) / RADII * cut
     scaled = even * np.asarray(exact.profile(even, alpha, setting=setting))
-    return _Truth(r, profile, far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
+    return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
 
 
 def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:

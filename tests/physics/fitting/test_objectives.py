@@ -217,19 +217,18 @@ def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, 
 
 @pytest.mark.slow
 def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
-    """A law whose energy is (2 - alpha) times another's falls by 1e-5 over the last 1e-5 of albedo."""
+    """A law whose energy is 1 + v times another's, v = sqrt(1 - alpha), falls with the slope 1 in v at white."""
 
     class Falling:
         def under(self, surfaces):
             return self
 
         def unscaled_energy(self, x, alpha):
-            return burley.unscaled_energy(x, 0.9 + 0 * alpha) * (2 - alpha)
+            return burley.unscaled_energy(x, 0.9 + 0 * alpha) * (1 + jnp.sqrt(1 - alpha))
 
     limits = np.array([0.0, 0.0, 7.0])
     n = EDGES.size - 1
     rows = np.asarray(objectives.relative(Falling(), of_law(burley, limits=limits)))[:, 2 * n + 1 :]
-    fall = np.log1p(1e-5) + objectives.LEAST_RISE
-    np.testing.assert_allclose(rows, 7 * fall / np.sqrt(ALPHAS.size), rtol=1e-6)
+    np.testing.assert_allclose(rows, 7 * (1 + objectives.LEAST_FALL) / np.sqrt(ALPHAS.size), rtol=1e-4)
     rises = np.asarray(objectives.relative(burley, of_law(burley, limits=limits)))[:, 2 * n + 1 :]
     assert np.any(rises == 0)
