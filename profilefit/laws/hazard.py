@@ -77,7 +77,7 @@ def radius(xi: Array, shape: Shape, steps: int) -> Array:
     """x at which the share xi of the energy has left, by `steps` steps from a guess; 0 at xi = 0, infinite at 1."""
     left = jnp.maximum(1.0 - xi, jnp.finfo(jnp.result_type(xi, float)).tiny)
     t = -jnp.log(left)
-    x = radius_at(t, xi / left / jnp.maximum(t, NEAREST), shape, steps)
+    x = radius_at(t, xi / (left * jnp.maximum(t, NEAREST)), shape, steps)
     return jnp.where(xi < 1.0, x, jnp.inf)
 
 

@@ -17,11 +17,12 @@ from profilefit.laws.hazard import FARTHEST, NEAREST, Shape, cumulative, density
 from profilefit.laws.refracting_rational import REFRACTING, RefractingRational
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
-# First guesses of a radius: of light scattered once p; of the rest p, q, d, m, and what bends them at small t and large
-# kappa. Their error after a step is least, over every alpha, n from 1.001 to 1.6 and both lights.
 ROUND = 1e-2  # of b [1/mfp^2]: where its parabola is as small, it turns to zero and never gets there
 LEAST_W = 1e-3  # of -w [1/mfp]: h must be positive
+# First guesses of a radius: of light scattered once p; of the rest p, q, d, m, and what bends them at small t and large
+# kappa. Their error after a step is least, over every alpha, n from 1.001 to 1.6 and both lights.
 ONCE, AGAIN = 0.535, (1.3479, 0.7442, 3.0873, 1.2056, 2.1187, -1.4458, 0.456)
+LEAST_STRETCH = 1e-3  # keeps the guess positive
 MOST_WHITE = 16.0  # keeps the guess finite in dark media, where the tail that it is made for is not reached
 
 
@@ -278,10 +279,9 @@ class RefractingHazardSampler(Sampler):
         high, width = jnp.where(is_once, of.share, 1.0), jnp.where(is_once, of.share, of.rest)
         least = jnp.finfo(jnp.result_type(xi, float)).tiny
         left = jnp.maximum((high - xi) / jnp.maximum(width, least), least)
-        shape = jax.tree.map(lambda once, again: jnp.where(is_once, once, again), of.once, of.again)
         left = jnp.minimum(left, 1.0)
         t = -jnp.log(left)
-        x = drawn(t, (1.0 - left) / left / jnp.maximum(t, NEAREST), shape, is_once, self.steps)
+        x = drawn(t, (1.0 - left) / (left * jnp.maximum(t, NEAREST)), of, is_once, self.steps)
         return jnp.where(xi < 1.0, x, jnp.inf)
 
     def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
@@ -300,24 +300,28 @@ class RefractingHazardSampler(Sampler):
         of = self.law.parts(alpha)
 
         def own(shape: Shape, is_once: bool) -> Array:
-            return map_density(x, shape, lambda t: drawn(t, growth(t), shape, is_once, self.steps))
+            return map_density(x, shape, lambda t: drawn(t, growth(t), of, is_once, self.steps))
 
         return of.share * own(of.once, True) + of.rest * own(of.again, False)
 
 
-def drawn(t: Array, growth: Array, shape: Shape, is_once: Array | bool, steps: int) -> Array:
+def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int) -> Array:
     """x at t = -ln S of a part, growth = (e^t - 1) / t."""
-    once = 1.0 + ONCE * t
-    near_source = t * once / (shape.kappa * once + shape.source - shape.kappa)
+    first, rest = of.once, of.again
     p, q, d, m, e, f, g = AGAIN
-    # Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t).
-    rate = m * jnp.sqrt(d * jnp.maximum(-shape.w, NEAREST) / shape.h)
-    white = q * jnp.minimum(rate * shape.c / shape.b * jnp.exp(-0.5 * shape.w * shape.h), MOST_WHITE)
-    stretch = (1.0 - white) + p * t + white * growth
-    slowest = rate * (1.0 + shape.kappa * (e + f * shape.kappa))
-    bent = jnp.sqrt(t * (t + 2.0 * d)) / (1.0 + g * jnp.sqrt(t))
-    again = bent * jnp.maximum(stretch, 1e-3) / (shape.kappa * stretch + slowest)
-    x = jnp.where(is_once, near_source, again)
+    # Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t). Numbers
+    # of a material before those of a point.
+    rate = m * jnp.sqrt(d * jnp.maximum(-rest.w, NEAREST) / rest.h)
+    white = q * jnp.minimum(rate * rest.c / rest.b * jnp.exp(-0.5 * rest.w * rest.h), MOST_WHITE)
+    slowest = rate * (1.0 + rest.kappa * (e + f * rest.kappa))
+    stretch = jnp.maximum((1.0 - white) + p * t + white * growth, LEAST_STRETCH)
+    bend = 1.0 + g * jnp.sqrt(t)
+    once = 1.0 + ONCE * t
+    length = jnp.where(is_once, t * once, jnp.sqrt(t * (t + 2.0 * d)) * stretch)
+    x = length / jnp.where(
+        is_once, first.kappa * once + (first.source - first.kappa), (rest.kappa * stretch + slowest) * bend
+    )
+    shape = jax.tree.map(lambda one, other: jnp.where(is_once, one, other), first, rest)
     for _ in range(steps):
         x = _closer(x, t, shape)
     return x
@@ -327,7 +331,7 @@ def _closer(x: Array, t: Array, shape: Shape) -> Array:
     near = jnp.clip(x, NEAREST, FARTHEST)
     here = local(near, shape)
     spent = jnp.maximum(here.exponent - jnp.log(here.ratio), NEAREST)
-    root, flight = jnp.sqrt(spent), 1.0 / jnp.maximum(here.hazard, NEAREST)
-    step = 2.0 * root * (jnp.sqrt(t) - root) * flight
-    y = (here.hazard / (2.0 * spent) - here.bend * flight) * step
+    flight, beyond = 1.0 / jnp.maximum(here.hazard, NEAREST), jnp.sqrt(t / spent) - 1.0
+    step = 2.0 * spent * beyond * flight
+    y = beyond - here.bend * flight * step
     return jnp.maximum(near + step * (1.0 + y * (1.0 / 2 + y * (1.0 / 6))), 0.0)

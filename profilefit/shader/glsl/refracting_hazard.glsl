@@ -11,6 +11,8 @@ struct LAW_Shape {
     float rest; // 1 - share, which would cancel where the medium is dark
     PfCurve once;
     PfCurve again;
+    float white; // of the first guess of a radius: share of what grows with e^t [-]
+    float slowest; // its slope's inverse at the source [1/mfp]
 };
 
 // All that depends on alpha only: once a material, or once a pixel where A is a texture.
@@ -42,6 +44,9 @@ LAW_Shape LAW_shape(float alpha) {
     shape.rest = alpha * again / (LAW_map_once + alpha * again);
     shape.once = f;
     shape.again = s;
+    float rate = 1.2056 * sqrt(3.0873 * max(-s.w, PF_NEAREST) / s.h);
+    shape.white = 0.7442 * min(rate * s.c / max(s.b, PF_NEAREST) * exp(-0.5 * s.w * s.h), 16.0);
+    shape.slowest = rate * (1.0 + kappa * (2.1187 - 1.4458 * kappa));
     return shape;
 }
 
@@ -81,23 +86,20 @@ float LAW_radius(float xi, LAW_Shape s) {
     float left = clamp(1.0 - inner, 1.0 - PF_MOST_XI, 1.0);
     float t = -log(left);
     float t_first = 1.0 + 0.535 * t;
-    float first = t * t_first / (curve.kappa * t_first + max(curve.source - curve.kappa, PF_NEAREST));
+    float first = t * t_first / (s.once.kappa * t_first + max(s.once.source - s.once.kappa, PF_NEAREST));
     float growth = PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
-    float rate = 1.2056 * sqrt(3.0873 * max(-curve.w, PF_NEAREST) / curve.h);
-    float white = 0.7442 * min(rate * curve.c / max(curve.b, PF_NEAREST) * exp(-0.5 * curve.w * curve.h), 16.0);
-    float stretch = 1.0 - white + 1.3479 * t + white * growth;
-    float bent = sqrt(t * (t + 6.1746)) / (1.0 + 0.456 * sqrt(t));
-    float slowest = rate * (1.0 + curve.kappa * (2.1187 - 1.4458 * curve.kappa));
-    float later = bent * max(stretch, 1e-3) / max(curve.kappa * stretch + slowest, 1e-3);
+    float stretch = max(1.0 - s.white + 1.3479 * t + s.white * growth, 1e-3);
+    float slope = max(s.again.kappa * stretch + s.slowest, 1e-3) * (1.0 + 0.456 * sqrt(t));
+    float later = sqrt(t * (t + 6.1746)) * stretch / slope;
     float x = PF_SELECT(share < s.share, first, later);
     for (int i = 0; i < HAZARD_STEPS; ++i) {
         float start = clamp(x, PF_NEAREST, PF_FARTHEST);
         PfLocal here = pf_local(start, curve);
         float spent = max(here.exponent - log(here.ratio), PF_NEAREST);
-        float root = sqrt(spent);
         float flight = 1.0 / max(here.hazard, PF_NEAREST);
-        float move = 2.0 * root * (sqrt(t) - root) * flight;
-        float y = (here.hazard / (2.0 * spent) - here.bend * flight) * move;
+        float beyond = sqrt(t / spent) - 1.0;
+        float move = 2.0 * spent * beyond * flight;
+        float y = beyond - here.bend * flight * move;
         x = max(start + move * (1.0 + y * (0.5 + y * 0.16666666666666667)), 0.0);
     }
     return x;
