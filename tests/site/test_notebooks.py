@@ -180,8 +180,8 @@ def test_light_and_surface_cost_more_steps_than_a_law():
     (apart,) = numbers(r"± model\s+taken one by one\s+(\S+) steps", text)
     (together,) = numbers(r"± model .*together\s+(\S+) steps", text)
     assert apart > 1 > 2 * together
-    shows = dict(zip(("b0", "c2"), numbers(r"(?m)^[bc]\d: (\d+) % show as one step", text), strict=True))
-    assert shows["b0"] < 5 < 20 < shows["c2"]
+    most, least = numbers(r"(?m)^[a-h]\d: (\d+) % show as one step", text)
+    assert most < 8 < 100 < least
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 @pytest.mark.slow
 def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
-    absent = ("absent", "gaussians", "no-such-set")
+    absent = contenders.Wanted("absent", "gaussians", "no-such-set")
     monkeypatch.setattr(contenders, "WANTED", (*(w for w in contenders.WANTED if w[0] in wanted), absent))
     monkeypatch.setattr(laws, "QUICK", SMALL)
     numbers = tmp_path / "numbers.json"
@@ -28,7 +28,7 @@ def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     assert set(content) == wanted | {f"{contenders.YARDSTICK}, Xie's sampler", "hazard, two steps"}
     assert content[contenders.YARDSTICK]["time_ratio"]["both"] == [1.0, 1.0, 1.0]
     hazard = content["hazard"]
-    assert hazard["constants"] == 12
+    assert hazard["constants"] == 14
     assert hazard["functions"]["both"] == {"exp": 1, "log": 4}
     assert hazard["setup_nanoseconds"] > 0
     assert hazard["rel"]["worst"] < 0.01 < 0.05 < content["Liang, corrected"]["rel"]["worst"]
