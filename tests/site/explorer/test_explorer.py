@@ -138,7 +138,10 @@ def test_errors_are_those_of_quality(explorer, laws, name):
     truth = profile_quality(laws[name], found["alpha"])
     np.testing.assert_allclose(found["rel"], truth.rel, atol=TABLE)
     np.testing.assert_allclose(found["ks"], truth.ks, atol=TABLE)
-    shown = [float(text.replace("−", "-")) for text in explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()]
+    shown = [
+        float(text.replace("−", "-"))
+        for text in explorer.locator("[data-part='readout'] td:nth-child(5)").all_inner_texts()
+    ]
     np.testing.assert_allclose(shown, truth.rel, rtol=0.05)  # two digits
 
 
