@@ -16,8 +16,8 @@ from profilefit.fitting.estimate import Fit, fit
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import albedo_quality, profile_quality
 from profilefit.laws import published
-from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
-from profilefit.recipes import catalogue, quality_tally, starts
+from profilefit.laws.base import Constants, ProfileLaw
+from profilefit.recipes import catalogue, starts
 from profilefit.recipes.crosscheck import crosscheck
 from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
@@ -46,7 +46,7 @@ def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
     laws = {**_printed_laws(recipe, run), "regenerated": result.law}
-    content["quality"] = {name: _albedo_quality(law, light) for name, law in laws.items()}
+    content["quality"] = {name: albedo_quality(law) for name, law in laws.items()}
     if recipe.indices:
         law: Any = result.law
         each = {n: albedo_quality(law.at_index(n)).delta_A for n in _judged(recipe)}
@@ -61,7 +61,7 @@ def _profile(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     profiles = truth_of(recipe, light)
     result, found = _fitted(recipe, run, profiles, light)
     content, arrays = _described(recipe, run, profiles, result)
-    content["quality"] = _compare(recipe, run, result.law, light)
+    content["quality"] = _compare(recipe, run, result.law)
     if recipe.indices:
         content["quality"]["by_index"] = by_index(result.law, _judged(recipe))
     content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
@@ -111,7 +111,7 @@ def _as_published(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
         "length_exponents": staged.length_exponents(tuple(points.values())) if len(points) > 1 else {},
         "per_albedo_failures": {f"{m:g}": sum(r != "converged" for r in p.results) for m, p in points.items()},
     }
-    content["quality"] = _compare(recipe, run, result.law, light)
+    content["quality"] = _compare(recipe, run, result.law)
     content["normalisation"] = catalogue.normalisation(recipe.setting, run.out).constants()
     arrays |= {"coefficients": unit.values, "coefficient_errors": unit.standard_error, "r_trim": unit.r_trim}
     return content, arrays | curves(profiles)
@@ -215,26 +215,14 @@ def _printed_laws(recipe: Recipe, run: RecipeRun) -> dict[str, Any]:
     return {name: kind(**given, **values) for name, values in printed_sets(recipe).items()}
 
 
-def _compare(recipe: Recipe, run: RecipeRun, law: Any, light: Orders | None) -> dict[str, Any]:
+def _compare(recipe: Recipe, run: RecipeRun, law: Any) -> dict[str, Any]:
     """The measures of every set of constants of this law, at held-out albedos."""
     alpha = albedo_values(QUALITY_ALBEDOS)
     table: dict[str, Any] = {"alpha": alpha}
     for name, one in {**_printed_laws(recipe, run), "regenerated": law}.items():
-        measured = asdict(_profile_quality(one, alpha, light))
+        measured = asdict(profile_quality(one, alpha))
         table[name] = {key: value for key, value in measured.items() if key != "alpha"}
     return table
-
-
-def _profile_quality(law: ProfileLaw, alpha: Floats, light: Orders | None) -> Any:
-    if law.setting.n >= 1.0 or light is None:
-        return profile_quality(law, alpha)
-    return quality_tally.profile_quality(law, light, alpha)
-
-
-def _albedo_quality(law: AlbedoLaw, light: Orders | None) -> Any:
-    if law.setting.n >= 1.0 or light is None:
-        return albedo_quality(law)
-    return quality_tally.albedo_quality(law, light)
 
 
 def _regenerated_laws(run: RecipeRun) -> dict[str, ProfileLaw]:

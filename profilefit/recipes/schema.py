@@ -65,6 +65,7 @@ NUMBERS = Kind("a list of numbers", _every(is_number, 1))
 MEASURES = Kind("a list of numbers or nulls", _every(_is_measure))
 RATIOS = Kind("a list of numbers > 0", _every(lambda value: is_number(value) and value > 0, 1))
 PAIR = Kind("a list of two numbers or nulls", lambda value: _every(_is_measure)(value) and len(value) == 2)
+SPAN = Kind("a list of two numbers", lambda value: _every(is_number)(value) and len(value) == 2)
 HALVES = Kind("a list of pairs of numbers", _every(lambda row: _every(is_number)(row) and len(row) == 2))
 MATRIX = Kind("a square matrix of numbers, or null", _is_matrix)
 
@@ -79,7 +80,7 @@ ERRORS = {
     "jackknife_error": "jackknife",
 }
 # What a law is made of.
-NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "indices?": PAIR, "data_digest?": DIGEST}
+NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "indices?": SPAN, "data_digest?": DIGEST}
 CONSTANTS: Kinds = {
     "constants": TABLE,
     "constants.*": TABLE,
@@ -104,8 +105,9 @@ TOLD: Kinds = {
     "versions?": TABLE,
     "versions?.*": TEXT,
 }
-# A measure of laws by albedo, and one of maps as a whole.
-BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error", "rel_noise", "ks_noise")
+# A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
+BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
+BY_INDEX = ("n", "rel", "ks", "largest", "delta_A")
 OF_MAP = {
     "delta_A": NUMBER,
     "delta_alpha": NUMBER,
@@ -199,7 +201,7 @@ FIT: Kinds = {
     "quality.regenerated": TABLE,
     "quality.alpha?": NUMBERS,
     "quality.by_index?": TABLE,
-    **{f"quality.by_index?.{name}?": NUMBERS for name in ("n", "rel", "ks", "largest", "delta_A")},
+    **{f"quality.by_index?.{name}?": NUMBERS for name in BY_INDEX},
     **{f"quality.{one}?": TABLE for one in SETS},
     **{f"quality.{one}?.{name}?": NUMBERS for one in SETS for name in BY_ALBEDO},
     **{f"quality.{one}?.{name}_halves?": HALVES for one in SETS for name in ("mse", "r2")},
@@ -270,6 +272,7 @@ def problem(content: dict[str, Any], whole: bool) -> str | None:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
         kinds += [TOLD, PIPELINES[str(pipeline)][1]]
     found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
+    found = found or _outside(content)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
 
 
@@ -314,6 +317,15 @@ def _each(value: Any, key: list[str], place: str = "") -> Iterator[tuple[str, An
         yield from _each(value.get(name, ABSENT), key[1:], f"{place}.{name}")
 
 
+def _outside(content: dict[str, Any]) -> str | None:
+    """An index of its own that is none of those which its constants are for."""
+    n = content["setting"].get("n")
+    if "indices" not in content or not is_number(n):
+        return None
+    low, high = content["indices"]
+    return None if low < n <= high else f"setting.n must be in ({low:g}, {high:g}], as its indices are, got {n:g}"
+
+
 def _mismatched(content: dict[str, Any]) -> str | None:
     """Lists that must be as long as others, names that must be of the constants, measures that come together."""
     names = content.get("covariance", {}).get("names", [])
@@ -327,6 +339,10 @@ def _mismatched(content: dict[str, Any]) -> str | None:
         if len(derived[key]) != len(derived["alpha"]):
             return f"derived.{key} must be as long as derived.alpha, {len(derived['alpha'])}, got {len(derived[key])}"
     quality = content["quality"]
+    by_index = quality.get("by_index", {})
+    for key in BY_INDEX:
+        if key in by_index and len(by_index[key]) != len(by_index.get("n", ())):
+            return f"quality.by_index.{key} must be as long as quality.by_index.n, got {len(by_index[key])}"
     found = [one for one in SETS if one in quality]
     for one in found:
         for key in (*BY_ALBEDO, "mse_halves", "r2_halves"):

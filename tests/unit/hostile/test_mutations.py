@@ -35,7 +35,7 @@ from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading
 from profilefit.recipes import recipe, record
-from profilefit.recipes.inventory import find
+from profilefit.recipes.inventory import Named, find
 from profilefit.report.page.document import write_page
 from profilefit.scenes.skin import scene as skin
 from profilefit.shader import emit
@@ -185,9 +185,14 @@ def skeleton(text: str, lang: str) -> Any:
     return tokens(text, True), tokens(text, False)
 
 
+def code_of(named: Named, lang: str) -> tuple[str, str, str]:
+    """What decides an exported code, numbers apart: one prefix serves laws of matched and of refracting surfaces."""
+    return type(named.law).__name__, emit.prefix(named.law), lang
+
+
 @cache
-def expected() -> dict[tuple[str, str], Any]:
-    """The same of the records unchanged, by the prefix of their law and the language."""
+def expected() -> dict[tuple[str, str, str], Any]:
+    """The same of the records unchanged."""
     found = {}
     for name in mutations.records():
         with tempfile.TemporaryDirectory() as folder:  # a folder of one record is read soonest
@@ -195,7 +200,7 @@ def expected() -> dict[tuple[str, str], Any]:
             with contextlib.suppress(RecordError):  # one of readings holds no law
                 named = find(name, Path(folder))
                 for lang in LANGUAGES:
-                    found[emit.prefix(named.law), lang] = skeleton(export(named, Path(folder), lang), lang)
+                    found[code_of(named, lang)] = skeleton(export(named, Path(folder), lang), lang)
     return found
 
 
@@ -210,7 +215,7 @@ def export_faults(name: str, folder: Path, faults: list[str], told: str) -> None
             text = export(named, folder, lang)
             if CONTROL.search(text):
                 faults.append(f"{told}, {lang}: control characters {CONTROL.findall(text)[:5]}")
-            if skeleton(text, lang) != known.get((emit.prefix(named.law), lang)):
+            if skeleton(text, lang) != known.get(code_of(named, lang)):
                 faults.append(f"{told}, {lang}: other code than of the record unchanged")
 
 

@@ -302,6 +302,22 @@ def test_lists_that_belong_together_are_of_one_length(tmp_path):
             record.read(path, whole=True)
 
 
+def test_what_a_law_of_many_indices_needs(tmp_path):
+    """Its own index, of which it is exported, is one of those; a table by index has a number for each."""
+    for change, whole, words in (
+        (lambda c: c["setting"].update(n=1.7), False, r"setting.n must be in \(1, 1.6\], as its indices are, got 1.7"),
+        (lambda c: c["setting"].update(n=1.0), False, r"setting.n must be in \(1, 1.6\]"),
+        (lambda c: c.update(indices=[None, 1.6]), False, "indices must be a list of two numbers"),
+        (lambda c: c["quality"]["by_index"]["rel"].pop(), True, "by_index.rel must be as long as quality.by_index.n"),
+    ):
+        content = json.loads((fits_folder() / "hazard-refracting.json").read_text())
+        change(content)
+        path = tmp_path / "mine.json"
+        path.write_text(json.dumps(content))
+        with pytest.raises(RecordError, match=words):
+            record.read(path, whole=whole)
+
+
 def test_records_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(RecordError, match=r"gone\.json: there is no such record; `profilefit regenerate` makes them"):
         record.read(tmp_path / "gone.json")
