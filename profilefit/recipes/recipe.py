@@ -11,7 +11,8 @@ from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecipeError
-from profilefit.recipes.schema import LONGEST_TEXT, PIPELINES, is_line, is_number
+from profilefit.recipes.kinds import LONGEST_TEXT, is_line, is_number
+from profilefit.recipes.schema import PIPELINES
 
 TRUTHS = ("orders", "exact")
 SEARCHLIGHT = Setting()

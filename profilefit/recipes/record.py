@@ -24,7 +24,7 @@ from mcml_sim.files.text_file import plain as to_plain
 from mcml_sim.files.whole_file import read_whole, require_folder, write_together
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError, RecordError
-from profilefit.recipes import schema
+from profilefit.recipes import kinds, schema
 
 FORMAT = 2
 # What the covariance of the misfit was called in format 1, beside the discrepancy of the model, which keeps its name.
@@ -58,8 +58,8 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     Its law, pipeline, setting and constants must be there: that is what a law is made from. A `whole` record holds
     everything that `profilefit report` shows.
     """
-    if not schema.is_line(path.stem):  # it is shown, and stands in exported texts
-        raise RecordError(f"{str(path)!r}: the name of a record must be {schema.TEXT.words}")
+    if not kinds.is_line(path.stem):  # it is shown, and stands in exported texts
+        raise RecordError(f"{str(path)!r}: the name of a record must be {kinds.TEXT.words}")
     if not path.exists():
         raise RecordError(f"{path}: there is no such record; `profilefit regenerate` makes them")
     try:
@@ -69,7 +69,7 @@ def read(path: Path, whole: bool = False) -> dict[str, Any]:
     except ValueError as error:
         raise RecordError(f"{path}: is not a record: {error}") from None
     if not isinstance(content, dict) or content.get("format") not in (1, FORMAT):
-        found = schema.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
+        found = kinds.shown(content.get("format")) if isinstance(content, dict) else repr(type(content).__name__)
         raise RecordError(f"{path}: is not a record of format 1 or {FORMAT}, got {found}")
     if content["format"] == 1:
         content = _of_format_1(content)
@@ -99,8 +99,17 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
 
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
     """RecordError where a record lacks what `read` promises, or holds what is of another kind."""
-    if text := schema.problem(content, whole):
+    if text := schema.problem(content, whole) or _outside(content):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+
+
+def _outside(content: Mapping[str, Any]) -> str | None:
+    """An index of its own that is none of those which its constants are for."""
+    n = content["setting"].get("n")
+    if "indices" not in content or not kinds.is_number(n):
+        return None
+    low, high = content["indices"]
+    return None if low < n <= high else f"setting.n must be in ({low:g}, {high:g}], as its indices are, got {n:g}"
 
 
 def record_setting(content: Mapping[str, Any]) -> Setting:

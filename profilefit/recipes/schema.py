@@ -6,69 +6,33 @@ constants: what passes here is safe for both.
 
 from __future__ import annotations
 
-import json
-import re
-import sys
-from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-LONGEST_TEXT = 1000  # characters; ours have 256
-DEEPEST = 12  # tables and lists within one another; ours have 6
-LONGEST_SHOWN = 60  # characters of a value in a message
-
-
-def is_line(value: Any) -> bool:
-    """Whether it is one line of printable text: no line break of any kind, no control character, no hidden one."""
-    return isinstance(value, str) and len(value) <= LONGEST_TEXT and value.isprintable()
-
-
-def is_number(value: Any) -> bool:
-    """Whether it is a number that float64 can hold; true and false are none."""
-    if not isinstance(value, int | float) or isinstance(value, bool):
-        return False
-    return abs(value) <= sys.float_info.max  # false for nan; exact for whole numbers of any size
-
-
-@dataclass(frozen=True)
-class Kind:
-    """What a value may be: `accepts` decides, `words` say it."""
-
-    words: str
-    accepts: Callable[[Any], bool]
-
-
-def _every(accepts: Callable[[Any], bool], least: int = 0) -> Callable[[Any], bool]:
-    return lambda value: isinstance(value, list) and len(value) >= least and all(map(accepts, value))
-
-
-def _is_measure(value: Any) -> bool:
-    return value is None or is_number(value)
-
-
-def _is_matrix(value: Any) -> bool:
-    return value is None or _every(lambda row: _every(_is_measure)(row) and len(row) == len(value))(value)
-
-
-TEXT = Kind(f"one line of printable text, of {LONGEST_TEXT} characters at most", is_line)
-TEXTS = Kind("a list of texts", _every(is_line))
-DIGEST = Kind(
-    "64 hexadecimal digits", lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{64}", value))
+from profilefit.recipes.kinds import (
+    COUNT,
+    DIGEST,
+    FLAG,
+    HALVES,
+    LIST,
+    MATRIX,
+    MEASURE,
+    MEASURES,
+    NUMBER,
+    NUMBERS,
+    PAIR,
+    RATIOS,
+    SPAN,
+    TABLE,
+    TEXT,
+    TEXTS,
+    Kind,
+    is_line,
+    is_number,
+    shown,
 )
-NUMBER = Kind("a number", is_number)
-MEASURE = Kind("a number or null", _is_measure)  # null where it is not finite
-COUNT = Kind("a whole number", lambda v: isinstance(v, int) and not isinstance(v, bool) and 0 <= v < 2**63)
-FLAG = Kind("true or false", lambda value: isinstance(value, bool))
-TABLE = Kind("a table", lambda value: isinstance(value, dict))
-LIST = Kind("a list", lambda value: isinstance(value, list))
-NUMBERS = Kind("a list of numbers", _every(is_number, 1))
-MEASURES = Kind("a list of numbers or nulls", _every(_is_measure))
-RATIOS = Kind("a list of numbers > 0", _every(lambda value: is_number(value) and value > 0, 1))
-PAIR = Kind("a list of two numbers or nulls", lambda value: _every(_is_measure)(value) and len(value) == 2)
-SPAN = Kind("a list of two numbers", lambda value: _every(is_number)(value) and len(value) == 2)
-HALVES = Kind("a list of pairs of numbers", _every(lambda row: _every(is_number)(row) and len(row) == 2))
-MATRIX = Kind("a square matrix of numbers, or null", _is_matrix)
 
+DEEPEST = 12  # tables and lists within one another; ours have 6
 # By dotted key, * for each one inside, ? behind what may be absent; a table stands before what is in it.
 Kinds = Mapping[str, Kind]
 # A constant's errors in a record, and what tables and texts call them; older records have no second and third.
@@ -107,7 +71,7 @@ TOLD: Kinds = {
 }
 # A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
 BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
-BY_INDEX = ("n", "rel", "ks", "largest", "delta_A")
+HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "rel", "ks", "largest", "delta_A")
 OF_MAP = {
     "delta_A": NUMBER,
     "delta_alpha": NUMBER,
@@ -204,7 +168,7 @@ FIT: Kinds = {
     **{f"quality.by_index?.{name}?": NUMBERS for name in BY_INDEX},
     **{f"quality.{one}?": TABLE for one in SETS},
     **{f"quality.{one}?.{name}?": NUMBERS for one in SETS for name in BY_ALBEDO},
-    **{f"quality.{one}?.{name}_halves?": HALVES for one in SETS for name in ("mse", "r2")},
+    **{f"quality.{one}?.{name}?": HALVES for one in SETS for name in HALVED},
     **{f"quality.{one}?.{name}?": kind for one in SETS for name, kind in OF_MAP.items()},
     **PARTS,
 }
@@ -272,7 +236,6 @@ def problem(content: dict[str, Any], whole: bool) -> str | None:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
         kinds += [TOLD, PIPELINES[str(pipeline)][1]]
     found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
-    found = found or _outside(content)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
 
 
@@ -317,15 +280,6 @@ def _each(value: Any, key: list[str], place: str = "") -> Iterator[tuple[str, An
         yield from _each(value.get(name, ABSENT), key[1:], f"{place}.{name}")
 
 
-def _outside(content: dict[str, Any]) -> str | None:
-    """An index of its own that is none of those which its constants are for."""
-    n = content["setting"].get("n")
-    if "indices" not in content or not is_number(n):
-        return None
-    low, high = content["indices"]
-    return None if low < n <= high else f"setting.n must be in ({low:g}, {high:g}], as its indices are, got {n:g}"
-
-
 def _mismatched(content: dict[str, Any]) -> str | None:
     """Lists that must be as long as others, names that must be of the constants, measures that come together."""
     names = content.get("covariance", {}).get("names", [])
@@ -334,33 +288,21 @@ def _mismatched(content: dict[str, Any]) -> str | None:
     for kind, matrix in content.get("covariance", {}).items():
         if kind != "names" and matrix is not None and len(matrix) != len(names):
             return f"covariance.{kind} must have a row for each of {len(names)} names, got {len(matrix)}"
-    derived = content.get("derived", {})
-    for key in ("value", "statistical", "model") if derived else ():
-        if len(derived[key]) != len(derived["alpha"]):
-            return f"derived.{key} must be as long as derived.alpha, {len(derived['alpha'])}, got {len(derived[key])}"
-    quality = content["quality"]
-    by_index = quality.get("by_index", {})
-    for key in BY_INDEX:
-        if key in by_index and len(by_index[key]) != len(by_index.get("n", ())):
-            return f"quality.by_index.{key} must be as long as quality.by_index.n, got {len(by_index[key])}"
+    derived, quality = content.get("derived", {}), content["quality"]
+    by_index, alpha = quality.get("by_index", {}), len(quality.get("alpha", ()))
     found = [one for one in SETS if one in quality]
+    for place, table, keys, like, length in (
+        ("derived", derived, ("value", "statistical", "model"), "derived.alpha", len(derived.get("alpha", ()))),
+        ("quality.by_index", by_index, BY_INDEX, "quality.by_index.n", len(by_index.get("n", ()))),
+        *((f"quality.{one}", quality[one], (*BY_ALBEDO, *HALVED), "quality.alpha", alpha) for one in found),
+    ):
+        for key in keys:
+            if key in table and len(table[key]) != length:
+                return f"{place}.{key} must be as long as {like}, {length}, got {len(table[key])}"
     for one in found:
-        for key in (*BY_ALBEDO, "mse_halves", "r2_halves"):
-            length = len(quality.get("alpha", ()))
-            if key in quality[one] and len(quality[one][key]) != length:
-                return f"quality.{one}.{key} must be as long as quality.alpha, {length}, got {len(quality[one][key])}"
         # What is measured of the regenerated law is measured of the printed ones beside it.
         kept = [key for key in ("rel", "ks", "inversion_error") if key in quality["regenerated"]]
         kept += OF_MAP if "delta_A" in quality["regenerated"] else ()
         if missing := [key for key in kept if key not in quality[one]]:
             return f"quality.{one}.{missing[0]} must be there, as others of its kind are, got nothing"
     return None
-
-
-def shown(value: Any) -> str:
-    """A value for a message: printable, and shortened."""
-    try:
-        text = json.dumps(value)
-    except (ValueError, RecursionError, TypeError):  # Python spells no whole number beyond 4300 digits
-        return f"a {type(value).__name__}"
-    return text if len(text) <= LONGEST_SHOWN else f"{text[:LONGEST_SHOWN]}..."
