@@ -6,12 +6,13 @@ panels, where fluences go as z ln z.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import roots_legendre
 
 from mcml_sim.exact.half_space import decay_rate
 from mcml_sim.media.checks import checked_whole
@@ -34,11 +35,13 @@ class Nodes:
     """Numbers of nodes of `exact.solve`, 4 to 100; InputError on any others.
 
     depth   of a panel of depths; slope, azimuth  directions of slanted light where k = 0, more of them elsewhere
+    wave    of a panel of wave numbers, which is as long as it is far from 0
     """
 
     depth: int
     slope: int
     azimuth: int
+    wave: int = 14
 
     def __post_init__(self) -> None:
         for field in fields(self):
@@ -47,9 +50,8 @@ class Nodes:
     @property
     def fewer(self) -> Nodes:
         """Those that an error is estimated with: what they change is above it."""
-        return Nodes(
-            *(max(FEWEST, number) for number in (self.depth * 4 // 5, self.slope * 3 // 4, self.azimuth * 3 // 4))
-        )
+        depth, slope, azimuth = self.depth * 4 // 5, self.slope * 3 // 4, self.azimuth * 3 // 4
+        return replace(self, depth=max(FEWEST, depth), slope=max(FEWEST, slope), azimuth=max(FEWEST, azimuth))
 
 
 class Depths(NamedTuple):
@@ -174,7 +176,7 @@ def _tail(layer: Layer, top: float, tau_top: float, seen: bool) -> Floats:
 @lru_cache(maxsize=512)
 def gauss(nodes: int) -> tuple[Floats, Floats]:
     """Gauss's rule on (0, 1)."""
-    x, weight = np.polynomial.legendre.leggauss(nodes)
+    x, weight = roots_legendre(nodes)  # numpy's takes seconds for thousands of nodes
     return (1 + x) / 2, weight / 2
 
 

@@ -64,7 +64,8 @@ def cones(here: Depths, nodes: int) -> tuple[Complexes, Complexes]:
     slopes, weights, low = [np.empty(0)], [np.empty(0)], 0.0
     for ratio in sorted({ratio for ratio in (here.above, here.below) if ratio > 1}, reverse=True):
         top = np.sqrt(1 - (ratio * low) ** 2 / (1 + low**2))
-        x, weight = gauss(nodes - nodes % -8)  # few rules are kept
+        step = 8 * 2 ** max(0, nodes.bit_length() - 8)  # at most 6 % more nodes, and few rules
+        x, weight = gauss(nodes - nodes % -step)
         # Flat at the normal, where the slope goes as the root of the cosine, and at 90 degrees: where the indices are
         # nearly equal mu follows the cosine but close to 0.
         angle = 0.5 * np.pi * x

@@ -46,7 +46,6 @@ Floats = NDArray[np.float64]
 MAX_LAYERS = 20
 STANDARD = Nodes(depth=20, slope=24, azimuth=24)
 FINE = Nodes(depth=28, slope=32, azimuth=32)
-WAVE_NODES = 14  # of a panel of k, which is as long as it is far from 0
 DECAYED = 32.0  # k times the depth of the next interface, where the stack is no other than its topmost layer
 LAST_WAVE = {True: 2000.0, False: 40.0}  # times the largest mu_t, where indices match and where they do not
 THIN = 1.0  # mean free paths: plates that a half space is not much like, and in which slanted light does not go far:
@@ -194,7 +193,7 @@ class _Difference:
     edges: Floats
     """Of panels of k, (panels + 1,) [1/length]."""
     rest: Floats
-    """Transform of the rest, (panels, WAVE_NODES) [-]."""
+    """Transform of the rest, (panels, nodes) [-]."""
 
     def profile(self, r: Floats) -> Floats:
         """R_d [1/length^2] at radii of shape (n,)."""
@@ -239,18 +238,18 @@ def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order:
     k = low + (stop - low) * ((np.arange(steps)[:, None] + x) / steps).ravel()
     # Ended softly, what is left at the last k blurs the light over a few times its wavelength, and that is all.
     soft = 0.5 * erfc(9.0 * (k / last - 0.52))
-    through = _interpolation((k - low) / (high - low))
+    through = _interpolation((k - low) / (high - low), rest.size)
     values = soft * (through @ rest) * np.tile(weight, steps) * ((stop - low) / steps)
     waves = np.multiply.outer(r, k)
     return j0(waves) @ (values * k) if order == 0 else j1(waves) @ values
 
 
-def _interpolation(at: Floats) -> Floats:
-    """From WAVE_NODES Gauss nodes on (0, 1) to places there, (places, WAVE_NODES)."""
-    x, weight = depths.gauss(WAVE_NODES)
-    degree = np.arange(WAVE_NODES)
-    basis = np.polynomial.legendre.legvander(2 * x - 1, WAVE_NODES - 1) * (2 * degree + 1) * weight[:, None]
-    return np.polynomial.legendre.legvander(2 * at - 1, WAVE_NODES - 1) @ basis.T
+def _interpolation(at: Floats, nodes: int) -> Floats:
+    """From so many Gauss nodes on (0, 1) to places there, (places, nodes)."""
+    x, weight = depths.gauss(nodes)
+    degree = np.arange(nodes)
+    basis = np.polynomial.legendre.legvander(2 * x - 1, nodes - 1) * (2 * degree + 1) * weight[:, None]
+    return np.polynomial.legendre.legvander(2 * at - 1, nodes - 1) @ basis.T
 
 
 def _unit(medium: Medium) -> float:
@@ -261,7 +260,7 @@ def _unit(medium: Medium) -> float:
 def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
-    waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(WAVE_NODES)[0]
+    waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(rule.wave)[0]
     rest, share = _each(lambda k: _rest(medium, k, illumination, rule), waves), 0.0
     if base is not None:
         deep = _rest_of_half_space(base, medium, waves, illumination, rule)
