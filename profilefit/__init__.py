@@ -5,6 +5,7 @@ from profilefit.errors import InputError, OutputError, RecipeError, RecordError,
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest, while Ctrl-C is a traceback
 if TYPE_CHECKING:
+    from profilefit import scenes
     from profilefit.fitting.chains import Posterior, posterior
     from profilefit.fitting.estimate import Fit, fit
     from profilefit.fitting.profiles import Profiles
@@ -19,6 +20,7 @@ else:
             **dict.fromkeys(("Fit", "fit"), "fitting.estimate"),
             "Profiles": "fitting.profiles",
             **dict.fromkeys(("albedo_quality", "profile_quality"), "fitting.quality"),
+            "scenes": "",
         },
     )
 
@@ -39,6 +41,7 @@ __all__ = [
     "names",
     "posterior",
     "profile_quality",
+    "scenes",
 ]
 
 

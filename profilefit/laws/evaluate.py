@@ -28,7 +28,7 @@ PROGRAMS = 256
 # What an argument of this name may be, wherever it occurs. A mean free path beyond these, in whatever unit, has no
 # square in float64; jax arrays of single precision need it within 1e-12 and 1e12, which cannot be checked for them.
 SHARE, ANY_LENGTH, POSITIVE = (0.0, 1.0), (0.0, np.inf), (1e-100, 1e100)
-RANGES = {"alpha": SHARE, "reflectance": SHARE, "xi": SHARE, "r": ANY_LENGTH, "mfp": POSITIVE}
+RANGES = {"alpha": SHARE, "reflectance": SHARE, "xi": SHARE, "r": ANY_LENGTH, "thickness": ANY_LENGTH, "mfp": POSITIVE}
 ACCEPTED = {SHARE: "in [0, 1]", ANY_LENGTH: ">= 0", POSITIVE: "> 0, from 1e-100 to 1e+100"}
 
 

@@ -43,6 +43,7 @@ SIGNATURES = {
     "albedo_law": (profilefit, "name constants setting"),
     "fit": (profilefit, "profiles law"),
     "posterior": (profilefit, "fit"),
+    "scenes.layers.single_scattering": (profilefit, "medium cos_in cos_out azimuth"),
 }
 
 

@@ -13,6 +13,8 @@ import profilefit
 import profilefit.fitting
 import profilefit.measured
 import profilefit.report
+import profilefit.scenes
+import profilefit.scenes.layers
 import profilefit.shader
 import profilefit.studies
 from mcml_sim.cli.lazy import attributes
@@ -23,6 +25,8 @@ FACES = (
     profilefit.fitting,
     profilefit.measured,
     profilefit.report,
+    profilefit.scenes,
+    profilefit.scenes.layers,
     profilefit.shader,
     profilefit.studies,
 )
@@ -50,7 +54,7 @@ def test_an_interactive_shell_completes_names_that_nobody_has_asked_for(package)
 def test_no_module_has_the_name_of_what_is_exported_beside_it(package):
     """It would stand in the place of the function as soon as anybody imports it."""
     beside = {path.stem for path in Path(package.__file__).parent.iterdir()}
-    assert beside & set(package.__all__) <= {"exact"}, "which is itself a module"
+    assert beside & set(package.__all__) <= {"exact", "layers", "scenes"}, "which are modules themselves"
 
 
 def test_an_unknown_name_is_an_attribute_error():

@@ -1,0 +1,132 @@
+"""How wrong the law of a stack is: twelve stacks at thicknesses that were not fitted, and random ones at their own.
+
+    python -m benchmarks.stacks               # twenty minutes on two cores
+    python -m benchmarks.stacks --random 20   # ten minutes: 2 to 4 layers, seeded
+
+Held against `exact.solve`. rel is the mean relative error of R_d over radii even in ln r, from a hundredth of a mean
+free path to 99.5 % of the light; ks the largest error of the cdf. Beside it stands the half space of the first layer.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from benchmarks.table import show
+from mcml_sim import Layer, Medium, Setting, exact
+from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.recipes.stacks import stack_law
+
+LIGHTS = ("searchlight", "diffuse")
+THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]
+RADII, LAST = 120, 0.995
+Triple = tuple[float, float, float]
+# n, and of each layer mu_s', mu_a of red, green and blue [1/mm] and the thickness [mm]. Skin: C. Donner and
+# H. W. Jensen, SIGGRAPH 2005; heart muscle: within the ranges of J. Am. Physiol. 277, H698, 1999; its epicardium, and
+# the thicknesses, assumed. The others as in `profilefit.materials`.
+STACKS: dict[str, tuple[float, tuple[tuple[Triple, Triple, float], ...]]] = {
+    "skin": (
+        1.4,
+        (
+            ((4.8, 6.0, 6.5), (0.21, 0.21, 0.50), 0.25),
+            ((3.2, 4.0, 4.6), (0.016, 0.019, 0.030), 0.20),
+            ((0.45, 0.47, 0.48), (0.0085, 0.10, 2.5), np.inf),
+        ),
+    ),
+    "heart": (
+        1.38,
+        (((1.8, 2.2, 2.6), (0.05, 0.20, 0.35), 0.3), ((1.13, 1.2, 1.3), (0.20, 0.80, 1.2), np.inf)),
+    ),
+}
+OVER = {"milk on marble": (1.3, "skimmilk", 1.0, "marble"), "marble on potato": (1.5, "marble", 0.5, "potato")}
+
+
+class Error(NamedTuple):
+    """rel, and of the half space of the first layer alone; ks; relative error of A; [-]"""
+
+    rel: float
+    alone: float
+    ks: float
+    of_a: float
+
+
+def stacks(channel: int) -> dict[str, Medium]:
+    """The four, in one colour."""
+    made = {
+        name: Medium(tuple(Layer(n, mu_a[channel], mu_s[channel], 0.0, d) for mu_s, mu_a, d in layers))
+        for name, (n, layers) in STACKS.items()
+    }
+    for name, (n, top, d, bottom) in OVER.items():
+        pair = [(BY_NAME[one].absorption[channel], BY_NAME[one].scattering[channel]) for one in (top, bottom)]
+        made[name] = Medium((Layer(n, *pair[0], 0.0, d), Layer(n, *pair[1], 0.0)))
+    return made
+
+
+def random_stack(number: int) -> Medium:
+    """2 to 4 layers, n 1 to 1.5, alpha .3 to .999 even in ln(1 - alpha), .1 to 3 mean free paths thick."""
+    random = np.random.default_rng(100 + number)
+    count, n, layers = int(random.integers(2, 5)), float(random.uniform(1.0, 1.5)), []
+    for place in range(count):
+        dark = 10 ** random.uniform(-3.0, np.log10(0.7))
+        mu, depth = 10 ** random.uniform(-0.3, 0.7), 10 ** random.uniform(-1.0, np.log10(3.0))
+        layers.append(Layer(n, mu * dark, mu * (1 - dark), 0.0, depth / mu if place < count - 1 else np.inf))
+    return Medium(tuple(layers))
+
+
+def error(law, medium: Medium, light: str) -> Error:
+    """Of a law, under the first layer of this medium."""
+    true, first = exact.solve(medium, light), medium.layers[0]
+    setting = Setting(light, n=first.n / medium.n_above)
+    r = np.geomspace(0.01 * first.mfp, 300.0 * max(layer.mfp for layer in medium.layers), RADII)
+    share = np.asarray(true.cdf(r))
+    near = r[share <= LAST]
+    profile = np.asarray(true.profile(near))
+    alone = exact.profile(near, first.alpha, first.mfp, setting)
+    return Error(
+        float(np.mean(np.abs(law.profile(near, first.thickness) / profile - 1))),
+        float(np.mean(np.abs(alone / profile - 1))),
+        float(np.max(np.abs(law.cdf(r, first.thickness) - share))),
+        float(law.total(first.thickness) / true.reflectance - 1),
+    )
+
+
+def row(name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]) -> tuple[tuple[str, ...], list[Error]]:
+    begin = time.perf_counter()
+    law = stack_law(medium, light)
+    seconds = time.perf_counter() - begin
+    first, *others = medium.layers
+    found = [error(law, replace(medium, layers=(replace(first, thickness=d), *others)), light) for d in thicknesses]
+    return (f"{name}, {light}", f"{seconds:.0f}", *_figures(found)), found
+
+
+def _figures(found: list[Error]) -> tuple[str, ...]:
+    rel, alone, ks, of_a = (np.abs(column) for column in zip(*found, strict=True))
+    return tuple(f"{value:.2g}" for value in (rel.mean(), rel.max(), alone.mean(), ks.max(), of_a.max()))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--random", type=int, default=0, metavar="N", help="so many random stacks in place of the four")
+    count = parser.parse_args(arguments).random
+    if count:
+        media = [(f"{number}", random_stack(number)) for number in range(count)]
+        jobs = [(name, LIGHTS[int(name) % 2], medium, (medium.layers[0].thickness,)) for name, medium in media]
+    else:
+        jobs = [
+            (f"{name}, {CHANNELS[channel]}", light, medium, THICKNESSES)
+            for light in LIGHTS
+            for channel in range(3)
+            for name, medium in stacks(channel).items()
+        ]
+    rows, errors = zip(*(row(*job) for job in jobs), strict=True)
+    whole = ("all", "", *_figures([one for some in errors for one in some]))
+    columns = ("stack", "s", "rel", "worst", "first layer alone", "ks", "A")
+    show("The law of a stack, at thicknesses of its first layer", columns, [*rows, whole])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,291 @@
+"""A law of a stack of layers: the half space of the first layer, and what those below it change."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import equinox as eqx
+import jax.numpy as jnp
+from jax import Array
+
+from mcml_sim.media.setting import Setting
+from profilefit.laws.base import Constants, ProfileLaw
+from profilefit.laws.escape import decay_rate
+from profilefit.laws.evaluate import evaluated
+
+KNOWN = {"closed": True}  # of a field that is no constant: what the law is a law of
+THICKEST = 1e6  # mean free paths that stand for an infinite first layer
+LEAST_RATE = 1e-9  # over the image's height: a rate of 0 has no logarithm
+NEWTON_STEPS = 4  # of an image's radius: to rounding
+
+
+class LayerLaw(Constants):
+    """The half space of one layer, in its unit of length: a law R_d(r / l; alpha) at that layer's alpha [-] and l."""
+
+    setting: Setting = eqx.field(static=True)
+    law: ProfileLaw = eqx.field(metadata=KNOWN)
+    alpha: float = eqx.field(metadata=KNOWN)
+    mfp: float = eqx.field(metadata=KNOWN)
+
+    @evaluated
+    def profile(self, r) -> Array:
+        """R_d(r) [1/length^2]: 2 pi r R_d integrates to A."""
+        return self.value(r)
+
+    @evaluated
+    def cdf(self, r) -> Array:
+        """Share of the reflected light within radius r [-]."""
+        return self.law.scaled_cdf(r / self.mfp, jnp.asarray(self.alpha))
+
+    @property
+    def reflectance(self) -> float:
+        """A [-]."""
+        return float(self.law.total(self.alpha))
+
+    @property
+    def sampler(self) -> StackSampler:
+        """Draws radii of the law, by its own sampler."""
+        return StackSampler(self)
+
+    def decay(self) -> Array:
+        """Rate at which the light decays far off [1/length]."""
+        return decay_rate(self.alpha) / self.mfp
+
+    def whole(self) -> Array:
+        """A [-]."""
+        return self.law.total(self.alpha)
+
+    def value(self, r: Array) -> Array:
+        """R_d [1/length^2]."""
+        return self.law.scaled_profile(r / self.mfp, jnp.asarray(self.alpha)) / self.mfp**2
+
+    def within(self, r: Array) -> Array:
+        """Light that leaves within r [-]."""
+        return self.law.unscaled_energy(r / self.mfp, jnp.asarray(self.alpha))
+
+    def drawn(self, xi: Array) -> Array:
+        """A radius [length] for xi in [0, 1)."""
+        return self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp
+
+    def drawn_density(self, r: Array) -> Array:
+        """Its density [1/length]."""
+        return self.law.sampler.scaled_pdf(r / self.mfp, jnp.asarray(self.alpha)) / self.mfp
+
+
+class StackLaw(Constants):
+    """R_d(r; d) = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r),   s_i^2 = r^2 + (g_i d)^2,   c_i = e^{-b_i x},
+
+    of a first layer of thickness d, x = d / l its mean free paths, over a half space or stack R_2: R_1 is the half
+    space of the first layer, the second term what of it went deeper than d, seen from a depth of about d, the third
+    what came back from below, seen likewise. The fourth is an image at height D = h_0 l + h_1 d,
+
+    I = D (1 + k s) e^{-k (s - D)} / (2 pi s^3),   s^2 = r^2 + D^2,   k = min(kappa_1, kappa_2) + k_0 / l,
+
+    whose integral is 1: m is what brings the reflectance to
+
+    A(d) = A_1 + (A_2 - A_1) (1 - w) e / (1 - w e),   e = e^{-2 kappa_1 d - u (1 - e^{-x})}.
+
+    Nine constants, for every d in [0, inf]. At d = 0 it is R_2, at infinity R_1, as exact as these are; the cdf is
+    closed where theirs are; A lies between A_1 and A_2. A stack of more layers is a law over a law.
+
+    top        the first layer's half space;  below  what lies under it
+    thickness  of the first layer, where no other is given [length]
+    """
+
+    setting: Setting = eqx.field(static=True)
+    top: LayerLaw = eqx.field(metadata=KNOWN)
+    below: LayerLaw | StackLaw = eqx.field(metadata=KNOWN)
+    thickness: float = eqx.field(metadata=KNOWN)
+    w: float
+    u: float
+    g1: float
+    g2: float
+    b1: float
+    b2: float
+    h0: float
+    h1: float
+    k0: float
+
+    def profile(self, r, thickness=None):
+        """R_d(r) [1/length^2], 2 pi r R_d integrates to A; thickness of the first layer [length]. All broadcast."""
+        return self._profile(r, self.thickness if thickness is None else thickness)
+
+    def cdf(self, r, thickness=None):
+        """Share of the reflected light within radius r [-]; 1 at infinity."""
+        return self._cdf(r, self.thickness if thickness is None else thickness)
+
+    def total(self, thickness=None):
+        """Reflectance A [-] under a first layer of that thickness [length]."""
+        return self._total(self.thickness if thickness is None else thickness)
+
+    @property
+    def reflectance(self) -> float:
+        """A [-], under its own thickness."""
+        return float(self.total())
+
+    @property
+    def sampler(self) -> StackSampler:
+        """Draws radii where this law has its light, with their own density."""
+        return StackSampler(self)
+
+    @evaluated
+    def _profile(self, r, thickness) -> Array:
+        return self.value(r, thickness)
+
+    @evaluated
+    def _cdf(self, r, thickness) -> Array:
+        whole = self.whole(thickness)
+        share = self.within(r, thickness) / jnp.where(whole > 0, whole, 1.0)
+        return jnp.where(r < jnp.inf, jnp.clip(share, 0.0, 1.0), 1.0)
+
+    @evaluated
+    def _total(self, thickness) -> Array:
+        return self.whole(thickness)
+
+    def decay(self) -> Array:
+        """Rate at which the light decays far off [1/length]: the slowest of its layers'."""
+        return jnp.minimum(self.top.decay(), self.below.decay())
+
+    def whole(self, thickness: Array | None = None) -> Array:
+        """A [-]."""
+        d = self._bounded(thickness)
+        e = jnp.exp(-2.0 * self.top.decay() * d + self.u * jnp.expm1(-d / self.top.mfp))
+        first, second = self.top.whole(), self.below.whole()
+        return first + (second - first) * (1.0 - self.w) * e / (1.0 - self.w * e)
+
+    def value(self, r: Array, thickness: Array | None = None) -> Array:
+        """R_d [1/length^2]."""
+        of = self.terms(thickness)
+        gone, back = self.top.value(jnp.hypot(r, of.gone)), self.below.value(jnp.hypot(r, of.back))
+        return self.top.value(r) - of.c1 * gone + of.c2 * back + of.image * _image(r, of)
+
+    def within(self, r: Array, thickness: Array | None = None) -> Array:
+        """Light that leaves within r [-]."""
+        of = self.terms(thickness)
+        gone = self.top.within(jnp.hypot(r, of.gone)) - self.top.within(of.gone)
+        back = self.below.within(jnp.hypot(r, of.back)) - self.below.within(of.back)
+        image = 1.0 - _beyond(jnp.hypot(r, of.height), of)
+        return self.top.within(r) - of.c1 * gone + of.c2 * back + of.image * image
+
+    def drawn(self, xi: Array, thickness: Array | None = None) -> Array:
+        """A radius [length] for xi in [0, 1), of one of the three terms that add light.
+
+        Of that from below a radius s of its own law, moved out to r = sqrt(s (s + 2 g_2 d)).
+        """
+        of = self.terms(thickness)
+        first, second, third = self._shares(of)
+        own = self.top.drawn(_stretched(xi, 0.0, first))
+        s = self.below.drawn(_stretched(xi, first, second))
+        image = _image_radius(_stretched(xi, first + second, third), of)
+        moved = jnp.sqrt(s * (s + 2.0 * of.back))
+        return jnp.where(xi < first, own, jnp.where(xi < first + second, moved, image))
+
+    def drawn_density(self, r: Array, thickness: Array | None = None) -> Array:
+        """Its density [1/length]."""
+        of = self.terms(thickness)
+        first, second, third = self._shares(of)
+        far = jnp.hypot(r, of.back)
+        sure = jnp.where(far > 0, far, 1.0)
+        s = jnp.where(of.back > 0, r * r / (sure + of.back), r)
+        moved = self.below.drawn_density(s) * jnp.where(far > 0, r / sure, 1.0)
+        return first * self.top.drawn_density(r) + second * moved + third * 2.0 * jnp.pi * r * _image(r, of)
+
+    def terms(self, thickness: Array | None = None) -> StackTerms:
+        """What depends on the thickness only: once a point of a surface."""
+        d = self._bounded(thickness)
+        x = d / self.top.mfp
+        gone, back, height = self.g1 * d, self.g2 * d, self.h0 * self.top.mfp + self.h1 * d
+        rate = self.decay() + jnp.maximum(self.k0 / self.top.mfp, LEAST_RATE / height)
+        c1, c2 = jnp.exp(-self.b1 * x), jnp.exp(-self.b2 * x)
+        lost = c1 * (self.top.whole() - self.top.within(gone))
+        came = c2 * (self.below.whole() - self.below.within(back))
+        kept = self.top.whole() - lost
+        return StackTerms(gone, back, c1, c2, height, rate, self.whole(d) - kept - came, kept, came)
+
+    def _bounded(self, thickness: Array | None) -> Array:
+        given = self.thickness if thickness is None else thickness
+        return jnp.minimum(jnp.asarray(given), THICKEST * self.top.mfp)
+
+    def _shares(self, of: StackTerms) -> tuple[Array, Array, Array]:
+        """Of the radii that are drawn for each term [-]: those of light that is added, not taken away."""
+        image = jnp.maximum(of.image, 0.0)
+        total = of.kept + of.came + image
+        scale = jnp.where(total > 0, 1.0 / jnp.where(total > 0, total, 1.0), 1.0)
+        return 1.0 - (of.came + image) * scale, of.came * scale, image * scale
+
+
+class StackTerms(NamedTuple):
+    """Of one thickness: depths g_i d [length], c_i [-], the image's height [length] and rate [1/length].
+
+    image, kept, came  energies [-]: m, of R_1 less what it lost, and of what came back from below
+    """
+
+    gone: Array
+    back: Array
+    c1: Array
+    c2: Array
+    height: Array
+    rate: Array
+    image: Array
+    kept: Array
+    came: Array
+
+
+class StackSampler(eqx.Module):
+    """Radii with a density of their own, near the law's: an estimate weighs each by 2 pi r R_d / (A pdf)."""
+
+    law: LayerLaw | StackLaw
+
+    def sample(self, xi, thickness=None):
+        """Radius [length] for a uniform number xi in [0, 1); thickness of the first layer [length]. All broadcast."""
+        return self._sample(xi) if thickness is None else self._sample_at(xi, thickness)
+
+    def pdf(self, r, thickness=None):
+        """Density in r of `sample` [1/length]; integrates to 1."""
+        return self._pdf(r) if thickness is None else self._pdf_at(r, thickness)
+
+    @evaluated
+    def _sample(self, xi) -> Array:
+        return self.law.drawn(xi)
+
+    @evaluated
+    def _sample_at(self, xi, thickness) -> Array:
+        return self.law.drawn(xi, thickness)  # type: ignore[call-arg]
+
+    @evaluated
+    def _pdf(self, r) -> Array:
+        return self.law.drawn_density(r)
+
+    @evaluated
+    def _pdf_at(self, r, thickness) -> Array:
+        return self.law.drawn_density(r, thickness)  # type: ignore[call-arg]
+
+
+def _image(r: Array, of: StackTerms) -> Array:
+    """I [1/length^2]."""
+    s = jnp.hypot(r, of.height)
+    far = jnp.where(s < jnp.inf, s, 1.0)
+    value = of.height * (1.0 + of.rate * far) * jnp.exp(-of.rate * (far - of.height)) / (2.0 * jnp.pi * far**3)
+    return jnp.where(s < jnp.inf, value, 0.0)
+
+
+def _beyond(s: Array, of: StackTerms) -> Array:
+    """Share of the image's light beyond a distance s from it [-]."""
+    return of.height / s * jnp.exp(-of.rate * (s - of.height))
+
+
+def _image_radius(xi: Array, of: StackTerms) -> Array:
+    """Radius [length] at which `_beyond` is 1 - xi: z + ln z = q for z = k s, by Newton's method."""
+    nearest = of.rate * of.height
+    q = nearest + jnp.log(nearest) - jnp.log1p(-xi)
+    z = jnp.where(q > 1.0, q - jnp.log(jnp.maximum(q, 1.0)), jnp.exp(jnp.minimum(q, 1.0) - 0.5))
+    for _ in range(NEWTON_STEPS):
+        z = z * (1.0 + q - jnp.log(z)) / (1.0 + z)
+    s = z / of.rate
+    return jnp.sqrt(jnp.maximum((s - of.height) * (s + of.height), 0.0))
+
+
+def _stretched(xi: Array, low: Array | float, width: Array) -> Array:
+    """xi of a term, from its part of [0, 1) to all of it; below 1."""
+    inside = (xi - low) / jnp.where(width > 0, width, 1.0)
+    return jnp.clip(inside, 0.0, 1.0 - jnp.finfo(jnp.result_type(xi, float)).epsneg)

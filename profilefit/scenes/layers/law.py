@@ -1,0 +1,167 @@
+"""The closed forms of a stack of layers: light scattered once, exactly, and all of it by the fitted `stack_law`.
+
+    from mcml_sim import Layer, Medium
+    from profilefit.scenes import layers
+
+    skin = Medium((Layer(1.4, 0.2, 48.0, 0.9, 0.25), Layer(1.4, 0.02, 32.0, 0.9)))
+    layers.single_scattering(skin, cos_in=1.0, cos_out=0.5, azimuth=0.0)
+
+Single scattering is a sum over the layers, for any indices and any phase functions.
+Light of one direction outside has one direction in each layer: down, and up where an interface below threw it back.
+What arrives of it at a depth is a product of Beer's and Fresnel's factors, and so is, by reciprocity, what reaches the
+eye from there. Of a layer of albedo alpha and index n, with cosines mu_i and mu_o inside, t optical depths below its
+top
+
+    L = alpha (n_above / n)^2  cos_in / (mu_i mu_o)  sum_ab p(c_ab) int in_a(t) out_b(t) dt,    a, b down or up,
+
+in_down = D e^{-t / mu_i}, say. With one index in all layers and no surface below that is
+
+    L = T_i T_o / n^2  cos_in / (mu_i mu_o)  sum_j alpha_j p_j e^{-b t_j} (1 - e^{-b d_j}) / b,   b = 1/mu_i + 1/mu_o,
+
+t_j and d_j the optical depths above and inside layer j (P. Hanrahan and W. Krueger, Reflection from layered surfaces
+due to subsurface scattering, SIGGRAPH 1993, for one layer).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
+from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.medium import Layer, Medium
+from mcml_sim.media.phase import HenyeyGreenstein, Phase
+from profilefit.errors import InputError
+from profilefit.recipes.stacks import stack_law
+
+__all__ = ["beams", "single_scattering", "stack_law"]
+
+Floats = NDArray[np.float64]
+
+
+class Beam(NamedTuple):
+    """Light of one direction outside, in one layer: shares of the power that arrives on the surface [-]."""
+
+    sine: Floats
+    """Of its angle to the normal in the layer; above 1 where no light of that direction gets there."""
+    cosine: Floats
+    down: Floats
+    """Share that passes the layer's top on its way down, as often as it does."""
+    up: Floats
+    """The same of the layer's bottom, on its way up."""
+
+
+def single_scattering(
+    medium: Medium,
+    cos_in: ArrayLike,
+    cos_out: ArrayLike,
+    azimuth: ArrayLike,
+    phases: Sequence[Phase] | None = None,
+) -> float | Floats:
+    """Radiance outside [1/sr] of light scattered once, for unit irradiance on a plane across the beam. All broadcast.
+
+    cos_in, cos_out  cosines of the beam and of the eye's ray to the normal, outside, in (0, 1] [-]
+    azimuth          between the planes of the two propagation directions; 0 is onward [rad]
+    phases           one for each layer, by default Henyey and Greenstein's with the layer's g
+
+    InputError on other arguments. Exact, to rounding.
+    """
+    if not isinstance(medium, Medium):
+        raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
+    given = _phases_of(medium) if phases is None else tuple(phases)
+    if len(given) != len(medium.layers) or not all(isinstance(one, Phase) for one in given):
+        raise InputError(f"phases must be {len(medium.layers)} phase functions, one a layer, got {shown(phases)}")
+    into, out = _cosine("cos_in", cos_in), _cosine("cos_out", cos_out)
+    turn = checked_numbers("azimuth", azimuth, "a finite angle")
+    if not np.all(np.isfinite(turn)):
+        raise InputError("azimuth must be a finite angle, got one that is not")
+    require_one_shape(cos_in=into, cos_out=out, azimuth=turn)
+    arriving, leaving = beams(medium, into), beams(medium, out)
+    radiance = np.zeros(np.broadcast_shapes(into.shape, out.shape, turn.shape))
+    for layer, phase, one, other in zip(medium.layers, given, arriving, leaving, strict=True):
+        if layer.mu_s > 0:
+            radiance = (
+                radiance + _of_layer(layer, phase, one, other, np.cos(turn)) * into * (medium.n_above / layer.n) ** 2
+            )
+    return float(radiance) if radiance.ndim == 0 else radiance
+
+
+def _phases_of(medium: Medium) -> tuple[Phase, ...]:
+    """Henyey and Greenstein's phase function of each layer that scatters, and any in clear glass."""
+    return tuple(HenyeyGreenstein(layer.g if layer.mu_s > 0 else 0.0) for layer in medium.layers)
+
+
+def beams(medium: Medium, cosine: Floats) -> list[Beam]:
+    """Light that arrives at a cosine outside, layer by layer, as interfaces divide it; reflections of any order."""
+    indices = [medium.n_above, *(layer.n for layer in medium.layers)]
+    if not medium.is_half_space:
+        indices.append(medium.n_below)
+    invariant = medium.n_above * np.sqrt((1.0 - cosine) * (1.0 + cosine))
+    sines = [invariant / n for n in indices]
+    cosines = [cosine, *(np.sqrt(np.maximum((1.0 - sine) * (1.0 + sine), 0.0)) for sine in sines[1:])]
+    mirror = [
+        np.where(sines[j + 1] < 1.0, fresnel(indices[j], indices[j + 1], cosines[j])[0], 1.0)
+        for j in range(len(indices) - 1)
+    ]
+    # Of light at a layer's bottom, and at its top on its way down, what comes up there: from below upwards.
+    kept = [_kept(layer, mu) for layer, mu in zip(medium.layers, cosines[1:], strict=False)]
+    below = [np.zeros_like(cosine)] * len(medium.layers)
+    for j in reversed(range(len(medium.layers))):
+        if j + 1 < len(mirror):
+            deeper = kept[j + 1] ** 2 * below[j + 1] if j + 1 < len(kept) else np.zeros_like(cosine)
+            below[j] = mirror[j + 1] + (1.0 - mirror[j + 1]) * _passed(mirror[j + 1], deeper) * deeper
+    found, arrives = [], np.ones_like(cosine)
+    for j in range(len(medium.layers)):
+        down = arrives * _passed(mirror[j], kept[j] ** 2 * below[j])
+        arrives = down * kept[j]
+        found.append(Beam(sines[j + 1], cosines[j + 1], down, arrives * below[j]))
+    return found
+
+
+def _passed(mirror: Floats, deeper: Floats) -> Floats:
+    """Share that passes an interface, with what goes to and fro between it and what lies deeper."""
+    return np.where(mirror < 1.0, (1.0 - mirror) / np.where(mirror < 1.0, 1.0 - mirror * deeper, 1.0), 0.0)
+
+
+def _kept(layer: Layer, cosine: Floats) -> Floats:
+    """Share that crosses the layer [-]; none where it is infinite, or where no light of that direction gets there."""
+    if np.isinf(layer.thickness):
+        return np.zeros_like(cosine)
+    depth = layer.mu_t * layer.thickness
+    return np.where(cosine > 0, np.exp(-depth / np.where(cosine > 0, cosine, 1.0)), 0.0)
+
+
+def _of_layer(layer: Layer, phase: Phase, one: Beam, other: Beam, turn: Floats) -> Floats:
+    """alpha / (mu_i mu_o) sum_ab p int in out dt [1/sr]."""
+    reached = (one.cosine > 0) & (other.cosine > 0)
+    into, out = np.where(reached, one.cosine, 1.0), np.where(reached, other.cosine, 1.0)
+    depth = layer.mu_t * layer.thickness if np.isfinite(layer.thickness) else np.inf
+    across, along = np.where(reached, one.sine * other.sine, 0.0) * turn, into * out
+    back, onward = (np.clip(across + sign * along, -1.0, 1.0) for sign in (-1.0, 1.0))
+    turned = (one.down * other.down + one.up * other.up) * phase.pdf(back) * _spent(depth, 1.0 / into + 1.0 / out)
+    total = turned
+    if np.isfinite(depth):
+        # Down on one way and up on the other: e^{-t / mu_i - (d - t) / mu_o}.
+        least = np.exp(-depth / np.maximum(into, out))
+        straight = least * _spent(depth, np.abs(1.0 / into - 1.0 / out))
+        total = turned + (one.down * other.up + one.up * other.down) * phase.pdf(onward) * straight
+    return np.where(reached, layer.alpha * total / along, 0.0)
+
+
+def _spent(depth: float, rate: Floats) -> Floats:
+    """int_0^depth e^{-rate t} dt, also where the rate is 0, or the depth infinite."""
+    if np.isinf(depth):
+        return 1.0 / rate
+    fast = np.where(rate > 0, rate, 1.0)
+    return np.where(rate > 0, -np.expm1(-fast * depth) / fast, depth)
+
+
+def _cosine(name: str, value: ArrayLike) -> Floats:
+    numbers = checked_numbers(name, value, "a cosine in (0, 1]")
+    outside = ~((numbers > 0) & (numbers <= 1))
+    if np.any(outside):
+        raise InputError(f"{name} must be a cosine in (0, 1], got {float(numbers[outside].flat[0])!r}")
+    return numbers

@@ -1,0 +1,158 @@
+"""The law of a stack: its ends, its energy, its sampler, whatever its constants; and what a fit makes of it."""
+
+from dataclasses import replace
+
+import jax
+import numpy as np
+import pytest
+
+import profilefit
+from mcml_sim import Layer, Medium, Setting, exact, half_space
+from profilefit.errors import InputError
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.recipes import stacks
+from profilefit.recipes.stacks import stack_law
+
+R = np.geomspace(1e-3, 30.0, 40)
+CONSTANTS = {"w": 0.2, "u": -0.1, "g1": 0.9, "g2": 1.4, "b1": 0.1, "b2": 0.2, "h0": 0.7, "h1": 1.1, "k0": 0.2}
+
+
+def layer(alpha: float, mfp: float, n: float = 1.4, light: str = "searchlight") -> LayerLaw:
+    setting = Setting(light, n=n)
+    return LayerLaw(setting, profilefit.load("hazard", setting=setting), alpha, mfp)
+
+
+def stack(n: float = 1.4, light: str = "searchlight", **changed: float) -> StackLaw:
+    top, below = layer(0.95, 0.2, n, light), layer(0.8, 0.5, n, light)
+    return StackLaw(top.setting, top, below, 0.1, **{**CONSTANTS, **changed})
+
+
+@pytest.mark.parametrize("n", [1.0, 1.4])
+@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+def test_both_ends_are_the_half_spaces(n, light):
+    law = stack(n, light)
+    for thickness, end in ((0.0, law.below), (np.inf, law.top), (1e4, law.top)):
+        np.testing.assert_allclose(law.profile(R, thickness), end.profile(R), rtol=1e-9)
+        np.testing.assert_allclose(law.cdf(R, thickness), end.cdf(R), rtol=1e-9, atol=1e-12)
+        assert law.total(thickness) == pytest.approx(end.reflectance, rel=1e-9)
+
+
+@pytest.mark.parametrize("thickness", [0.01, 0.1, 1.0])
+@pytest.mark.parametrize("law", [stack(), stack(1.0, "diffuse"), stack(u=0.5, w=0.9)], ids=["n", "matched", "back"])
+def test_energy_is_closed(law, thickness):
+    """2 pi r R_d integrates to A times the cdf."""
+    edges = np.append(0.0, np.geomspace(1e-7, 1e3, 4001))
+    x, weight = np.polynomial.legendre.leggauss(8)
+    width = np.diff(edges)
+    r = edges[:-1, None] + width[:, None] * (x + 1) / 2
+    within = np.cumsum((2 * np.pi * r * law.profile(r, thickness)) @ (weight / 2) * width)
+    np.testing.assert_allclose(law.cdf(edges[1:], thickness) * law.total(thickness), within, rtol=1e-6, atol=1e-7)
+    assert law.cdf(np.inf, thickness) == 1.0
+    assert law.cdf(1e9, thickness) == pytest.approx(1.0, abs=1e-12)
+
+
+def test_reflectance_goes_from_one_end_to_the_other():
+    law, d = stack(), np.linspace(0.0, 3.0, 200)
+    total = law.total(d)
+    assert np.all(np.diff(total) * np.sign(law.top.reflectance - law.below.reflectance) > 0)
+    assert law.reflectance == law.total(0.1)
+    assert law.profile(0.3) == law.profile(0.3, 0.1)
+
+
+@pytest.mark.parametrize(("n", "thickness"), [(1.0, 0.1), (1.4, 0.0), (1.4, 0.02), (1.4, 2.0), (1.4, np.inf)])
+def test_sampler_has_its_own_density_and_finds_all_the_light(n, thickness):
+    law = stack(n)
+    xi = (np.arange(2**15) + 0.5) / 2**15
+    r = law.sampler.sample(xi, thickness)
+    edges = np.append(0.0, np.geomspace(1e-3, 10.0, 25))
+    counted = np.histogram(r, edges)[0] / xi.size
+    x, weight = np.polynomial.legendre.leggauss(40)
+    at = edges[:-1, None] + np.diff(edges)[:, None] * (x + 1) / 2
+    expected = law.sampler.pdf(at, thickness) @ (weight / 2) * np.diff(edges)
+    np.testing.assert_allclose(counted, expected, atol=4e-4)
+    weights = 2 * np.pi * r * law.profile(r, thickness) / law.sampler.pdf(r, thickness)
+    assert weights.mean() == pytest.approx(law.total(thickness), rel=5e-3)
+    assert np.std(weights) < 1.5 * weights.mean()
+
+
+def test_a_stack_over_a_stack():
+    """A layer cut in two by an interface of no thickness, and one whose lower part is as if it were not there."""
+    inner = stack()
+    outer = StackLaw(inner.setting, layer(0.9, 0.3), inner, 0.2, **CONSTANTS)
+    np.testing.assert_allclose(outer.profile(R, 0.0), inner.profile(R), rtol=1e-9)
+    np.testing.assert_allclose(outer.cdf(R, 0.0), inner.cdf(R), rtol=1e-8)
+    r = outer.sampler.sample(np.array([0.1, 0.5, 0.999]))
+    assert np.all(r > 0)
+    assert np.all(outer.sampler.pdf(r) > 0)
+
+
+def test_it_is_a_value():
+    """A pytree: its constants by name, traced, differentiated."""
+    law = stack()
+    assert law.constants() == CONSTANTS
+    assert replace(law, w=0.3).total(0.1) != law.total(0.1)
+    with jax.enable_x64(True):
+        slope = jax.grad(lambda d: law.total(d))(jax.numpy.asarray(0.1))
+    assert float(slope) == pytest.approx((law.total(0.1 + 1e-6) - law.total(0.1 - 1e-6)) / 2e-6, rel=1e-6)
+
+
+def test_one_layer_is_its_half_space():
+    law = stack_law(half_space(0.9, mfp=0.5, n=1.3), "diffuse")
+    known = profilefit.load("hazard", setting=Setting("diffuse", n=1.3))
+    np.testing.assert_allclose(law.profile(R), known.profile(R, 0.9, 0.5), rtol=1e-12)
+    np.testing.assert_allclose(law.sampler.sample([0.2, 0.9]), known.sampler.sample([0.2, 0.9], 0.9, 0.5), rtol=1e-12)
+    np.testing.assert_allclose(law.sampler.pdf(R), known.sampler.pdf(R, 0.9, 0.5), rtol=1e-12)
+
+
+def error(law: StackLaw, thickness: float, medium: Medium, light: str) -> tuple[float, float, float]:
+    """rel, ks and relative error of A of a law at a thickness, against the exact light of this medium."""
+    true = exact.solve(medium, light)
+    r = np.geomspace(0.01 * medium.layers[0].mfp, 40.0, 120)
+    share = true.cdf(r)
+    near = r[share <= 0.995]
+    relative = np.abs(law.profile(near, thickness) / true.profile(near) - 1).mean()
+    return relative, np.abs(law.cdf(r, thickness) - share).max(), abs(law.total(thickness) / true.reflectance - 1)
+
+
+@pytest.mark.slow
+def test_a_fit_holds_between_the_thicknesses_that_it_was_made_at():
+    """Green light on a heart; neither thickness is fitted."""
+    wall, top = Layer(1.38, 0.80, 1.2, 0.0), Layer(1.38, 0.20, 2.2, 0.0, 0.3)
+    law = stack_law(Medium((top, wall)))
+    for thickness in (0.15, 0.6):
+        medium = Medium((replace(top, thickness=thickness), wall))
+        relative, ks, of_a = error(law, thickness, medium, "searchlight")
+        assert relative < 0.03
+        assert ks < 0.01
+        assert of_a < 5e-3
+        # Negative control: another thickness is another light, and the first layer alone is another still.
+        assert error(law, 1.3 * thickness, medium, "searchlight")[2] > 0.03
+        assert error(law, np.inf, medium, "searchlight")[0] > 0.1
+
+
+@pytest.mark.parametrize(
+    ("medium", "message"),
+    [
+        (1.4, "medium must be a mcml_sim.Medium"),
+        (Medium((Layer(1.4, 0.1, 1.0, 0.0, 1.0),)), "last layer must be infinitely thick"),
+        (Medium((Layer(1.4, 0.0, 0.0, 0.0, 1.0), Layer(1.4, 0.1, 1.0, 0.0))), "layers must scatter or absorb"),
+        (Medium((Layer(1.4, 0.1, 1.0, 0.5, 1.0), Layer(1.4, 0.1, 1.0, 0.0))), "g = 0 .*0.5 in layer 1"),
+        (Medium((Layer(1.4, 0.1, 1.0, 0.0, 1.0), Layer(1.5, 0.1, 1.0, 0.0))), "one n .*1.5 in layer 2"),
+    ],
+)
+def test_refused(medium, message):
+    with pytest.raises(InputError, match=message):
+        stack_law(medium)
+
+
+def test_refused_arguments():
+    with pytest.raises(InputError, match="thickness must be >= 0"):
+        stack().profile(0.1, -1.0)
+    with pytest.raises(InputError, match="illumination"):
+        stack_law(half_space(0.9), "sunlight")
+
+
+def test_fitted_thicknesses_hold_the_layer_s_own():
+    own = stacks._thicknesses(Layer(1.4, 0.1, 1.0, 0.0, 0.37), is_below=False)
+    assert 0.37 in own
+    assert own[0] == pytest.approx(0.1 / 1.1)
