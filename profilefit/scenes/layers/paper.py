@@ -50,7 +50,13 @@ class Corrections:
 
     @classmethod
     def switches(cls) -> tuple[str, ...]:
+        """Their names."""
         return tuple(field.name for field in fields(cls))
+
+    @classmethod
+    def of_sum(cls) -> tuple[str, ...]:
+        """Those of single scattering, all but the dipole's."""
+        return tuple(name for name in cls.switches() if name != "dipole_sign")
 
 
 CORRECTED = Corrections()
