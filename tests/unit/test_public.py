@@ -44,6 +44,7 @@ SIGNATURES = {
     "fit": (profilefit, "profiles law"),
     "posterior": (profilefit, "fit"),
     "scenes.layers.single_scattering": (profilefit, "medium cos_in cos_out azimuth"),
+    "scenes.layers.stack_law": (profilefit, "medium illumination"),
 }
 
 
