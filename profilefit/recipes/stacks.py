@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.exact import half_space
+from mcml_sim.exact.stack.solution import MAX_LAYERS
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Optimum, solve
+from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.recipes import catalogue
 
@@ -56,6 +58,11 @@ def _require(medium: Medium) -> None:
         raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
     if not medium.is_half_space:
         raise InputError(f"the last layer must be infinitely thick, got {medium.layers[-1].thickness:g}")
+    if len(medium.layers) > MAX_LAYERS:
+        raise InputError(f"a law of a stack must have at most {MAX_LAYERS} layers, got {len(medium.layers)}")
+    index = medium.layers[0].n / medium.n_above
+    if not (index == 1.0 or REFRACTING.holds(index)):
+        raise InputError(f"n over that above must be 1 or in {REFRACTING} for a law of a stack, got {index:g}")
     for number, layer in enumerate(medium.layers, start=1):
         if not layer.mu_t > 0:
             raise InputError(f"layers must scatter or absorb, got mu_a = mu_s = 0 in layer {number}")
