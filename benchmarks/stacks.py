@@ -26,7 +26,7 @@ THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]
 RADII, LAST = 120, 0.995
 Triple = tuple[float, float, float]
 # n, and of each layer mu_s', mu_a of red, green and blue [1/mm] and the thickness [mm]. Skin: C. Donner and
-# H. W. Jensen, SIGGRAPH 2005; heart muscle: within the ranges of J. Am. Physiol. 277, H698, 1999; its epicardium, and
+# H. W. Jensen, SIGGRAPH 2005; heart muscle: within the ranges of Am. J. Physiol. 277, H698, 1999; its epicardium, and
 # the thicknesses, assumed. The others as in `profilefit.materials`.
 STACKS: dict[str, tuple[float, tuple[tuple[Triple, Triple, float], ...]]] = {
     "skin": (
