@@ -37,10 +37,11 @@ def evaluated(method: Callable) -> Callable:
 
     Arguments that are jax arrays (concrete or traced) keep their type, so that a law can be jitted, vmapped and
     differentiated in whatever precision its caller chose. Numbers out of range, and shapes that do not broadcast, raise
-    InputError. The method is compiled for blocks of a few sizes, whatever the lengths and the law's constants.
-    Constants may be arrays, too, which broadcast with the arguments.
+    InputError; None for what may be left out leaves it out. The method is compiled for blocks of a few sizes, whatever
+    the lengths and the law's constants. Constants may be arrays, too, which broadcast with the arguments.
     """
     signature = inspect.signature(method)
+    spare = {name for name, parameter in signature.parameters.items() if parameter.default is None}
 
     @wraps(method)
     def call(law, *arguments, **named):
@@ -48,7 +49,7 @@ def evaluated(method: Callable) -> Callable:
         if any(isinstance(value, jax.Array) for value in (*leaves, *arguments, *named.values())):
             return method(law, *arguments, **named)
         given = list(signature.bind(law, *arguments, **named).arguments.items())[1:]
-        checked = {name: _checked(name, value) for name, value in given}
+        checked = {name: _checked(name, value) for name, value in given if not (value is None and name in spare)}
         if any(np.ndim(leaf) for leaf in leaves):  # many laws at once, as a posterior's draws
             with jax.enable_x64(True):
                 return np.asarray(method(law, **{name: jnp.asarray(value) for name, value in checked.items()}))

@@ -9,6 +9,7 @@ import jax.numpy as jnp
 from jax import Array
 
 from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
 from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.laws.escape import decay_rate
 from profilefit.laws.evaluate import evaluated
@@ -28,13 +29,15 @@ class LayerLaw(Constants):
     mfp: float = eqx.field(metadata=KNOWN)
 
     @evaluated
-    def profile(self, r) -> Array:
-        """R_d(r) [1/length^2]: 2 pi r R_d integrates to A."""
+    def profile(self, r, thickness=None) -> Array:
+        """R_d(r) [1/length^2]: 2 pi r R_d integrates to A. InputError on a thickness: it has none."""
+        _require_none(thickness)
         return self.value(r)
 
     @evaluated
-    def cdf(self, r) -> Array:
+    def cdf(self, r, thickness=None) -> Array:
         """Share of the reflected light within radius r [-]."""
+        _require_none(thickness)
         return self.law.scaled_cdf(r / self.mfp, jnp.asarray(self.alpha))
 
     @property
@@ -63,12 +66,14 @@ class LayerLaw(Constants):
         """Light that leaves within r [-]."""
         return self.law.unscaled_energy(r / self.mfp, jnp.asarray(self.alpha))
 
-    def drawn(self, xi: Array) -> Array:
+    def drawn(self, xi: Array, thickness: Array | None = None) -> Array:
         """A radius [length] for xi in [0, 1)."""
+        _require_none(thickness)
         return self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp
 
-    def drawn_density(self, r: Array) -> Array:
+    def drawn_density(self, r: Array, thickness: Array | None = None) -> Array:
         """Its density [1/length]."""
+        _require_none(thickness)
         return self.law.sampler.scaled_pdf(r / self.mfp, jnp.asarray(self.alpha)) / self.mfp
 
 
@@ -106,41 +111,32 @@ class StackLaw(Constants):
     h1: float
     k0: float
 
-    def profile(self, r, thickness=None):
-        """R_d(r) [1/length^2], 2 pi r R_d integrates to A; thickness of the first layer [length]. All broadcast."""
-        return self._profile(r, self.thickness if thickness is None else thickness)
-
-    def cdf(self, r, thickness=None):
-        """Share of the reflected light within radius r [-]; 1 at infinity."""
-        return self._cdf(r, self.thickness if thickness is None else thickness)
-
-    def total(self, thickness=None):
-        """Reflectance A [-] under a first layer of that thickness [length]."""
-        return self._total(self.thickness if thickness is None else thickness)
-
-    @property
-    def reflectance(self) -> float:
-        """A [-], under its own thickness."""
-        return float(self.total())
-
-    @property
-    def sampler(self) -> StackSampler:
-        """Draws radii where this law has its light, with their own density."""
-        return StackSampler(self)
-
     @evaluated
-    def _profile(self, r, thickness) -> Array:
+    def profile(self, r, thickness=None) -> Array:
+        """R_d(r) [1/length^2], 2 pi r R_d integrates to A; thickness of the first layer [length]. All broadcast."""
         return self.value(r, thickness)
 
     @evaluated
-    def _cdf(self, r, thickness) -> Array:
+    def cdf(self, r, thickness=None) -> Array:
+        """Share of the reflected light within radius r [-]; 1 at infinity."""
         whole = self.whole(thickness)
         share = self.within(r, thickness) / jnp.where(whole > 0, whole, 1.0)
         return jnp.where(r < jnp.inf, jnp.clip(share, 0.0, 1.0), 1.0)
 
     @evaluated
-    def _total(self, thickness) -> Array:
+    def total(self, thickness) -> Array:
+        """Reflectance A [-] under a first layer of that thickness [length]."""
         return self.whole(thickness)
+
+    @property
+    def reflectance(self) -> float:
+        """A [-], under its own thickness."""
+        return float(self.total(self.thickness))
+
+    @property
+    def sampler(self) -> StackSampler:
+        """Draws radii where this law has its light, with their own density."""
+        return StackSampler(self)
 
     def decay(self) -> Array:
         """Rate at which the light decays far off [1/length]: the slowest of its layers'."""
@@ -236,29 +232,20 @@ class StackSampler(eqx.Module):
 
     law: LayerLaw | StackLaw
 
-    def sample(self, xi, thickness=None):
+    @evaluated
+    def sample(self, xi, thickness=None) -> Array:
         """Radius [length] for a uniform number xi in [0, 1); thickness of the first layer [length]. All broadcast."""
-        return self._sample(xi) if thickness is None else self._sample_at(xi, thickness)
+        return self.law.drawn(xi, thickness)
 
-    def pdf(self, r, thickness=None):
+    @evaluated
+    def pdf(self, r, thickness=None) -> Array:
         """Density in r of `sample` [1/length]; integrates to 1."""
-        return self._pdf(r) if thickness is None else self._pdf_at(r, thickness)
+        return self.law.drawn_density(r, thickness)
 
-    @evaluated
-    def _sample(self, xi) -> Array:
-        return self.law.drawn(xi)
 
-    @evaluated
-    def _sample_at(self, xi, thickness) -> Array:
-        return self.law.drawn(xi, thickness)  # type: ignore[call-arg]
-
-    @evaluated
-    def _pdf(self, r) -> Array:
-        return self.law.drawn_density(r)
-
-    @evaluated
-    def _pdf_at(self, r, thickness) -> Array:
-        return self.law.drawn_density(r, thickness)  # type: ignore[call-arg]
+def _require_none(thickness: Array | None) -> None:
+    if thickness is not None:
+        raise InputError("thickness must be left out where there is but one layer, got one")
 
 
 def _image(r: Array, of: StackTerms) -> Array:

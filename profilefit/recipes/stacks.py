@@ -24,11 +24,8 @@ Floats = NDArray[np.float64]
 THIN, THICK, LONGEST = 0.1, 3.0, 12.0  # thicknesses that are fitted: mean free paths; decay lengths; mean free paths
 COUNT = 5
 INSIDE = (0.6, 1.0, 1.6)  # thicknesses of a layer below another, in its own: there it has no other
-NEAREST, FARTHEST, LONGEST_DECAY = (
-    0.01,
-    30.0,
-    300.0,
-)  # radii: mean free paths; decay lengths, of so many mean free paths
+NEAREST = 0.01  # radius [mfp of the first layer]
+FARTHEST, LONGEST_DECAY = 30.0, 300.0  # radius, in decay lengths of so many mean free paths at most
 RADII = 100
 LAST_SHARE = 0.995
 OF_A = 3.0  # weight of the reflectance beside that of a whole profile

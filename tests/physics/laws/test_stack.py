@@ -150,6 +150,12 @@ def test_refused(medium, message):
 def test_refused_arguments():
     with pytest.raises(InputError, match="thickness must be >= 0"):
         stack().profile(0.1, -1.0)
+    with pytest.raises(InputError, match="thickness must be a number"):
+        stack().total(None)
+    for refused in (stack().top.profile, stack().top.cdf, stack().top.sampler.sample, stack().top.sampler.pdf):
+        with pytest.raises(InputError, match="thickness must be left out"):
+            refused(0.1, 1.0)
+    assert stack().profile(0.1, None) == stack().profile(0.1)
     with pytest.raises(InputError, match="illumination"):
         stack_law(half_space(0.9), "sunlight")
 
