@@ -13,13 +13,13 @@ if TYPE_CHECKING:
     from profilefit.scenes.skin.material import translucent
     from profilefit.scenes.skin.passes import SeparableFilter
     from profilefit.scenes.skin.scene import head_scene
-    from profilefit.scenes.skin.truth import gathered
     from profilefit.scenes.stage.exact_law import ExactLaw
     from profilefit.scenes.stage.pattern import Sampling
     from profilefit.scenes.stage.picture import srgb_codes, to_srgb
     from profilefit.scenes.stage.stage import Stage, covering
     from profilefit.scenes.stage.step_edge import step_response
     from profilefit.scenes.stage.surface import seen
+    from profilefit.scenes.stage.surface_integral import gathered
     from profilefit.scenes.stage.technique import Lambert
     from profilefit.scenes.stage.world import Camera
 else:
@@ -31,13 +31,13 @@ else:
             "translucent": "skin.material",
             "SeparableFilter": "skin.passes",
             "head_scene": "skin.scene",
-            "gathered": "skin.truth",
             "ExactLaw": "stage.exact_law",
             "Sampling": "stage.pattern",
             **dict.fromkeys(("srgb_codes", "to_srgb"), "stage.picture"),
             **dict.fromkeys(("Stage", "covering"), "stage.stage"),
             "step_response": "stage.step_edge",
             "seen": "stage.surface",
+            "gathered": "stage.surface_integral",
             "Lambert": "stage.technique",
             "Camera": "stage.world",
         },

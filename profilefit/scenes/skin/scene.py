@@ -14,16 +14,17 @@ from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
 from profilefit.recipes import catalogue
 from profilefit.recipes.toml_tables import Table, Tables
-from profilefit.scenes.skin import chart, head
+from profilefit.scenes.skin import chart
 from profilefit.scenes.skin.material import Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
-from profilefit.scenes.skin.truth import exitance_of, own_error
+from profilefit.scenes.stage import head
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.picture import Drawn, to_srgb
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface_integral import exitance_of, own_error
 from profilefit.scenes.stage.technique import Lambert, Technique
 from profilefit.scenes.stage.world import Camera, Light, Part, Rgb, Scene, unit
 

@@ -1,1 +1,1 @@
-"""What every scene shares: G-buffer, shadow map, gather, exact edges and integrals."""
+"""What every scene shares: G-buffer, shadow map, gather, exact edges and integrals, a head."""

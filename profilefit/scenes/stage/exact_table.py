@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,11 +33,11 @@ LEAST_REFRACTED = (
 
 @dataclass(frozen=True)
 class Curves:
-    """The exact half space at m albedos.
+    """The exact half space at m albedos, or what another `CurveTable` has at m values.
 
     alpha, reflectance, kappa (m,)  albedo, A [-], decay rate [1/mfp]
-    profile, cdf (m, intervals, 4)  ln(R_d l^2 / A) + kappa x and ln(cdf / x) between knots of ln x: rising powers of
-                                    the way t from the one to the next, 0 to 1
+    profile, cdf (m, intervals, 4)  ln(R_d l^2 / A) + kappa x and ln(cdf / x) between knots of ln x, which start at
+                                    ln NEAREST, STEP apart: rising powers of the way t from one to the next, 0 to 1
     """
 
     alpha: Floats
@@ -54,6 +55,17 @@ class Curves:
         """Cdf of each albedo at its x = r/l >= 0, (m, n) [-]."""
         near = np.clip(x, NEAREST, FARTHEST)
         return np.minimum(np.exp(_cubic(self.cdf, near)) * np.minimum(x, FARTHEST), 1.0)
+
+
+class CurveTable(Protocol):
+    """Where light that scatters in a surface takes its curves from: an `ExactTable`, or a scene's own."""
+
+    def curves(self, values: ArrayLike, /) -> Curves:
+        """At values (3 m,) in [0, 1] [-], pixel by pixel, red, green, blue in turn.
+
+        A value is A, or what the table has in its place. Each curve is normalised by its own A, `Curves.reflectance`:
+        its cdf tends to 1.
+        """
 
 
 @dataclass(frozen=True)

@@ -45,7 +45,7 @@ class Gather(Technique):
         }
         surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map")
         reads = {**surface, "noise_map": pattern.shifts(), **self.law.tables}
-        source = f"{_switches(sampling)}{self.law.text}\n{text_beside(__name__, 'glsl/scatter.frag')}"
+        source = _switches(sampling) + self.law.before(text_beside(__name__, "glsl/scatter.frag"))
         return [Pass(f"scatter {self.law.name}", reads, EXITANCE, source, uniforms)]
 
     def through(self) -> LawText:

@@ -66,6 +66,7 @@ class Surface:
 
     position [length], normal (unit, towards the eye), irradiance E [any unit], reflectance A [-], each (h, w, 3), the
     last two by channel;  mask (h, w), True where the surface is seen
+    For a sum over a scene's own `CurveTable` reflectance is what that maps to curves, in [0, 1] too.
     """
 
     position: Floats

@@ -26,6 +26,9 @@ from profilefit.shader.emit import text_beside
 Floats = NDArray[np.float64]
 LAW = "law"  # the prefix of the law in every shader of the stage
 EXITANCE, RADIANCE = "exitance_map", "radiance_map"
+# How a pixel of the one half space takes its law: by its own A, or by a fixed albedo.
+SHAPE = f"{LAW}_shape(fixed_alpha[c] < 0.0 ? {LAW}_alpha(surface[c]) : fixed_alpha[c])"
+COLOUR = "surface[c]"
 COMMENT = re.compile(r"//[^\n]*|/\*.*?\*/", re.DOTALL)
 UNIFORM = re.compile(r"\buniform\s+(?:(?:low|medium|high)p\s+)?\w+\s+([^;]+);")
 
@@ -76,11 +79,25 @@ class Frame:
 
 @dataclass(frozen=True)
 class LawText:
-    """A law with the prefix `LAW`: its name, its GLSL, and the arrays that its samplers read, by their names."""
+    """A law with the prefix `LAW`: its name, its GLSL, and the arrays that its samplers read, by their names.
+
+    shape   GLSL of the LAW_Shape of a pixel's channel, an expression of `surface`, the texel of reflectance_map (vec3),
+            and of `c`, the channel (int)
+    colour  GLSL of A there [-], an expression of both and of `shape`, the LAW_Shape
+    Both may also read the uniforms `fixed_alpha` and `mfp` (vec3), and are asked only where light scatters inside.
+    """
 
     name: str
     text: str
     tables: Mapping[str, Singles] = field(default_factory=dict)
+    shape: str = SHAPE
+    colour: str = COLOUR
+
+    def before(self, shader: str) -> str:
+        """A shader's text with the law before it, and SHAPE and COLOUR, by which it asks for both."""
+        shape, colour = (" ".join(one.split()) for one in (self.shape, self.colour))  # a macro is one line
+        macros = f"#define SHAPE(surface, c) ({shape})\n#define COLOUR(surface, c, shape) ({colour})\n"
+        return f"{self.text}\n{macros}{shader}"
 
 
 class Technique(ABC):
@@ -92,7 +109,7 @@ class Technique(ABC):
 
     @abstractmethod
     def through(self) -> LawText:
-        """LAW_alpha, LAW_shape and LAW_cumulated: the share of the light that a thin part keeps."""
+        """LAW_cumulated, the share of the light that a thin part keeps, and what its shape and colour call."""
 
     def lengths(self, frame: Frame) -> Floats:
         """The unit of LAW_cumulated's x, of red, green, blue (3,) [mm]."""
@@ -120,7 +137,7 @@ def combination(by: Technique, frame: Frame, scene: Scene | None) -> Pass:
         **_lit(scene),
     }
     surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map", EXITANCE)
-    source = f"{law.text}\n{text_beside(__name__, 'glsl/combine.frag')}"
+    source = law.before(text_beside(__name__, "glsl/combine.frag"))
     return Pass(f"combine {law.name}", {**surface, **law.tables}, RADIANCE, source, uniforms)
 
 

@@ -5,6 +5,7 @@ World and view space are in millimetres, y up; a view looks along -z.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -16,6 +17,8 @@ from profilefit.errors import InputError
 Floats = NDArray[np.float64]
 Rgb = tuple[float, float, float]
 KINDS = ("perspective", "orthographic")
+# Of central differences, over the largest coordinate: there rounding, eps / step, is as large as the rest, step^2.
+DIFFERENCE = float(np.cbrt(np.finfo(float).eps))
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,46 @@ def sheet(points: Floats, u: Floats, v: Floats, closed: bool = False) -> Mesh:
     triangles = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     uv = np.stack([u, v], -1).reshape(-1, 2)
     return Mesh(points.reshape(-1, 3), normals(points, closed).reshape(-1, 3), uv, triangles)
+
+
+def deformed(mesh: Mesh, move: Callable[[Floats], Floats]) -> Mesh:
+    """The mesh moved by a smooth map of space, (n, 3) -> (n, 3) [mm]; its normals by the map's derivatives.
+
+    Raises InputError where the map turns space inside out, as a mirror does, or is not finite.
+    """
+    start = np.asarray(mesh.position, float)
+    with np.errstate(all="ignore"):  # what is not finite is named below
+        position = _moved(move, start)
+        a, b, c = _derivatives(move, start)
+        # The columns of the inverse transpose, times the determinant, which is > 0.
+        by_x, by_y, by_z = np.cross(b, c), np.cross(c, a), np.cross(a, b)
+        determinant = np.sum(a * by_x, axis=1)
+    good = np.isfinite(determinant) & (determinant > 0) & np.isfinite(position).all(axis=1)
+    if not good.all():
+        at = int(np.argmin(good))
+        place = ", ".join(f"{one:g}" for one in start[at])
+        found = f"{determinant[at]:g} at ({place})"
+        raise InputError(f"move must keep orientation, with a determinant > 0 of its derivatives, got {found}")
+    x, y, z = mesh.normal.T[..., None]
+    return replace(mesh, position=position, normal=unit(x * by_x + y * by_y + z * by_z))
+
+
+def _moved(move: Callable[[Floats], Floats], points: Floats) -> Floats:
+    moved = np.asarray(move(points), float)
+    if moved.shape != points.shape:
+        raise InputError(f"move must return an array of shape {points.shape}, as it is given, got {moved.shape}")
+    return moved
+
+
+def _derivatives(move: Callable[[Floats], Floats], points: Floats) -> list[Floats]:
+    """d move / dx, d / dy, d / dz, each (n, 3) [-]: central differences."""
+    step = DIFFERENCE * (np.max(np.abs(points), initial=0.0) or 1.0)
+    found = []
+    for axis in np.eye(3):
+        high, low = points + step * axis, points - step * axis
+        # Over the step that float64 took, which is not quite the one that was asked for.
+        found.append((_moved(move, high) - _moved(move, low)) / ((high - low) @ axis)[:, None])
+    return found
 
 
 def normals(points: Floats, closed: bool = False) -> Floats:

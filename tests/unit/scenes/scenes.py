@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from profilefit.scenes.skin import head, material
+from profilefit.scenes.skin import material
+from profilefit.scenes.stage import head
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene, parameters, sheet
 
 RADIUS = 10.0

@@ -5,8 +5,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
+import profilefit
+from mcml_sim import Setting
 from profilefit.errors import InputError, ShaderError
+from profilefit.scenes.skin import material
 from profilefit.scenes.stage.buffers import flat, step_edge
+from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.technique import (
     EXITANCE,
@@ -18,6 +22,7 @@ from profilefit.scenes.stage.technique import (
     through_text,
     uniforms_of,
 )
+from tests.unit.scenes.scenes import ball, scene
 
 SIZE = (128, 128)
 SOURCE = """
@@ -88,6 +93,38 @@ def test_a_sampler_without_a_map_is_an_error(stage):
     stage.upload(flat(SIZE, 1.0, 0.5))
     with pytest.raises(ShaderError, match="uniform reflectance_map stands in its source, but is never set"):
         stage.scatter(Unread(), 1.0)
+
+
+@pytest.fixture(scope="module")
+def law():
+    """The text of the project's law for diffuse light."""
+    return Gather.of(profilefit.load("hazard", setting=Setting("diffuse"))).law
+
+
+def test_a_law_takes_its_shape_and_colour_from_other_channels(stage, law):
+    """Red for blue, on a ball that the light shines through: that of the ball of the other colours, to the bit."""
+    behind, mfp = (0.2, 0.4, -1.0), (12.0, 6.0, 9.0)
+    swapped = Gather(replace(law, shape="law_shape(law_alpha(surface[2 - c]))", colour="\n  surface[2 - c]\n"))
+    drawn = {}
+    for name, colours, by in (("other", (0.3, 0.5, 0.8), Gather(law)), ("swapped", (0.8, 0.5, 0.3), swapped)):
+        stage.draw(scene(behind, replace(ball(), reflectance=material.plain(colours)), kind="perspective"))
+        drawn[name] = stage.scatter(by, mfp), stage.render(by, mfp)
+    for other, found in zip(*drawn.values(), strict=True):
+        np.testing.assert_array_equal(found, other)
+    light, radiance = drawn["swapped"]
+    assert np.mean(radiance > light / np.pi + 1e-3) > 0.1  # some of it shone through
+    assert np.max(np.abs(stage.scatter(Gather(law), mfp) - light)) > 0.01  # the comparison can fail
+
+
+def test_a_colour_that_the_shape_gives(stage, law):
+    """A map that holds albedos, and no A."""
+    alpha = np.array([0.95, 0.8, 0.5])
+    colour = profilefit.load("hazard", setting=Setting("diffuse")).albedo.reflectance(alpha)
+    stage.upload(flat(SIZE, 1.0, alpha))
+    by = Gather(replace(law, shape="law_shape(surface[c])", colour="law_reflectance(shape)"))
+    for mfp in (2.0, 1e-3):  # blurred all over, and nowhere
+        light = stage.scatter(by, mfp)
+        np.testing.assert_allclose(light, np.broadcast_to(colour, light.shape), rtol=1e-5)  # float32
 
 
 def test_lambert_is_the_light_that_arrives(stage):

@@ -13,13 +13,14 @@ out vec4 radiance;
 const float PI = 3.141592653589793;
 
 // Energy that has not come out within the thickness comes out behind it; A of the side that is seen.
-vec3 through(vec3 reflectance, float thickness) {
-    vec3 rest;
+vec3 through(vec3 surface, float thickness) {
+    vec3 colour, rest;
     for (int c = 0; c < 3; ++c) {
-        float alpha = fixed_alpha[c] < 0.0 ? law_alpha(reflectance[c]) : fixed_alpha[c];
-        rest[c] = max(1.0 - law_cumulated(thickness / mfp[c], law_shape(alpha)), 0.0);
+        law_Shape shape = SHAPE(surface, c);
+        colour[c] = COLOUR(surface, c, shape);
+        rest[c] = max(1.0 - law_cumulated(thickness / mfp[c], shape), 0.0);
     }
-    return reflectance * rest;
+    return colour * rest;
 }
 
 // Torrance and Sparrow with GGX, Smith's heights correlated, Fresnel by Schlick: times cosine [1/sr].

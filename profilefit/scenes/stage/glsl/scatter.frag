@@ -137,19 +137,21 @@ void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec4 centre = texelFetch(position_map, here, 0);
     vec3 own = texelFetch(irradiance_map, here, 0).rgb;
-    vec3 reflectance = texelFetch(reflectance_map, here, 0).rgb;
+    vec3 surface = texelFetch(reflectance_map, here, 0).rgb;
+    vec3 colour = surface;
     vec3 light = own;
     // So short a mean free path does not leave the pixel: Lambert, to a part in 1000.
     vec3 across = mfp / world_per_pixel(-centre.z);
     vec3 blurred = clamp((across - LAMBERT.x) / (LAMBERT.y - LAMBERT.x), 0.0, 1.0);
-    if (centre.w > 0.5 && any(greaterThan(blurred, vec3(0.0)))) {
+    if (centre.w > 0.5) {
         for (int c = 0; c < 3; ++c) {
-            shape[c] = law_shape(fixed_alpha[c] < 0.0 ? law_alpha(reflectance[c]) : fixed_alpha[c]);
+            shape[c] = SHAPE(surface, c);
+            colour[c] = COLOUR(surface, c, shape[c]); // where nothing is blurred, too
 #if UNIFORM
             reach[c] = law_radius(MOST_UNIFORM, shape[c]);
 #endif
         }
-        light = mix(own, gathered(here, -centre.z, own), blurred);
+        if (any(greaterThan(blurred, vec3(0.0)))) light = mix(own, gathered(here, -centre.z, own), blurred);
     }
-    exitance = vec4(reflectance * light, centre.w);
+    exitance = vec4(colour * light, centre.w);
 }

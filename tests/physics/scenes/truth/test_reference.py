@@ -1,16 +1,18 @@
 """The gather over the visible surface: a double loop over exact profiles, conservation, the step edge, gaps."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mcml_sim import exact
 from profilefit.errors import InputError
-from profilefit.scenes.skin.truth import gathered, own_share, refined
 from profilefit.scenes.stage import buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.exact_table import exact_table
 from profilefit.scenes.stage.step_edge import step_response
 from profilefit.scenes.stage.surface import Surface, View, seen
+from profilefit.scenes.stage.surface_integral import exitance_of, gathered, own_share, refined
 
 VIEW = View(*np.diag([1.0, 1.0, -1.0]), pixel=0.5)
 MFP = np.array([1.5, 0.8, 2.2])
@@ -151,8 +153,42 @@ def test_refined_says_what_coarse_pixels_cost():
     assert 1e-4 < np.max(np.abs(change)) < 0.02
 
 
+def test_a_table_of_ones_own():
+    """One that knows its curves by (A - 0.1) / 0.8: the same light, to the bit, as of A itself."""
+
+    class Stretched:
+        def curves(self, values):
+            assert values.size % 3 == 0
+            return exact_table(DIFFUSE).curves(0.1 + 0.8 * values)
+
+    surface = hill(4, 6)
+    values = replace(surface, reflectance=(surface.reflectance - 0.1) / 0.8)
+    itself = replace(surface, reflectance=0.1 + 0.8 * values.reflectance)
+    found, truth = gathered(values, VIEW, MFP, Stretched()), gathered(itself, VIEW, MFP)
+    np.testing.assert_array_equal(found.light, truth.light)
+    np.testing.assert_array_equal(found.share, truth.share)
+    assert np.max(np.abs(gathered(values, VIEW, MFP).light - truth.light)) > 0.01  # the comparison can fail
+
+
+def test_a_table_of_ones_own_in_a_picture():
+    """Where nothing scatters inside, the map is A all the same."""
+
+    class Half:
+        def curves(self, values):
+            return exact_table(DIFFUSE).curves(0.5 * values)
+
+    mask = np.ones((4, 6), np.float32)
+    mask[:, 0] = 0.0
+    picture = replace(buffers.flat((6, 4), 1.0, 0.8), mask=mask)
+    light = exitance_of(picture, np.ones(3), Half())
+    np.testing.assert_allclose(light[:, 1:], 0.4, rtol=1e-6)  # float32 of 0.8
+    np.testing.assert_allclose(light[:, 0], 0.8, rtol=1e-6)
+
+
 def test_misuse():
     surface = flat(4, 6, 0.5)
+    with pytest.raises(InputError, match="table must be a Setting, or have a method curves, got 'diffuse'"):
+        gathered(surface, VIEW, MFP, "diffuse")
     with pytest.raises(InputError, match="mfp must be three lengths > 0"):
         gathered(surface, VIEW, [1.0, 0.0, 1.0])
     with pytest.raises(InputError, match=r"pixels must be visible ones, got \(4, 0\)"):

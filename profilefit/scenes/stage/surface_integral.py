@@ -7,6 +7,9 @@ path of the channel; distances are straight lines; only what the view sees count
 it (`share`, their sum, says how much of the profile's energy it holds: 1 on an endless plane); a pixel shows the
 parallelogram of its footprint in its tangent plane, with one irradiance all over.
 
+In place of a setting a scene may give a table of its own, which maps the surface's `reflectance` to curves: that is
+then whatever the table takes it for, a number in [0, 1] a channel, and A_c(o) is what the curves have as reflectance.
+
 W of the own pixel, where R_d is infinite, is an integral of the cdf along the edge of its parallelogram; neighbours are
 divided by Gauss points, all others taken at their middle. All pairs count, near and far.
 """
@@ -27,7 +30,7 @@ from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
+from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, CurveTable, exact_table
 from profilefit.scenes.stage.picture import TruthError
 from profilefit.scenes.stage.surface import Surface, View, seen
 
@@ -57,23 +60,29 @@ class Gathered:
 
 
 def gathered(
-    surface: Surface, view: View, mfp: ArrayLike, setting: Setting = DIFFUSE, pixels: ArrayLike | None = None
+    surface: Surface,
+    view: View,
+    mfp: ArrayLike,
+    table: CurveTable | Setting = DIFFUSE,
+    pixels: ArrayLike | None = None,
 ) -> Gathered:
     """The reference at every visible pixel, or at `pixels` (m, 2) of (row, column), all visible.
 
     mfp  of the three channels (3,), in the unit of the positions
+    table  of the curves, by the surface's `reflectance`; of a setting, that of the exact half space by A
     Raises InputError. 26 000 visible pixels take about a minute on a core, 100 MiB.
     """
     lengths = np.asarray(mfp, float)
     if lengths.shape != (3,) or not np.all((lengths > 0) & np.isfinite(lengths)):
         raise InputError(f"mfp must be three lengths > 0, got {mfp!r}")
+    curves = _table(table)
     chosen = np.argwhere(surface.mask) if pixels is None else _chosen(surface, pixels)
     light, share = np.empty((len(chosen), 3)), np.empty((len(chosen), 3))
     scene, numbers = _scene(surface, view), _numbers(surface.mask)
     for start in range(0, len(chosen), AT_ONCE):
         part = chosen[start : start + AT_ONCE]
         light[start : start + AT_ONCE], share[start : start + AT_ONCE] = _some(
-            surface, scene, numbers, lengths, setting, part
+            surface, scene, numbers, lengths, curves, part
         )
     if pixels is not None:
         return Gathered(light, share)
@@ -83,7 +92,7 @@ def gathered(
 
 
 def refined(
-    fine: Surface, view: View, mfp: ArrayLike, setting: Setting, pixels: ArrayLike, factor: int = 2
+    fine: Surface, view: View, mfp: ArrayLike, table: CurveTable | Setting, pixels: ArrayLike, factor: int = 2
 ) -> tuple[Floats, Floats]:
     """Light at pixels (m, 2) of a coarser view, from a surface `factor` times as fine, and the error without it.
 
@@ -94,18 +103,18 @@ def refined(
     chosen = _chosen(coarse, pixels)
     inside = np.stack(np.meshgrid(range(factor), range(factor), indexing="ij"), axis=-1).reshape(-1, 2)
     parts = (factor * chosen[:, None] + inside).reshape(-1, 2)
-    mean = gathered(fine, view, mfp, setting, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
-    return mean, gathered(coarse, view.coarsened(factor), mfp, setting, chosen).light - mean
+    mean = gathered(fine, view, mfp, table, parts).light.reshape(len(chosen), -1, 3).mean(axis=1)
+    return mean, gathered(coarse, view.coarsened(factor), mfp, table, chosen).light - mean
 
 
-def exitance_of(buffers: Buffers, mfp: ArrayLike, setting: Setting = DIFFUSE) -> Floats:
+def exitance_of(buffers: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> Floats:
     """(h, w, 3) radiant exitance of a picture in diffuse light: the reference; Lambert's where nothing scatters."""
-    light = gathered(*seen(buffers), mfp, setting).light
+    light = gathered(*seen(buffers), mfp, table).light
     inside = (buffers.mask > INSIDE)[..., None]
     return np.where(inside, light, buffers.irradiance.astype(float) * buffers.reflectance)
 
 
-def own_error(fine: Buffers, mfp: ArrayLike, setting: Setting = DIFFUSE) -> TruthError:
+def own_error(fine: Buffers, mfp: ArrayLike, table: CurveTable | Setting = DIFFUSE) -> TruthError:
     """What half the pixel's side changes in `exitance_of`, over its mean [-], at some pixels of an even-sized picture.
 
     fine  the same picture with pixels of half the side
@@ -113,7 +122,7 @@ def own_error(fine: Buffers, mfp: ArrayLike, setting: Setting = DIFFUSE) -> Trut
     surface, view = seen(fine)
     inside = np.argwhere(surface.coarsened(2).mask)
     chosen = inside[np.random.default_rng(1).choice(len(inside), min(CHECKED, len(inside)), replace=False)]
-    mean, difference = refined(surface, view, mfp, setting, chosen)
+    mean, difference = refined(surface, view, mfp, table, chosen)
     share = np.abs(difference) / np.mean(mean)
     half, most = np.quantile(share, (0.5, 0.9)).tolist()
     return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
@@ -164,6 +173,14 @@ class _Points(NamedTuple):
     irradiance: Array
 
 
+def _table(table: CurveTable | Setting) -> CurveTable:
+    if isinstance(table, Setting):
+        return exact_table(table)
+    if not callable(getattr(table, "curves", None)):
+        raise InputError(f"table must be a Setting, or have a method curves, got {table!r}")
+    return table
+
+
 def _chosen(surface: Surface, pixels: ArrayLike) -> NDArray[np.int64]:
     chosen = np.asarray(pixels)
     if chosen.ndim != 2 or chosen.shape[1] != 2 or not np.issubdtype(chosen.dtype, np.integer):
@@ -202,14 +219,13 @@ def _some(
     scene: _Scene,
     numbers: NDArray[np.int64],
     mfp: Floats,
-    setting: Setting,
+    table: CurveTable,
     chosen: NDArray[np.int64],
 ) -> tuple[Floats, Floats]:
     """Light and share of up to AT_ONCE points (m, 3); the last one fills the shape that was compiled."""
     full = np.concatenate([chosen, np.repeat(chosen[-1:], AT_ONCE - len(chosen), axis=0)])
     rows, columns = full.T
-    reflectance = surface.reflectance[rows, columns]
-    curves = exact_table(setting).curves(reflectance.ravel())
+    curves = table.curves(surface.reflectance[rows, columns].ravel())
     around = np.stack([numbers[r : r + 2 * NEAR + 1, c : c + 2 * NEAR + 1].ravel() for r, c in full])
     visible = around[:, around.shape[1] // 2]
     across, along = np.asarray(scene.across)[visible], np.asarray(scene.along)[visible]
@@ -226,7 +242,7 @@ def _some(
             scene.irradiance[visible],
         )
         lit, share = (np.asarray(value) for value in _sums(scene, points, mfp))
-    return (reflectance * lit / share)[: len(chosen)], share[: len(chosen)]
+    return (curves.reflectance.reshape(AT_ONCE, 3) * lit / share)[: len(chosen)], share[: len(chosen)]
 
 
 @jax.jit
