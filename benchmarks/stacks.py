@@ -19,7 +19,7 @@ import numpy as np
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.materials import BY_NAME, CHANNELS
-from profilefit.recipes.stacks import stack_law
+from profilefit.recipes.stack.fit import stack_law
 
 LIGHTS = ("searchlight", "diffuse")
 THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]

@@ -33,8 +33,9 @@ def choose(
     """Find the cheapest option within a scene's limits.
 
     The limits are its error tolerance and its time budget. Options range from no scattering through filters to samples
-    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by tracing both.
-    Half a minute. --json prints every option and its constants. Exit status 1 if no option is within the limits.
+    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by tracing both,
+    in its worst colour. Half a minute. --json prints every option and its constants. Exit status 1 if no option is
+    within the limits.
 
     \b
     Example, on a file of profilefit examples:
@@ -46,21 +47,18 @@ def choose(
         from profilefit.report.tables.choose_table import choose_table, content
         from profilefit.studies.choose import cost
         from profilefit.studies.choose.choice import choose as chosen
-        from profilefit.studies.choose.layers import one_layer
+        from profilefit.studies.choose.layers import of_each_colour
         from profilefit.studies.choose.requirements import read
 
     requirements = read(scene)
     ratios = _measured(requirements, quiet) if measure else cost.shipped()
     choice = chosen(requirements, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
-    layer = None
-    if requirements.layers is not None:
-        layer = one_layer(
-            requirements.layers, requirements.tolerance, requirements.within, progress=False if quiet else None
-        )
+    stack, bar = requirements.layers, False if quiet else None
+    layers = () if stack is None else of_each_colour(stack, requirements.tolerance, requirements.within, bar)
     if as_json:
-        print_json(content(choice, ratios, layer))
+        print_json(content(choice, ratios, layers))
     else:
-        screen().print(choose_table(choice, ratios, layer))
+        screen().print(choose_table(choice, ratios, layers))
     if choice.chosen is None:
         raise typer.Exit(UNSERVED)
 

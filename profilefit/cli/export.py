@@ -12,6 +12,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.folders import records_folder
 from profilefit.cli.options import Fits
+from profilefit.errors import InputError
 
 
 def export(
@@ -19,7 +20,7 @@ def export(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A record (hazard-diffuse), a law (burley) or a map (chiang).",
+            help="A record (hazard-diffuse), a law (burley), a map (chiang) or the record of a stack (skin).",
             autocompletion=options.subjects,
         ),
     ],
@@ -47,7 +48,8 @@ def export(
     """Write a law as one file for a shader or a program.
 
     Its functions, every constant with its errors, units, illumination, range and digests. Without --constants a law or
-    map that was not regenerated has its printed ones.
+    map that was not regenerated has its printed ones. Of a stack: the law of its three colours with the first layer's
+    thickness as an argument, and light scattered once.
 
     \b
     Examples:
@@ -57,10 +59,17 @@ def export(
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
         from profilefit.recipes.inventory import find
+        from profilefit.recipes.stack import record as stack_record
         from profilefit.shader import export as exported
+        from profilefit.shader.stack_file import export_stack
 
     folder = records_folder(fits)
-    text = exported(find(what, folder, constants, n), folder, lang, name)
+    if (path := stack_record.find(what, folder)) is not None:
+        if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
+            raise InputError(f"{given[0]} must be left out where NAME is a stack, got {what!r}")
+        text = export_stack(stack_record.load(path), lang, name)
+    else:
+        text = exported(find(what, folder, constants, n), folder, lang, name)
     if out is None:
         sys.stdout.write(text)
     else:

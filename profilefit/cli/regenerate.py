@@ -31,7 +31,8 @@ def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of recipes, or .toml files; all of them if none is named.", autocompletion=options.recipes
+            help="Names of recipes or stacks, or .toml files of either; all recipes if none is named.",
+            autocompletion=options.recipes,
         ),
     ] = None,
     preset: Annotated[Preset, typer.Option(help=PRESETS)] = Preset.QUICK,
@@ -52,10 +53,14 @@ def regenerate(
     One record a recipe, in some seconds each, as many side by side as there are cores. Ctrl-C loses what is in flight
     only: photons that are traced stay, and the same command resumes.
 
+    A file with [[layers]] is a stack: its law is fitted to exact light, a minute or two, and its record goes to
+    OUT/stacks.
+
     \b
-    Examples:
+    Examples, the last on a file of profilefit examples:
       profilefit regenerate hazard --out mine
       profilefit regenerate albedo-liang --photons 100000 --out mine
+      profilefit regenerate examples/layers-head.toml --out mine
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes, print_json, put
@@ -64,6 +69,7 @@ def regenerate(
         from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
         from profilefit.recipes.run import RecipeRun
+        from profilefit.recipes.stack import record as stack_record
         from profilefit.recipes.workers import cores
         from profilefit.report.tables.summary_tables import outcome, spent
 
@@ -72,7 +78,10 @@ def regenerate(
     if photons is not None and photons < 1:
         raise InputError(f"photons must be a whole number >= 1, got {photons}")
     said = notes(quiet)
-    those = chosen(recipes or (), fits_folder())
+    stacks = [stack_record.request_of(name) for name in recipes or () if stack_record.is_stack(name)]
+    others = [name for name in recipes or () if not stack_record.is_stack(name)]
+    those = chosen(others, fits_folder()) if others or not stacks else ()
+    stack_record.require_apart(stacks)
     require_folder(out)
     begin = time.perf_counter()
     run = RecipeRun(
@@ -84,11 +93,15 @@ def regenerate(
         say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=is_watched() and not quiet,
     )
-    steps = regenerate_records(those, run, processes=cores())
+    steps = regenerate_records(those, run, processes=cores()) if those else []
     written = {step.name: step.path for step in steps if step.path}
+    seconds = {step.name: step.seconds for step in steps}
+    for stack in stacks:
+        start, name = time.perf_counter(), f"{stack_record.FOLDER}/{stack.name}"
+        written[name] = stack_record.regenerate(stack, out, cores(), run.say)
+        seconds[name] = time.perf_counter() - start
     if len(written) > 1:
-        put(spent({step.name: step.seconds for step in steps}, written), said)
+        put(spent(seconds, written), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
     if as_json:
-        seconds = {step.name: round(step.seconds, 1) for step in steps}
-        print_json({name: {**outcome(path), "seconds": seconds[name]} for name, path in written.items()})
+        print_json({name: {**outcome(path), "seconds": round(seconds[name], 1)} for name, path in written.items()})

@@ -66,15 +66,16 @@ class LayerLaw(Constants):
         """Light that leaves within r [-]."""
         return self.law.unscaled_energy(r / self.mfp, jnp.asarray(self.alpha))
 
-    def drawn(self, xi: Array, thickness: Array | None = None) -> Array:
-        """A radius [length] for xi in [0, 1)."""
+    def drawn(self, xi: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
+        """A radius [length] for xi in [0, 1), of light seen from a depth [length]."""
         _require_none(thickness)
-        return self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp
+        return _moved(self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp, depth)
 
-    def drawn_density(self, r: Array, thickness: Array | None = None) -> Array:
+    def drawn_density(self, r: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
         """Its density [1/length]."""
         _require_none(thickness)
-        return self.law.sampler.scaled_pdf(r / self.mfp, jnp.asarray(self.alpha)) / self.mfp
+        s, slope = _unmoved(r, depth)
+        return slope * self.law.sampler.scaled_pdf(s / self.mfp, jnp.asarray(self.alpha)) / self.mfp
 
 
 class StackLaw(Constants):
@@ -163,28 +164,23 @@ class StackLaw(Constants):
         image = 1.0 - _beyond(jnp.hypot(r, of.height), of)
         return self.top.within(r) - of.c1 * gone + of.c2 * back + of.image * image
 
-    def drawn(self, xi: Array, thickness: Array | None = None) -> Array:
-        """A radius [length] for xi in [0, 1), of one of the three terms that add light.
-
-        Of that from below a radius s of its own law, moved out to r = sqrt(s (s + 2 g_2 d)).
-        """
+    def drawn(self, xi: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
+        """A radius [length] for xi in [0, 1), of one of the three terms that add light, seen from a depth [length]."""
         of = self.terms(thickness)
-        first, second, third = self._shares(of)
-        own = self.top.drawn(_stretched(xi, 0.0, first))
-        s = self.below.drawn(_stretched(xi, first, second))
-        image = _image_radius(_stretched(xi, first + second, third), of)
-        moved = jnp.sqrt(s * (s + 2.0 * of.back))
-        return jnp.where(xi < first, own, jnp.where(xi < first + second, moved, image))
+        first, second, third = self.shares(of)
+        own = self.top.drawn(_stretched(xi, 0.0, first), None, depth)
+        back = self.below.drawn(_stretched(xi, first, second), None, jnp.hypot(depth, of.back))
+        image = _moved(_image_radius(_stretched(xi, first + second, third), of), depth)
+        return jnp.where(xi < first, own, jnp.where(xi < first + second, back, image))
 
-    def drawn_density(self, r: Array, thickness: Array | None = None) -> Array:
+    def drawn_density(self, r: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
         """Its density [1/length]."""
         of = self.terms(thickness)
-        first, second, third = self._shares(of)
-        far = jnp.hypot(r, of.back)
-        sure = jnp.where(far > 0, far, 1.0)
-        s = jnp.where(of.back > 0, r * r / (sure + of.back), r)
-        moved = self.below.drawn_density(s) * jnp.where(far > 0, r / sure, 1.0)
-        return first * self.top.drawn_density(r) + second * moved + third * 2.0 * jnp.pi * r * _image(r, of)
+        first, second, third = self.shares(of)
+        s, slope = _unmoved(r, depth)
+        image = slope * 2.0 * jnp.pi * s * _image(s, of)
+        back = self.below.drawn_density(r, None, jnp.hypot(depth, of.back))
+        return first * self.top.drawn_density(r, None, depth) + second * back + third * image
 
     def terms(self, thickness: Array | None = None) -> StackTerms:
         """What depends on the thickness only: once a point of a surface."""
@@ -202,7 +198,7 @@ class StackLaw(Constants):
         given = self.thickness if thickness is None else thickness
         return jnp.minimum(jnp.asarray(given), THICKEST * self.top.mfp)
 
-    def _shares(self, of: StackTerms) -> tuple[Array, Array, Array]:
+    def shares(self, of: StackTerms) -> tuple[Array, Array, Array]:
         """Of the radii that are drawn for each term [-]: those of light that is added, not taken away."""
         image = jnp.maximum(of.image, 0.0)
         total = of.kept + of.came + image
@@ -270,6 +266,20 @@ def _image_radius(xi: Array, of: StackTerms) -> Array:
         z = z * (1.0 + q - jnp.log(z)) / (1.0 + z)
     s = z / of.rate
     return jnp.sqrt(jnp.maximum((s - of.height) * (s + of.height), 0.0))
+
+
+def _moved(s: Array, depth: Array | float) -> Array:
+    """The radius of a law at which what it has beyond s is seen from a depth: from hypot(r, depth) = s + depth."""
+    return jnp.sqrt(s * (s + 2.0 * depth))
+
+
+def _unmoved(r: Array, depth: Array | float) -> tuple[Array, Array]:
+    """Its inverse, s [length], and ds/dr [-]."""
+    inside = (r > 0) & (r < jnp.inf)
+    bounded = jnp.where(inside, r, 1.0)
+    far = jnp.hypot(bounded, depth)
+    slope = jnp.where(r > 0, jnp.where(inside, bounded / far, 1.0), jnp.where(depth > 0, 0.0, 1.0))
+    return jnp.where(inside, bounded * (bounded / (far + depth)), r), slope
 
 
 def _stretched(xi: Array, low: Array | float, width: Array) -> Array:

@@ -44,7 +44,10 @@ else:
     )
 
 # By its name in a file's key `scene`: the module that reads such a file and draws it, and an example of one.
-SCENES = {"skin": ("profilefit.scenes.skin.scene", "skin-head.toml")}
+SCENES = {
+    "skin": ("profilefit.scenes.skin.scene", "skin-head.toml"),
+    "layers": ("profilefit.scenes.layers.scene", "layers-head.toml"),
+}
 
 __all__ = [
     "SCENES",

@@ -27,8 +27,11 @@ from profilefit.shader.languages import translated
 Numbers = dict[str, float]
 PLACEHOLDER = "LAW_"
 NORMALISED = "rational"  # the part that stands for the text of the map which normalises a law
-# A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before.
+# A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before;
+# @n is the last one, anywhere.
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
+# The function that makes a shape of an albedo: a text that has its shapes as numbers leaves it out.
+SHAPE = re.compile(r"^//% shape\n(.*?)^//% end\n", re.MULTILINE | re.DOTALL)
 # A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
 PREFIX = re.compile(r"(?!gl_|PF_|pf_|LAW\b)[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*")
 # A second include of the same text is skipped; one of other constants under the same names would be so in silence.
@@ -71,12 +74,41 @@ def law_text(
     InputError for a law that has no text.
     """
     text = _text(law, ProfileLaw)
-    albedo = _normalisation(law) if NORMALISED in text.parts else None
-    map_constants = _prefixed(albedo) if albedo else {}
-    constants = {**map_constants, **law.text_numbers(), **law.text_constants()}
-    own = {NORMALISED: _text(albedo).file} if albedo else {}
-    files = [read_text(own.get(part, part)) for part in ("common", *text.parts, text.file, *text.ends)]
-    return _filled(files, name or prefix(law), constants, text.count, lang, told or {})
+    files = [*parts(law), *map(read_text, text.ends)]
+    return filled(files, name or prefix(law), numbers(law), text.count, lang, told or {})
+
+
+def numbers(law: ProfileLaw) -> Numbers:
+    """Every number of a law's text, by its name less the prefix."""
+    albedo = _normalisation(law) if NORMALISED in _text(law, ProfileLaw).parts else None
+    return {**(_prefixed(albedo) if albedo else {}), **law.text_numbers(), **law.text_constants()}
+
+
+def parts(law: ProfileLaw) -> list[str]:
+    """The files of a law's text in order, without those that complete it."""
+    text = _text(law, ProfileLaw)
+    own = {NORMALISED: _text(_normalisation(law)).file} if NORMALISED in text.parts else {}
+    return [SHAPE.sub(r"\1", read_text(own.get(part, part))) for part in ("common", *text.parts, text.file)]
+
+
+def shapeless(law: ProfileLaw) -> list[str]:
+    """What of a law's text works on shapes that are made elsewhere."""
+    text = _text(law, ProfileLaw)
+    return [SHAPE.sub("", read_text(part)) for part in ("common", "survival", text.file)]
+
+
+def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
+    """The members of a law's shape at an albedo, in float64, by their dotted names in its text."""
+    made: dict[str, Any] = {}
+    exec(compile(law_text(law, "python", "law"), "law.py", "exec"), made)
+
+    def members(shape: Any, before: str) -> Numbers:
+        found: Numbers = {}
+        for key, value in vars(shape).items():
+            found |= members(value, f"{before}{key}.") if hasattr(value, "__dict__") else {before + key: float(value)}
+        return found
+
+    return members(made["law_shape"](alpha), "")
 
 
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
@@ -85,7 +117,7 @@ def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: 
     constants = _prefixed(law)
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
     files = [read_text(part) for part in ("common", *text.parts, text.file)]
-    return _filled(files, name or prefix(law), constants, 0, lang, remarks)
+    return filled(files, name or prefix(law), constants, 0, lang, remarks)
 
 
 @cache
@@ -123,7 +155,8 @@ def read_text(file: str) -> str:
     return text_beside(__name__, f"glsl/{file}.glsl")
 
 
-def _filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:
+def filled(texts: list[str], name: str, constants: Numbers, count: int, lang: str, told: Mapping[str, str]) -> str:
+    """Texts, the first of which is `common`, with a prefix and its constants, in a language."""
     if not PREFIX.fullmatch(name):
         raise InputError(f"name must be letters, digits and single underscores, not of gl_ or PF_, got {name!r}")
     common, *rest = texts
@@ -158,4 +191,4 @@ def _repeated(text: str, count: int) -> str:
         first, body = int(found.group(1)), found.group(2)
         return "".join(body.replace("@i", str(i)).replace("@h", str(i - 1)) for i in range(first, count + 1))
 
-    return BLOCK.sub(each, text)
+    return BLOCK.sub(each, text).replace("@n", str(count))

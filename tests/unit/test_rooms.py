@@ -33,7 +33,6 @@ SHORT, LONG = 60, 350  # lines: a shorter file needs a second importer, a longer
 EXCEPTIONS = {
     "mcml_sim.media.phase.isotropic": "one of a shelf",
     "profilefit.laws.van_de_hulst": "one of a shelf",
-    "profilefit.scenes.skin.chart": "one of the four names that every scene has",
     "profilefit.recipes.paper.reproduction": "three lines over: the readings of one paper",
 }
 

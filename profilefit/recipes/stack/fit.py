@@ -1,8 +1,9 @@
-"""Fit the law of a stack to its exact light."""
+"""Fit the law of a stack to its exact light, and what the constants depend on."""
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
@@ -15,6 +16,7 @@ from mcml_sim.exact.stack.solution import MAX_LAYERS
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
+from profilefit.fitting.estimate import degrees_of_freedom, scaled_inverse
 from profilefit.fitting.solver import Optimum, solve
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
@@ -36,6 +38,26 @@ STARTS, SPREAD, SEED = 5, 0.8, 1
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
+NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: right to a tenth of the law's error and better
+
+
+class Interface(NamedTuple):
+    """What one interface of a stack was fitted to, and how that ended.
+
+    law        of the stack below the surface of its upper layer;  thicknesses  (m,) of that layer, fitted at [length]
+    best       the optimum taken, in unbounded parameters;  found  those of every start
+    lights     of each thickness radii [length], R_d, weights and A;  is_below  whether layers lie above it
+    """
+
+    law: StackLaw
+    medium: Medium
+    is_below: bool
+    thicknesses: Floats
+    lights: list[tuple[Floats, ...]]
+    best: Optimum
+    found: tuple[Optimum, ...]
+
+
 def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | LayerLaw:
     """The law of a stack of layers of one index that scatter isotropically, fitted to its exact light.
 
@@ -45,12 +67,108 @@ def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | L
     A half space has a law as it is. Of two layers the thickness of the first is an argument; of more, those below the
     first have the ones that they have. InputError on other media. Seconds to a minute, most of it for the exact light.
     """
-    _require(medium)
+    law, _ = fitted(medium, illumination)
+    return law
+
+
+def fitted(medium: Medium, illumination: str) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    """The law, and the fit at each interface from the surface down; none of a half space."""
+    require(medium)
     require_illumination(illumination)
-    return _law(medium, Setting(illumination, n=medium.layers[0].n / medium.n_above), is_below=False)
+    setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
+    hazard = catalogue.load("hazard", setting=setting)
+    law: StackLaw | LayerLaw | None = None
+    done: list[Interface] = []
+    for place in reversed(range(len(medium.layers))):
+        layer = medium.layers[place]
+        top = LayerLaw(setting, hazard, layer.alpha, layer.mfp)
+        if law is None:
+            law = top
+            continue
+        here = Medium(medium.layers[place:], medium.n_above)
+        d = _thicknesses(layer, is_below=place > 0)
+        lights = [light_of(here, each, illumination) for each in d]
+        best, found = _searched(top, law, d, lights)
+        law = _law_of(best.parameters, top, law, layer.thickness)
+        done.insert(0, Interface(law, here, place > 0, d, lights, best, found))
+    assert law is not None  # a medium has a layer
+    return law, tuple(done)
 
 
-def _require(medium: Medium) -> None:
+def errors(one: Interface) -> dict[str, dict[str, float | None]]:
+    """Errors of an interface's constants, by the names that records have for them; None where there can be none.
+
+    statistical     none: exact light has no photons
+    discretisation  what a refit to light of fewer nodes changes
+    model           none: of a law that fits at each thickness in its own way no likelihood is known
+    misfit          s^2 (J^T J)^-1, as if residuals were independent
+    jackknife       refits without one thickness after the other
+    """
+    top, below, thickness = one.law.top, one.law.below, one.law.thickness
+
+    def refitted(d: Floats, lights: list[tuple[Floats, ...]]) -> Floats:
+        return _vector(_law_of(_solved(one.best.parameters, top, below, d, lights).parameters, top, below, thickness))
+
+    coarse = [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
+    own, fewer = _vector(one.law), refitted(one.thicknesses, coarse)
+    count = len(one.thicknesses)
+    left_out = np.array(
+        [refitted(np.delete(one.thicknesses, i), one.lights[:i] + one.lights[i + 1 :]) for i in range(count)]
+    )
+    jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
+    with jax.enable_x64(True):
+        slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(jnp.asarray(one.best.parameters))
+    inverse = scaled_inverse(one.best.jacobian.T @ one.best.jacobian)
+    spread = np.asarray(slopes) @ (one.best.cost / degrees_of_freedom(one.best) * inverse) @ np.asarray(slopes).T
+    found = zip(np.abs(fewer - own), np.sqrt(np.diag(spread)), jackknife, strict=True)
+    return {
+        name: {
+            "statistical_error": None,
+            "discretisation_error": float(discretisation),
+            "model_error": None,
+            "misfit_error": float(misfit),
+            "jackknife_error": float(jack),
+        }
+        for name, (discretisation, misfit, jack) in zip(StackLaw.constant_names(), found, strict=True)
+    }
+
+
+def quality(one: Interface) -> dict[str, list[float]]:
+    """rel, ks and the relative error of A at thicknesses that were not fitted, between those that were [length]."""
+    d = np.sqrt(one.thicknesses[:-1] * one.thicknesses[1:])
+    found: dict[str, list[float]] = {"thickness": d.tolist(), "rel": [], "ks": [], "delta_A": []}
+    for each in d:
+        light = _solution(one.medium, each, one.law.setting.illumination, NODES)
+        r = _radii(one.medium)
+        share = np.asarray(light.cdf(r))
+        near = r[share <= LAST_SHARE]
+        relative = np.asarray(one.law.profile(near, each)) / np.asarray(light.profile(near)) - 1.0
+        found["rel"].append(float(np.mean(np.abs(relative))))
+        found["ks"].append(float(np.max(np.abs(np.asarray(one.law.cdf(r, each)) - share))))
+        found["delta_A"].append(float(np.asarray(one.law.total(each)) / light.reflectance - 1.0))
+    return found
+
+
+def _solution(medium: Medium, d: float, illumination: str, nodes: exact.Nodes) -> exact.Solution:
+    """Its light under a first layer of another thickness."""
+    first, *others = medium.layers
+    return exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, nodes)
+
+
+def _radii(medium: Medium) -> Floats:
+    """As far as light of its slowest layer goes [length]."""
+    slowest = max(
+        min(layer.mfp / max(float(half_space.decay_rate(layer.alpha)), 1e-12), LONGEST_DECAY * layer.mfp)
+        for layer in medium.layers
+    )
+    return np.geomspace(NEAREST * medium.layers[0].mfp, FARTHEST * slowest, RADII)
+
+
+def _vector(law: StackLaw):
+    return jnp.stack([jnp.asarray(getattr(law, name)) for name in StackLaw.constant_names()])
+
+
+def require(medium: Medium) -> None:
     if not isinstance(medium, Medium):
         raise InputError(f"medium must be a mcml_sim.Medium, got {shown(medium)}")
     if not medium.is_half_space:
@@ -70,17 +188,6 @@ def _require(medium: Medium) -> None:
             raise InputError(f"layers must have one n for a law of a stack, got {got}")
 
 
-def _law(medium: Medium, setting: Setting, is_below: bool) -> StackLaw | LayerLaw:
-    first, *others = medium.layers
-    top = LayerLaw(setting, catalogue.load("hazard", setting=setting), first.alpha, first.mfp)
-    if not others:
-        return top
-    below = _law(Medium(tuple(others), medium.n_above), setting, is_below=True)
-    thicknesses = _thicknesses(first, is_below)
-    lights = [_light(first, others, medium.n_above, d, setting.illumination) for d in thicknesses]
-    return _fitted(top, below, first.thickness, thicknesses, lights)
-
-
 def _thicknesses(layer: Layer, is_below: bool) -> Floats:
     """Those to fit at, the layer's own among them [length]."""
     if is_below:
@@ -90,31 +197,31 @@ def _thicknesses(layer: Layer, is_below: bool) -> Floats:
     return np.unique(np.append(layer.mfp * np.geomspace(THIN, last, COUNT), layer.thickness))
 
 
-def _light(first: Layer, others: list[Layer], n_above: float, d: float, illumination: str) -> tuple[Floats, ...]:
-    """Radii [length], R_d there, weights of the radii, and A."""
-    medium = Medium((Layer(first.n, first.mu_a, first.mu_s, 0.0, d), *others), n_above)
-    light = exact.solve(medium, illumination, exact.Nodes(12, 16, 16, 10))
-    slowest = max(
-        min(layer.mfp / max(float(half_space.decay_rate(layer.alpha)), 1e-12), LONGEST_DECAY * layer.mfp)
-        for layer in medium.layers
-    )
-    r = np.geomspace(NEAREST * first.mfp, FARTHEST * slowest, RADII)
+def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = NODES) -> tuple[Floats, ...]:
+    """Under a first layer of thickness d: radii [length], R_d there, weights of the radii, and A."""
+    light, r = _solution(medium, d, illumination, nodes), _radii(medium)
     seen = np.asarray(light.cdf(r)) <= LAST_SHARE
     value = np.where(seen, np.asarray(light.profile(r)), 1.0)
     return r, value, seen / np.count_nonzero(seen), np.asarray(light.reflectance)
 
 
-def _fitted(
-    top: LayerLaw, below: LayerLaw | StackLaw, thickness: float, d: Floats, lights: list[tuple[Floats, ...]]
-) -> StackLaw:
-    data = (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below)
+def _searched(
+    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[tuple[Floats, ...]]
+) -> tuple[Optimum, tuple[Optimum, ...]]:
+    """The best optimum of several starts, and all."""
     random = np.random.default_rng(SEED)
     starts = [np.array(START), *(START + SPREAD * random.standard_normal((STARTS - 1, len(START))))]
-    found: list[Optimum] = [solve(_residual, start, data) for start in starts]
-    best = min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+    found = tuple(_solved(start, top, below, d, lights) for start in starts)
+    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf), found
+
+
+def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[tuple[Floats, ...]]) -> Optimum:
+    return solve(_residual, start, (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below))
+
+
+def _law_of(parameters: Floats, top: LayerLaw, below: LayerLaw | StackLaw, thickness: float) -> StackLaw:
     with jax.enable_x64(True):
-        made = _made(jnp.asarray(best.parameters), top, below, thickness)
-        return jax.tree.map(float, made)
+        return jax.tree.map(float, _made(jnp.asarray(parameters), top, below, thickness))
 
 
 def _residual(parameters, data):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from rich.console import Group, RenderableType
@@ -30,10 +31,14 @@ LAYERS = {
     "not enough": "one layer is not enough: fit the stack's own profile (profilefit fit STACK.mco)",
     "undecided": "undecided: as far from the tolerance as the photons' noise",
 }
+SEVERITY = ("enough", "enough alone", "undecided", "not enough")
 
 
-def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> RenderableType:
-    """The whole report of a choice."""
+def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> RenderableType:
+    """The whole report of a choice.
+
+    layers  the one layer for a stack: none without one, one of a grey stack, or those of red, green and blue
+    """
     shown = {
         "best cheaper": choice.cheaper,
         "chosen" if choice.chosen else "nearest": choice.nearest,
@@ -57,8 +62,8 @@ def choose_table(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) 
     parts: list[RenderableType] = [
         column_table(headline(choice), columns, _caption(choice, ratios), ("", "serves"), fold)
     ]
-    if layer is not None:
-        parts += [Text(), Text(_layer(layer, choice), style="bold")]
+    if layers:
+        parts += [Text(), Text(_layer(layers, choice), style="bold")]
     return Group(*parts)
 
 
@@ -76,8 +81,8 @@ def headline(choice: Choice) -> str:
     return f"No option meets {requested}: the most accurate{where} is {one.option.label}"
 
 
-def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> dict[str, Any]:
-    """The same and all options, as data; filters with the constants that a shader needs."""
+def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> dict[str, Any]:
+    """The same and all options, as data; filters with the constants that a shader needs; layers of every colour."""
     scene = choice.scene
     made: dict[str, Any] = {
         "tolerance": scene.tolerance,
@@ -92,8 +97,11 @@ def content(choice: Choice, ratios: Ratios, layer: OneLayer | None = None) -> di
         "filters": _filters(choice),
         "export": export_hint(choice),
     }
-    if layer is not None:
-        made["one_layer"] = {**vars(layer), "verdict": _verdict(layer, choice)}
+    told = [{**vars(layer), "verdict": _verdict(layer, choice)} for layer in layers]
+    if len(told) == 1:
+        made["one_layer"] = told[0]
+    elif told:
+        made["one_layer"] = [{"channel": name, **one} for name, one in zip(CHANNELS, told, strict=True)]
     return made
 
 
@@ -177,12 +185,16 @@ def _verdict(layer: OneLayer, choice: Choice) -> str:
     return "enough alone" if alone == "enough" and layer.verdict(math.sqrt(left)) != "enough" else alone
 
 
-def _layer(layer: OneLayer, choice: Choice) -> str:
-    verdict = _verdict(layer, choice)
+def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
+    """What stands for the stack, of several colours for that which it serves worst."""
+    verdicts = [_verdict(layer, choice) for layer in layers]
+    worst = max(range(len(layers)), key=lambda one: (SEVERITY.index(verdicts[one]), layers[one].error))
+    layer, verdict = layers[worst], verdicts[worst]
+    colour = "of one colour" if len(layers) == 1 else f"of three colours, {CHANNELS[worst]} the worst"
     unit = choice.scene.unit
     together = math.hypot(layer.error, choice.nearest.error.total)
     text = (
-        f"Layers, of one colour: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
+        f"Layers, {colour}: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
         f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a pencil beam) is off by "
         f"{_percent(layer.error)} ± {_percent(layer.standard_error)} %; with the choice {_percent(together)} %."
     )

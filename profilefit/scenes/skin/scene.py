@@ -14,13 +14,13 @@ from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
 from profilefit.recipes import catalogue
 from profilefit.recipes.toml_tables import Table, Tables
-from profilefit.scenes.skin import chart
 from profilefit.scenes.skin.material import Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
+from profilefit.scenes.stage.judge import TURNS, Judge, points
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
 from profilefit.scenes.stage.picture import Drawn, to_srgb
 from profilefit.scenes.stage.stage import Stage
@@ -142,11 +142,11 @@ def draw(context: moderngl.Context, request: SceneRequest) -> Drawn:
         stage.draw(scene)
         buffers = stage.buffers()
         _require_lit(request.file, buffers)
-        judge = chart.Judge(stage, mfp, exitance_of(buffers, mfp), buffers.mask > INSIDE)
+        judge = Judge(stage, mfp, exitance_of(buffers, mfp), buffers.mask > INSIDE)
         numbers = dict.fromkeys((sampling.samples, *request.chart))
-        point, *others = chart.points(judge, request.label, by, sampling, tuple(numbers))
+        point, *others = points(judge, request.label, by, sampling, tuple(numbers))
         exitance, radiance = stage.scatter(by, mfp, sampling), stage.render(by, mfp, sampling)
-        frame = tuple(stage.time(by, mfp, sampling, chart.TURNS, "frame"))
+        frame = tuple(stage.time(by, mfp, sampling, TURNS, "frame"))
     # What the surface mirrors and what shines through thin parts is the stage's own in both.
     true = radiance + (judge.truth - exitance) / np.pi
     return Drawn(

@@ -85,16 +85,23 @@ class ExactTable:
         s = np.clip(self.root(values), 0.0, 1.0)
         alpha = 1.0 - s * s
         kappa = np.asarray(exact.decay_rate(alpha))
-        return Curves(alpha, values, kappa, self._hermite(self.profile, s), self._hermite(self.cdf, s))
+        return Curves(alpha, values, kappa, hermite(self.profile, s, self.y), hermite(self.cdf, s, self.y))
 
-    def _hermite(self, spline: RectBivariateSpline, s: Floats) -> Floats:
-        order = np.argsort(s)
-        value, slope = np.empty((s.size, self.y.size)), np.empty((s.size, self.y.size))
-        value[order] = spline(s[order], self.y)
-        slope[order] = STEP * spline(s[order], self.y, dy=1)
-        left, right, rise, next_rise = value[:, :-1], value[:, 1:], slope[:, :-1], slope[:, 1:]
-        span = right - left
-        return np.stack([left, rise, 3.0 * span - 2.0 * rise - next_rise, rise + next_rise - 2.0 * span], axis=-1)
+
+def hermite(spline: RectBivariateSpline, at: Floats, y: Floats) -> Floats:
+    """A spline of (s, ln x) at some s (m,), as cubics between the knots y of ln x (m, intervals, 4), as in `Curves`."""
+    order = np.argsort(at)
+    value, slope = np.empty((at.size, y.size)), np.empty((at.size, y.size))
+    value[order] = spline(at[order], y)
+    slope[order] = STEP * spline(at[order], y, dy=1)
+    left, right, rise, next_rise = value[:, :-1], value[:, 1:], slope[:, :-1], slope[:, 1:]
+    span = right - left
+    return np.stack([left, rise, 3.0 * span - 2.0 * rise - next_rise, rise + next_rise - 2.0 * span], axis=-1)
+
+
+def knots() -> Floats:
+    """ln x of a table's columns."""
+    return np.log(NEAREST) + STEP * np.arange(int(np.ceil(np.log(FARTHEST / NEAREST) / STEP)) + 1)
 
 
 @lru_cache(maxsize=4)
@@ -104,7 +111,7 @@ def exact_table(setting: Setting) -> ExactTable:
     Relative error below 1e-5 of R_d for x in [1e-5, 3000] where x^2 R_d l^2 / A > 1e-10, and of the cdf everywhere;
     where the surface refracts, below 1e-3 of R_d where x^2 R_d l^2 / A > 1e-8, and 1e-7 of the whole in the cdf.
     """
-    y = np.log(NEAREST) + STEP * np.arange(int(np.ceil(np.log(FARTHEST / NEAREST) / STEP)) + 1)
+    y = knots()
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, ALBEDOS) ** 3) ** 2
     alpha = np.maximum(1.0 - s * s, LEAST_ALPHA)
     x, albedos = np.exp(y), alpha[:, None]
@@ -118,15 +125,15 @@ def exact_table(setting: Setting) -> ExactTable:
 def log_profile(y: Floats, alpha: Floats, setting: Setting) -> Floats:
     """ln(R_d l^2) + kappa x (albedos, radii) at y = ln x, continued as x^-2 where R_d is faint [-]."""
     path = np.asarray(exact.decay_rate(alpha))[:, None] * np.exp(y)
-    held = _held(path <= FAINT)
-    profile = np.asarray(exact.profile(np.exp(y[held]), alpha[:, None], setting=setting))
+    kept = held(path <= FAINT)
+    profile = np.asarray(exact.profile(np.exp(y[kept]), alpha[:, None], setting=setting))
     if setting.n != 1.0:
-        held = _held((path <= FAINT) & (profile > LEAST_REFRACTED * alpha[:, None]))
-        profile = np.take_along_axis(profile, held, axis=1)
-    return np.log(profile) + np.take_along_axis(path, held, axis=1) - 2.0 * (y - y[held])
+        kept = held((path <= FAINT) & (profile > LEAST_REFRACTED * alpha[:, None]))
+        profile = np.take_along_axis(profile, kept, axis=1)
+    return np.log(profile) + np.take_along_axis(path, kept, axis=1) - 2.0 * (y - y[kept])
 
 
-def _held(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
+def held(bright: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Of each column itself, or the last before all that is faint."""
     last = np.where(bright.all(axis=1), bright.shape[1], np.argmin(bright, axis=1)) - 1
     return np.minimum(np.arange(bright.shape[1]), last[:, None])

@@ -155,13 +155,13 @@ class Stage:
         self, law: By, mfp: ArrayLike, sampling: Sampling, fixed_alpha: ArrayLike | None
     ) -> tuple[Technique, Frame]:
         by, view = technique(law), self._ready()
-        frame = Frame(self.size, *view, sampling, _lengths(mfp), _albedos(fixed_alpha), self._mean)
+        frame = Frame(self.size, *view, sampling, _lengths(mfp), _albedos(fixed_alpha), self._mean, self._scene)
         for one in by.passes(frame):
             self._run(one)
         return by, frame
 
     def _combine(self, by: Technique, frame: Frame) -> None:
-        self._run(combination(by, frame, self._scene))
+        self._run(combination(by, frame))
 
     def _frame(self, law: By, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
         if passes == "frame" and self._scene is not None:

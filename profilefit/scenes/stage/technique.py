@@ -54,7 +54,7 @@ class Frame:
 
     size  [pixels];  pixel  its side [mm], in perspective at a depth of 1 mm
     mfp  of red, green, blue (3,) [mm];  fixed_alpha  (3,) [-]; None where a pixel's own A gives it
-    mean_reflectance  () -> (3,) mean A where light scatters [-]
+    mean_reflectance  () -> (3,) mean A where light scatters [-];  scene  what is seen; None where buffers were uploaded
     """
 
     size: tuple[int, int]
@@ -64,6 +64,7 @@ class Frame:
     mfp: Floats
     fixed_alpha: Floats | None
     mean_reflectance: Callable[[], Floats]
+    scene: Scene | None = None
 
     @property
     def alpha_uniform(self) -> tuple[float, ...]:
@@ -75,6 +76,14 @@ class Frame:
         """Uniforms of shaders that look for another place on the screen."""
         columns, rows = self.size
         return {"size": (float(columns), float(rows)), "pixel": self.pixel, "perspective": float(self.is_perspective)}
+
+    @property
+    def light(self) -> dict[str, Any]:
+        """Uniforms of shaders that see the light: none shines where there is no scene."""
+        if self.scene is None:
+            return {"toward_light": (0.0, 0.0, 1.0), "light": (0.0, 0.0, 0.0)}
+        toward = self.scene.camera.view()[:3, :3] @ unit(self.scene.light.direction)
+        return {"toward_light": tuple(toward), "light": self.scene.light.irradiance}
 
 
 @dataclass(frozen=True)
@@ -127,25 +136,19 @@ class Lambert(Technique):
         return LawText("lambert", through_text("1.0"))
 
 
-def combination(by: Technique, frame: Frame, scene: Scene | None) -> Pass:
+def combination(by: Technique, frame: Frame) -> Pass:
     """From `EXITANCE` to `RADIANCE`. Without a scene there is no light to mirror or to shine through."""
     law = by.through()
     uniforms = {
         "perspective": float(frame.is_perspective),
         "mfp": tuple(by.lengths(frame)),
         "fixed_alpha": frame.alpha_uniform,
-        **_lit(scene),
+        "f0": 0.0 if frame.scene is None else frame.scene.f0,
+        **frame.light,
     }
     surface = maps("irradiance_map", "reflectance_map", "position_map", "normal_map", EXITANCE)
     source = law.before(text_beside(__name__, "glsl/combine.frag"))
     return Pass(f"combine {law.name}", {**surface, **law.tables}, RADIANCE, source, uniforms)
-
-
-def _lit(scene: Scene | None) -> dict[str, Any]:
-    if scene is None:
-        return {"toward_light": (0.0, 0.0, 1.0), "light": (0.0, 0.0, 0.0), "f0": 0.0}
-    toward = scene.camera.view()[:3, :3] @ unit(scene.light.direction)
-    return {"toward_light": tuple(toward), "light": scene.light.irradiance, "f0": scene.f0}
 
 
 def maps(*names: str) -> dict[str, str | Singles]:

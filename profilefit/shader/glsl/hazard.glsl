@@ -10,6 +10,7 @@ struct LAW_Shape {
     PfCurve curve;
 };
 
+//% shape
 // All that depends on alpha only: once a material, or once a pixel where A is a texture.
 LAW_Shape LAW_shape(float alpha) {
     PfCurve s;
@@ -26,6 +27,7 @@ LAW_Shape LAW_shape(float alpha) {
     shape.curve = s;
     return shape;
 }
+//% end
 
 float LAW_reflectance(LAW_Shape s) {
     return s.reflectance;

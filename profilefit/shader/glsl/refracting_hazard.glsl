@@ -15,6 +15,7 @@ struct LAW_Shape {
     float slowest; // its slope's inverse at the source [1/mfp]
 };
 
+//% shape
 // All that depends on alpha only: once a material, or once a pixel where A is a texture.
 LAW_Shape LAW_shape(float alpha) {
     float v = sqrt(max(1.0 - alpha, 0.0));
@@ -49,6 +50,7 @@ LAW_Shape LAW_shape(float alpha) {
     shape.slowest = rate * (1.0 + kappa * (2.1187 - 1.4458 * kappa));
     return shape;
 }
+//% end
 
 float LAW_reflectance(LAW_Shape s) {
     return s.reflectance;

@@ -15,6 +15,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
 from profilefit.errors import InputError
+from profilefit.recipes.stack.file import LayerStack
 from profilefit.studies.choose.case import Within
 
 Floats = NDArray[np.float64]
@@ -92,6 +93,14 @@ def one_layer(
     mfp = _length(of_stack, of_one, within)
     error, standard_error = _difference(of_stack, of_one, mfp, within)
     return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number)
+
+
+def of_each_colour(
+    stack: LayerStack, tolerance: float, within: Within, progress: bool | None = None
+) -> tuple[OneLayer, ...]:
+    """`one_layer` of red, green and blue, of which equal ones are traced once; one alone where all three are equal."""
+    found = {medium: one_layer(medium, tolerance, within, progress=progress) for medium in dict.fromkeys(stack.media)}
+    return tuple(found[medium] for medium in stack.media[: 1 if stack.is_grey else None])
 
 
 def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mcml_sim import Layer, Medium, Setting
+from mcml_sim import Setting
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.checks import is_number, shown
+from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError
 from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.recipes.stack.file import LayerStack, stack_of
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import GPUS, YARDSTICK
@@ -27,7 +26,6 @@ TABLES = {
     "channel": ("reflectance", "mfp"),
     "tolerance": ("error", "mfp", "pixels"),
     "budget": ("ms", "gpu"),
-    "layers": ("n", "mu_a", "mu_s", "g", "thickness"),
 }
 LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
 LENGTHS = (1e-9, 1e9)  # in the unit of the mean free paths
@@ -53,7 +51,7 @@ class Requirements:
     pixel        its side on the surface, near and far [unit];  radius  the smallest of curvature [unit], or infinite
     resolution   columns and rows of the screen [pixels]
     tolerance    root mean square error of radiance, as a share of white, `within` reach of a step edge of light
-    layers       a stack that one layer is to stand for, or none
+    layers       a stack that one layer a colour is to stand for, or none
     """
 
     unit: str
@@ -66,7 +64,7 @@ class Requirements:
     within: Within
     budget: Budget
     resolution: tuple[int, int] = (1920, 1080)
-    layers: Medium | None = None
+    layers: LayerStack | None = None
 
 
 def read(path: Path) -> Requirements:
@@ -101,8 +99,9 @@ class _Reader(Tables):
         if radius < LEAST_RADIUS * longest:
             least = f"at least {LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest / world:.3g}"
             raise self.bad("view", "radius", least, view["radius"])
+        unit = self.text("", "unit", content, "mm")
         return Requirements(
-            unit=self.text("", "unit", content, "mm"),
+            unit=unit,
             setting=setting,
             reflectance=_three(reflectance),
             mfp=_three(mfp),
@@ -112,7 +111,7 @@ class _Reader(Tables):
             within=self.within(tolerance),
             budget=self.budget(budget, view),
             resolution=self.sides("view", "resolution", view, (1920, 1080), 16384),
-            layers=self.layers(content.get("layers")),
+            layers=stack_of(self, content["layers"], unit) if "layers" in content else None,
         )
 
     def within(self, tolerance: Table) -> Within:
@@ -150,20 +149,6 @@ class _Reader(Tables):
             self.text("budget", "gpu", budget, YARDSTICK, tuple(GPUS)),
             self.number("view", "coverage", view, 0.5, most=1.0),
         )
-
-    def layers(self, stack: Any) -> Medium | None:
-        if stack is None:
-            return None
-        if not isinstance(stack, list) or not all(isinstance(layer, dict) for layer in stack):
-            raise InputError(f"{self.file}: layers must be tables [[layers]], got {shown(stack)}")
-        made = []
-        for number, layer in enumerate(stack, start=1):
-            self.known(f"layers {number}", layer, TABLES["layers"])
-            missing = [key for key in ("n", "mu_a", "mu_s", "g") if key not in layer]
-            if missing:
-                raise self.bad(f"layers {number}", missing[0], "a number", None)
-            made.append(self.made(f"layers {number}", partial(Layer, **layer)))
-        return self.made("layers", lambda: Medium(tuple(made)))
 
     def range(self, where: str, key: str, table: Table, most: float = math.inf) -> Range:
         """A number, or the least and the most."""

@@ -7,8 +7,10 @@ import pytest
 
 from mcml_sim import Layer, Medium
 from profilefit.errors import InputError
+from profilefit.recipes.stack.file import LayerStack
+from profilefit.studies.choose import layers as module
 from profilefit.studies.choose.case import Within
-from profilefit.studies.choose.layers import OneLayer, RingShares, one_layer
+from profilefit.studies.choose.layers import OneLayer, RingShares, of_each_colour, one_layer
 
 WITHIN = Within()
 
@@ -22,6 +24,17 @@ def test_rings_beyond_an_edge():
 @pytest.mark.parametrize(("error", "verdict"), [(0.01, "enough"), (0.03, "not enough"), (0.0195, "undecided")])
 def test_verdict(error, verdict):
     assert OneLayer(0.5, 0.9, 1.0, 1.0, error, 0.001, 1000).verdict(0.02) == verdict
+
+
+def test_equal_colours_are_traced_once(monkeypatch):
+    """One answer of a grey stack, three of a coloured one, from as many runs as there are different media."""
+    pale, dark = (Medium((Layer(1.0, mu_a, 0.9, 0.0),)) for mu_a in (0.1, 0.2))
+    traced = []
+    monkeypatch.setattr(module, "one_layer", lambda medium, *_, progress: traced.append(medium) or medium)
+    grey = LayerStack("mm", (pale, pale, pale), ("",), ("",))
+    assert of_each_colour(grey, 0.02, WITHIN) == (pale,)
+    assert of_each_colour(LayerStack("mm", (pale, dark, pale), ("",), ("",)), 0.02, WITHIN) == (pale, dark, pale)
+    assert traced == [pale, pale, dark]
 
 
 @pytest.mark.slow

@@ -46,7 +46,8 @@ def test_example():
     assert scene.reflectance[0] == (0.55, 0.75)
     assert scene.radius == 5.0
     assert scene.budget.ms == 5.0
-    assert [layer.g for layer in scene.layers.layers] == [0.8, 0.9]
+    assert scene.layers.is_grey
+    assert [layer.g for layer in scene.layers.media[0].layers] == [0.8, 0.9]
 
 
 def test_defaults(written):
@@ -56,6 +57,15 @@ def test_defaults(written):
     assert math.isinf(scene.radius)
     assert scene.budget.ms is None
     assert (scene.unit, scene.resolution, scene.layers) == ("mm", (1920, 1080), None)
+
+
+def test_layers_have_colours_and_the_unit_of_the_scene(written):
+    stack = "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"
+    scene = read(written("", stack))
+    assert [medium.layers[0].mu_a for medium in scene.layers.media] == [1.0, 2.0, 3.0]
+    assert scene.layers.unit == "mm"
+    with pytest.raises(InputError, match=r'material must be left out unless unit = "mm", .* got .marble'):
+        read(written("[view]", 'unit = "cm"\n[[layers]]\nn = 1\nmaterial = "marble"\n[view]'))
 
 
 def test_world_scale_and_materials(tmp_path):
@@ -93,8 +103,10 @@ WRONG = [
     ("", "[budget]\ngpu = 'voodoo'", r"\[budget\] gpu must be one of switch, .* got 'voodoo'"),
     ("", "[extra]", "keys must be of unit, view, .* got 'extra'"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a number, got nothing"),
-    ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0, got -1"),
+    ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0.* got -1"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
+    ("", "[[layers]]\nn = 1\nmu_a = [1, 2]\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .* or three .* got \[1, 2\]"),
+    ("[view]", "layers = []\n[view]", r"toml: layers must be tables \[\[layers\]\], got \[\]"),
     ("[view]", "[view", "is not TOML: "),
     ("pixel = 0.5", f"pixel = {10**400}", r"\[view\] pixel must be a number > 0 .*, got one of 401 digits"),
     ("pixel = 0.5", f"pixel = 0x1{'0' * 5000}", r"\[view\] pixel must be .*, got one of more than 4300 digits"),

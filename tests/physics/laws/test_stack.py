@@ -10,8 +10,8 @@ import profilefit
 from mcml_sim import Layer, Medium, Setting, exact, half_space
 from profilefit.errors import InputError
 from profilefit.laws.stack import LayerLaw, StackLaw
-from profilefit.recipes import stacks
-from profilefit.recipes.stacks import stack_law
+from profilefit.recipes.stack import fit as stacks
+from profilefit.recipes.stack.fit import stack_law
 
 R = np.geomspace(1e-3, 30.0, 40)
 CONSTANTS = {"w": 0.2, "u": -0.1, "g1": 0.9, "g2": 1.4, "b1": 0.1, "b2": 0.2, "h0": 0.7, "h1": 1.1, "k0": 0.2}

@@ -15,7 +15,9 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
 
-EXAMPLE = Path(__file__).resolve().parents[3] / "examples" / "skin-head.toml"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+# What a file of each scene must have: all else may be left out.
+NEEDED = {"skin": (), "layers": ("layers",)}
 SMALL = """\
 scene = "skin"
 [technique]
@@ -37,12 +39,14 @@ def small(tmp_path):
 def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
     status, out, err = command("scene", name, "--example")
     assert (status, err) == (0, "")
-    assert out == EXAMPLE.read_text(encoding="utf-8")
+    assert out == (EXAMPLES / SCENES[name][1]).read_text(encoding="utf-8")
     home = import_module(SCENES[name][0])
     path = tmp_path / "printed.toml"
     path.write_text(out, encoding="utf-8")
-    said, taken = home.read("", read_toml(path)), home.read("", {"scene": name})
-    for key in ("label", "sampling", "chart", "material", "camera", "light", "ambient", "size"):
+    content = read_toml(path)
+    said, taken = home.read("", content), home.read("", {"scene": name, **{key: content[key] for key in NEEDED[name]}})
+    own = {"skin": ("label", "material"), "layers": ("kind", "pose", "single", "least", "most")}[name]
+    for key in ("sampling", "chart", "camera", "light", "ambient", "size", *own):
         assert getattr(said, key) == getattr(taken, key), key
 
 
@@ -74,8 +78,8 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"skin"', '"fog"', "scene must be one of skin, got 'fog'"),
-        ('scene = "skin"', "", "scene must be one of skin, got nothing"),
+        ('"skin"', '"fog"', "scene must be one of skin, layers, got 'fog'"),
+        ('scene = "skin"', "", "scene must be one of skin, layers, got nothing"),
         ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
         ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
         ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
@@ -116,7 +120,7 @@ def test_names_and_places(command, small):
     assert command("scene", "fog", "--example") == (
         2,
         "",
-        "profilefit: NAME must be one of skin with --example, got 'fog'\n",
+        "profilefit: NAME must be one of skin, layers with --example, got 'fog'\n",
     )
     assert command("scene", "nowhere.toml")[0] == 2
     Path("file").write_text("")

@@ -48,7 +48,7 @@ def printed(part):
 
 
 def test_says_it_in_one_line_and_why(choice):
-    text = printed(choose_table(choice, shipped(), LAYER))
+    text = printed(choose_table(choice, shipped(), (LAYER,)))
     chosen = "The cheapest option within tolerance and budget: separable, 17 taps (requested: 2.0 % within 4 ms)"
     assert text.splitlines()[0] == chosen
     rows = {line[:12]: line for line in text.splitlines()}
@@ -70,8 +70,25 @@ def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
     verdicts = {}
     for error in (0.014, 0.017, 0.03):
         layer = OneLayer(**{**vars(LAYER), "error": error, "standard_error": 0.0005})
-        verdicts[error] = content(choice, shipped(), layer)["one_layer"]["verdict"]
+        verdicts[error] = content(choice, shipped(), (layer,))["one_layer"]["verdict"]
     assert verdicts == {0.014: "enough", 0.017: "enough alone", 0.03: "not enough"}
+
+
+def test_the_worst_of_three_colours_is_told(choice):
+    """Its verdict counts first, then its error; all three as data."""
+    errors = {"red": (0.014, 0.0005), "green": (0.021, 0.0001), "blue": (0.022, 0.002)}
+    layers = [OneLayer(0.4, 0.9, 1.2, 1.4, error, spread, 10**6) for error, spread in errors.values()]
+    text = " ".join(printed(choose_table(choice, shipped(), layers)).split())
+    assert "Layers, of three colours, green the worst: one layer is not enough: " in text
+    assert "is off by 2.1 ± 0.010 %" in text
+    made = json.loads(json.dumps(content(choice, shipped(), layers)))["one_layer"]
+    assert [(one["channel"], one["error"], one["verdict"]) for one in made] == [
+        ("red", 0.014, "enough"),
+        ("green", 0.021, "not enough"),
+        ("blue", 0.022, "undecided"),
+    ]
+    alike = printed(choose_table(choice, shipped(), layers[:1] * 3))
+    assert "Layers, of three colours, red the worst: one layer is enough." in " ".join(alike.split())
 
 
 def test_says_when_nothing_serves(choice):
@@ -92,7 +109,7 @@ def test_a_budget_within_the_range_is_likely_kept(choice):
 
 
 def test_as_data(choice):
-    made = json.loads(json.dumps(content(choice, shipped(), LAYER)))
+    made = json.loads(json.dumps(content(choice, shipped(), (LAYER,))))
     assert made["chosen"] == "separable, 17 taps"
     assert [one["ms"] for one in made["options"]] == [2.0, 3.0, 5.0]
     assert made["options"][2]["ms_range"] == [4.0, 8.0]

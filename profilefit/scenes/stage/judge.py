@@ -1,9 +1,9 @@
-"""Error of the head's scattered light against what it costs: points, for a report to draw."""
+"""Error of a picture's scattered light against what it costs: points, for a report to draw."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,15 +19,17 @@ TURNS = 5
 
 @dataclass(frozen=True)
 class Judge:
-    """A stage that has drawn the head, and the truth of it; row 0 at the bottom.
+    """A stage that has drawn a scene, and the truth of it; row 0 at the bottom.
 
-    mfp  of red, green, blue [mm];  truth  (h, w, 3) radiant exitance;  mask  (h, w), where light scatters
+    mfp    of red, green, blue [mm];  truth  (h, w, 3) radiant exitance;  mask  (h, w), where light scatters
+    alpha  of the three [-], if not that of each pixel's A
     """
 
     stage: Stage
     mfp: Rgb
     truth: Floats
     mask: NDArray[np.bool_]
+    alpha: Rgb | None = field(default=None, kw_only=True)
 
     def rmse(self, exitance: NDArray[np.floating]) -> float:
         """Root mean square error of (h, w, 3) where light scatters, over the mean of the truth there [-]."""
@@ -48,7 +50,7 @@ def points(
     Times are taken in turns, so that what else the machine does hits all of them.
     """
     each = [replace(sampling, samples=number) for number in samples]
-    errors = [judge.rmse(judge.stage.scatter(by, judge.mfp, one)) for one in each]
+    errors = [judge.rmse(judge.stage.scatter(by, judge.mfp, one, judge.alpha)) for one in each]
     times = np.array([[judge.stage.time(by, judge.mfp, one, repeats=1)[0] for one in each] for _ in range(turns)])
     return [
         ChartPoint(label, one.samples, error, tuple(taken))

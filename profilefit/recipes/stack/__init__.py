@@ -1,0 +1,1 @@
+"""Stacks of layers: their files, the fit of their law, its records."""

@@ -1,0 +1,265 @@
+"""From STACK.toml to the record of a stack, and back from the record to the laws of its three colours.
+
+Records of stacks lie in a folder of their own, FITS/stacks: none of them is a law of every albedo.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcml_sim import Medium, Setting
+from mcml_sim.files.text_file import read_toml
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.errors import InputError, RecordError
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.stack import fit
+from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
+from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.workers import Workers
+
+FOLDER, PIPELINE = "stacks", "stack"
+TITLE = "Layers under a first one of any thickness"
+EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + (g_i d)^2, c_i = e^(-b_i d / l)"
+NOTE = (
+    "No error of photons: the light is exact. No error by a model of the misfit: at each thickness the law is wrong in "
+    "its own way. Constants that trade against each other have large jackknife errors; together they are the law."
+)
+ALIKE = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
+# Of STACK.toml, those that only draw a scene among them.
+KEYS = ("title", "unit", "illumination", "layers", "scene", "uneven", "pose", "technique", "camera", "light")
+
+
+@dataclass(frozen=True)
+class StackRequest:
+    """What STACK.toml says: a stack under a light, and its name, that of the file."""
+
+    name: str
+    title: str
+    illumination: str
+    stack: LayerStack
+
+
+@dataclass(frozen=True)
+class StackRecord:
+    """A record, read. laws  of red, green, blue;  content  all that it says;  digest  sha256 of its file"""
+
+    name: str
+    stack: LayerStack
+    laws: tuple[StackLaw, StackLaw, StackLaw]
+    content: Mapping[str, Any]
+    digest: str
+
+    @property
+    def setting(self) -> Setting:
+        return self.laws[0].setting
+
+
+def is_stack(name: str) -> bool:
+    """Whether it names a file of layers, or one that is shipped, rather than a recipe."""
+    if not name.endswith(".toml"):
+        return not (fits_folder() / f"{name}.toml").exists() and _shipped(name).exists()
+    path = Path(name)
+    return path.is_file() and "layers" in read_toml(path)
+
+
+def request_of(name: str) -> StackRequest:
+    """The stack of STACK.toml, or of a shipped one by its name; InputError in one line."""
+    path = Path(name) if name.endswith(".toml") else _shipped(name)
+    return requested(str(path), read_toml(path))
+
+
+def requested(file: str, content: Table) -> StackRequest:
+    """The same of a file's content; keys of `KEYS` that draw a scene are not looked at."""
+    tables = Tables(file, {"": KEYS})
+    tables.known("", content)
+    stack = read_layers(file, content)
+    name = Path(file).stem
+    if len(stack.names) < 2:
+        raise tables.bad(
+            "", "layers", "two layers or more: one is a half space, as `profilefit export hazard` has it", 1
+        )
+    if not record.kinds.is_line(name):
+        raise InputError(f"{file!r}: the name of a stack must be one printable line")
+    return StackRequest(
+        name,
+        tables.text("", "title", content, TITLE),
+        tables.text("", "illumination", content, "diffuse", ILLUMINATIONS),
+        stack,
+    )
+
+
+def require_apart(stacks: Sequence[StackRequest]) -> None:
+    """RecordError where two stacks would write one record."""
+    names = [one.name for one in stacks]
+    if twice := next((name for name in names if names.count(name) > 1), None):
+        raise RecordError(f"stacks must have different names, as their records do, got {twice!r} twice")
+
+
+def regenerate(of: StackRequest, out: Path, processes: int = 1, say: Callable[[str], None] = lambda _: None) -> Path:
+    """Fit the laws of a stack's colours, and write its record: a minute. InputError on what no law is for."""
+    for medium in of.stack.media:
+        fit.require(medium)
+    different = list(dict.fromkeys(of.stack.media))
+    found: list[dict[str, Any]] = [{} for _ in different]
+    with Workers(min(processes, len(different))) as workers:
+        for number, made in workers.each(partial(_channel, of.illumination), different):
+            found[number] = made
+            done = [name for name, medium in zip(CHANNELS, of.stack.media, strict=True) if medium == different[number]]
+            say(f"{of.name}: {', '.join(done)} fitted")
+    channels = {name: found[different.index(medium)] for name, medium in zip(CHANNELS, of.stack.media, strict=True)}
+    return record.write(out / FOLDER, of.name, _content(of, channels), {})
+
+
+def load(path: Path) -> StackRecord:
+    """The laws of a record; RecordError on one that is damaged, or whose half spaces have other constants by now."""
+    content = record.read(path)
+    if content["pipeline"] != PIPELINE:
+        raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
+    try:
+        stack = _stack(str(path), content)
+        setting, recorded = record.record_setting(content), content["half_space"]["constants"]
+        own = catalogue.load("hazard", setting=setting)
+        _require_same(path, own.constants(), recorded)
+        made = [_law(content, channel, medium, setting) for channel, medium in zip(CHANNELS, stack.media, strict=True)]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise RecordError(f"{path}: is damaged: {error} is missing or of another kind; regenerate it") from None
+    red, green, blue = made
+    return StackRecord(path.stem, stack, (red, green, blue), content, hashlib.sha256(path.read_bytes()).hexdigest())
+
+
+def find(name: str, folder: Path) -> Path | None:
+    """The record of a stack by its path, or by its name in a folder of records; None where there is none."""
+    if name.endswith(".json"):
+        path = Path(name)
+        return path if path.exists() and record.read(path)["pipeline"] == PIPELINE else None
+    path = folder / FOLDER / f"{name}.json"
+    return path if path.exists() else None
+
+
+def matching(of: StackRequest, folder: Path) -> StackRecord | None:
+    """The record in a folder that is of these very layers and this light, by whatever name; None if there is none."""
+    for path in record.available(folder / FOLDER).values():
+        one = load(path)
+        if one.stack.media == of.stack.media and one.setting.illumination == of.illumination:
+            return one
+    return None
+
+
+def _shipped(name: str) -> Path:
+    return fits_folder() / FOLDER / f"{name}.toml"
+
+
+def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
+    """All that is recorded of one colour."""
+    _, interfaces = fit.fitted(medium, illumination)
+    constants: dict[str, Any] = {}
+    for number, one in enumerate(interfaces, start=1):
+        errors = fit.errors(one)
+        for name, value in one.law.constants().items():
+            own = {"published": None, "regenerated": value, "free": True, **errors[name]}
+            constants[f"{number}.{name}"] = own
+    best = [one.best for one in interfaces]
+    starts = [
+        {
+            "count": len(one.found),
+            "as_good": sum(each.cost <= 1.01 * one.best.cost for each in one.found),
+            "results": sorted({each.result.partition(" in ")[0] for each in one.found}),
+        }
+        for one in interfaces
+    ]
+    return {
+        "constants": constants,
+        "thicknesses": [one.thicknesses for one in interfaces],
+        "quality": [fit.quality(one) for one in interfaces],
+        "starts": starts,
+        "fit": [
+            {"result": one.result.partition(" in ")[0], "steps": one.steps, "condition_number": one.condition_number}
+            for one in best
+        ],
+        "data_digest": record.digest(*(array for one in interfaces for light in one.lights for array in light)),
+    }
+
+
+def _content(of: StackRequest, channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    setting = Setting(of.illumination, n=of.stack.media[0].layers[0].n)
+    digests = "".join(one["data_digest"] for one in channels.values())
+    return {
+        "title": of.title,
+        "law": PIPELINE,
+        "pipeline": PIPELINE,
+        "equations": EQUATIONS,
+        "note": NOTE,
+        "setting": setting,
+        "unit": of.stack.unit,
+        "layers": of.stack.layers,
+        "half_space": {"law": "hazard", "constants": catalogue.load("hazard", setting=setting).constants()},
+        "constants": {
+            f"{channel}.{name}": value for channel, one in channels.items() for name, value in one["constants"].items()
+        },
+        "fit": {"result": _result([fit for one in channels.values() for fit in one["fit"]])},
+        "quality": {"regenerated": _worst([one for of in channels.values() for one in of["quality"]])},
+        "interfaces": {
+            channel: {key: one[key] for key in ("fit", "quality", "starts", "thicknesses")}
+            for channel, one in channels.items()
+        },
+        "truth": {"kind": "exact"},
+        "preset": "quick",
+        "seed": fit.SEED,
+        "versions": record.versions(),
+        "data_digest": hashlib.sha256(digests.encode()).hexdigest(),
+    }
+
+
+def _worst(found: Sequence[Mapping[str, list[float]]]) -> dict[str, Any]:
+    """rel and ks of every interface and thickness that was not fitted, and the largest relative error of A [-]."""
+    rel, ks, of_a = ([value for one in found for value in one[key]] for key in ("rel", "ks", "delta_A"))
+    return {"rel": rel, "ks": ks, "delta_A": max(map(abs, of_a))}
+
+
+def _result(fits: Sequence[Mapping[str, Any]]) -> str:
+    """Of all interfaces: one that does not converge has constants that trade against each other."""
+    return next((one["result"] for one in fits if one["result"] != "converged"), "converged")
+
+
+def _stack(file: str, content: Mapping[str, Any]) -> LayerStack:
+    layers = [{key: value for key, value in one.items() if value is not None} for one in content["layers"]]
+    return stack_of(Tables(file, {}), layers, content["unit"])
+
+
+def _require_same(path: Path, own: Mapping[str, float], recorded: Mapping[str, float]) -> None:
+    """A stack's constants belong to its half spaces'."""
+    same = own.keys() == recorded.keys() and np.allclose(
+        [own[name] for name in own], [recorded[name] for name in own], rtol=ALIKE
+    )
+    if not same:
+        raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
+
+
+def _law(content: Mapping[str, Any], channel: str, medium: Medium, setting: Setting) -> StackLaw:
+    hazard = catalogue.load("hazard", setting=setting)
+    law: LayerLaw | StackLaw | None = None
+    for number in reversed(range(len(medium.layers))):
+        layer = medium.layers[number]
+        top = LayerLaw(setting, hazard, layer.alpha, layer.mfp)
+        if law is None:
+            law = top
+            continue
+        values = {
+            name: float(content["constants"][f"{channel}.{number + 1}.{name}"]["regenerated"])
+            for name in StackLaw.constant_names()
+        }
+        law = StackLaw(setting, top, law, layer.thickness, **values)
+    if not isinstance(law, StackLaw) or not all(map(math.isfinite, law.constants().values())):
+        raise RecordError(f"record {content.get('name')!r} is damaged: it has fewer than two layers")
+    return law

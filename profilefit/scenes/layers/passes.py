@@ -1,0 +1,116 @@
+"""The passes of layered objects: samples of a stack's law with the thickness of each pixel; light scattered once.
+
+The G-buffer's `reflectance_map` holds a share of the way from the least thickness of the first layer to the most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Medium
+from profilefit.laws.base import ProfileLaw
+from profilefit.laws.stack import StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.scenes.layers.law import single_scattering
+from profilefit.scenes.stage.gather import Gather
+from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
+from profilefit.shader.emit import law_text, literal, prefix, text_beside
+from profilefit.shader.stack_text import single_text, stack_text
+
+Floats = NDArray[np.float64]
+Singles = NDArray[np.float32]
+SCATTERED = "scattered_map"
+COSINES, SHARES = 24, 12  # of the table of what leaves after one scattering
+RULE = 24  # directions of its quadrature, for slope and azimuth each
+
+
+def thickness_text(least: float, most: float) -> str:
+    """GLSL of the thickness at a pixel, an expression of `surface`."""
+    return f"mix({literal(least)}, {literal(most)}, surface.r)"
+
+
+def of_stack(laws: Sequence[StackLaw], least: float, most: float) -> Gather:
+    """Samples of a stack's law with the thickness at each pixel."""
+    shape = f"{LAW}_shape(float(c), {thickness_text(least, most)})"
+    return Gather(LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)"))
+
+
+def of_half_space(law: ProfileLaw) -> Gather:
+    """Samples of one half space everywhere, that of the stage's `fixed_alpha`, with the reflectance of the law."""
+    shape = f"{LAW}_shape(fixed_alpha[c])"
+    return Gather(LawText(prefix(law), law_text(law, name=LAW), {}, shape, f"{LAW}_reflectance(shape)"))
+
+
+@dataclass(frozen=True, eq=False)
+class WithSingle(Technique):
+    """A technique whose light scattered once leaves as it does, not in all directions alike.
+
+    A law has all scattered light leave as a white wall's does. To what it gives this adds the radiance of the light
+    that was scattered once, exactly, and takes away that light's exitance over pi: no energy comes or goes.
+
+    media  of red, green, blue;  least, most  thickness of the first layer where the map is 0 and 1
+    """
+
+    by: Gather
+    media: tuple[Medium, Medium, Medium]
+    least: float
+    most: float
+    table: Singles
+
+    @classmethod
+    def of(cls, by: Gather, media: tuple[Medium, Medium, Medium], least: float, most: float) -> WithSingle:
+        """With its table of exitances, a quadrature of seconds."""
+        return cls(by, media, least, most, once_table(media, least, most))
+
+    def passes(self, frame: Frame) -> Sequence[Pass]:
+        inner = [replace(one, writes=SCATTERED) if one.writes == EXITANCE else one for one in self.by.passes(frame)]
+        head = f"#define THICKNESS(surface) ({thickness_text(self.least, self.most)})\n"
+        source = f"{single_text(self.media, name='once')}{head}{text_beside(__name__, 'single.frag')}"
+        reads = maps(SCATTERED, "reflectance_map", "position_map", "normal_map")
+        uniforms = {**frame.light, "perspective": float(frame.is_perspective)}
+        return [*inner, Pass("single", {**reads, "once_table": self.table}, EXITANCE, source, uniforms)]
+
+    def through(self) -> LawText:
+        return self.by.through()
+
+    def lengths(self, frame: Frame) -> Floats:
+        return self.by.lengths(frame)
+
+
+def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
+    """(SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines of the light along rows."""
+    cosine = (np.arange(COSINES) + 0.5) / COSINES
+    thickness = np.linspace(least, most, SHARES)
+    rows = [[once(_with_first(one, d), cosine) for one in media] for d in thickness]
+    return np.moveaxis(np.array(rows), 1, 2).astype(np.float32)
+
+
+def once(medium: Medium, cosine: Floats) -> Floats:
+    """Share of the light of each direction, cosines (m,), that leaves above after one scattering [-]."""
+    node, weight = np.polynomial.legendre.leggauss(RULE)
+    mu, of_mu = 0.5 * (node + 1.0), 0.5 * weight
+    turn, of_turn = 0.5 * np.pi * (node + 1.0), np.pi * weight  # both sides of the plane are alike
+    radiance = single_scattering(medium, cosine[:, None, None], mu[:, None], turn)
+    return np.einsum("moa,o,a->m", np.asarray(radiance), of_mu * mu, of_turn) / cosine
+
+
+def diffusely_once(medium: Medium) -> float:
+    """The same of diffuse light [-]."""
+    node, weight = np.polynomial.legendre.leggauss(RULE)
+    cosine = 0.5 * (node + 1.0)
+    return float(np.sum(weight * cosine * once(medium, cosine)))
+
+
+def _with_first(medium: Medium, thickness: float) -> Medium:
+    first, *others = medium.layers
+    return Medium((replace(first, thickness=max(thickness, 1e-9 * first.mfp)), *others), medium.n_above)
+
+
+def channels_of(values: Sequence[float]) -> tuple[float, float, float]:
+    red, green, blue = (float(one) for one in values)
+    assert len(values) == len(CHANNELS)
+    return red, green, blue

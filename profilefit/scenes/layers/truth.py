@@ -1,0 +1,112 @@
+"""Exact light of a stack as the first layer's thickness varies: curves for the integral over a surface.
+
+At a point that gathers, R_d is that of an endless stack with the thickness there ("a stack at each point"): what a step
+in thickness does besides is in no closed form here.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.interpolate import CubicSpline, RectBivariateSpline
+
+from mcml_sim import Medium, exact
+from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
+from profilefit.scenes.stage.exact_table import Curves, held, hermite, knots
+
+Floats = NDArray[np.float64]
+NODES = exact.Nodes(12, 16, 16, 10)
+THICKNESSES = 9  # of the table, even in ln d
+LEAST = 1e-3  # mean free paths that stand for no first layer
+FAINT = 1e-7  # of the largest x^2 R_d, from which on R_d is continued by its own asymptote, x^-2 e^(-kappa x)
+LEFT = 1e-6  # share of the light from which on it is, too
+
+
+@dataclass(frozen=True)
+class StackTable:
+    """A `CurveTable` whose values are shares of the way from the least thickness to the most.
+
+    least, most  thickness [unit of the media];  u  ln d of the rows;  the others by channel
+    """
+
+    least: float
+    most: float
+    u: Floats
+    profile: tuple[RectBivariateSpline, ...]
+    cdf: tuple[RectBivariateSpline, ...]
+    reflectance: tuple[CubicSpline, ...]
+    kappa: tuple[float, ...]
+
+    def colour(self, values: ArrayLike) -> Floats:
+        """A [-] of red, green and blue along a last axis, at values in [0, 1] of any shape."""
+        u = self._place(np.asarray(values, float))
+        return np.stack([spline(u) for spline in self.reflectance], axis=-1)
+
+    def curves(self, values: ArrayLike, /) -> Curves:
+        """As `CurveTable.curves`."""
+        given, y = np.asarray(values, float), knots()
+        u = self._place(given)
+        size = (given.size, y.size - 1, 4)
+        reflectance, kappa = np.empty(given.size), np.empty(given.size)
+        profile, cdf = np.empty(size), np.empty(size)
+        for channel in range(len(CHANNELS)):
+            own = slice(channel, None, len(CHANNELS))
+            reflectance[own] = self.reflectance[channel](u[own])
+            kappa[own] = self.kappa[channel]
+            profile[own] = hermite(self.profile[channel], u[own], y)
+            cdf[own] = hermite(self.cdf[channel], u[own], y)
+        return Curves(np.zeros(given.size), reflectance, kappa, profile, cdf)
+
+    def _place(self, values: Floats) -> Floats:
+        thickness = self.least + (self.most - self.least) * values
+        return np.log(np.maximum(thickness, np.exp(self.u[0])))
+
+
+def stack_table(
+    media: tuple[Medium, Medium, Medium], least: float, most: float, illumination: str = "diffuse"
+) -> StackTable:
+    """The table of a stack whose first layer is from `least` to `most` thick; 9 exact solutions a channel, 20 s each.
+
+    media  of red, green, blue, of one index and g = 0;  thicknesses in their unit, 0 <= least < most
+    Relative error of R_d between thicknesses below 1e-3, of A below 1e-4 (a test), where the most is no more than a
+    hundred times the least; x = r / l, l the first layer's mean free path. InputError as of `exact.solve`.
+    """
+    if not 0 <= least < most < np.inf:
+        raise InputError(f"least and most must be thicknesses, 0 <= least < most, got {least!r} and {most!r}")
+    shortest = min(medium.layers[0].mfp for medium in media)
+    u = np.linspace(np.log(max(least, LEAST * shortest)), np.log(most), THICKNESSES)
+    y, degree = knots(), min(3, THICKNESSES - 1)
+    profile, cdf, reflectance, kappa = [], [], [], []
+    for medium in media:
+        rate = _slowest(medium)
+        rows = [_row(medium, float(d), illumination, y, rate) for d in np.exp(u)]
+        known, within, whole = (np.array(column) for column in zip(*rows, strict=True))
+        profile.append(RectBivariateSpline(u, y, known, kx=degree))
+        cdf.append(RectBivariateSpline(u, y, within, kx=degree))
+        reflectance.append(CubicSpline(u, whole))
+        kappa.append(rate)
+    return StackTable(least, most, u, tuple(profile), tuple(cdf), tuple(reflectance), tuple(kappa))
+
+
+def _row(medium: Medium, d: float, illumination: str, y: Floats, rate: float) -> tuple[Floats, Floats, float]:
+    """ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A, under a first layer of thickness d."""
+    first, *others = medium.layers
+    light = exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, NODES)
+    x = np.exp(y)
+    share = np.clip(np.asarray(light.cdf(first.mfp * x)), 0.0, 1.0)
+    value = np.asarray(light.profile(first.mfp * x)) * first.mfp**2 / light.reflectance
+    strength = x**2 * value
+    bright = (strength > FAINT * strength.max()) & (1.0 - share > LEFT)
+    bright[: int(np.argmax(strength)) + 1] = True
+    kept = held(bright[None, :])[0]
+    known = np.log(value[kept]) + rate * x[kept] - 2.0 * (y - y[kept])
+    return known, np.log(share / x), light.reflectance
+
+
+def _slowest(medium: Medium) -> float:
+    """Rate at which light decays far off, in 1 / l of the first layer: that of the layer in which it is slowest."""
+    l1 = medium.layers[0].mfp
+    return min(float(exact.decay_rate(layer.alpha)) / layer.mfp for layer in medium.layers) * l1

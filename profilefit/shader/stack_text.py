@@ -1,0 +1,168 @@
+"""The shader source of a stack of layers: the laws of red, green and blue in one text, and light scattered once."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import jax
+import jax.numpy as jnp
+
+from mcml_sim.media.medium import Medium
+from profilefit.errors import InputError
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.shader import emit
+
+NAME = "stack"
+LAYER = "layer"  # of the names of the half space that every layer is
+HALF_SPACES = ("hazard", "refracting_hazard")  # texts of half spaces whose shapes can be made elsewhere
+THICKEST = 1e6  # optical depth that stands for an infinite one
+Numbers = dict[str, float]
+
+
+def stack_text(
+    laws: Sequence[StackLaw], lang: str = "glsl", name: str = NAME, told: Mapping[str, str] | None = None
+) -> str:
+    """The laws of a stack's three channels, ready to include, with the first layer's thickness as an argument.
+
+    NAME_profile(r, channel, thickness) and what else `glsl/README.md` lists; channel 0, 1, 2 is red, green, blue.
+    lang, name, told  as for `emit.law_text`;  InputError on laws of unlike stacks
+    """
+    count = _one_count(laws)
+    constants: Numbers = {}
+    for channel, law in zip(CHANNELS, laws, strict=True):
+        constants |= {f"{channel}_{key}": value for key, value in channel_numbers(law).items()}
+    common, *parts = emit.shapeless(laws[0].top.law)
+    own = [one.replace(emit.PLACEHOLDER, f"{emit.PLACEHOLDER}{LAYER}_") for one in parts]
+    texts = [common, *own, emit.read_text("channel"), *_layer_texts(laws), emit.read_text("stack")]
+    return emit.filled(texts, name, constants, count, lang, told or {})
+
+
+def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME}_once") -> str:
+    """Light scattered once in a stack, NAME_radiance(channel, thickness, cos_in, cos_out, turned) [1/sr].
+
+    media  of red, green, blue: two layers or more, the last infinite, of one index >= that above; InputError else
+    """
+    index, count = _one_index(media)
+    constants: Numbers = {"index": index}
+    for channel, one in zip(CHANNELS, media, strict=True):
+        constants[f"{channel}_rate"] = one.layers[0].mu_t
+        for i, layer in enumerate(one.layers, start=1):
+            constants |= {f"{channel}_alpha{i}": layer.alpha, f"{channel}_g{i}": layer.g}
+            if i > 1:
+                constants[f"{channel}_depth{i}"] = min(layer.mu_t * layer.thickness, THICKEST)
+    return emit.filled(
+        [emit.read_text(part) for part in ("common", "channel", "single_scattering")],
+        *(name, constants, count, lang, {}),
+    )
+
+
+def channel_numbers(law: StackLaw) -> Numbers:
+    """The numbers of one channel's text, lengths in mean free paths of its first layer; mfp itself as it is."""
+    unit = law.top.mfp
+    with jax.enable_x64(True):
+        found: Numbers = {
+            "mfp": unit,
+            "kappa": float(law.top.decay()) * unit,
+            "slowest": float(law.decay()) * unit,
+            "below": float(law.below.whole()),
+            **law.constants(),
+        }
+        one: StackLaw | LayerLaw = law
+        number = 1
+        while True:
+            half_space = one.top if isinstance(one, StackLaw) else one
+            found[f"scale{number}"] = unit / half_space.mfp
+            if not isinstance(one, StackLaw):
+                return found
+            if number > 1:
+                found |= {f"{key}{number}": value for key, value in _edge(one, unit).items()}
+            one, number = one.below, number + 1
+
+
+def _layers(law: StackLaw | LayerLaw) -> list[LayerLaw]:
+    """Its half spaces, from the first layer down."""
+    return [law.top, *_layers(law.below)] if isinstance(law, StackLaw) else [law]
+
+
+def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:
+    """The functions that give the shapes of the layers' half spaces, numbers since no albedo changes, and choose."""
+    each = [[_rounded(emit.shape_numbers(one.law, one.alpha)) for one in _layers(law)] for law in laws]
+    prefix = f"{emit.PLACEHOLDER}{LAYER}"
+    keys = list(each[0][0])
+    curves = list(dict.fromkeys(key.partition(".")[0] for key in keys if "." in key))
+
+    def function(head: str, values: Mapping[str, str]) -> str:
+        lines = [f"{prefix}_Shape {prefix}{head} {{", f"    {prefix}_Shape s;"]
+        lines += [f"    PfCurve {curve};" for curve in curves]
+        lines += [f"    {key if '.' in key else f's.{key}'} = {value};" for key, value in values.items()]
+        lines += [f"    s.{curve} = {curve};" for curve in curves]
+        return "\n".join([*lines, "    return s;", "}"]) + "\n"
+
+    def chosen(values: Sequence[str]) -> str:
+        return values[0] if len(set(values)) == 1 else f"{emit.PLACEHOLDER}of(channel, {', '.join(values)})"
+
+    texts = [
+        function(f"{number}(float channel)", {key: chosen([one[key] for one in layers]) for key in keys})
+        for number, layers in enumerate(zip(*each, strict=True), start=1)
+    ]
+    differ = {key for key in keys if len({one[key] for layers in each for one in layers}) > 1}
+    either = {key: f"PF_SELECT(first > 0.5, one.{key}, other.{key})" if key in differ else f"one.{key}" for key in keys}
+    return [*texts, function(f"_either(float first, {prefix}_Shape one, {prefix}_Shape other)", either)]
+
+
+def _rounded(numbers: Numbers) -> dict[str, str]:
+    return {key: emit.literal(float(f"{value:.{emit.DIGITS}g}")) for key, value in numbers.items()}
+
+
+def _edge(law: StackLaw, unit: float) -> Numbers:
+    """What depends on the thickness, at its own."""
+    of = law.terms()
+    first, second, _ = law.shares(of)
+    passed = law.top.cdf(float(of.gone))
+    return {
+        **{key: float(value) / unit for key, value in (("gone", of.gone), ("back", of.back), ("height", of.height))},
+        **{"lost": float(of.c1), "came": float(of.c2), "rate": float(of.rate) * unit, "image": float(of.image)},
+        **{"passed": float(passed), "began": float(law.below.within(jnp.asarray(of.back)))},
+        **{"first": float(first), "second": float(second)},
+    }
+
+
+def _one_count(laws: Sequence[StackLaw]) -> int:
+    """The number of layers of all channels; InputError unless they are alike in what a text has but once."""
+    if len(laws) != len(CHANNELS) or not all(isinstance(law, StackLaw) for law in laws):
+        raise InputError(f"laws must be three laws of a stack, of red, green and blue, got {_kinds(laws)}")
+    settings = {layer.setting for law in laws for layer in _layers(law)}
+    if len(settings) > 1:
+        told = "; ".join(sorted(map(str, settings)))
+        raise InputError(f"laws must be of one light and one n in all layers and channels, got {told}")
+    texts = {emit.source(layer.law) for law in laws for layer in _layers(law)}
+    if len(texts) > 1 or not texts <= set(HALF_SPACES):
+        told = ", ".join(sorted(texts))
+        raise InputError(f"laws must be of half spaces by one text, {' or '.join(HALF_SPACES)}, got {told}")
+    return _one_number("laws", [len(_layers(law)) for law in laws])
+
+
+def _one_index(media: Sequence[Medium]) -> tuple[float, int]:
+    """Index over that above, and number of layers, of all channels; InputError unless they are alike in both."""
+    if len(media) != len(CHANNELS) or not all(isinstance(one, Medium) for one in media):
+        raise InputError(f"media must be three media, of red, green and blue, got {_kinds(media)}")
+    for one in media:
+        if not one.is_half_space:
+            raise InputError(f"media must have an infinite last layer, got thickness {one.layers[-1].thickness:g}")
+    indices = {layer.n / one.n_above for one in media for layer in one.layers}
+    if len(indices) > 1 or min(indices) < 1.0:
+        told = ", ".join(f"{index:g}" for index in sorted(indices))
+        raise InputError(f"media must be of one n in all layers and channels, 1 or more over that above, got {told}")
+    return indices.pop(), _one_number("media", [len(one.layers) for one in media])
+
+
+def _one_number(name: str, counts: Sequence[int]) -> int:
+    if len(set(counts)) > 1 or counts[0] < 2:
+        told = ", ".join(map(str, counts))
+        raise InputError(f"{name} must have one number of layers in all channels, two or more, got {told}")
+    return counts[0]
+
+
+def _kinds(given: Sequence[object]) -> str:
+    return ", ".join(type(one).__name__ for one in given) or "none"

@@ -1,0 +1,421 @@
+"""STACK.toml: three colours, published materials, images of thickness, and one line for every mistake."""
+
+import io
+import math
+import os
+import random
+import struct
+import zlib
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from benchmarks.stacks import stacks
+from mcml_sim import Layer, Medium
+from mcml_sim.files.text_file import read_toml
+from profilefit.errors import InputError
+from profilefit.materials import BY_NAME, SOURCE
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.recipe import available
+from profilefit.recipes.stack.file import LARGEST_FILE, LAYER_KEYS, LONGEST_LINE, LayerStack, read_layers, stack_of
+from profilefit.recipes.toml_tables import Tables
+
+STACK = """\
+[[layers]]
+name = "veil"
+n = 1.4
+mu_a = [0.1, 0.2, 0.3]
+mu_s = 9
+g = 0.5
+thickness = 0.25
+source = "measured"
+
+[[layers]]
+n = 1.3
+mu_a = 1
+mu_s = [1, 2, 3]
+g = 0
+"""
+IMAGE = 'thickness = { image = "thickness.png", range = [0.05, 0.4] }'
+KIND = r"8- or 16-bit grey, or a TIFF of float32, got thickness.png of another kind \(Pillow's "
+SIZE = r"thickness.image must be a grey PNG or TIFF of at most 4096 x 4096 pixels, got "
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Reads the stack above, one piece of it replaced."""
+
+    def from_file(old="", new=""):
+        assert not old or STACK.count(old) == 1, "the piece to replace must be there, once"
+        path = tmp_path / "skin.toml"
+        path.write_text(STACK.replace(old, new) if old else new or STACK, encoding="utf-8")
+        return read_layers(path, read_toml(path))
+
+    return from_file
+
+
+@pytest.fixture
+def of_image(read, tmp_path):
+    """Reads the stack above with an image as its first thickness."""
+
+    def from_image(image, name="thickness.png", **options):
+        if isinstance(image, bytes):
+            (tmp_path / name).write_bytes(image)
+        else:
+            image.save(tmp_path / name, **options)
+        return read("thickness = 0.25", IMAGE.replace("thickness.png", name))
+
+    return from_image
+
+
+def refused(make, message):
+    """One line that begins with the file's name, and has these words."""
+    with pytest.raises(InputError, match=message) as caught:
+        make()
+    text = str(caught.value)
+    assert ": " in text
+    assert text.partition(": ")[0].endswith("skin.toml")
+    assert text.isprintable()
+    assert len(text) < 2000
+
+
+def test_three_colours(read):
+    stack = read()
+    assert stack.unit == "mm"
+    assert stack.media == tuple(
+        Medium((Layer(1.4, mu_a, 9.0, 0.5, 0.25), Layer(1.3, 1.0, mu_s, 0.0)))
+        for mu_a, mu_s in ((0.1, 1.0), (0.2, 2.0), (0.3, 3.0))
+    )
+    assert not stack.is_grey
+    assert (stack.names, stack.sources, stack.map) == (("veil", ""), ("measured", ""), None)
+
+
+def test_plain_data_of_a_record(read):
+    assert read().layers == [
+        {"name": "veil", "n": 1.4, "mu_a": [0.1, 0.2, 0.3], "mu_s": [9.0, 9.0, 9.0], "g": 0.5, "thickness": 0.25}
+        | {"source": "measured"},
+        {"name": "", "n": 1.3, "mu_a": [1.0, 1.0, 1.0], "mu_s": [1.0, 2.0, 3.0], "g": 0.0, "thickness": None}
+        | {"source": ""},
+    ]
+
+
+def test_single_numbers_are_grey(read):
+    stack = read(new='unit = "cm"\nother = 1\n[[layers]]\nn = 1\nmu_a = 0.1\nmu_s = [9, 9.0, 9]\ng = 0\nthickness = 2')
+    assert stack.is_grey
+    assert stack.unit == "cm"
+    assert stack.media[2] == Medium((Layer(1.0, 0.1, 9.0, 0.0, 2.0),))
+
+
+def test_infinite_may_be_said(read):
+    assert math.isinf(read("g = 0\n", "g = 0\nthickness = inf\n").media[0].layers[1].thickness)
+
+
+def test_published_material(read):
+    stack = read("mu_a = 1\nmu_s = [1, 2, 3]\ng = 0\n", 'material = "marble"\n')
+    marble = BY_NAME["marble"]
+    assert [medium.layers[1] for medium in stack.media] == [
+        Layer(1.3, mu_a, mu_s, 0.0) for mu_a, mu_s in zip(marble.absorption, marble.scattering, strict=True)
+    ]
+    assert stack.names == ("veil", "marble")
+    assert stack.sources == ("measured", SOURCE)
+    named = read("mu_a = 1\nmu_s = [1, 2, 3]\ng = 0\n", 'material = "marble"\nname = "slab"\nsource = "a book"\n')
+    assert (named.names[1], named.sources[1]) == ("slab", "a book")
+
+
+SHIPPED = sorted((fits_folder() / "stacks").glob("*.toml"))
+
+
+@pytest.mark.parametrize("path", SHIPPED, ids=[path.stem for path in SHIPPED])
+def test_shipped_stacks(path):
+    stack = read_layers(path, read_toml(path))
+    assert all(stack.names)
+    assert all(stack.sources)
+    twin = {"skimmilk-on-marble": "milk on marble", "marble-on-potato": "marble on potato"}.get(path.stem, path.stem)
+    if twin in stacks(0):
+        assert list(stack.media) == [stacks(channel)[twin] for channel in range(3)]
+    text = path.read_text(encoding="utf-8")
+    if "material = " in text:
+        assert all(source.startswith(SOURCE) for source in stack.sources)
+    assert text.count("thickness = ") == sum(
+        "thickness = " in line and "# assumed" in line for line in text.split("\n")
+    )
+
+
+def test_stacks_are_no_recipes():
+    assert [path.stem for path in SHIPPED] == [
+        *("heart", "marble-on-potato", "skimmilk-on-marble", "skimmilk-on-potato", "skin"),
+    ]
+    assert not set(available(fits_folder())) & {path.stem for path in SHIPPED}
+
+
+def test_values_are_thicknesses(of_image, tmp_path):
+    """0, half and full scale of each kind; row 0 is the image's first; the mean stands in the media."""
+    top, half = np.array([[0.0, 1.0], [1.0, 1.0]]), 0.5
+    for name, scale, dtype in (
+        ("8.png", 255, "u1"),
+        ("16.png", 65535, "u2"),
+        ("8.tif", 255, "u1"),
+        ("16.tif", 65535, "u2"),
+    ):
+        stack = of_image(Image.fromarray((top * scale).astype(dtype)), name)
+        np.testing.assert_array_equal(stack.map.values, top)
+        assert (stack.map.values.dtype, stack.map.least, stack.map.most) == (np.float32, 0.05, 0.4)
+        assert stack.map.mean == pytest.approx(0.05 + 0.35 * 0.75)
+        assert [medium.layers[0].thickness for medium in stack.media] == [stack.map.mean] * 3
+        assert not stack.map.values.flags.writeable
+        grey = of_image(Image.fromarray(np.full((3, 5), round(half * scale), dtype)), name)
+        assert grey.map.values.shape == (3, 5)
+        assert grey.map.mean == pytest.approx(0.05 + 0.35 * round(half * scale) / scale, rel=1e-6)
+    values = np.array([[0.0, 0.25, 1.0]], np.float32)
+    stack = of_image(Image.fromarray(values), "float.tiff")
+    np.testing.assert_array_equal(stack.map.values, values)
+    assert stack.map.mean == pytest.approx(0.05 + 0.35 * 1.25 / 3.0)
+    assert stack.layers[0]["thickness"] == stack.map.mean
+
+
+def test_big_endian_image(of_image):
+    values = np.arange(0, 60000, 1000, dtype=np.uint16).reshape(6, 10)
+    image = _tiff(10, 6, 16, values.astype(">u2").tobytes(), order=">")
+    np.testing.assert_allclose(of_image(image, "a.tif").map.values, values / 65535.0, rtol=1e-6)
+
+
+def _chunk(name, data):
+    return struct.pack(">I", len(data)) + name + data + struct.pack(">I", zlib.crc32(name + data))
+
+
+def _png(columns, rows, bits=8, colour=0, data=b"\0"):
+    """A PNG that says it is so large."""
+    header = struct.pack(">IIBBBBB", columns, rows, bits, colour, 0, 0, 0)
+    chunks = ((b"IHDR", header), (b"IDAT", zlib.compress(data)), (b"IEND", b""))
+    return b"\x89PNG\r\n\x1a\n" + b"".join(_chunk(*one) for one in chunks)
+
+
+def _tiff(columns, rows, bits, data, order="<", black=1, sample_format=1, samples=1):
+    """A TIFF of one strip."""
+    tags = [
+        *((256, columns), (257, rows), (258, bits), (259, 1), (262, black), (273, 8), (277, samples), (278, rows)),
+        *((279, len(data)), (339, sample_format)),
+    ]
+    entries = b"".join(struct.pack(f"{order}HHII", tag, 4, 1, value) for tag, value in tags)
+    mark = b"II*\0" if order == "<" else b"MM\0*"
+    head = struct.pack(f"{order}H", len(tags))
+    return mark + struct.pack(f"{order}I", 8 + len(data)) + data + head + entries + bytes(4)
+
+
+@pytest.mark.parametrize(
+    ("image", "size"),
+    [
+        (_png(10_000, 10_000), "10000 x 10000"),
+        (_png(2**31 - 1, 2**31 - 1), "2147483647 x 2147483647"),
+        (_png(4097, 1), "4097 x 1"),
+        (_tiff(9000, 9000, 8, b""), "9000 x 9000"),
+        (_tiff(1, 2**31, 8, b""), "1 x 2147483648"),
+    ],
+)
+def test_too_large_is_refused_undecoded(of_image, monkeypatch, image, size):
+    """What a tiny file says, which Pillow's Image.open would warn of."""
+
+    def decoded(self):
+        raise AssertionError("it was decoded")
+
+    monkeypatch.setattr("PIL.ImageFile.ImageFile.load", decoded)
+    monkeypatch.setattr("PIL.TiffImagePlugin.TiffImageFile.load", decoded)
+    refused(lambda: of_image(image), rf"\[layers 1\] {SIZE}thickness.png of {size}$")
+
+
+def test_largest_image(of_image):
+    stack = of_image(Image.new("L", (4096, 4096), 255))
+    assert stack.map.values.shape == (4096, 4096)
+    assert stack.map.mean == pytest.approx(0.4)
+
+
+def _saved(image, kind="PNG", **options):
+    file = io.BytesIO()
+    image.save(file, kind, **options)
+    return file.getvalue()
+
+
+GREY = Image.new("L", (8, 8), 100)
+NOISE = Image.fromarray(np.random.default_rng(1).integers(0, 256, (64, 64), np.uint8))
+OTHERS = {
+    "colours": (_saved(Image.new("RGB", (2, 2))), KIND + "RGB"),
+    "transparent": (_saved(Image.new("LA", (2, 2))), KIND + "LA"),
+    "palette": (_saved(Image.new("P", (2, 2))), KIND + "P"),
+    "one bit": (_saved(Image.new("1", (2, 2))), KIND + "1"),
+    "colours in a TIFF": (_saved(Image.new("RGB", (2, 2)), "TIFF"), KIND + "RGB"),
+    "palette in a TIFF": (_saved(Image.new("P", (2, 2)), "TIFF"), KIND + "P"),
+    "32-bit whole": (_saved(Image.new("I", (2, 2)), "TIFF"), KIND + "I"),
+    "12 bits": (_tiff(2, 2, 12, bytes(6)), KIND + "I;16"),
+    "with a sign": (_tiff(2, 2, 8, bytes(4), sample_format=2), KIND + "L"),
+    "white is 0": (_tiff(2, 2, 16, bytes(8), black=0), KIND + "I;16"),
+    "packed": (_saved(GREY, "TIFF", compression="tiff_lzw"), r"be uncompressed if it is a TIFF .* packed by tiff_lzw$"),
+    "pages": (_saved(GREY, "TIFF", save_all=True, append_images=[GREY]), SIZE + "thickness.png of several pages"),
+    "moves": (_saved(GREY, save_all=True, append_images=[NOISE]), SIZE + "thickness.png of several pages"),
+    "JPEG": (_saved(GREY, "JPEG"), SIZE + "thickness.png, which is neither"),
+    "text": (b"P2 1 1 255 0", SIZE + "thickness.png, which is neither"),
+    "empty": (b"", "a file of at most 64 MiB, got thickness.png of 0 bytes"),
+    "nothing behind": (b"\x89PNG\r\n\x1a\n", SIZE + "thickness.png, which is damaged"),
+    "no pixels": (_png(0, 0), SIZE + "thickness.png, which is damaged"),
+    "fewer pixels": (_png(100, 100), SIZE + "thickness.png, which is damaged"),
+    "cut": (_saved(NOISE)[:2000], SIZE + "thickness.png, which is damaged"),
+    "cut TIFF": (_tiff(64, 64, 8, bytes(64 * 64))[:3000], SIZE + "thickness.png, which is damaged"),
+    "cut strip": (_tiff(64, 64, 8, bytes(100)), SIZE + "thickness.png, which is damaged"),
+    "a thousand samples": (_tiff(2, 2, 8, bytes(4), samples=1000), SIZE + "thickness.png, which is damaged"),
+}
+
+
+@pytest.mark.parametrize("name", OTHERS)
+def test_other_images_are_refused(of_image, capfd, name):
+    image, message = OTHERS[name]
+    refused(lambda: of_image(image), message)
+    assert capfd.readouterr() == ("", ""), "libraries print nothing beside the error"
+
+
+@pytest.mark.parametrize(
+    ("value", "shown"), [(math.nan, "nan"), (math.inf, "inf"), (-math.inf, "-inf"), (1.001, "1.001"), (-1e-3, "-0.001")]
+)
+def test_values_beyond_the_range_are_refused(of_image, value, shown):
+    image = Image.fromarray(np.array([[0.5, value, 0.5]], np.float32))
+    refused(lambda: of_image(image, "a.tif"), rf"image must be an image of values in 0 ... 1, got a.tif with {shown}$")
+
+
+def test_a_signalling_nan_warns_of_nothing(of_image):
+    image = _tiff(1, 1, 32, struct.pack("<I", 0x7F800001), sample_format=3)
+    refused(lambda: of_image(image), r"image must be an image of values in 0 ... 1, got thickness.png with nan$")
+
+
+def test_no_thickness_at_all_is_refused(of_image, read):
+    of_image(Image.new("L", (2, 2), 0))
+    message = r"\[layers 1\] thickness must be > 0, or infinite in the last layer, got 0.0"
+    refused(lambda: read("thickness = 0.25", IMAGE.replace("0.05", "0")), message)
+
+
+def test_damaged_images_are_one_line(of_image, capfd):
+    """Bytes changed or cut, from a seed: read or refused, and nothing is printed."""
+    rng, accepted, told = random.Random(1), 0, []
+    values = np.random.default_rng(1).random((16, 16), np.float32)
+    wholes = [
+        *(_saved(NOISE), _saved(Image.fromarray((values * 65535).astype(np.uint16)))),
+        *(_saved(Image.fromarray(values), "TIFF"), _saved(NOISE, "TIFF")),
+    ]
+    for _ in range(400):
+        data = bytearray(rng.choice(wholes))
+        for _ in range(rng.randint(1, 4)):
+            data[rng.choice((rng.randrange(len(data)), rng.randrange(200)))] = rng.randrange(256)
+        if rng.random() < 0.2:
+            del data[rng.randrange(len(data)) :]
+        try:
+            stack = of_image(bytes(data))
+        except InputError as error:
+            told.append(str(error))
+        else:
+            accepted += 1
+            assert np.all((stack.map.values >= 0) & (stack.map.values <= 1))
+    assert all(text.isprintable() for text in told)
+    assert accepted > 20  # neither all nor none, or nothing was tried
+    assert len(told) > 20
+    assert capfd.readouterr() == ("", "")
+
+
+def test_only_regular_files_of_some_size_are_read(read, tmp_path):
+    def by_image(name):
+        return lambda: read("thickness = 0.25", IMAGE.replace("thickness.png", name))
+
+    refused(by_image("absent.png"), SIZE + "absent.png: No such file or directory$")
+    refused(by_image("x" * 299), SIZE + "x*: File name too long")
+    refused(by_image("."), SIZE + r"\., which is no regular file")
+    refused(by_image(""), SIZE + ", which is no regular file")
+    refused(by_image("/dev/zero"), SIZE + "/dev/zero, which is no regular file")
+    refused(by_image("/proc/kmsg"), "a file of at most 64 MiB, got /proc/kmsg of 0 bytes")
+    os.mkfifo(tmp_path / "pipe.png")
+    refused(by_image("pipe.png"), SIZE + "pipe.png, which is no regular file")
+    with (tmp_path / "large.png").open("wb") as file:
+        file.truncate(LARGEST_FILE * 2**20 + 1)
+    refused(by_image("large.png"), "a file of at most 64 MiB, got large.png of 67108865 bytes")
+
+
+def test_image_lies_beside_the_file(of_image, tmp_path, monkeypatch):
+    monkeypatch.chdir(Path(__file__).parent)
+    assert of_image(GREY, "beside.png").map.mean == pytest.approx(0.05 + 0.35 * 100 / 255)
+
+
+WRONG = [
+    ("thickness = 0.25", "thickness = -0.1", r"\[layers 1\] thickness must be a number > 0, got -0.1$"),
+    ("thickness = 0.25", "thickness = true", r"\[layers 1\] thickness must be a number > 0, got True"),
+    ("thickness = 0.25", "thickness = nan", r"\[layers 1\] thickness must be a number > 0, got nan"),
+    ("thickness = 0.25", "thickness = [1, 2]", r"\[layers 1\] thickness must be a number > 0, got \[1, 2\]"),
+    ("thickness = 0.25", "", r"\[layers\] thickness may be infinite in the last layer only, got it in layer 1"),
+    ("thickness = 0.25", "depth = 1", rf"\[layers 1\] keys must be of {', '.join(LAYER_KEYS)}, got 'depth'"),
+    ("thickness = 0.25", "thickness = {}", r"\[layers 1\] thickness.range must be two numbers >= 0, .* got nothing"),
+    ("thickness = 0.25", "thickness = { range = [0, 1] }", r"\[layers 1\] thickness.image must be .*, got nothing"),
+    ("thickness = 0.25", IMAGE.replace("range", "ranges"), r"\[layers 1.thickness\] keys must be of image, range, got"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "0.5"), r"\[layers 1\] thickness.range must be .* got \[0.5, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "-1"), r"\[layers 1\] thickness.range must be .* got \[-1, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.05", "true"), r"\[layers 1\] thickness.range must be .* got \[True, 0.4\]"),
+    ("thickness = 0.25", IMAGE.replace("0.4", "inf"), r"\[layers 1\] thickness.range must be .* got \[0.05, inf\]"),
+    ("thickness = 0.25", IMAGE.replace("0.4", "nan"), r"\[layers 1\] thickness.range must be .* got \[0.05, nan\]"),
+    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "0.4"), r"\[layers 1\] thickness.range must be .* got 0.4"),
+    ("thickness = 0.25", IMAGE.replace("[0.05, 0.4]", "[]"), r"\[layers 1\] thickness.range must be .* got \[\]"),
+    ("thickness = 0.25", IMAGE.replace('"thickness.png"', "3"), r"\[layers 1\] thickness.image must be .* got 3"),
+    ("thickness = 0.25", IMAGE.replace(".png", "\\u0000"), r"thickness.image must be a text .* got 'thickness\\x00'"),
+    ("thickness = 0.25", IMAGE.replace("thickness.png", "x" * 400), r"must be a text of 300 characters .* got 'xx*"),
+    ("g = 0\n", f"g = 0\n{IMAGE}\n", r"\[layers 2\] thickness must be a number > 0 below the first layer, got {"),
+    ("mu_s = 9", "mu_s = 9\nmaterial = 'marble'", r"\[layers 1\] material must be left out where mu_a, mu_s, g are"),
+    ("mu_a = [0.1, 0.2, 0.3]", "", r"\[layers 1\] mu_a must be a number, got nothing"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [0.1, 0.2]", r"\[layers 1\] mu_a must be .* got \[0.1, 0.2\]"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [0.1, 0.2, -3]", r"\[layers 1\] mu_a must be a coefficient >= 0, or three of"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [[1, 2, 3]]", r"\[layers 1\] mu_a must be .* got \[\[1, 2, 3\]\]"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = [1, 2, true]", r"\[layers 1\] mu_a must be .* got \[1, 2, True\]"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = inf", r"\[layers 1\] mu_a must be .* got inf"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = {red = 1}", r"\[layers 1\] mu_a must be .* got {'red': 1}"),
+    ("mu_a = [0.1, 0.2, 0.3]", f"mu_a = {10**400}", r"\[layers 1\] mu_a must be .* got one of 401 digits"),
+    ("mu_a = [0.1, 0.2, 0.3]", "mu_a = 1e308\n[x]", r"\[layers 1\] mu_s must be a number, got nothing"),
+    ("mu_s = 9", f"mu_s = [1, {10**308 * 9}, 1]", r"\[layers 1\] mu_s must be .* got \[1, 9000"),
+    ("n = 1.4", "", r"\[layers 1\] n must be a number, got nothing"),
+    ("n = 1.4", "n = -1", r"\[layers 1\] n must be a refractive index > 0, got -1"),
+    ("n = 1.4", "n = [1.4, 1.4, 1.4]", r"\[layers 1\] n must be a number, got \[1.4"),
+    ("n = 1.4", "n = inf", r"\[layers 1\] n must be a refractive index > 0, got inf"),
+    ("g = 0.5", "", r"\[layers 1\] g must be a number, got nothing"),
+    ("g = 0.5", "g = 1", r"\[layers 1\] g must be a mean cosine in \(-1, 1\), got 1"),
+    ('"veil"', '"a\\nb"', r"\[layers 1\] name must be a text of 60 characters at most, got 'a\\nb'"),
+    ('"veil"', "['veil']", r"\[layers 1\] name must be a text of 60 characters at most, got \['veil'\]"),
+    ('"measured"', '"\\u001b[31m"', r"\[layers 1\] source must be a text of 300 characters at most, got '\\x1b"),
+    ('"measured"', "1979-05-27", r"\[layers 1\] source must be a text of 300 characters at most, got datetime"),
+    ('"measured"', f'"{"x" * (LONGEST_LINE + 1)}"', r"\[layers 1\] source must be a text of 300 characters at most"),
+    ("", "n = 1", r"table \[\[layers\]\] is missing"),
+    ("", "layers = 3", r"layers must be tables \[\[layers\]\], got 3"),
+    ("", "layers = []", r"layers must be tables \[\[layers\]\], got \[\]"),
+    ("", "layers = [[]]", r"layers must be tables \[\[layers\]\], got \[\[\]\]"),
+    ("", "[layers]\nn = 1", r"layers must be tables \[\[layers\]\], got {'n': 1}"),
+    ("", "unit = 3\n[[layers]]\nn = 1", r"unit must be a text of 60 characters at most, got 3"),
+    ("", "[[layers]]\nn = 1\nmu_a = 0\nmu_s = 0\ng = 0", r"\[layers\] an infinitely thick layer must scatter"),
+    ("", "[[layers]]\nn = 1\nmu_a = 1e308\nmu_s = 1e308\ng = 0", r"\[layers 1\] mu_a \+ mu_s must be finite"),
+    ("", f"[[layers]]\nn = 1\nmu_a = {10**308}\nmu_s = {10**308}\ng = 0", r"\[layers 1\] mu_a \+ mu_s must be finite"),
+    ("", "[[layers]]\nmaterial = 'marble'", r"\[layers 1\] n must be a number, got nothing"),
+    ("", "[[layers]]\nn = 1\nmaterial = 'wood'", r"\[layers 1\] material must be one of apple, .*, got 'wood'"),
+    ("", "[[layers]]\nn = 1\nmaterial = ['marble']", r"\[layers 1\] material must be one of .*, got \['marble'\]"),
+    ("", "unit = 'cm'\n[[layers]]\nn = 1\nmaterial = 'marble'", 'material must be left out unless unit = "mm", .* got'),
+    ("", "[[layers]]\n" * 21, r"skin.toml: layers must be at most 20, got 21$"),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"), WRONG, ids=[(new or old).replace("\n", " ")[:40] for old, new, _ in WRONG]
+)
+def test_mistakes_are_one_line(read, old, new, message):
+    refused(lambda: read(old, new), message)
+
+
+def test_layers_are_counted_before_they_are_looked_at():
+    """A million of nothing in particular."""
+    refused(
+        lambda: stack_of(Tables("skin.toml", {}), [None] * 10**6), "^skin.toml: layers must be at most 20, got 1000000$"
+    )
+
+
+def test_stacks_are_values(read):
+    assert read() == read()
+    assert isinstance(read(), LayerStack)
+    assert hash(read()) == hash(read())
