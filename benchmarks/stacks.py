@@ -2,9 +2,14 @@
 
     python -m benchmarks.stacks               # twenty minutes on two cores
     python -m benchmarks.stacks --random 20   # ten minutes: 2 to 4 layers, seeded
+    python -m benchmarks.stacks --forward 0.9 --light searchlight   # an hour: g in every layer, against photons
 
 Held against `exact.solve`. rel is the mean relative error of R_d over radii even in ln r, from a hundredth of a mean
 free path to 99.5 % of the light; ks the largest error of the cdf. Beside it stands the half space of the first layer.
+
+Where layers scatter forward (mu_s = mu_s' / (1 - g)) the truth is 3e7 photons at the stack's own thickness; rel is of
+rings from a tenth of a mean free path (reduced) of the first layer, its noise printed beside it and taken off in
+quadrature. "similar" is the exact light of the similar isotropic stack.
 """
 
 from __future__ import annotations
@@ -19,11 +24,14 @@ import numpy as np
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.recipes.stack import photons
 from profilefit.recipes.stack.fit import stack_law
 
 LIGHTS = ("searchlight", "diffuse")
 THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]
 RADII, LAST = 120, 0.995
+TRACED, TRACED_SEED = 30_000_000, 77
+NEAR_TRACED = 0.1  # radius from which on traced light is judged [mfp]
 Triple = tuple[float, float, float]
 # n, and of each layer mu_s', mu_a of red, green and blue [1/mm] and the thickness [mm]. Skin: C. Donner and
 # H. W. Jensen, SIGGRAPH 2005; heart muscle: within the ranges of Am. J. Physiol. 277, H698, 1999; its epicardium, and
@@ -94,6 +102,36 @@ def error(law, medium: Medium, light: str) -> Error:
     )
 
 
+def forward(medium: Medium, g: float) -> Medium:
+    """The same reduced scattering, forward."""
+    return replace(medium, layers=tuple(replace(layer, mu_s=layer.mu_s / (1.0 - g), g=g) for layer in medium.layers))
+
+
+def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> tuple[tuple[str, ...], Error]:
+    """Of a law with g, at its own thickness, against so many photons; in place of `alone` the similar stack's rel."""
+    begin = time.perf_counter()
+    law, own = stack_law(forward(medium, g), light), forward(medium, g)
+    seconds = time.perf_counter() - begin
+    rings = photons.traced(own, light, photons.ring_edges(own.layers[0], own.layers), count, TRACED_SEED)
+    noise = np.sqrt(2.0 / np.pi) * float(np.mean(rings.noise[rings.weight > 0]))
+
+    counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.top.mfp)
+    within = np.asarray(law.cdf(rings.edges)) * law.reflectance
+    exactly = exact.solve(medium, light)
+
+    def rel(light_within: np.ndarray) -> float:
+        mean = float(np.mean(np.abs(np.diff(light_within)[counts] / rings.energy[counts] - 1)))
+        return float(np.sqrt(max(mean**2 - noise**2, 0.0)))
+
+    mine, similar = rel(within), rel(np.asarray(exactly.cdf(rings.edges)) * exactly.reflectance)
+    light_within = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
+    ks = float(np.max(np.abs(light_within - within[1:]))) / rings.whole
+    of_a = law.reflectance / rings.whole - 1
+    cells = (f"{name}, {light}", f"{seconds:.0f}", *(f"{value:.2g}" for value in (mine, noise, similar, ks, abs(of_a))))
+    print(*cells, flush=True)
+    return cells, Error(mine, similar, ks, of_a)
+
+
 def row(name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]) -> tuple[tuple[str, ...], list[Error]]:
     begin = time.perf_counter()
     law = stack_law(medium, light)
@@ -111,16 +149,40 @@ def _figures(found: list[Error]) -> tuple[str, ...]:
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--random", type=int, default=0, metavar="N", help="so many random stacks in place of the four")
-    count = parser.parse_args(arguments).random
+    parser.add_argument("--forward", type=float, default=0.0, metavar="G", help="g of every layer, in (0, 0.95]")
+    parser.add_argument("--stack", choices=tuple(stacks(0)), help="one of the four; all by default")
+    parser.add_argument("--light", choices=LIGHTS, help="one of the two lights; both by default")
+    parser.add_argument(
+        "--photons", type=int, default=TRACED, metavar="N", help="of a stack and colour, with --forward"
+    )
+    given = parser.parse_args(arguments)
+    lights = (given.light,) if given.light else LIGHTS
+    if given.forward:
+        made = [
+            traced_row(f"{name}, {CHANNELS[channel]}", light, medium, given.forward, given.photons)
+            for light in lights
+            for channel in range(3)
+            for name, medium in stacks(channel).items()
+            if given.stack in (None, name)
+        ]
+        rows, errors = zip(*made, strict=True)
+        own, similar, ks, of_a = (np.abs(column) for column in zip(*errors, strict=True))
+        figures = [f"{own.mean():.2g}, at most {own.max():.2g}", "", f"{similar.mean():.2g}", ks.max(), of_a.max()]
+        whole = ("all", "", *(one if isinstance(one, str) else f"{one:.2g}" for one in figures))
+        columns = ("stack", "s", "rel", "noise", "similar", "ks", "A")
+        show(f"The law of a stack, g = {given.forward:g}, against {given.photons:.1g} photons", columns, [*rows, whole])
+        return
+    count = given.random
     if count:
         media = [(f"{number}", random_stack(number)) for number in range(count)]
         jobs = [(name, LIGHTS[int(name) % 2], medium, (medium.layers[0].thickness,)) for name, medium in media]
     else:
         jobs = [
             (f"{name}, {CHANNELS[channel]}", light, medium, THICKNESSES)
-            for light in LIGHTS
+            for light in lights
             for channel in range(3)
             for name, medium in stacks(channel).items()
+            if given.stack in (None, name)
         ]
     rows, errors = zip(*(row(*job) for job in jobs), strict=True)
     whole = ("all", "", *_figures([one for some in errors for one in some]))

@@ -16,7 +16,9 @@ OUT = Path("scene")
 def scene(
     file: Annotated[
         str,
-        typer.Argument(metavar="FILE.toml", help="What is drawn, and how; with --example the name of a scene: skin, layers."),
+        typer.Argument(
+            metavar="FILE.toml", help="What is drawn, and how; with --example the name of a scene: skin, layers."
+        ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,
     example: Annotated[bool, typer.Option("--example", help="Print an example of a scene's file instead.")] = False,

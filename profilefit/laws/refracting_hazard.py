@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -270,7 +270,7 @@ class RefractingHazardSampler(Sampler):
     Error in xi within a part, at every alpha, xi and n: one step 6e-5, two steps 1e-8.
     """
 
-    law: RefractingHazard
+    law: Any  # a `RefractingHazard`, or another law of these `Parts`
     steps: int = eqx.field(static=True, default=1)
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
@@ -308,12 +308,8 @@ class RefractingHazardSampler(Sampler):
 def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int) -> Array:
     """x at t = -ln S of a part, growth = (e^t - 1) / t."""
     first, rest = of.once, of.again
-    p, q, d, m, e, f, g = AGAIN
-    # Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t). Numbers
-    # of a material before those of a point.
-    rate = m * jnp.sqrt(d * jnp.maximum(-rest.w, NEAREST) / rest.h)
-    white = q * jnp.minimum(rate * rest.c / rest.b * jnp.exp(-0.5 * rest.w * rest.h), MOST_WHITE)
-    slowest = rate * (1.0 + rest.kappa * (e + f * rest.kappa))
+    p, _, d, _, _, _, g = AGAIN
+    white, slowest = guess(of)
     stretch = jnp.maximum((1.0 - white) + p * t + white * growth, LEAST_STRETCH)
     bend = 1.0 + g * jnp.sqrt(t)
     once = 1.0 + ONCE * t
@@ -325,6 +321,17 @@ def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int)
     for _ in range(steps):
         x = _closer(x, t, shape)
     return x
+
+
+def guess(of: Parts) -> tuple[Array, Array]:
+    """Of the first guess of a radius, what depends on the material: the share that grows with e^t, and its slope.
+
+    Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t).
+    """
+    rest, (_, q, d, m, e, f, _) = of.again, AGAIN
+    rate = m * jnp.sqrt(d * jnp.maximum(-rest.w, NEAREST) / rest.h)
+    white = q * jnp.minimum(rate * rest.c / rest.b * jnp.exp(-0.5 * rest.w * rest.h), MOST_WHITE)
+    return white, rate * (1.0 + rest.kappa * (e + f * rest.kappa))
 
 
 def _closer(x: Array, t: Array, shape: Shape) -> Array:

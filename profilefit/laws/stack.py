@@ -50,6 +50,11 @@ class LayerLaw(Constants):
         """Draws radii of the law, by its own sampler."""
         return StackSampler(self)
 
+    @property
+    def layers(self) -> tuple[LayerLaw, ...]:
+        """Itself."""
+        return (self,)
+
     def decay(self) -> Array:
         """Rate at which the light decays far off [1/length]."""
         return decay_rate(self.alpha) / self.mfp
@@ -96,6 +101,8 @@ class StackLaw(Constants):
 
     top        the first layer's half space;  below  what lies under it
     thickness  of the first layer, where no other is given [length]
+
+    Where layers scatter forward, l, alpha and kappa are those of similar isotropic ones.
     """
 
     setting: Setting = eqx.field(static=True)
@@ -138,6 +145,11 @@ class StackLaw(Constants):
     def sampler(self) -> StackSampler:
         """Draws radii where this law has its light, with their own density."""
         return StackSampler(self)
+
+    @property
+    def layers(self) -> tuple[LayerLaw, ...]:
+        """The half spaces of its layers, from the first down."""
+        return (self.top, *self.below.layers)
 
     def decay(self) -> Array:
         """Rate at which the light decays far off [1/length]: the slowest of its layers'."""

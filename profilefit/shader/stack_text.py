@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import jax
 import jax.numpy as jnp
@@ -16,7 +17,6 @@ from profilefit.shader import emit
 NAME = "stack"
 LAYER = "layer"  # of the names of the half space that every layer is
 HALF_SPACES = ("hazard", "refracting_hazard")  # texts of half spaces whose shapes can be made elsewhere
-THICKEST = 1e6  # optical depth that stands for an infinite one
 Numbers = dict[str, float]
 
 
@@ -49,8 +49,8 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
         constants[f"{channel}_rate"] = one.layers[0].mu_t
         for i, layer in enumerate(one.layers, start=1):
             constants |= {f"{channel}_alpha{i}": layer.alpha, f"{channel}_g{i}": layer.g}
-            if i > 1:
-                constants[f"{channel}_depth{i}"] = min(layer.mu_t * layer.thickness, THICKEST)
+            if 1 < i < count:
+                constants[f"{channel}_depth{i}"] = layer.mu_t * layer.thickness
     return emit.filled(
         [emit.read_text(part) for part in ("common", "channel", "single_scattering")],
         *(name, constants, count, lang, {}),
@@ -80,14 +80,9 @@ def channel_numbers(law: StackLaw) -> Numbers:
             one, number = one.below, number + 1
 
 
-def _layers(law: StackLaw | LayerLaw) -> list[LayerLaw]:
-    """Its half spaces, from the first layer down."""
-    return [law.top, *_layers(law.below)] if isinstance(law, StackLaw) else [law]
-
-
 def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:
     """The functions that give the shapes of the layers' half spaces, numbers since no albedo changes, and choose."""
-    each = [[_rounded(emit.shape_numbers(one.law, one.alpha)) for one in _layers(law)] for law in laws]
+    each = [[_rounded(emit.shape_numbers(one.law, one.alpha)) for one in law.layers] for law in laws]
     prefix = f"{emit.PLACEHOLDER}{LAYER}"
     keys = list(each[0][0])
     curves = list(dict.fromkeys(key.partition(".")[0] for key in keys if "." in key))
@@ -132,15 +127,15 @@ def _one_count(laws: Sequence[StackLaw]) -> int:
     """The number of layers of all channels; InputError unless they are alike in what a text has but once."""
     if len(laws) != len(CHANNELS) or not all(isinstance(law, StackLaw) for law in laws):
         raise InputError(f"laws must be three laws of a stack, of red, green and blue, got {_kinds(laws)}")
-    settings = {layer.setting for law in laws for layer in _layers(law)}
+    settings = {replace(layer.setting, g=0.0) for law in laws for layer in law.layers}
     if len(settings) > 1:
         told = "; ".join(sorted(map(str, settings)))
         raise InputError(f"laws must be of one light and one n in all layers and channels, got {told}")
-    texts = {emit.source(layer.law) for law in laws for layer in _layers(law)}
+    texts = {emit.source(layer.law) for law in laws for layer in law.layers}
     if len(texts) > 1 or not texts <= set(HALF_SPACES):
         told = ", ".join(sorted(texts))
         raise InputError(f"laws must be of half spaces by one text, {' or '.join(HALF_SPACES)}, got {told}")
-    return _one_number("laws", [len(_layers(law)) for law in laws])
+    return _one_number("laws", [len(law.layers) for law in laws])
 
 
 def _one_index(media: Sequence[Medium]) -> tuple[float, int]:

@@ -1,4 +1,8 @@
-"""Fit the law of a stack to its exact light, and what the constants depend on."""
+"""Fit the law of a stack to its light, exact where all layers scatter isotropically, and what its constants depend on.
+
+Where a layer scatters forward, half spaces are fitted to traced light (`photons`), the constants of the interfaces
+begin at those of the similar stack and are fitted to the stack's own traced light.
+"""
 
 from __future__ import annotations
 
@@ -21,6 +25,8 @@ from profilefit.fitting.solver import Optimum, solve
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.recipes import catalogue
+from profilefit.recipes.stack import photons
+from profilefit.recipes.stack.photons import TracedRings
 
 Floats = NDArray[np.float64]
 THIN, THICK, LONGEST = 0.1, 3.0, 12.0  # thicknesses that are fitted: mean free paths; decay lengths; mean free paths
@@ -34,11 +40,16 @@ OF_A = 3.0  # weight of the reflectance beside that of a whole profile
 TIMID = 1e-3  # weight of a constant's distance from its start: those that nothing depends on stay there
 # ln, but of w its logit, and u a multiple of the least one with which A is monotone in d.
 START = (0.0, 0.0, 0.2, 0.2, -2.0, -2.0, -1.0, 0.0, -2.0)
+MOST_FORWARD = 0.95
 STARTS, SPREAD, SEED = 5, 0.8, 1
+NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
 NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: right to a tenth of the law's error and better
+
+
+Lights = list[tuple[Floats, ...] | TracedRings]
 
 
 class Interface(NamedTuple):
@@ -46,26 +57,33 @@ class Interface(NamedTuple):
 
     law        of the stack below the surface of its upper layer;  thicknesses  (m,) of that layer, fitted at [length]
     best       the optimum taken, in unbounded parameters;  found  those of every start
-    lights     of each thickness radii [length], R_d, weights and A;  is_below  whether layers lie above it
+    lights     of each thickness radii [length], R_d, weights and A, or traced rings
+    is_below   whether layers lie above it
     """
 
     law: StackLaw
     medium: Medium
     is_below: bool
     thicknesses: Floats
-    lights: list[tuple[Floats, ...]]
+    lights: Lights
     best: Optimum
     found: tuple[Optimum, ...]
 
+    @property
+    def is_traced(self) -> bool:
+        """Whether its light has photons."""
+        return isinstance(self.lights[0], TracedRings)
+
 
 def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | LayerLaw:
-    """The law of a stack of layers of one index that scatter isotropically, fitted to its exact light.
+    """The law of a stack of layers of one index, fitted to its light.
 
-    medium        layers from the surface down, the last one infinite; one n in [1, 1.6] over that above, g = 0
+    medium        layers from the surface down, the last one infinite; one n in [1, 1.6] over that above, g in [0, 0.95]
     illumination  "searchlight" or "diffuse"
 
     A half space has a law as it is. Of two layers the thickness of the first is an argument; of more, those below the
-    first have the ones that they have. InputError on other media. Seconds to a minute, most of it for the exact light.
+    first have the ones that they have. InputError on other media. Seconds to a minute, most of it for the exact light;
+    where a layer scatters forward light is traced, minutes, and lengths of the law are those of similar layers.
     """
     law, _ = fitted(medium, illumination)
     return law
@@ -76,41 +94,67 @@ def fitted(medium: Medium, illumination: str) -> tuple[StackLaw | LayerLaw, tupl
     require(medium)
     require_illumination(illumination)
     setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
-    hazard = catalogue.load("hazard", setting=setting)
-    law: StackLaw | LayerLaw | None = None
+    if all(layer.g == 0 for layer in medium.layers):
+        hazard = catalogue.load("hazard", setting=setting)
+        return _fitted(medium, [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers])
+    _, begun = fitted(replace(medium, layers=tuple(layer.similar for layer in medium.layers)), illumination)
+    tops = [photons.half_space(layer, setting, SEED + place) for place, layer in enumerate(medium.layers)]
+    return _fitted(medium, tops, begun)
+
+
+def _fitted(
+    medium: Medium, tops: list[LayerLaw], begun: tuple[Interface, ...] = ()
+) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    """From the last layer up, over the half spaces of the layers.
+
+    begun  the interfaces of the similar stack, from whose constants those of traced light start
+    """
+    law: StackLaw | LayerLaw = tops[-1]
     done: list[Interface] = []
-    for place in reversed(range(len(medium.layers))):
-        layer = medium.layers[place]
-        top = LayerLaw(setting, hazard, layer.alpha, layer.mfp)
-        if law is None:
-            law = top
-            continue
+    for place in reversed(range(len(tops) - 1)):
+        layer, top, illumination = medium.layers[place], tops[place], tops[place].setting.illumination
         here = Medium(medium.layers[place:], medium.n_above)
-        d = _thicknesses(layer, is_below=place > 0)
-        lights = [light_of(here, each, illumination) for each in d]
-        best, found = _searched(top, law, d, lights)
+        d = _thicknesses(layer.similar, is_below=place > 0)
+        lights: Lights = []
+        if begun:
+            lights += [_rings(here, each, illumination, number) for number, each in enumerate(d)]
+            best = _solved(begun[place].best.parameters, top, law, d, lights)
+            found: tuple[Optimum, ...] = (best,)
+        else:
+            lights += [light_of(here, each, illumination) for each in d]
+            best, found = _searched(top, law, d, lights)
         law = _law_of(best.parameters, top, law, layer.thickness)
         done.insert(0, Interface(law, here, place > 0, d, lights, best, found))
-    assert law is not None  # a medium has a layer
     return law, tuple(done)
+
+
+def _rings(medium: Medium, d: float, illumination: str, number: int) -> TracedRings:
+    """Traced light under a first layer of another thickness."""
+    first, *others = medium.layers
+    made = Medium((replace(first, thickness=d), *others), medium.n_above)
+    edges = photons.ring_edges(first, medium.layers)
+    return photons.traced(made, illumination, edges, photons.STACK_PHOTONS, SEED + 100 + number)
 
 
 def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     """Errors of an interface's constants, by the names that records have for them; None where there can be none.
 
-    statistical     none: exact light has no photons
-    discretisation  what a refit to light of fewer nodes changes
+    statistical     that of the photons, by the sandwich formula; none where light is exact
+    discretisation  what a refit to light of fewer nodes changes; none of rings, which are integrals
     model           none: of a law that fits at each thickness in its own way no likelihood is known
     misfit          s^2 (J^T J)^-1, as if residuals were independent
     jackknife       refits without one thickness after the other
     """
     top, below, thickness = one.law.top, one.law.below, one.law.thickness
 
-    def refitted(d: Floats, lights: list[tuple[Floats, ...]]) -> Floats:
+    def refitted(d: Floats, lights: Lights) -> Floats:
         return _vector(_law_of(_solved(one.best.parameters, top, below, d, lights).parameters, top, below, thickness))
 
-    coarse = [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
-    own, fewer = _vector(one.law), refitted(one.thicknesses, coarse)
+    own, fewer = _vector(one.law), None
+    if not one.is_traced:
+        coarse: Lights = []
+        coarse += [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
+        fewer = refitted(one.thicknesses, coarse)
     count = len(one.thicknesses)
     left_out = np.array(
         [refitted(np.delete(one.thicknesses, i), one.lights[:i] + one.lights[i + 1 :]) for i in range(count)]
@@ -118,26 +162,53 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
     with jax.enable_x64(True):
         slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(jnp.asarray(one.best.parameters))
-    inverse = scaled_inverse(one.best.jacobian.T @ one.best.jacobian)
-    spread = np.asarray(slopes) @ (one.best.cost / degrees_of_freedom(one.best) * inverse) @ np.asarray(slopes).T
-    found = zip(np.abs(fewer - own), np.sqrt(np.diag(spread)), jackknife, strict=True)
-    return {
-        name: {
-            "statistical_error": None,
-            "discretisation_error": float(discretisation),
-            "model_error": None,
-            "misfit_error": float(misfit),
-            "jackknife_error": float(jack),
-        }
-        for name, (discretisation, misfit, jack) in zip(StackLaw.constant_names(), found, strict=True)
+    slopes, jacobian = np.asarray(slopes), one.best.jacobian
+    inverse = scaled_inverse(jacobian.T @ jacobian)
+
+    def spread(covariance: Floats) -> Floats:
+        return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
+
+    found: dict[str, Floats | None] = {
+        "statistical_error": spread(inverse @ _noise(one) @ inverse) if one.is_traced else None,
+        "discretisation_error": None if fewer is None else np.abs(fewer - own),
+        "model_error": None,
+        "misfit_error": spread(one.best.cost / degrees_of_freedom(one.best) * inverse),
+        "jackknife_error": jackknife,
     }
+    return {
+        name: {key: None if each is None else float(each[i]) for key, each in found.items()}
+        for i, name in enumerate(StackLaw.constant_names())
+    }
+
+
+def _noise(one: Interface) -> Floats:
+    """J^T V J of the photons' variances V of the residuals (p, p)."""
+    rings = [light for light in one.lights if isinstance(light, TracedRings)]
+    of_rings = np.concatenate([light.weight * light.noise for light in rings])
+    of_whole = np.array([OF_A * light.error / light.whole for light in rings])
+    rest = np.zeros(len(one.best.residuals) - len(of_rings) - len(of_whole))  # those that keep constants near a start
+    scaled = np.concatenate([of_rings, of_whole, rest])[:, None] * one.best.jacobian
+    return np.asarray(scaled.T @ scaled)
 
 
 def quality(one: Interface) -> dict[str, list[float]]:
     """rel, ks and the relative error of A at thicknesses that were not fitted, between those that were [length]."""
     d = np.sqrt(one.thicknesses[:-1] * one.thicknesses[1:])
     found: dict[str, list[float]] = {"thickness": d.tolist(), "rel": [], "ks": [], "delta_A": []}
-    for each in d:
+    for number, each in enumerate(d):
+        if one.is_traced:
+            rings = _rings(one.medium, each, one.law.setting.illumination, len(d) + 1 + number)
+            with jax.enable_x64(True):
+                within = np.asarray(one.law.within(jnp.asarray(rings.edges), jnp.asarray(each)))
+            counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * one.law.top.mfp)
+            off = np.diff(within)[counts] / rings.energy[counts] - 1.0
+            # The mean size of a Gaussian's values is sqrt(2 / pi) of its spread: noise is taken off in quadrature.
+            noise = np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts])
+            found["rel"].append(float(np.sqrt(max(np.mean(np.abs(off)) ** 2 - noise**2, 0.0))))
+            light_within = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
+            found["ks"].append(float(np.max(np.abs(light_within - within[1:]))) / rings.whole)
+            found["delta_A"].append(float(np.asarray(one.law.total(each)) / rings.whole - 1.0))
+            continue
         light = _solution(one.medium, each, one.law.setting.illumination, NODES)
         r = _radii(one.medium)
         share = np.asarray(light.cdf(r))
@@ -181,8 +252,13 @@ def require(medium: Medium) -> None:
     for number, layer in enumerate(medium.layers, start=1):
         if not layer.mu_t > 0:
             raise InputError(f"layers must scatter or absorb, got mu_a = mu_s = 0 in layer {number}")
-        if layer.g != 0:
-            raise InputError(f"layers must scatter with g = 0 for a law of a stack, got {layer.g:g} in layer {number}")
+        if not 0 <= layer.g <= MOST_FORWARD:
+            accepted = f"g in [0, {MOST_FORWARD:g}]"
+            raise InputError(
+                f"layers must scatter with {accepted} for a law of a stack, got {layer.g:g} in layer {number}"
+            )
+        if not layer.mu_s > 0 and any(one.g > 0 for one in medium.layers):
+            raise InputError(f"layers must scatter where one scatters forward, got mu_s = 0 in layer {number}")
         if layer.n != medium.layers[0].n:
             got = f"{medium.layers[0].n:g} in layer 1 and {layer.n:g} in layer {number}"
             raise InputError(f"layers must have one n for a law of a stack, got {got}")
@@ -206,7 +282,7 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 
 def _searched(
-    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[tuple[Floats, ...]]
+    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights
 ) -> tuple[Optimum, tuple[Optimum, ...]]:
     """The best optimum of several starts, and all."""
     random = np.random.default_rng(SEED)
@@ -215,7 +291,12 @@ def _searched(
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf), found
 
 
-def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: list[tuple[Floats, ...]]) -> Optimum:
+def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights) -> Optimum:
+    """The optimum from a start; fits to traced light stay near it where nothing speaks against that."""
+    if isinstance(lights[0], TracedRings):
+        rings = [light for light in lights if isinstance(light, TracedRings)]
+        arrays = tuple(np.stack([np.asarray(part) for part in column]) for column in zip(*rings, strict=True))
+        return solve(_ring_residual, start, (*arrays, d, top, below, np.asarray(start)))
     return solve(_residual, start, (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below))
 
 
@@ -231,6 +312,15 @@ def _residual(parameters, data):
     of_a = jax.vmap(law.whole)(d) / whole - 1.0
     away = TIMID * (parameters - jnp.asarray(START))
     return jnp.concatenate([jnp.where(weight > 0, jnp.sqrt(weight) * relative, 0.0).ravel(), OF_A * of_a, away])
+
+
+def _ring_residual(parameters, data):
+    edges, energy, weight, _, whole, _, d, top, below, start = data
+    law = _made(parameters, top, below, d[0])
+    within = jax.vmap(law.within)(edges, d)
+    relative = jnp.diff(within, axis=1) / energy - 1.0
+    of_a = jax.vmap(law.whole)(d) / whole - 1.0
+    return jnp.concatenate([(weight * relative).ravel(), OF_A * of_a, TIMID * (parameters - start)])
 
 
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:

@@ -6,9 +6,8 @@ Records of stacks lie in a folder of their own, FITS/stacks: none of them is a l
 from __future__ import annotations
 
 import hashlib
-import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -19,9 +18,10 @@ from mcml_sim import Medium, Setting
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, RecordError
+from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
-from profilefit.recipes import catalogue, record
+from profilefit.recipes import catalogue, kinds, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
@@ -34,6 +34,20 @@ EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + 
 NOTE = (
     "No error of photons: the light is exact. No error by a model of the misfit: at each thickness the law is wrong in "
     "its own way. Constants that trade against each other have large jackknife errors; together they are the law."
+)
+# What texts and pictures take from a record besides its laws, by dotted key.
+TOLD: Mapping[str, kinds.Kind] = {
+    **dict.fromkeys(("unit", "equations", "note"), kinds.TEXT),
+    "layers": kinds.LIST,
+    "half_spaces": kinds.TABLE,
+    **{f"half_spaces.{channel}": kinds.LIST for channel in CHANNELS},
+    **dict.fromkeys(("quality.regenerated.rel", "quality.regenerated.ks"), kinds.NUMBERS),
+    "quality.regenerated.delta_A": kinds.NUMBER,
+    "data_digest": kinds.DIGEST,
+}
+TRACED_NOTE = (
+    "Traced light, since a layer scatters forward: half spaces are fitted to it first, then the interfaces, from where "
+    "the similar stack has them. rel is of rings from a tenth of a mean free path, noise taken off in quadrature."
 )
 ALIKE = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 # Of STACK.toml, those that only draw a scene among them.
@@ -67,10 +81,13 @@ class StackRecord:
 
 def is_stack(name: str) -> bool:
     """Whether it names a file of layers, or one that is shipped, rather than a recipe."""
-    if not name.endswith(".toml"):
-        return not (fits_folder() / f"{name}.toml").exists() and _shipped(name).exists()
-    path = Path(name)
-    return path.is_file() and "layers" in read_toml(path)
+    try:
+        if not name.endswith(".toml"):
+            return not (fits_folder() / f"{name}.toml").exists() and _shipped(name).exists()
+        path = Path(name)
+        return path.is_file() and "layers" in read_toml(path)
+    except OSError:  # no file has so long a name
+        return False
 
 
 def request_of(name: str) -> StackRequest:
@@ -89,7 +106,7 @@ def requested(file: str, content: Table) -> StackRequest:
         raise tables.bad(
             "", "layers", "two layers or more: one is a half space, as `profilefit export hazard` has it", 1
         )
-    if not record.kinds.is_line(name):
+    if not kinds.is_line(name):
         raise InputError(f"{file!r}: the name of a stack must be one printable line")
     return StackRequest(
         name,
@@ -128,12 +145,19 @@ def load(path: Path) -> StackRecord:
         raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
     try:
         stack = _stack(str(path), content)
-        setting, recorded = record.record_setting(content), content["half_space"]["constants"]
-        own = catalogue.load("hazard", setting=setting)
-        _require_same(path, own.constants(), recorded)
-        made = [_law(content, channel, medium, setting) for channel, medium in zip(CHANNELS, stack.media, strict=True)]
-    except (KeyError, TypeError, AttributeError) as error:
-        raise RecordError(f"{path}: is damaged: {error} is missing or of another kind; regenerate it") from None
+        setting = record.record_setting(content)
+        if setting.n != stack.media[0].layers[0].n:
+            raise InputError(f"setting.n must be that of its layers, got {setting.n:g}")
+        made = [
+            _law(content, channel, medium, _tops(path, medium, setting, content["half_spaces"][channel]))
+            for channel, medium in zip(CHANNELS, stack.media, strict=True)
+        ]
+    except RecordError:
+        raise
+    except InputError as error:
+        raise RecordError(f"{path}: is damaged: {str(error).removeprefix(f'{path}: ')}; regenerate it") from None
+    except KeyError as error:
+        raise RecordError(f"{path}: is damaged: {error} is missing; regenerate it") from None
     red, green, blue = made
     return StackRecord(path.stem, stack, (red, green, blue), content, hashlib.sha256(path.read_bytes()).hexdigest())
 
@@ -143,15 +167,15 @@ def find(name: str, folder: Path) -> Path | None:
     if name.endswith(".json"):
         path = Path(name)
         return path if path.exists() and record.read(path)["pipeline"] == PIPELINE else None
-    path = folder / FOLDER / f"{name}.json"
-    return path if path.exists() else None
+    return record.available(folder / FOLDER).get(name)
 
 
 def matching(of: StackRequest, folder: Path) -> StackRecord | None:
     """The record in a folder that is of these very layers and this light, by whatever name; None if there is none."""
+    wanted = record.plain(of.stack.media)  # to the digits of a record: the mean of an image has more
     for path in record.available(folder / FOLDER).values():
         one = load(path)
-        if one.stack.media == of.stack.media and one.setting.illumination == of.illumination:
+        if record.plain(one.stack.media) == wanted and one.setting.illumination == of.illumination:
             return one
     return None
 
@@ -162,7 +186,7 @@ def _shipped(name: str) -> Path:
 
 def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
     """All that is recorded of one colour."""
-    _, interfaces = fit.fitted(medium, illumination)
+    law, interfaces = fit.fitted(medium, illumination)
     constants: dict[str, Any] = {}
     for number, one in enumerate(interfaces, start=1):
         errors = fit.errors(one)
@@ -180,6 +204,7 @@ def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
     ]
     return {
         "constants": constants,
+        "half_spaces": [layer.law.constants() for layer in law.layers],
         "thicknesses": [one.thicknesses for one in interfaces],
         "quality": [fit.quality(one) for one in interfaces],
         "starts": starts,
@@ -187,23 +212,27 @@ def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
             {"result": one.result.partition(" in ")[0], "steps": one.steps, "condition_number": one.condition_number}
             for one in best
         ],
-        "data_digest": record.digest(*(array for one in interfaces for light in one.lights for array in light)),
+        "data_digest": record.digest(
+            *(np.asarray(array) for one in interfaces for light in one.lights for array in light)
+        ),
     }
 
 
 def _content(of: StackRequest, channels: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    setting = Setting(of.illumination, n=of.stack.media[0].layers[0].n)
+    first = of.stack.media[0].layers[0]
+    is_traced = any(layer.g > 0 for layer in of.stack.media[0].layers)
+    setting = Setting(of.illumination, n=first.n, g=first.g)
     digests = "".join(one["data_digest"] for one in channels.values())
     return {
         "title": of.title,
         "law": PIPELINE,
         "pipeline": PIPELINE,
         "equations": EQUATIONS,
-        "note": NOTE,
+        "note": TRACED_NOTE if is_traced else NOTE,
         "setting": setting,
         "unit": of.stack.unit,
         "layers": of.stack.layers,
-        "half_space": {"law": "hazard", "constants": catalogue.load("hazard", setting=setting).constants()},
+        "half_spaces": {channel: one["half_spaces"] for channel, one in channels.items()},
         "constants": {
             f"{channel}.{name}": value for channel, one in channels.items() for name, value in one["constants"].items()
         },
@@ -213,7 +242,7 @@ def _content(of: StackRequest, channels: Mapping[str, Mapping[str, Any]]) -> dic
             channel: {key: one[key] for key in ("fit", "quality", "starts", "thicknesses")}
             for channel, one in channels.items()
         },
-        "truth": {"kind": "exact"},
+        "truth": {"kind": "orders" if is_traced else "exact"},
         "preset": "quick",
         "seed": fit.SEED,
         "versions": record.versions(),
@@ -233,33 +262,66 @@ def _result(fits: Sequence[Mapping[str, Any]]) -> str:
 
 
 def _stack(file: str, content: Mapping[str, Any]) -> LayerStack:
-    layers = [{key: value for key, value in one.items() if value is not None} for one in content["layers"]]
-    return stack_of(Tables(file, {}), layers, content["unit"])
+    """The layers of a record, of which some law is; InputError where what it holds is of another kind."""
+    for key, kind in TOLD.items():
+        value: Any = content
+        for name in key.split("."):
+            if not isinstance(value, Mapping):
+                raise InputError(f"{key} must be {kind.words}, got nothing")
+            value = value[name]
+        if not kind.accepts(value):
+            raise InputError(f"{key} must be {kind.words}, got {kinds.shown(value)}")
+    layers = [_told_layer(one) for one in content["layers"]]
+    stack = stack_of(Tables(file, {}), layers, content["unit"])
+    for medium in stack.media:
+        fit.require(medium)
+    return stack
 
 
-def _require_same(path: Path, own: Mapping[str, float], recorded: Mapping[str, float]) -> None:
-    """A stack's constants belong to its half spaces'."""
-    same = own.keys() == recorded.keys() and np.allclose(
-        [own[name] for name in own], [recorded[name] for name in own], rtol=ALIKE
-    )
-    if not same:
-        raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
+def _told_layer(layer: Any) -> Table:
+    """A layer of a record as a file has it. Its thickness is no image: a record opens no other file."""
+    if not kinds.TABLE.accepts(layer):
+        raise InputError(f"layers must be tables, got {kinds.shown(layer)}")
+    if not kinds.MEASURE.accepts(layer.get("thickness")):
+        raise InputError(f"thickness must be {kinds.MEASURE.words}, got {kinds.shown(layer['thickness'])}")
+    return {key: value for key, value in layer.items() if value is not None}
 
 
-def _law(content: Mapping[str, Any], channel: str, medium: Medium, setting: Setting) -> StackLaw:
+def _tops(path: Path, medium: Medium, setting: Setting, recorded: Sequence[Mapping[str, float]]) -> list[LayerLaw]:
+    """The half spaces of a medium's layers: today's, which the record's must be, or its own where it scatters forward.
+
+    A stack's constants belong to its half spaces'. InputError where what is recorded is of another kind.
+    """
+    for one in recorded:
+        if not isinstance(one, Mapping) or not all(map(kinds.is_number, one.values())):
+            raise InputError(f"half_spaces must be tables of numbers, got {kinds.shown(one)}")
+    if len(recorded) != len(medium.layers):
+        raise InputError(f"half_spaces must be {len(medium.layers)}, one a layer, got {len(recorded)}")
+    if any(layer.g > 0 for layer in medium.layers):
+        own = [replace(setting, g=layer.g) for layer in medium.layers]
+        similar = [layer.similar for layer in medium.layers]
+        laws = [
+            ForwardHalfSpace(each, **{name: float(one[name]) for name in ForwardHalfSpace.constant_names()})
+            for each, one in zip(own, recorded, strict=True)
+        ]
+        return [LayerLaw(each, law, one.alpha, one.mfp) for each, law, one in zip(own, laws, similar, strict=True)]
     hazard = catalogue.load("hazard", setting=setting)
-    law: LayerLaw | StackLaw | None = None
-    for number in reversed(range(len(medium.layers))):
-        layer = medium.layers[number]
-        top = LayerLaw(setting, hazard, layer.alpha, layer.mfp)
-        if law is None:
-            law = top
-            continue
+    constants = hazard.constants()
+    for one in recorded:
+        same = one.keys() == constants.keys()
+        if not (same and np.allclose([one[name] for name in constants], list(constants.values()), rtol=ALIKE)):
+            raise RecordError(f"{path}: was fitted with other constants of its half spaces; regenerate it")
+    return [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers]
+
+
+def _law(content: Mapping[str, Any], channel: str, medium: Medium, tops: Sequence[LayerLaw]) -> StackLaw:
+    law: LayerLaw | StackLaw = tops[-1]
+    for number in reversed(range(len(tops) - 1)):
         values = {
             name: float(content["constants"][f"{channel}.{number + 1}.{name}"]["regenerated"])
             for name in StackLaw.constant_names()
         }
-        law = StackLaw(setting, top, law, layer.thickness, **values)
-    if not isinstance(law, StackLaw) or not all(map(math.isfinite, law.constants().values())):
+        law = StackLaw(tops[number].setting, tops[number], law, medium.layers[number].thickness, **values)
+    if not isinstance(law, StackLaw):
         raise RecordError(f"record {content.get('name')!r} is damaged: it has fewer than two layers")
     return law

@@ -18,9 +18,13 @@ from profilefit.materials import CHANNELS
 from profilefit.scenes.stage.exact_table import Curves, held, hermite, knots
 
 Floats = NDArray[np.float64]
+Row = tuple[Floats, Floats, float]  # ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A
 NODES = exact.Nodes(12, 16, 16, 10)
-THICKNESSES = 9  # of the table, even in ln d
+THICKNESSES, WIDEST = 9, 0.5  # of the table, even in ln d: so many at least, and so far apart at most
 LEAST = 1e-3  # mean free paths that stand for no first layer
+# Mean free paths: exact light of a thinner layer has no digits within a few times its thickness. R_d / A of this one
+# stands for it.
+THINNEST = 0.03
 FAINT = 1e-7  # of the largest x^2 R_d, from which on R_d is continued by its own asymptote, x^-2 e^(-kappa x)
 LEFT = 1e-6  # share of the light from which on it is, too
 
@@ -76,34 +80,51 @@ def stack_table(
     """
     if not 0 <= least < most < np.inf:
         raise InputError(f"least and most must be thicknesses, 0 <= least < most, got {least!r} and {most!r}")
-    shortest = min(medium.layers[0].mfp for medium in media)
-    u = np.linspace(np.log(max(least, LEAST * shortest)), np.log(most), THICKNESSES)
-    y, degree = knots(), min(3, THICKNESSES - 1)
+    shortest = min(most, *(medium.layers[0].mfp for medium in media))
+    low = max(least, LEAST * shortest)
+    count = max(THICKNESSES, 1 + int(np.ceil(np.log(most / low) / WIDEST)))
+    u, y = np.linspace(np.log(low), np.log(most), count), knots()
     profile, cdf, reflectance, kappa = [], [], [], []
+    rates = {medium: _slowest(medium) for medium in media}  # channels that are alike are solved once
+    solved = {one: _rows(one, np.exp(u), illumination, y, rate) for one, rate in rates.items()}
     for medium in media:
-        rate = _slowest(medium)
-        rows = [_row(medium, float(d), illumination, y, rate) for d in np.exp(u)]
-        known, within, whole = (np.array(column) for column in zip(*rows, strict=True))
-        profile.append(RectBivariateSpline(u, y, known, kx=degree))
-        cdf.append(RectBivariateSpline(u, y, within, kx=degree))
+        rate = rates[medium]
+        known, within, whole = (np.array(column) for column in zip(*solved[medium], strict=True))
+        profile.append(RectBivariateSpline(u, y, known))
+        cdf.append(RectBivariateSpline(u, y, within))
         reflectance.append(CubicSpline(u, whole))
         kappa.append(rate)
     return StackTable(least, most, u, tuple(profile), tuple(cdf), tuple(reflectance), tuple(kappa))
 
 
-def _row(medium: Medium, d: float, illumination: str, y: Floats, rate: float) -> tuple[Floats, Floats, float]:
-    """ln(R_d l^2 / A) + kappa x, ln(cdf / x), and A, under a first layer of thickness d."""
+def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
+    """Of each thickness of the first layer."""
     first, *others = medium.layers
-    light = exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, NODES)
-    x = np.exp(y)
-    share = np.clip(np.asarray(light.cdf(first.mfp * x)), 0.0, 1.0)
-    value = np.asarray(light.profile(first.mfp * x)) * first.mfp**2 / light.reflectance
+    shapes: dict[float, tuple[Floats, Floats]] = {}
+
+    def under(d: float) -> exact.Solution:
+        return exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, NODES)
+
+    rows = []
+    for d in thicknesses.tolist():
+        seen = max(d, THINNEST * first.mfp)
+        if seen not in shapes:
+            shapes[seen] = _shape(under(seen), y, rate)
+        rows.append((*shapes[seen], under(d).reflectance))
+    return rows
+
+
+def _shape(light: exact.Solution, y: Floats, rate: float) -> tuple[Floats, Floats]:
+    """ln(R_d l^2 / A) + kappa x, and ln(cdf / x)."""
+    unit, x = light.medium.layers[0].mfp, np.exp(y)
+    share = np.clip(np.asarray(light.cdf(unit * x)), 0.0, 1.0)
+    value = np.asarray(light.profile(unit * x)) * unit**2 / light.reflectance
     strength = x**2 * value
     bright = (strength > FAINT * strength.max()) & (1.0 - share > LEFT)
     bright[: int(np.argmax(strength)) + 1] = True
     kept = held(bright[None, :])[0]
     known = np.log(value[kept]) + rate * x[kept] - 2.0 * (y - y[kept])
-    return known, np.log(share / x), light.reflectance
+    return known, np.log(share / x)
 
 
 def _slowest(medium: Medium) -> float:

@@ -8,9 +8,10 @@ medians over turns: machines are shared, and their clocks change.
 from __future__ import annotations
 
 import time
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -46,7 +47,7 @@ uniform int rounds;
 layout(location = 0) out vec4 found;
 void main() {{
     float start = fract(dot(gl_FragCoord.xy, vec2(0.7548776662, 0.5698402910)));
-    {name}_Shape s = {name}_shape(0.05 + 0.9 * start);
+    {prefix}_Shape s = {shape};
     float sum = 0.0;
     for (int i = 0; i < rounds; ++i) {{
         float u = fract(start + 0.6180339887 * float(i));
@@ -55,6 +56,17 @@ void main() {{
     found = vec4(sum);
 }}
 """
+
+
+class TimedText(NamedTuple):
+    """A text whose functions are timed, and the prefix of their names.
+
+    shape  GLSL of the shape before the loop; `start` in [0, 1) is another in each pixel
+    """
+
+    text: str
+    prefix: str
+    shape: str
 
 
 @dataclass(frozen=True)
@@ -76,34 +88,50 @@ def costs(context: moderngl.Context, laws: Sequence[ProfileLaw], yardstick: Prof
 
     yardstick  the law that is counted as 1
     """
-    texts = {emit.source(law): law for law in (yardstick, *laws)}
-    timed: dict[tuple[str, str], tuple[Floats, Floats]] = {}
+    texts = {emit.source(law): timed_text(law) for law in (yardstick, *laws)}
+    return text_costs(context, texts, emit.source(yardstick))
+
+
+def timed_text(law: ProfileLaw) -> TimedText:
+    """That of a law, at an albedo for each pixel."""
+    prefix = emit.prefix(law)
+    return TimedText(emit.law_text(law), prefix, f"{prefix}_shape(0.05 + 0.9 * start)")
+
+
+def text_costs(
+    context: moderngl.Context, texts: Mapping[str, TimedText], yardstick: str, works: Iterable[str] = WORKS
+) -> dict[str, Cost]:
+    """The costs of each text, by its name.
+
+    yardstick  the name of the text that is counted as 1;  works  names of `WORKS`: "material" is for laws only
+    """
+    timed: dict[str, dict[str, tuple[Floats, Floats]]] = {name: {} for name in texts}
     with ExitStack() as held:
         board = Board(context, SIZE)
         held.callback(board.release)
         held.enter_context(board.bound())
-        for work in WORKS:
-            loops = {name: _Loop(context, name, law, work) for name, law in texts.items()}
+        for work in works:
+            loops = {name: _Loop(context, name, text, work) for name, text in texts.items()}
             for loop in loops.values():
                 held.callback(loop.release)
-            own = loops[emit.source(yardstick)]
-            timed |= {(name, work): loop.beside(own) for name, loop in loops.items()}
+            for name, loop in loops.items():
+                timed[name][work] = loop.beside(loops[yardstick])
         check_errors(context, "the loops that are timed")
     return {
         name: Cost(
-            {work: 1e9 * float(np.min(timed[name, work][0])) for work in WORKS},
-            {work: float(np.median(timed[name, work][0] / timed[name, work][1])) for work in WORKS},
+            {work: 1e9 * float(np.min(own)) for work, (own, _) in turns.items()},
+            {work: float(np.median(own / other)) for work, (own, other) in turns.items()},
         )
-        for name in texts
+        for name, turns in timed.items()
     }
 
 
 class _Loop:
-    """One work of one law."""
+    """One work of one text."""
 
-    def __init__(self, context: moderngl.Context, name: str, law: ProfileLaw, work: str) -> None:
-        prefix = emit.prefix(law)
-        source = LOOP.format(text=emit.law_text(law), name=prefix, work=WORKS[work].replace("P_", f"{prefix}_"))
+    def __init__(self, context: moderngl.Context, name: str, timed: TimedText, work: str) -> None:
+        text, prefix, shape = timed
+        source = LOOP.format(text=text, prefix=prefix, shape=shape, work=WORKS[work].replace("P_", f"{prefix}_"))
         self._context = context
         self._program = program(context, f"{name}: {work}", source)
         self._triangle = full_screen(context, self._program)

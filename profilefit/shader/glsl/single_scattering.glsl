@@ -1,7 +1,8 @@
 // Light scattered once in a stack of layers of one index, exactly: with cosines mu_i and mu_o inside and
 // b = 1 / mu_i + 1 / mu_o,
 //     L = T_i T_o / n^2  cos_in / (mu_i mu_o)  sum_j alpha_j p_j e^{-b t_j} (1 - e^{-b d_j}) / b,
-// t_j and d_j the optical depths above and inside layer j, p Henyey and Greenstein's phase function.
+// t_j and d_j the optical depths above and inside layer j, infinite inside the last, p Henyey and Greenstein's phase
+// function.
 
 // Cosine inside
 float LAW_inside(float outside) {
@@ -37,6 +38,9 @@ float LAW_radiance(float channel, float thickness, float cos_in, float cos_out, 
     float grazing = (square_in + square_out - square_in * square_out) / (1.0 + sines);
     float away = grazing + mu_in * mu_out + sines * (1.0 - turned);
     float depth1 = max(thickness, 0.0) * LAW_of(channel, LAW_red_rate, LAW_green_rate, LAW_blue_rate);
+//% for 3
+    float depth@h = LAW_of(channel, LAW_red_depth@h, LAW_green_depth@h, LAW_blue_depth@h);
+//% end
     float kept1 = 1.0;
     float sum = 0.0;
 //% for 2
@@ -45,11 +49,10 @@ float LAW_radiance(float channel, float thickness, float cos_in, float cos_out, 
     float phase@h = LAW_phase(away, LAW_of(channel, LAW_red_g@h, LAW_green_g@h, LAW_blue_g@h));
     sum = sum + kept@h * (1.0 - through@h) * alpha@h * phase@h;
     float kept@i = kept@h * through@h;
-    float depth@i = LAW_of(channel, LAW_red_depth@i, LAW_green_depth@i, LAW_blue_depth@i);
 //% end
     float alpha@n = LAW_of(channel, LAW_red_alpha@n, LAW_green_alpha@n, LAW_blue_alpha@n);
     float phase@n = LAW_phase(away, LAW_of(channel, LAW_red_g@n, LAW_green_g@n, LAW_blue_g@n));
-    sum = sum + kept@n * (1.0 - exp(-b * depth@n)) * alpha@n * phase@n;
+    sum = sum + kept@n * alpha@n * phase@n; // of all that lies deeper
     float surface = LAW_passed(within, mu_in) * LAW_passed(without, mu_out) / (LAW_index * LAW_index);
     return surface * cos_in / (mu_in * mu_out * b) * sum;
 }

@@ -136,7 +136,11 @@ def test_a_fit_holds_between_the_thicknesses_that_it_was_made_at():
         (1.4, "medium must be a mcml_sim.Medium"),
         (Medium((Layer(1.4, 0.1, 1.0, 0.0, 1.0),)), "last layer must be infinitely thick"),
         (Medium((Layer(1.4, 0.0, 0.0, 0.0, 1.0), Layer(1.4, 0.1, 1.0, 0.0))), "layers must scatter or absorb"),
-        (Medium((Layer(1.4, 0.1, 1.0, 0.5, 1.0), Layer(1.4, 0.1, 1.0, 0.0))), "g = 0 .*0.5 in layer 1"),
+        (Medium((Layer(1.4, 0.1, 1.0, -0.5, 1.0), Layer(1.4, 0.1, 1.0, 0.0))), r"g in \[0, 0.95\] .*-0.5 in layer 1"),
+        (
+            Medium((Layer(1.4, 0.1, 1.0, 0.5, 1.0), Layer(1.4, 0.1, 0.0, 0.0))),
+            "where one scatters forward, .*in layer 2",
+        ),
         (Medium((Layer(1.4, 0.1, 1.0, 0.0, 1.0), Layer(1.5, 0.1, 1.0, 0.0))), "one n .*1.5 in layer 2"),
         (half_space(0.9, n=1.8), r"n over that above must be 1 or in \(1, 1.6\] .*1.8"),
         (Medium((*[Layer(1.4, 0.1, 1.0, 0.0, 1.0)] * 30, Layer(1.4, 0.1, 1.0, 0.0))), "at most 20 layers, got 31"),

@@ -1,0 +1,112 @@
+"""A head of layers, way by way: error and cost in three poses, shares of its light, where layers matter.
+
+    python -m benchmarks.layers            # six minutes on two cores, of which the exact light takes two
+    python -m benchmarks.layers --frames   # time of a frame over resolution and number of faces
+
+Of examples/layers-head.toml. Errors are root mean squares of scattered light over its mean, against the surface
+integral with the exact stack at each point; times are of this machine's OpenGL, the least of five turns.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+
+from benchmarks.stacks import forward, stacks
+from benchmarks.table import show
+from mcml_sim.files.text_file import read_toml
+from profilefit.materials import CHANNELS
+from profilefit.recipes.folder import shipped
+from profilefit.scenes.layers import chart, scene
+from profilefit.scenes.layers.truth import stack_table
+from profilefit.scenes.stage import head
+from profilefit.scenes.stage.judge import points
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.world import Part
+from profilefit.shader import opened, renderer
+
+FILE = "layers-head.toml"
+WAYS = {"stack": (4, 16, 64), "dipole": (64,), "half space": (64,), "none": (1,)}
+SIZES, DETAILS = ((128, 128), (256, 256), (512, 512), (1024, 1024)), (1, 2)
+THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
+
+
+def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
+    """The example, at that many pixels."""
+    path = shipped("examples") / FILE
+    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+
+
+def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
+    """Rows of error and milliseconds of each way in each pose; one table of exact light serves all."""
+    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
+    laws, rows = scene.laws_of(request.stack), []
+    with opened() as context, Stage(context, request.size) as stage:
+        for pose in scene.POSES:
+            posed = replace(request, pose=pose)
+            judge = chart.judged(stage, posed, table)
+            for kind, samples in WAYS.items():
+                way = scene.technique(replace(posed, kind=kind), laws)
+                own = replace(judge, mfp=way.mfp, alpha=way.alpha)
+                for one in points(own, way.label, way.by, request.sampling, samples):
+                    rows.append((pose, kind, str(one.samples), f"{one.rmse:.3g}", f"{min(one.milliseconds):.3g}"))
+        device = renderer(context)
+    rows.append(("", device.partition(",")[0], "", "", ""))
+    return rows
+
+
+def shares() -> list[tuple[str, ...]]:
+    """Single : multiple : mirrored light of the stacks, by colour, isotropic and with g = 0.9."""
+    rows = []
+    for channel in range(3):
+        for name, medium in stacks(channel).items():
+            for g in (0.0, 0.9):
+                own = medium if g == 0 else forward(medium, g)
+                found = [chart.split(own, light) for light in ("searchlight", "diffuse")]
+                cells = (f"{100 * value:.2g}" for one in found for value in one)
+                rows.append((f"{name}, {CHANNELS[channel]}", f"{g:g}", *cells))
+    return rows
+
+
+def matter() -> list[tuple[str, ...]]:
+    """Error of one half space over thickness and the mean free path below."""
+    errors = chart.one_half_space_errors(THICKNESSES, MFPS)
+    return [(f"{d:g}", *(f"{100 * value:.2g}" for value in row)) for d, row in zip(THICKNESSES, errors, strict=True)]
+
+
+def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
+    """Milliseconds of a whole frame over resolution and faces: what figure 11 a of Zhao et al. charts."""
+    laws, rows = scene.laws_of(request.stack), []
+    with opened() as context:
+        for size in SIZES:
+            with Stage(context, size) as stage:
+                for detail in DETAILS:
+                    drawn = scene.scene_of(request)
+                    finer = (head.head(detail), head.ear(-1, detail), head.ear(1, detail), head.neck(detail))
+                    parts = tuple(Part(mesh, part.reflectance) for mesh, part in zip(finer, drawn.parts, strict=True))
+                    stage.draw(replace(drawn, parts=parts))
+                    way = scene.technique(request, laws)
+                    times = stage.time(way.by, way.mfp, request.sampling, 3, "frame")
+                    faces = sum(len(mesh.triangles) for mesh in finer)
+                    rows.append((f"{size[0]} x {size[1]}", str(faces), f"{median(times):.3g}"))
+    return rows
+
+
+def main(arguments: list[str] | None = None) -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--frames", action="store_true", help="time of a frame over resolution and faces, only")
+    request = request_of()
+    if parser.parse_args(arguments).frames:
+        show("A frame of 16 samples a pixel", ("pixels", "faces", "ms"), frames(request))
+        return
+    show("Error and cost by pose", ("pose", "way", "samples", "error", "ms"), poses(request))
+    lights = [f"{part}, {light}" for light in ("pencil", "diffuse") for part in ("single", "multiple", "mirror")]
+    show("Of light that arrives [%]", ("stack", "g", *lights), shares())
+    title = "One half space: error [% of white] by thickness of layer 1 and mean free path below, in that of layer 1"
+    show(title, ("", *(f"{mfp:g}" for mfp in MFPS)), matter())
+
+
+if __name__ == "__main__":
+    main()

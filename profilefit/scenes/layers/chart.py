@@ -1,0 +1,94 @@
+"""Where layers matter, and what each way of drawing them costs: points and maps, for a report to draw."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Layer, Medium, exact
+from mcml_sim.media.fresnel import fresnel
+from profilefit.scenes.layers.law import one_half_space
+from profilefit.scenes.layers.passes import diffusely_once, once
+from profilefit.scenes.layers.scene import LayersRequest, laws_of, scene_of, technique, truth_of
+from profilefit.scenes.layers.truth import StackTable, stack_table
+from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.judge import Judge, points
+from profilefit.scenes.stage.picture import ChartPoint
+from profilefit.scenes.stage.stage import Stage
+
+Floats = NDArray[np.float64]
+
+
+class Split(NamedTuple):
+    """Where the light of one direction goes that comes back [-]: shares of what arrives.
+
+    single  scattered once;  multiple  scattered more often;  mirror  thrown back by the surface
+    """
+
+    single: float
+    multiple: float
+    mirror: float
+
+
+def split(medium: Medium, illumination: str = "searchlight") -> Split:
+    """Single : multiple : mirrored light of a stack of one index, exact; of g > 0 the similar stack's whole.
+
+    illumination  "searchlight", along the normal, or "diffuse"
+    """
+    similar = Medium(tuple(layer.similar for layer in medium.layers), medium.n_above)
+    light = exact.solve(similar, illumination)
+    if illumination == "diffuse":
+        first, mirror = diffusely_once(medium), light.specular
+    else:
+        first = float(once(medium, np.array([1.0]))[0])
+        mirror = float(fresnel(medium.n_above, medium.layers[0].n, 1.0)[0])
+    return Split(first, max(light.reflectance - first, 0.0), mirror)
+
+
+def one_half_space_errors(
+    thicknesses: Sequence[float], mfps: Sequence[float], above: float = 0.95, below: float = 0.98, n: float = 1.4
+) -> Floats:
+    """Error of the one half space nearest to two layers, as a share of white: (thicknesses, mfps).
+
+    thicknesses  of the first layer, mfps of what lies below, both in mean free paths of the first
+    above, below  albedos [-];  n  of both. Root mean square near a step edge of diffuse light; exact.
+    """
+    return np.array(
+        [
+            [one_half_space(Medium((_layer(n, above, 1.0, d), _layer(n, below, mfp, np.inf)))).error for mfp in mfps]
+            for d in thicknesses
+        ]
+    )
+
+
+def ways(
+    context: moderngl.Context, request: LayersRequest, kinds: Sequence[str], samples: Sequence[int], turns: int = 5
+) -> list[ChartPoint]:
+    """Error and cost of each kind of technique with each number of samples, of the scene that is requested."""
+    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
+    laws = laws_of(request.stack)
+    found = []
+    with Stage(context, request.size) as stage:
+        judge = judged(stage, request, table)
+        for kind in kinds:
+            way = technique(replace(request, kind=kind), laws)
+            own = replace(judge, mfp=way.mfp, alpha=way.alpha)
+            found += points(own, way.label, way.by, request.sampling, samples, turns)
+    return found
+
+
+def judged(stage: Stage, request: LayersRequest, table: StackTable) -> Judge:
+    """The scene drawn, with its truth."""
+    stage.draw(scene_of(request))
+    buffers = stage.buffers()
+    truth = truth_of(buffers, request.stack.stack.media, table)
+    return Judge(stage, (1.0, 1.0, 1.0), truth, buffers.mask > INSIDE)
+
+
+def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:
+    return Layer(n, (1.0 - alpha) / mfp, alpha / mfp, 0.0, thickness)
