@@ -192,12 +192,16 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     layer, verdict = layers[worst], verdicts[worst]
     colour = "of one colour" if len(layers) == 1 else f"of three colours, {CHANNELS[worst]} the worst"
     unit = choice.scene.unit
+    noise = f" ± {_percent(layer.standard_error)}" if layer.photons else ""
     together = math.hypot(layer.error, choice.nearest.error.total)
     text = (
         f"Layers, {colour}: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
         f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a pencil beam) is off by "
-        f"{_percent(layer.error)} ± {_percent(layer.standard_error)} %; with the choice {_percent(together)} %."
+        f"{_percent(layer.error)}{noise} %; with the choice {_percent(together)} %."
     )
+    single = max(one.single for one in layers)
+    needs = "needs a pass of its own" if single > choice.scene.tolerance else "needs no pass of its own"
+    text += f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on average."
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as material.index says, and these layers are not."

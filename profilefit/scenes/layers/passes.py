@@ -105,6 +105,19 @@ def diffusely_once(medium: Medium) -> float:
     return float(np.sum(weight * cosine * once(medium, cosine)))
 
 
+def alike_error(medium: Medium) -> float:
+    """What it costs to have light scattered once leave like all other light, in all directions alike.
+
+    Mean over diffuse light and diffusely placed eyes of |pi L - its exitance|, as a share of white [-]. No root mean
+    square: where nothing refracts a few grazing directions would be all of it.
+    """
+    node, weight = np.polynomial.legendre.leggauss(RULE)
+    mu, of_mu = 0.5 * (node + 1.0), weight * 0.5 * (node + 1.0)  # 2 mu dmu on (0, 1)
+    radiance = np.asarray(single_scattering(medium, mu[:, None, None], mu[:, None], 0.5 * np.pi * (node + 1.0)))
+    apart = np.pi * radiance / mu[:, None, None] - once(medium, mu)[:, None, None]
+    return float(np.einsum("ioa,i,o,a->", np.abs(apart), of_mu, of_mu, 0.5 * weight))
+
+
 def _with_first(medium: Medium, thickness: float) -> Medium:
     first, *others = medium.layers
     return Medium((replace(first, thickness=max(thickness, 1e-9 * first.mfp)), *others), medium.n_above)

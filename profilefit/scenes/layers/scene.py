@@ -46,15 +46,19 @@ NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]
 LARGEST_VIEW, MOST_LIGHT = 1000.0, 1000.0
 TARGET, DISTANCE, FROM, HEIGHT = (4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0
 EXPOSURE = 1.1
-# Share of the scattered light that its directions may be wrong by before light scattered once is drawn by itself.
-NEGLIGIBLE = 0.02
+NEGLIGIBLE = 0.01  # share of white that directions may be wrong by before light scattered once is drawn by itself
 NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
 COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
 
 
 @dataclass(frozen=True)
 class LayersRequest:
-    """What a file requests. share  of what is lit that leaves after one scattering, of each colour [-]"""
+    """What a file requests.
+
+    least, most  thickness of the first layer where values (rows, columns) are 0 and 1 [mm];  row 0 at the top
+    chart        other numbers of samples, whose error and cost are measured;  size  [pixels]
+    single       whether light scattered once leaves in its own directions
+    """
 
     file: str
     stack: StackRequest
@@ -265,13 +269,7 @@ def _single(tables: Tables, named: Table, stack: StackRequest) -> bool:
         return value
     if value != "auto":
         raise tables.bad("technique", "single", "true, false or auto", value)
-    return single_share(stack) > NEGLIGIBLE
-
-
-def single_share(stack: StackRequest) -> float:
-    """Of the diffuse light that leaves the brightest colour, what was scattered once [-]."""
-    shares = [passes.diffusely_once(medium) for medium in stack.stack.media]
-    return max(shares)
+    return max(map(passes.alike_error, stack.stack.media)) > NEGLIGIBLE
 
 
 def _chart(tables: Tables, named: Table) -> tuple[int, ...]:

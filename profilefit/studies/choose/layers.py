@@ -1,8 +1,11 @@
-"""Is one layer enough? A stack of layers against the half space that is nearest to it, in photons, at a step edge.
+"""Is one layer enough? A stack of layers against the half space that is nearest to it at a step edge of light.
 
-Both are traced: the stack as it is, and a half space of the upper layer's index that scatters alike in all directions,
-at every albedo from one run. Its albedo is the one that gives the stack's reflectance back; its mean free path is the
-one whose light near an edge is nearest to the stack's. Light is a searchlight's, as photons are started.
+By exact light where all layers scatter isotropically under one index; else both are traced, the stack as it is, and a
+half space of the upper layer's index that scatters alike in all directions, at every albedo from one run. The half
+space's albedo is the one that gives the stack's reflectance back; its mean free path is the one whose light near an
+edge is nearest to the stack's. Light is a searchlight's, as photons are started.
+
+And does light scattered once need a pass of its own? What it costs to let it leave like all other light.
 """
 
 from __future__ import annotations
@@ -16,6 +19,8 @@ from scipy.optimize import brentq, minimize_scalar
 from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
 from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack
+from profilefit.scenes.layers.law import one_half_space
+from profilefit.scenes.layers.passes import alike_error
 from profilefit.studies.choose.case import Within
 
 Floats = NDArray[np.float64]
@@ -36,7 +41,8 @@ class OneLayer:
 
     reflectance  A of both [-];  alpha, mfp  of the half space [-], [unit];  n  of its surface [-]
     error        root mean square, near a step edge, of what it is wrong by, as a share of white, less what the photons'
-                 noise adds;  standard_error  of that;  photons  of each run
+                 noise adds;  standard_error  of that;  photons  of each run, 0 where light is exact
+    single       mean error, as a share of white, of light scattered once if it leaves in all directions alike; exact
     """
 
     reflectance: float
@@ -46,6 +52,7 @@ class OneLayer:
     error: float
     standard_error: float
     photons: int
+    single: float
 
     def verdict(self, tolerance: float) -> str:
         """Whether it is within the tolerance: "enough", "not enough", or "undecided" by so many photons."""
@@ -71,11 +78,15 @@ class RingShares:
 def one_layer(
     stack: Medium, tolerance: float, within: Within, photons: int | None = None, progress: bool | None = None
 ) -> OneLayer:
-    """Trace both, and compare; InputError where nothing comes back. Seconds to a minute.
+    """Compare both, by exact light or traced; InputError where nothing comes back. Seconds to a minute.
 
     tolerance  share of white, which says how many photons it takes, unless `photons` does
     progress   show a bar on stderr; by default only if that is a terminal
     """
+    n = stack.layers[0].n / stack.n_above
+    if photons is None and _is_solved(stack):
+        near = one_half_space(stack, "searchlight", within.mfp)
+        return OneLayer(near.reflectance, near.alpha, near.mfp, n, near.error, 0.0, 0, alike_error(stack))
     number = int(np.clip((PRECISE / tolerance) ** 2, FEWEST, MOST)) if photons is None else photons
     reduced = [layer.mu_a + layer.mu_s * (1.0 - layer.g) for layer in stack.layers]
     lengths = [1.0 / mu for mu in reduced if mu > 0]
@@ -84,7 +95,6 @@ def one_layer(
     edges = np.append(0.0, np.geomspace(NEAREST * min(lengths), FARTHEST * max(lengths), RINGS))
     tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress)
     reflectance = float(tally.diffuse_reflectance.value)
-    n = stack.layers[0].n / stack.n_above
     scaled = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
     white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=Setting(n=n), progress=progress)
     alpha = _alpha(white, reflectance)
@@ -92,7 +102,15 @@ def one_layer(
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
     mfp = _length(of_stack, of_one, within)
     error, standard_error = _difference(of_stack, of_one, mfp, within)
-    return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number)
+    once = alike_error(stack)
+    return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number, once)
+
+
+def _is_solved(stack: Medium) -> bool:
+    """Whether exact light is known of it, and of the half spaces that are tried for it."""
+    n = stack.layers[0].n
+    alike = all(layer.g == 0 and layer.n == n and layer.mu_t > 0 for layer in stack.layers)
+    return alike and stack.is_half_space and n >= stack.n_above and stack.layers[0].mu_s > 0
 
 
 def of_each_colour(

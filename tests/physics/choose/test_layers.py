@@ -23,7 +23,7 @@ def test_rings_beyond_an_edge():
 
 @pytest.mark.parametrize(("error", "verdict"), [(0.01, "enough"), (0.03, "not enough"), (0.0195, "undecided")])
 def test_verdict(error, verdict):
-    assert OneLayer(0.5, 0.9, 1.0, 1.0, error, 0.001, 1000).verdict(0.02) == verdict
+    assert OneLayer(0.5, 0.9, 1.0, 1.0, error, 0.001, 1000, 0.0).verdict(0.02) == verdict
 
 
 def test_equal_colours_are_traced_once(monkeypatch):
@@ -39,13 +39,26 @@ def test_equal_colours_are_traced_once(monkeypatch):
 
 @pytest.mark.slow
 def test_two_halves_are_one_layer():
-    """Within three standard errors of nothing, with its own mean free path and albedo."""
+    """By exact light; traced within three standard errors of nothing. With its own mean free path and albedo."""
     stack = Medium((Layer(1.0, 0.1, 0.9, 0.0, 0.5), Layer(1.0, 0.1, 0.9, 0.0)))
-    found = one_layer(stack, 0.02, WITHIN)
-    assert found.error < 3.0 * found.standard_error
-    assert found.alpha == pytest.approx(0.9, abs=1e-3)
-    assert found.mfp == pytest.approx(1.0, abs=0.01)
-    assert found.verdict(0.02) == "enough"
+    found, traced = one_layer(stack, 0.02, WITHIN), one_layer(stack, 0.02, WITHIN, 2**18)
+    assert (found.photons, found.error) == (0, pytest.approx(0.0, abs=1e-6))
+    assert traced.error < 3.0 * traced.standard_error
+    for one, mfp in ((found, 1e-4), (traced, 0.01)):
+        assert one.alpha == pytest.approx(0.9, abs=0.1 * mfp)
+        assert one.mfp == pytest.approx(1.0, abs=mfp)
+        assert one.verdict(0.02) == "enough"
+
+
+@pytest.mark.slow
+def test_exact_light_and_traced_light_say_the_same():
+    """Skin in red light, whose lower layer is clear."""
+    stack = Medium((Layer(1.4, 0.21, 4.8, 0.0, 0.25), Layer(1.4, 0.0085, 0.45, 0.0)))
+    found, traced = one_layer(stack, 0.02, WITHIN), one_layer(stack, 0.02, WITHIN, 2**20)
+    assert found.error > 0.01
+    assert traced.error == pytest.approx(found.error, abs=4.0 * traced.standard_error)
+    assert traced.mfp == pytest.approx(found.mfp, rel=0.02)
+    assert found.single == traced.single
 
 
 @pytest.mark.slow

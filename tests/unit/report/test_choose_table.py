@@ -19,7 +19,7 @@ ONE = ((0.5, 0.5),) * 3
 SCENE = Requirements("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
 CURVED = Case((0.5, 0.5, 0.5), (0.5, 0.5, 0.5), 0.1, 5.0)
 SAMPLED = Option("sampled", 64, name="hazard-diffuse")
-LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6)
+LAYER = OneLayer(0.4, 0.9, 1.2, 1.4, 0.005, 0.0001, 10**6, 0.003)
 
 
 @pytest.fixture(scope="module")
@@ -77,7 +77,7 @@ def test_layers_have_what_the_choice_leaves_of_the_tolerance(choice):
 def test_the_worst_of_three_colours_is_told(choice):
     """Its verdict counts first, then its error; all three as data."""
     errors = {"red": (0.014, 0.0005), "green": (0.021, 0.0001), "blue": (0.022, 0.002)}
-    layers = [OneLayer(0.4, 0.9, 1.2, 1.4, error, spread, 10**6) for error, spread in errors.values()]
+    layers = [OneLayer(0.4, 0.9, 1.2, 1.4, error, spread, 10**6, 0.003) for error, spread in errors.values()]
     text = " ".join(printed(choose_table(choice, shipped(), layers)).split())
     assert "Layers, of three colours, green the worst: one layer is not enough: " in text
     assert "is off by 2.1 ± 0.010 %" in text
