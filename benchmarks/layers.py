@@ -2,6 +2,7 @@
 
     python -m benchmarks.layers            # six minutes on two cores, of which the exact light takes two
     python -m benchmarks.layers --frames   # time of a frame over resolution and number of faces
+    python -m benchmarks.layers --ear EAR.png   # an ear lit from behind: stack, first layer's dipole, half space
 
 Of examples/layers-head.toml. Errors are root mean squares of scattered light over its mean, against the surface
 integral with the exact stack at each point; times are of this machine's OpenGL, the least of five turns.
@@ -10,26 +11,34 @@ integral with the exact stack at each point; times are of this machine's OpenGL,
 from __future__ import annotations
 
 import argparse
+import json
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
 
+import numpy as np
+from matplotlib import image
+
 from benchmarks.stacks import forward, stacks
 from benchmarks.table import show
+from mcml_sim import Medium, exact
 from mcml_sim.files.text_file import read_toml
 from profilefit.materials import CHANNELS
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.layers import chart, scene
+from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.judge import points
+from profilefit.scenes.stage.picture import to_srgb
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.world import Part
+from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
 
 FILE = "layers-head.toml"
 WAYS = {"stack": (4, 16, 64), "dipole": (64,), "half space": (64,), "none": (1,)}
 SIZES, DETAILS = ((128, 128), (256, 256), (512, 512), (1024, 1024)), (1, 2)
+BEHIND, PARTS = Camera((250.0, 10.0, 600.0), (78.0, 2.0, -10.0), 110.0), (2.0, 5.0)  # of the ear; parts [mm]
 THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
@@ -94,14 +103,49 @@ def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     return rows
 
 
+def ear(file: Path) -> list[tuple[str, ...]]:
+    """Draw it by each way, side by side; rows of the light through a part with the layers on both sides, over what
+    arrives: exact plates, the scene's closed form, and what a half space's law has left beyond the thickness."""
+    request = replace(
+        request_of((320, 320)), camera=BEHIND, light=Light((0.4, 0.25, -0.9)), ambient=(0.05, 0.055, 0.06)
+    )
+    laws, pictures, rows = scene.laws_of(request.stack), [], []
+    with opened() as context, Stage(context, request.size) as stage:
+        stage.draw(scene.scene_of(request))
+        for kind in ("stack", "dipole", "half space"):
+            way = scene.technique(replace(request, kind=kind), laws)
+            pictures.append(to_srgb(stage.render(way.by, way.mfp, request.sampling, way.alpha)[::-1], 1.5))
+    image.imsave(file, np.concatenate(pictures, axis=1))
+    for channel, medium, law in zip(CHANNELS, request.stack.stack.media, laws, strict=True):
+        plate, (*upper, core) = plate_of(medium), medium.layers
+        for thickness in PARTS:
+            middle = replace(core, thickness=thickness - plate.skins)
+            layers = Medium((*upper, middle, *reversed(upper)), medium.n_above, medium.n_above)
+            true = exact.solve(layers, "diffuse").transmittance
+            left = law.reflectance * (1.0 - float(law.cdf(thickness)))
+            cells = (f"{value:.3g}" for value in (thickness, true, float(plate.transmitted(thickness)), left))
+            rows.append((channel, *cells))
+    return rows
+
+
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", action="store_true", help="time of a frame over resolution and faces, only")
-    request = request_of()
-    if parser.parse_args(arguments).frames:
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the errors by pose and way there too")
+    parser.add_argument("--ear", type=Path, metavar="FILE", help="an ear lit from behind, only")
+    request, given = request_of(), parser.parse_args(arguments)
+    if given.ear is not None:
+        columns = ("light through skin", "mm", "exact", "closed form", "half space's rest")
+        show("Of light that arrives [-]", columns, ear(given.ear))
+        return
+    if given.frames:
         show("A frame of 16 samples a pixel", ("pixels", "faces", "ms"), frames(request))
         return
-    show("Error and cost by pose", ("pose", "way", "samples", "error", "ms"), poses(request))
+    found = poses(request)
+    show("Error and cost by pose", ("pose", "way", "samples", "error", "ms"), found)
+    if given.json is not None:
+        kept = [dict(zip(("pose", "way", "samples", "error", "ms"), one, strict=True)) for one in found[:-1]]
+        given.json.write_text(json.dumps(kept, indent=1) + "\n", encoding="utf-8")
     lights = [f"{part}, {light}" for light in ("pencil", "diffuse") for part in ("single", "multiple", "mirror")]
     show("Of light that arrives [%]", ("stack", "g", *lights), shares())
     title = "One half space: error [% of white] by thickness of layer 1 and mean free path below, in that of layer 1"

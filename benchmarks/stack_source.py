@@ -13,6 +13,7 @@ them: what depends on thickness only is computed once before the loop, as a rend
 from __future__ import annotations
 
 import argparse
+import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -132,7 +133,9 @@ def _twin(text: str) -> dict[str, Any]:
 def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--fits", type=Path, default=fits_folder(), metavar="FOLDER", help="of the records")
-    folder = parser.parse_args(arguments).fits / FOLDER
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures there too")
+    given = parser.parse_args(arguments)
+    folder = given.fits / FOLDER
     records = [load(path) for path in record.available(folder).values()]
     if not records:
         print(f"{folder} has no record of a stack: `profilefit regenerate STACK.toml` makes one")
@@ -142,6 +145,11 @@ def main(arguments: list[str] | None = None) -> None:
         errors, costs = rows(context, records)
     show("float32 against float64, at worst", ("stack", *Rounding._fields), errors)
     show("Cost over hazard, ratio of medians in turns", ("stack", *WORKS, "both, ns"), costs)
+    if given.json is not None:
+        names = (*Rounding._fields, *WORKS)
+        values = ([*map(float, one[1:]), *map(float, other[1:-1])] for one, other in zip(errors, costs, strict=True))
+        found = {one.name: dict(zip(names, row, strict=True)) for one, row in zip(records, values, strict=True)}
+        given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -15,8 +15,10 @@ quadrature. "similar" is the exact light of the similar isotropic stack.
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from dataclasses import replace
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -132,18 +134,31 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
     return cells, Error(mine, similar, ks, of_a)
 
 
-def row(name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]) -> tuple[tuple[str, ...], list[Error]]:
+def row(
+    name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]
+) -> tuple[tuple[str, ...], list[Error], Error]:
+    """Cells, errors at some thicknesses, and the error at its own."""
     begin = time.perf_counter()
     law = stack_law(medium, light)
     seconds = time.perf_counter() - begin
     first, *others = medium.layers
     found = [error(law, replace(medium, layers=(replace(first, thickness=d), *others)), light) for d in thicknesses]
-    return (f"{name}, {light}", f"{seconds:.0f}", *_figures(found)), found
+    own = error(law, medium, light)
+    return (f"{name}, {light}", f"{seconds:.0f}", *_figures(found), *_short(own.rel, own.ks)), found, own
 
 
 def _figures(found: list[Error]) -> tuple[str, ...]:
+    return _short(*_summary(found).values())
+
+
+def _summary(found: list[Error]) -> dict[str, float]:
     rel, alone, ks, of_a = (np.abs(column) for column in zip(*found, strict=True))
-    return tuple(f"{value:.2g}" for value in (rel.mean(), rel.max(), alone.mean(), ks.max(), of_a.max()))
+    figures = (rel.mean(), rel.max(), alone.mean(), ks.max(), of_a.max())
+    return dict(zip(("rel", "worst", "alone", "ks", "A"), map(float, figures), strict=True))
+
+
+def _short(*values: float) -> tuple[str, ...]:
+    return tuple(f"{value:.2g}" for value in values)
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -155,6 +170,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument(
         "--photons", type=int, default=TRACED, metavar="N", help="of a stack and colour, with --forward"
     )
+    parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures of all there too")
     given = parser.parse_args(arguments)
     lights = (given.light,) if given.light else LIGHTS
     if given.forward:
@@ -166,11 +182,12 @@ def main(arguments: list[str] | None = None) -> None:
             if given.stack in (None, name)
         ]
         rows, errors = zip(*made, strict=True)
-        own, similar, ks, of_a = (np.abs(column) for column in zip(*errors, strict=True))
-        figures = [f"{own.mean():.2g}, at most {own.max():.2g}", "", f"{similar.mean():.2g}", ks.max(), of_a.max()]
-        whole = ("all", "", *(one if isinstance(one, str) else f"{one:.2g}" for one in figures))
+        figures = _summary(list(errors))
+        own = f"{figures['rel']:.2g}, at most {figures['worst']:.2g}"
+        whole = ("all", "", own, "", *_short(figures["alone"], figures["ks"], figures["A"]))
         columns = ("stack", "s", "rel", "noise", "similar", "ks", "A")
         show(f"The law of a stack, g = {given.forward:g}, against {given.photons:.1g} photons", columns, [*rows, whole])
+        _write(given.json, figures)
         return
     count = given.random
     if count:
@@ -184,10 +201,18 @@ def main(arguments: list[str] | None = None) -> None:
             for name, medium in stacks(channel).items()
             if given.stack in (None, name)
         ]
-    rows, errors = zip(*(row(*job) for job in jobs), strict=True)
-    whole = ("all", "", *_figures([one for some in errors for one in some]))
-    columns = ("stack", "s", "rel", "worst", "first layer alone", "ks", "A")
+    rows, errors, own_errors = zip(*(row(*job) for job in jobs), strict=True)
+    figures, at_own = _summary([one for some in errors for one in some]), _summary(list(own_errors))
+    own = (f"{at_own['rel']:.2g}, at most {at_own['worst']:.2g}", f"{at_own['ks']:.2g}")
+    whole = ("all", "", *_short(*figures.values()), *own)
+    columns = ("stack", "s", "rel", "worst", "first layer alone", "ks", "A", "own rel", "own ks")
     show("The law of a stack, at thicknesses of its first layer", columns, [*rows, whole])
+    _write(given.json, {**figures, "own": at_own})
+
+
+def _write(file: Path | None, figures: dict) -> None:
+    if file is not None:
+        file.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -201,7 +201,9 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     )
     single = max(one.single for one in layers)
     needs = "needs a pass of its own" if single > choice.scene.tolerance else "needs no pass of its own"
-    text += f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on average."
+    text += (
+        f" Light scattered once {needs}: let out in all directions alike it is off by {_percent(single)} % on average."
+    )
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as material.index says, and these layers are not."

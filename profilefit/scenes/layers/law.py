@@ -25,11 +25,12 @@ due to subsurface scattering, SIGGRAPH 1993, for one layer).
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq, least_squares, minimize_scalar
 
 from mcml_sim import Setting, exact
 from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
@@ -39,12 +40,14 @@ from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.recipes.stack.fit import stack_law
 
-__all__ = ["OneHalfSpace", "beams", "one_half_space", "single_scattering", "stack_law"]
+__all__ = ["OneHalfSpace", "Plate", "beams", "one_half_space", "plate_of", "single_scattering", "stack_law"]
 
 Floats = NDArray[np.float64]
+NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
 WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
 RINGS, NEAREST_RING, FARTHEST_RING = 200, 1e-3, 200.0  # that light is summed over [mfp]
 PLACES = 40  # beside the edge
+PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
 AROUND = 1.5  # of ln l that is searched on either side of the first guess
 
 
@@ -113,7 +116,7 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
 
     InputError as of `exact.solve`, and where no half space reflects as much. Seconds.
     """
-    stack = exact.solve(medium, illumination)
+    stack = exact.solve(medium, illumination, NODES)
     setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
     whole = stack.reflectance
     most = float(exact.reflectance(1.0 - WHITE, setting))
@@ -144,6 +147,55 @@ def one_half_space(medium: Medium, illumination: str = "diffuse", within: float 
     first = quartile(unit * middle, of_stack) - quartile(middle, of_one)
     best = minimize_scalar(apart, bounds=(first - AROUND, first + AROUND), method="bounded")
     return OneHalfSpace(alpha, float(np.exp(best.x)), whole * float(best.fun), whole)
+
+
+class Plate(NamedTuple):
+    """Light through a part of a thickness D that has a stack's upper layers on both sides, over what arrives:
+
+    T = strength / sinh(rate (D - skins) + offset)
+
+    rate  the decay rate of the last layer [1/length], exact far inside;  skins  thickness of all upper layers [length]
+    strength, offset  fitted [-];  error  largest relative error of T at the thicknesses that they were fitted at
+    """
+
+    rate: float
+    skins: float
+    strength: float
+    offset: float
+    error: float
+
+    def transmitted(self, thickness: ArrayLike) -> Floats:
+        """T [-] through a part of that thickness [length]; a thinner one than its skins counts as these."""
+        depth = self.rate * np.maximum(np.asarray(thickness, float) - self.skins, 0.0) + self.offset
+        return self.strength / np.sinh(depth)
+
+
+def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
+    """The two constants of a stack, fitted to the exact transmittance of five plates. A second; InputError as of
+    `exact.solve`.
+
+    Within .5 % where the last layer is no darker than alpha = 0.8; light through darker ones is little: a plate of two
+    mean free paths of alpha = 0.6 lets a hundredth through, 3 % of that off.
+    """
+    *upper, core = medium.layers
+    skins = 2.0 * sum(layer.thickness for layer in upper)
+    rate = float(exact.decay_rate(core.alpha)) / core.mfp
+    depth = core.mfp * np.array(PLATES)
+
+    def solved(inner: float) -> float:
+        layers = (*upper, replace(core, thickness=inner), *reversed(upper))
+        found = exact.solve(Medium(layers, medium.n_above, medium.n_above), illumination, NODES).transmittance
+        assert found is not None  # there is something below
+        return found
+
+    known = np.log([solved(float(inner)) for inner in depth])
+
+    def off(at: Floats) -> Floats:
+        return at[0] - np.log(np.sinh(rate * depth + np.exp(at[1]))) - known
+
+    best = least_squares(off, [known[0], 0.0])
+    error = float(np.max(np.abs(np.expm1(best.fun))))
+    return Plate(rate, skins, float(np.exp(best.x[0])), float(np.exp(best.x[1])), error)
 
 
 def _phases_of(medium: Medium) -> tuple[Phase, ...]:

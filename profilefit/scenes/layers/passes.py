@@ -15,7 +15,7 @@ from mcml_sim import Medium
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
-from profilefit.scenes.layers.law import single_scattering
+from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
@@ -33,10 +33,37 @@ def thickness_text(least: float, most: float) -> str:
     return f"mix({literal(least)}, {literal(most)}, surface.r)"
 
 
-def of_stack(laws: Sequence[StackLaw], least: float, most: float) -> Gather:
+@dataclass(frozen=True, eq=False)
+class StackGather(Gather):
+    """Samples of a stack's law; light through thin parts as plates let it through, which have the layers on both sides.
+
+    plates  of red, green, blue
+    """
+
+    plates: tuple[Plate, ...] = ()
+
+    def through(self) -> LawText:
+        rates, skins, strengths, offsets = (
+            ", ".join(map(literal, column)) for column in list(zip(*self.plates, strict=True))[:4]
+        )
+        text = f"""
+struct {LAW}_Shape {{ int channel; float length; }};
+const vec3 plate_rate = vec3({rates}), plate_skins = vec3({skins});
+const vec3 plate_strength = vec3({strengths}), plate_offset = vec3({offsets});
+float {LAW}_cumulated(float x, {LAW}_Shape s) {{
+    int c = s.channel;
+    float depth = plate_rate[c] * max(x * s.length - plate_skins[c], 0.0) + plate_offset[c];
+    return 1.0 - 2.0 * plate_strength[c] * exp(-depth) / (1.0 - exp(-2.0 * depth));
+}}
+"""
+        return LawText("plates", text, {}, f"{LAW}_Shape(c, mfp[c])", "1.0")
+
+
+def of_stack(laws: Sequence[StackLaw], least: float, most: float, plates: Sequence[Plate]) -> StackGather:
     """Samples of a stack's law with the thickness at each pixel."""
     shape = f"{LAW}_shape(float(c), {thickness_text(least, most)})"
-    return Gather(LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)"))
+    law = LawText("stack", stack_text(laws, name=LAW), {}, shape, f"{LAW}_reflectance(shape)")
+    return StackGather(law, tuple(plates))
 
 
 def of_half_space(law: ProfileLaw) -> Gather:

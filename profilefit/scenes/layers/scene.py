@@ -19,7 +19,7 @@ from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.record import StackRequest, matching, requested
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.layers import passes
-from profilefit.scenes.layers.law import OneHalfSpace, one_half_space
+from profilefit.scenes.layers.law import OneHalfSpace, one_half_space, plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
 from profilefit.scenes.stage import head
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
@@ -167,8 +167,9 @@ def technique(request: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Way:
     setting = Setting(request.stack.illumination, n=media[0].layers[0].n)
     if request.kind in ("stack", "none"):  # of which the last one's light does not leave its pixel
         assert laws is not None
+        plates = [plate_of(medium, request.stack.illumination) for medium in media]
         lengths = mfp_of(media) if request.kind == "stack" else (NO_LENGTH,) * 3
-        return Way(request.kind, passes.of_stack(laws, request.least, request.most), lengths)
+        return Way(request.kind, passes.of_stack(laws, request.least, request.most, plates), lengths)
     if request.kind == "dipole":
         alpha = passes.channels_of([medium.layers[0].alpha for medium in media])
         dipole = catalogue.load("dipole", setting=Setting(n=setting.n))
