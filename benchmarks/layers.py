@@ -2,7 +2,7 @@
 
     python -m benchmarks.layers            # six minutes on two cores, of which the exact light takes two
     python -m benchmarks.layers --frames   # time of a frame over resolution and number of faces
-    python -m benchmarks.layers --ear EAR.png   # an ear lit from behind: stack, first layer's dipole, half space
+    python -m benchmarks.layers --pictures fits/evidence   # render-layers.png and render-ear.png, four minutes
 
 Of examples/layers-head.toml. Errors are root mean squares of scattered light over its mean, against the surface
 integral with the exact stack at each point; times are of this machine's OpenGL, the least of five turns.
@@ -38,6 +38,7 @@ from profilefit.shader import opened, renderer
 FILE = "layers-head.toml"
 WAYS = {"stack": (4, 16, 64), "dipole": (64,), "half space": (64,), "none": (1,)}
 SIZES, DETAILS = ((128, 128), (256, 256), (512, 512), (1024, 1024)), (1, 2)
+PICTURED, LARGE = ("stack", "dipole", "half space"), (200, 200)
 BEHIND, PARTS = Camera((250.0, 10.0, 600.0), (78.0, 2.0, -10.0), 110.0), (2.0, 5.0)  # of the ear; parts [mm]
 THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 
@@ -103,6 +104,24 @@ def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     return rows
 
 
+def head_picture(file: Path) -> None:
+    """Truth, stack, first layer's dipole, half space, side by side."""
+    request = request_of(LARGE)
+    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
+    laws, pictures = scene.laws_of(request.stack), []
+    with opened() as context, Stage(context, request.size) as stage:
+        judge = chart.judged(stage, request, table)
+        for kind in PICTURED:
+            way = scene.technique(replace(request, kind=kind), laws)
+            sampling = replace(request.sampling, samples=64)
+            radiance = stage.render(way.by, way.mfp, sampling, way.alpha)
+            if not pictures:
+                off = judge.truth - stage.scatter(way.by, way.mfp, sampling, way.alpha)
+                pictures.append(radiance + off / np.pi)
+            pictures.append(radiance)
+    image.imsave(file, np.concatenate([to_srgb(one[::-1], scene.EXPOSURE) for one in pictures], axis=1))
+
+
 def ear(file: Path) -> list[tuple[str, ...]]:
     """Draw it by each way, side by side; rows of the light through a part with the layers on both sides, over what
     arrives: exact plates, the scene's closed form, and what a half space's law has left beyond the thickness."""
@@ -112,7 +131,7 @@ def ear(file: Path) -> list[tuple[str, ...]]:
     laws, pictures, rows = scene.laws_of(request.stack), [], []
     with opened() as context, Stage(context, request.size) as stage:
         stage.draw(scene.scene_of(request))
-        for kind in ("stack", "dipole", "half space"):
+        for kind in PICTURED:
             way = scene.technique(replace(request, kind=kind), laws)
             pictures.append(to_srgb(stage.render(way.by, way.mfp, request.sampling, way.alpha)[::-1], 1.5))
     image.imsave(file, np.concatenate(pictures, axis=1))
@@ -132,11 +151,12 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--frames", action="store_true", help="time of a frame over resolution and faces, only")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the errors by pose and way there too")
-    parser.add_argument("--ear", type=Path, metavar="FILE", help="an ear lit from behind, only")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="the pictures, only")
     request, given = request_of(), parser.parse_args(arguments)
-    if given.ear is not None:
+    if given.pictures is not None:
+        head_picture(given.pictures / "render-layers.png")
         columns = ("light through skin", "mm", "exact", "closed form", "half space's rest")
-        show("Of light that arrives [-]", columns, ear(given.ear))
+        show("Of light that arrives [-]", columns, ear(given.pictures / "render-ear.png"))
         return
     if given.frames:
         show("A frame of 16 samples a pixel", ("pixels", "faces", "ms"), frames(request))

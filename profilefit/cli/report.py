@@ -91,7 +91,7 @@ def report(
     elif claims:
         _show_claims(evidence_folder(folder, evidence), folder, quiet)
     else:
-        _show(contents, bool(names))
+        _show(contents, folder, bool(names))
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
 
@@ -103,12 +103,15 @@ def _require_one(flags: dict[str, object]) -> None:
         raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
 
 
-def _show(contents: dict[str, dict[str, Any]], named: bool) -> None:
+def _show(contents: dict[str, dict[str, Any]], folder: Path, named: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import put, screen
         from profilefit.report import record_tables, summary
+        from profilefit.report.tables.stack_table import stack_table
 
     parts = [part for one in contents.values() for part in record_tables(one)] if named else [summary(contents)]
+    if not named and (stacks := stack_table(folder)) is not None:
+        parts.append(stacks)
     console = screen()
     for part in parts:
         put(part, console)

@@ -18,7 +18,7 @@ from profilefit.report.page import fits
 from profilefit.report.page.fits import provenance
 from profilefit.report.page.markup import element, section
 from profilefit.report.page.measured import EvidenceFolder
-from profilefit.report.page.sections import failures, promises, shader, speed
+from profilefit.report.page.sections import failures, layers, promises, shader, speed
 from profilefit.report.records import Source
 
 Tracked = Callable[[list[str]], Iterable[str]]
@@ -40,6 +40,7 @@ PARTS = {
     "quality": "How good, by albedo",
     "paper": "The paper's figures again",
     "records": "Each record",
+    "stacks": "Layers",
     "stability": "Where methods fail",
     "tradeoff": "Speed against accuracy",
     "check": "In a shader",
@@ -98,12 +99,12 @@ def write_page(
         record.read(file, whole=True)
     measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
     measured["claims"] = "\n".join(promises(found))
-    makers = _makers(source, path.name) | {key: partial(str, text) for key, text in measured.items()}
+    makers = _makers(source, found, path.name) | {key: partial(str, text) for key, text in measured.items()}
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     write_whole(path, _document(made, len(source.paths)))
 
 
-def _makers(source: Source, page: str) -> dict[str, Callable[[], str]]:
+def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
     """Part -> what makes it; each record is a part of its own, since they take longest."""
     return {
         "fits": lambda: fits.overview(source),
@@ -111,6 +112,7 @@ def _makers(source: Source, page: str) -> dict[str, Callable[[], str]]:
         "constants": lambda: fits.whole_figure(source, "constants"),
         "quality": lambda: fits.whole_figure(source, "quality"),
         "paper": lambda: "\n".join(fits.paper_figures(source)),
+        "stacks": lambda: "\n".join(layers(source, found)),
         **{f"{RECORD}{name}": partial(fits.record_part, source, name) for name in source.paths},
         "provenance": lambda: "\n".join(provenance(source, page)),
     }

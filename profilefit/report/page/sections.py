@@ -9,8 +9,10 @@ from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.drawing import address
 from profilefit.report.page.markup import details, element, figure, markup, paragraph
 from profilefit.report.page.measured import EvidenceFolder, Told, missing
+from profilefit.report.records import Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
+from profilefit.report.tables.stack_table import stack_table
 from profilefit.studies.stability.cells import Verdict
 
 # `python -m benchmarks.render` makes them.
@@ -19,6 +21,12 @@ RENDERS = {
     "render-error.png": "Error of renders over samples a pixel and over time, against the exact picture.",
     "render-choices.png": "The same head by each way to sample.",
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
+}
+# `python -m benchmarks.layers --pictures` makes them.
+OF_LAYERS = {
+    "render-layers.png": "A head of layered skin: its truth, the law of the stack, the first layer's dipole (Zhao et "
+    "al.), the nearest half space.",
+    "render-ear.png": "An ear lit from behind, by the same three ways.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),
@@ -36,6 +44,18 @@ def shader(found: EvidenceFolder) -> Iterator[str]:
     told = found.told("check")
     yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
     for name, title in RENDERS.items():
+        path = found.folder / name
+        if path.exists():
+            yield _picture(path.read_bytes(), title)
+
+
+def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
+    """The parts of the section: records of stacks, and pictures; none where there is no record."""
+    table = None if source.names else stack_table(source.folder)
+    if table is None:
+        return
+    yield markup(table)
+    for name, title in OF_LAYERS.items():
         path = found.folder / name
         if path.exists():
             yield _picture(path.read_bytes(), title)
