@@ -33,9 +33,9 @@ def choose(
     """Find the cheapest option within a scene's limits.
 
     The limits are its error tolerance and its time budget. Options range from no scattering through filters to samples
-    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by tracing both,
-    in its worst colour. Half a minute. --json prints every option and its constants. Exit status 1 if no option is
-    within the limits.
+    of a law, each with its predicted error; and whether one layer is enough for a stack of layers, by exact light
+    or traced, in its worst colour, and whether light scattered once needs a pass. Half a minute. --json prints every
+    option and its constants. Exit status 1 if no option is within the limits.
 
     \b
     Example, on a file of profilefit examples:

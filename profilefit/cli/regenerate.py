@@ -53,8 +53,8 @@ def regenerate(
     One record a recipe, in some seconds each, as many side by side as there are cores. Ctrl-C loses what is in flight
     only: photons that are traced stay, and the same command resumes.
 
-    A file with [[layers]] is a stack: its law is fitted to exact light, a minute or two, and its record goes to
-    OUT/stacks.
+    A file of layers is a stack: its law is fitted to exact light in two to four minutes, longer where a layer scatters
+    forward, and its record goes to OUT/stacks.
 
     \b
     Examples, the last on a file of profilefit examples:

@@ -70,10 +70,15 @@ def report(
         from profilefit.report import every_law
         from profilefit.report.tables import law_tables
         from profilefit.report.tables.claims_table import read_claims
+        from profilefit.report.tables.stack_table import stack_table
 
     printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
     _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
+    only_stacks = not names and not any(printed.values()) and not record.available(folder)
+    if only_stacks and (stacks := stack_table(folder)) is not None:
+        show([stacks], screen())
+        return
     contents = record.chosen(folder, names)
     if markdown is not None:
         _fill(markdown, contents, folder, quiet)

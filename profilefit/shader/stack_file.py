@@ -96,5 +96,6 @@ def _plain(record: StackRecord) -> dict[str, Any]:
         "layers": record.stack.layers,
         "numbers": {key: {k: v for k, v in one.items() if math.isfinite(v)} for key, one in numbers.items()},
         "constants": record.content["constants"],
+        "half_spaces": record.content["half_spaces"],
         "sha256": record.digest,
     }

@@ -19,7 +19,9 @@ import profilefit
 from mcml_sim.cli.app import app as mcml_sim_cli
 from profilefit import cli
 from profilefit.recipes import inventory, recipe
+from profilefit.recipes.stack import record as stack_record
 from profilefit.shader.law_file import export
+from profilefit.shader.stack_file import export_stack
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS, FITS = ROOT / "docs", ROOT / "fits"
@@ -136,11 +138,15 @@ def test_the_law_of_thirty_lines_is_one(monkeypatch, capsys):
 
 
 @pytest.mark.skipif(shutil.which("glslangValidator") is None, reason="glslangValidator is not there (glslang-tools)")
-def test_the_shader_that_is_printed_compiles(tmp_path):
-    law = export(inventory.find("hazard-diffuse", FITS), FITS)
-    main = "in vec2 uv;\nout vec4 colours;\nvoid main() { colours = vec4(radiance(uv)); }\n"
+@pytest.mark.parametrize(("printed", "call"), [("scatter", "radiance(uv)"), ("scatter_stack", "radiance(uv), 1.0")])
+def test_the_shader_that_is_printed_compiles(tmp_path, printed, call):
+    if printed == "scatter":
+        law = export(inventory.find("hazard-diffuse", FITS), FITS)
+    else:
+        law = export_stack(stack_record.load(FITS / stack_record.FOLDER / "skin.json"))
+    main = f"in vec2 uv;\nout vec4 colours;\nvoid main() {{ colours = vec4({call}); }}\n"
     path = tmp_path / "scatter.frag"
-    path.write_text(f"#version 330\n{law}{(EXAMPLES / 'scatter.glsl').read_text()}{main}", encoding="utf-8")
+    path.write_text(f"#version 330\n{law}{(EXAMPLES / f'{printed}.glsl').read_text()}{main}", encoding="utf-8")
     told = subprocess.run(["glslangValidator", path], capture_output=True, text=True, check=False)
     assert told.returncode == 0, told.stdout
 

@@ -85,8 +85,8 @@ def definitions(source: str) -> Iterator[list[str]]:
         yield block.rstrip().splitlines()
 
 
-def test_there_are_six_and_a_table_of_them():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06"]
+def test_there_are_seven_and_a_table_of_them():
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07"]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
 
 
@@ -210,6 +210,21 @@ def test_fits_report_what_is_not_identifiable():
     assert "MISFIT (p-value below 1e-16)" in text
     ((data, misfit),) = re.findall(r"two layers: mu_a = \S+ ± (\S+) \(statistical\) ± (\S+) \(lack of fit\)", text)
     assert float(misfit) > 24 * float(data)
+
+
+@pytest.mark.slow
+def test_layers_matter_where_mean_free_paths_differ():
+    text = printed("07-when-do-layers-matter")
+    (skin,) = numbers(r"red: A .* off by (\S+) % of white at an edge", text)
+    assert 1 < skin < 3
+    (layers, half_space) = re.findall(r"beyond .* mm: (\S+) of the light .*, (\S+) of that of the half space", text)[0]
+    assert float(layers) > 5 * float(half_space)
+    assert 0 < max(numbers(r"cdf off by (\S+) %", text)) < 0.5
+    errors = re.findall(r"below (\S+) times its mean free path: (\S+) %", text)
+    alike = [float(error) for length, error in errors if length == "1"]
+    others = [float(error) for length, error in errors if length != "1"]
+    assert max(alike) < 0.2
+    assert min(others) > 0.5
 
 
 @pytest.mark.slow

@@ -208,9 +208,11 @@ def beams(medium: Medium, cosine: Floats) -> list[Beam]:
     indices = [medium.n_above, *(layer.n for layer in medium.layers)]
     if not medium.is_half_space:
         indices.append(medium.n_below)
-    invariant = medium.n_above * np.sqrt((1.0 - cosine) * (1.0 + cosine))
-    sines = [invariant / n for n in indices]
-    cosines = [cosine, *(np.sqrt(np.maximum((1.0 - sine) * (1.0 + sine), 0.0)) for sine in sines[1:])]
+    n0 = medium.n_above
+    sines = [n0 * np.sqrt((1.0 - cosine) * (1.0 + cosine)) / n for n in indices]
+    # n^2 mu^2 = n^2 - n0^2 + n0^2 mu0^2: of 1 - sine^2 light that grazes the surface leaves few digits.
+    squared = [(n - n0) * (n + n0) + (n0 * cosine) ** 2 for n in indices[1:]]
+    cosines = [cosine, *(np.sqrt(np.maximum(one, 0.0)) / n for one, n in zip(squared, indices[1:], strict=True))]
     mirror = [
         np.where(sines[j + 1] < 1.0, fresnel(indices[j], indices[j + 1], cosines[j])[0], 1.0)
         for j in range(len(indices) - 1)

@@ -24,7 +24,8 @@ from profilefit.shader.stack_text import single_text, stack_text
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 SCATTERED = "scattered_map"
-COSINES, SHARES = 24, 12  # of the table of what leaves after one scattering
+COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4
+GRAZING = 1e-3  # cosine that stands for 0, where a quadrature is of no use
 RULE = 24  # directions of its quadrature, for slope and azimuth each
 
 
@@ -109,8 +110,8 @@ class WithSingle(Technique):
 
 
 def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
-    """(SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines of the light along rows."""
-    cosine = (np.arange(COSINES) + 0.5) / COSINES
+    """(SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines 0 to 1 along rows."""
+    cosine = np.maximum(np.linspace(0.0, 1.0, COSINES), GRAZING)
     thickness = np.linspace(least, most, SHARES)
     rows = [[once(_with_first(one, d), cosine) for one in media] for d in thickness]
     return np.moveaxis(np.array(rows), 1, 2).astype(np.float32)

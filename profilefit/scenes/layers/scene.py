@@ -116,12 +116,13 @@ def read(file: str, content: Table) -> LayersRequest:
 def draw(context: moderngl.Context, request: LayersRequest) -> Drawn:
     """The picture, its truth, error and cost: some minutes, most of them for exact light at nine thicknesses."""
     media, light = request.stack.stack.media, request.stack.illumination
-    table = stack_table(media, request.least, request.most, light)
     scene = scene_of(request)
-    way = technique(request, laws_of(request.stack) if request.kind in ("stack", "none") else None)
     with Stage(context, (2 * request.size[0], 2 * request.size[1])) as stage:
         stage.draw(scene)
         fine = stage.buffers()
+    _require_lit(request.file, fine)  # before the minutes that exact light takes
+    table = stack_table(media, request.least, request.most, light)
+    way = technique(request, laws_of(request.stack) if request.kind in ("stack", "none") else None)
     with Stage(context, request.size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()

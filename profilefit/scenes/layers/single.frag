@@ -2,7 +2,7 @@
 // white wall's, so that no energy comes or goes. The light far away only; light from everywhere has no direction.
 
 uniform sampler2D scattered_map, reflectance_map, position_map, normal_map;
-uniform sampler2D once_table; // exitance over irradiance; cosine of the light along rows, thickness across
+uniform sampler2D once_table; // exitance over irradiance; cosine of the light along rows, 0 to 1, thickness across
 uniform vec3 toward_light; // in view space
 uniform vec3 light; // irradiance of a surface that faces it [-]
 uniform float perspective;
@@ -11,10 +11,10 @@ out vec4 exitance;
 
 const float PI = 3.141592653589793;
 
-// Between four values of the table, even in both and taken in the middle of its columns.
+// Between four values of the table, even in both.
 vec3 left_once(float cosine, float share) {
     ivec2 last = textureSize(once_table, 0) - 1;
-    vec2 place = clamp(vec2(cosine * float(last.x + 1) - 0.5, share * float(last.y)), vec2(0.0), vec2(last));
+    vec2 place = clamp(vec2(cosine, share) * vec2(last), vec2(0.0), vec2(last));
     ivec2 corner = min(ivec2(place), max(last - 1, ivec2(0)));
     vec2 rest = place - vec2(corner);
     ivec2 next = min(corner + 1, last);
