@@ -58,13 +58,17 @@ def export(
     """
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
+        from profilefit.recipes.folder import LOCAL, fits_folder
         from profilefit.recipes.inventory import find
         from profilefit.recipes.stack import record as stack_record
         from profilefit.shader import export as exported
         from profilefit.shader.stack_file import export_stack
 
     folder = records_folder(fits)
-    if (path := stack_record.find(what, folder)) is not None:
+    path = stack_record.find(what, folder)
+    if path is None and fits is None:  # beside one's own records of other laws, or where there are none of these
+        path = stack_record.find(what, LOCAL) or stack_record.find(what, fits_folder())
+    if path is not None:
         if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
             raise InputError(f"{given[0]} must be left out where NAME is a stack, got {what!r}")
         text = export_stack(stack_record.load(path), lang, name)

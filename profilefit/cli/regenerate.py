@@ -16,6 +16,7 @@ from profilefit.errors import InputError
 from profilefit.recipes.folder import LOCAL, fits_folder
 
 PHOTON_STORE = ".photons"
+SEED = 1
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
 PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
 
@@ -39,7 +40,7 @@ def regenerate(
     out: Annotated[
         Path, typer.Option(help="Folder for the records, and for the photons that a rerun resumes.")
     ] = LOCAL,
-    seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, 0 to 4294967295.")] = 1,
+    seed: Annotated[int, typer.Option(help="Seed of the photons and of the chains, 0 to 4294967295.")] = SEED,
     photons: Annotated[
         int | None, typer.Option(help="Number of photons in each setting instead of the preset's.")
     ] = None,
@@ -82,6 +83,10 @@ def regenerate(
     others = [name for name in recipes or () if not stack_record.is_stack(name)]
     those = chosen(others, fits_folder()) if others or not stacks else ()
     stack_record.require_apart(stacks)
+    if stacks:
+        _require_default(
+            {"--preset": preset is not Preset.QUICK, "--seed": seed != SEED, "--photons": photons is not None}
+        )
     require_folder(out)
     begin = time.perf_counter()
     run = RecipeRun(
@@ -105,3 +110,10 @@ def regenerate(
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
     if as_json:
         print_json({name: {**outcome(path), "seconds": round(seconds[name], 1)} for name, path in written.items()})
+
+
+def _require_default(given: dict[str, bool]) -> None:
+    """InputError on an option that stacks do not take."""
+    for option, is_given in given.items():
+        if is_given:
+            raise InputError(f"{option} must be left out where a stack is fitted: its light and starts are fixed")

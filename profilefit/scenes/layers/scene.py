@@ -133,7 +133,7 @@ def draw(context: moderngl.Context, request: LayersRequest) -> Drawn:
         exitance = stage.scatter(way.by, way.mfp, request.sampling, way.alpha)
         seen = way.shown(request, media)
         radiance = stage.render(seen, way.mfp, request.sampling, way.alpha)
-        frame = tuple(stage.time(seen, way.mfp, request.sampling, TURNS, "frame"))
+        frame = tuple(stage.time(seen, way.mfp, request.sampling, TURNS, "frame", way.alpha))
     true = radiance + (judge.truth - exitance) / np.pi
     return Drawn(
         picture=to_srgb(radiance[::-1], EXPOSURE),

@@ -51,7 +51,9 @@ def points(
     """
     each = [replace(sampling, samples=number) for number in samples]
     errors = [judge.rmse(judge.stage.scatter(by, judge.mfp, one, judge.alpha)) for one in each]
-    times = np.array([[judge.stage.time(by, judge.mfp, one, repeats=1)[0] for one in each] for _ in range(turns)])
+    times = np.array(
+        [[judge.stage.time(by, judge.mfp, one, 1, fixed_alpha=judge.alpha)[0] for one in each] for _ in range(turns)]
+    )
     return [
         ChartPoint(label, one.samples, error, tuple(taken))
         for one, error, taken in zip(each, errors, times.T.tolist(), strict=True)

@@ -109,7 +109,13 @@ class Stage:
         return pixels(self.targets.map(RADIANCE))[..., :3]
 
     def time(
-        self, law: By, mfp: ArrayLike, sampling: Sampling = DEFAULT, repeats: int = 5, passes: str = "scatter"
+        self,
+        law: By,
+        mfp: ArrayLike,
+        sampling: Sampling = DEFAULT,
+        repeats: int = 5,
+        passes: str = "scatter",
+        fixed_alpha: ArrayLike | None = None,
     ) -> list[float]:
         """Milliseconds of each repeat, by the driver's clock where it is to be trusted; all is compiled before.
 
@@ -120,8 +126,8 @@ class Stage:
         if passes == "frame" and self._scene is None:
             raise InputError("passes must be scatter where no scene was drawn, got 'frame'")
         by = technique(law)  # a law's source is written once, and not in the time that is taken
-        self._frame(by, mfp, sampling, passes)
-        return [self._timed(lambda: self._frame(by, mfp, sampling, passes)) for _ in range(repeats)]
+        self._frame(by, mfp, sampling, passes, fixed_alpha)
+        return [self._timed(lambda: self._frame(by, mfp, sampling, passes, fixed_alpha)) for _ in range(repeats)]
 
     def release(self) -> None:
         """Frees all that the stage has on the GPU; the context is its owner's."""
@@ -163,10 +169,10 @@ class Stage:
     def _combine(self, by: Technique, frame: Frame) -> None:
         self._run(combination(by, frame))
 
-    def _frame(self, law: By, mfp: ArrayLike, sampling: Sampling, passes: str) -> None:
+    def _frame(self, law: By, mfp: ArrayLike, sampling: Sampling, passes: str, fixed_alpha: ArrayLike | None) -> None:
         if passes == "frame" and self._scene is not None:
             self._geometry.draw(self._scene, self.targets.surface)
-        drawn = self._scatter(law, mfp, sampling, None)
+        drawn = self._scatter(law, mfp, sampling, fixed_alpha)
         if passes == "frame":
             self._combine(*drawn)
 

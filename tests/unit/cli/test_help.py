@@ -73,8 +73,8 @@ def test_options_and_files_of_every_example_are_there(line):
     program, name, *rest = shlex.split(line)
     one = SUBCOMMANDS[program, name]
     context = one.make_context(name, rest)
-    given = [one for value in context.params.values() for one in (value if isinstance(value, list | tuple) else [value])]
-    files = [str(value) for value in given if str(value).startswith("examples/")]
+    lists = (value if isinstance(value, list | tuple) else [value] for value in context.params.values())
+    files = [str(one) for values in lists for one in values if str(one).startswith("examples/")]
     assert all((ROOT / path).is_file() for path in files)
     assert len(files) == line.count("examples/")
 

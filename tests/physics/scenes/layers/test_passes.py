@@ -1,0 +1,239 @@
+"""The passes of layered objects: light scattered once, in its own directions, and samples of a stack's law."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import profilefit
+from mcml_sim import Layer, Medium, Setting, half_space
+from mcml_sim.exact.single_scattering import reflected
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.scenes.layers import passes
+from profilefit.scenes.layers.law import single_scattering
+from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_space, of_stack, once, once_table
+from profilefit.scenes.stage.buffers import flat
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.world import unit
+from tests.unit.scenes.scenes import ball, scene
+
+SIZE, SAMPLES = (96, 96), Sampling(4)
+LEAST, MOST = 0.05, 0.5  # thickness of the first layer [mm]
+# Of each colour mu_a and mu_s of two layers [1/mm], and near what a fit of such a stack gives for its interface.
+COLOURS = (((0.05, 1.8), (0.20, 1.13)), ((0.20, 2.2), (0.80, 1.2)), ((0.35, 2.6), (1.2, 1.3)))
+CONSTANTS = {"w": 0.2, "u": -0.4, "g1": 0.95, "g2": 1.5, "b1": 0.06, "b2": 0.01, "h0": 0.78, "h1": 1.16, "k0": 0.17}
+
+
+def media(n: float = 1.4, g: float = 0.0) -> tuple[Medium, Medium, Medium]:
+    red, green, blue = (
+        Medium(
+            tuple(
+                Layer(n, mu_a, mu_s, g / place, d)
+                for place, ((mu_a, mu_s), d) in enumerate(zip(colour, (0.3, np.inf), strict=True), start=1)
+            )
+        )
+        for colour in COLOURS
+    )
+    return red, green, blue
+
+
+def laws(n: float = 1.4) -> list[StackLaw]:
+    setting = Setting("diffuse", n=n)
+    own = profilefit.load("hazard", setting=setting)
+    found = []
+    for medium in media(n):
+        top, below = (LayerLaw(setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
+        found.append(StackLaw(setting, top, below, 0.3, **CONSTANTS))
+    return found
+
+
+MFP = tuple(medium.layers[0].mfp for medium in media())
+
+
+def under(medium: Medium, thickness: float) -> Medium:
+    first, *others = medium.layers
+    return Medium((replace(first, thickness=thickness), *others))
+
+
+def left(medium: Medium, cosine: np.ndarray) -> np.ndarray:
+    """`once` by another rule."""
+    node, weight = np.polynomial.legendre.leggauss(90)
+    turn = np.pi * (np.arange(96) + 0.5) / 96
+    out = 0.5 * (node + 1.0)
+    radiance = single_scattering(medium, cosine[:, None, None], out[:, None], turn)
+    return np.pi * np.einsum("moa,o->m", radiance, weight * out) / 96 / cosine
+
+
+def test_once_is_what_a_half_space_gives():
+    """n = 1, g = 0: alpha / 2 (1 - mu ln(1 + 1 / mu))."""
+    cosine = np.array([0.02, 0.05, 0.1, 0.3, 0.6, 1.0])
+    known = 0.45 * (1.0 - cosine * np.log1p(1.0 / cosine))
+    np.testing.assert_allclose(once(half_space(0.9), cosine), known, rtol=2e-7)  # of the quadrature where light grazes
+    assert np.all(np.abs(once(half_space(0.91), cosine) / known - 1.0) > 0.01)
+    grazing = once(half_space(0.9), np.array([passes.GRAZING]))
+    assert grazing == pytest.approx(0.45 * (1.0 - passes.GRAZING * np.log1p(1.0 / passes.GRAZING)), rel=1e-3)
+
+
+@pytest.mark.parametrize("n", [1.0, 1.4])
+@pytest.mark.parametrize("g", [0.0, 0.5])
+def test_of_diffuse_light_it_is_the_half_space_s(n, g):
+    """Another sum of the same light, over spheroids; and a layer cut in two is one."""
+    whole = Layer(n, 1.0, 9.0, g)
+    share = 0.9 * reflected(Setting("diffuse", n=n, g=g))
+    assert diffusely_once(Medium((whole,))) == pytest.approx(share, rel=1e-7)
+    assert diffusely_once(Medium((replace(whole, thickness=0.03), whole))) == pytest.approx(share, rel=1e-7)
+    other = Medium((replace(whole, thickness=0.03), replace(whole, mu_a=2.0)))
+    assert diffusely_once(other) < 0.99 * share
+
+
+@pytest.mark.parametrize(("n", "accepted"), [(1.0, 2e-4), (1.4, 5e-5)])
+def test_the_table_is_right_between_its_places(n, accepted):
+    """Of the light that arrives, cos_in once(cos_in): what comes or goes where the table is wrong."""
+    three = media(n, 0.5)
+    table = once_table(three, LEAST, MOST)
+    assert table.shape == (passes.SHARES, passes.COSINES, 3)
+    cosine = np.linspace(0.005, 1.0, 60)
+    for share in (0.0, 0.04, 0.5, 1.0):
+        found = between(table, cosine, np.full_like(cosine, share))
+        for channel, medium in enumerate(three):
+            known = left(under(medium, LEAST + (MOST - LEAST) * share), cosine)
+            assert np.max(np.abs(found[:, channel] - known) * cosine) < accepted
+    assert np.max(np.abs(between(table, cosine, np.full_like(cosine, 0.6))[:, 0] - found[:, 0]) * cosine) > accepted
+
+
+def between(table, cosine, share):
+    """(m, 3): the shader's two ways between four values, in numpy."""
+    last = np.array(table.shape[1::-1]) - 1
+    place = np.stack([cosine, share], axis=-1) * last
+    corner = np.minimum(place.astype(int), last - 1)
+    x, y = (place - corner).T[..., None]
+    i, j = corner.T
+    low, high = (table[row, i] + (table[row, i + 1] - table[row, i]) * x for row in (j, j + 1))
+    return low + (high - low) * y
+
+
+def added(three, share, into, out, azimuth, exitance=left):
+    """pi L less what leaves alike in all directions, (m, 3): of unit irradiance on a plane across the light."""
+    found = []
+    for medium in three:
+        each = []
+        for part, mu, eye, turn in zip(share, into, out, azimuth, strict=True):
+            own = under(medium, LEAST + (MOST - LEAST) * float(part))
+            radiance = single_scattering(own, float(mu), float(eye), float(turn))
+            each.append(np.pi * radiance - float(mu * exitance(own, np.array([mu]))[0]))
+        found.append(each)
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("n", [1.0, 1.4])
+def test_no_energy_comes_or_goes(n):
+    """Over all directions of the eye, each by its cosine, what the pass adds is nothing; in one direction it is not."""
+    node, weight = np.polynomial.legendre.leggauss(64)
+    out, of_out = 0.5 * (node + 1.0), weight * 0.5 * (node + 1.0)  # 2 mu dmu: the mean over a hemisphere
+    turn = np.pi * (np.arange(48) + 0.5) / 48
+    for medium in media(n, 0.5):
+        for thickness in (LEAST, MOST):
+            own = under(medium, thickness)
+            for cosine in (0.05, 0.4, 1.0):
+                radiance = np.pi * np.asarray(single_scattering(own, cosine, out[:, None], turn))
+                alike = cosine * once(own, np.array([cosine]))
+                apart = radiance - alike
+                assert of_out @ apart.mean(axis=1) == pytest.approx(0.0, abs=1e-7)
+                assert of_out @ np.abs(apart).mean(axis=1) > 0.05 * alike
+
+
+@pytest.fixture
+def stage(context):
+    with Stage(context, SIZE, shadow_side=256) as stage:
+        yield stage
+
+
+def uneven_ball():
+    """Thin at one side, thick at the other."""
+    values = np.linspace(0.0, 1.0, 64, dtype=np.float32)[None, :, None]
+    return replace(ball(), reflectance=np.broadcast_to(values, (8, 64, 3)).copy())
+
+
+@pytest.mark.parametrize("kind", ["orthographic", "perspective"])
+@pytest.mark.parametrize("g", [0.0, 0.6])
+def test_the_shader_adds_what_numpy_does(stage, kind, g):
+    """On a ball, at some pixels that the light reaches: by the same table to float32, by the whole formula to 1e-4."""
+    direction, three = (0.5, 0.4, 0.6), media(1.4, g)
+    drawn = scene(direction, uneven_ball(), kind=kind)
+    drawn = replace(drawn, light=replace(drawn.light, irradiance=(1.0, 0.8, 0.5)))
+    stage.draw(drawn)
+    by = of_stack(laws(), LEAST, MOST, ())
+    plain, seen = stage.scatter(by, MFP, SAMPLES), stage.buffers()
+    single = WithSingle.of(by, three, LEAST, MOST)
+    found = stage.scatter(single, MFP, SAMPLES).astype(float) - plain
+    toward = drawn.camera.view()[:3, :3] @ unit(direction)
+    into = seen.normal.astype(float) @ toward
+    lit = (seen.mask > 0.5) & (into > 0.0)
+    np.testing.assert_array_equal(found[~lit], 0.0)
+    eye = np.broadcast_to([0.0, 0.0, 1.0], seen.normal.shape)
+    if kind == "perspective":
+        eye = unit(np.where(lit[..., None], -seen.position, eye))
+    out = np.sum(seen.normal * eye, axis=-1)
+    chosen = np.argwhere(lit & (out > 0.05) & (into > 0.05))[:: max(1, int(lit.sum() / 40))]
+    assert len(chosen) > 20
+    at = tuple(chosen.T)
+    onward = into[at][:, None] * seen.normal[at] - toward
+    leaving = eye[at] - out[at][:, None] * seen.normal[at]
+    turned = np.sum(unit(onward) * unit(leaving), axis=1)
+    angle = np.arccos(np.clip(turned, -1.0, 1.0))
+    share, light = seen.reflectance[at][:, 0], np.array(drawn.light.irradiance) * seen.visibility[at][:, None]
+    assert np.ptp(share) > 0.3
+    rows = between(single.table, into[at], share)
+    by_table = np.array(
+        [
+            [
+                np.pi
+                * single_scattering(under(medium, LEAST + (MOST - LEAST) * float(s)), float(i), float(o), float(a))
+                for medium in three
+            ]
+            for s, i, o, a in zip(share, into[at], out[at], angle, strict=True)
+        ]
+    )
+    np.testing.assert_allclose(found[at], light * (by_table - into[at][:, None] * rows), atol=5e-6)
+    known = light * added(three, share, into[at], out[at], angle)
+    np.testing.assert_allclose(found[at], known, atol=1e-4)
+    assert np.max(np.abs(known)) > 1e-3
+    # The comparison can fail: light that turns the other way along the surface, where scattering has a direction.
+    mirrored = light * added(three, share, into[at], out[at], np.pi - angle)
+    assert (np.max(np.abs(found[at] - mirrored)) > 1e-3) == (g > 0)
+
+
+def test_light_from_everywhere_has_no_direction(stage):
+    """Nor has light from behind: there the pass changes not a bit."""
+    by = of_stack(laws(), LEAST, MOST, ())
+    single = WithSingle.of(by, media(), LEAST, MOST)
+    stage.draw(scene((0.0, 0.0, -1.0), uneven_ball()))
+    np.testing.assert_array_equal(stage.scatter(single, MFP, SAMPLES), stage.scatter(by, MFP, SAMPLES))
+    stage.upload(flat(SIZE, 1.0, 0.5))
+    np.testing.assert_array_equal(stage.scatter(single, MFP, SAMPLES), stage.scatter(by, MFP, SAMPLES))
+
+
+@pytest.mark.parametrize("n", [1.0, 1.4])
+@pytest.mark.parametrize("mfp", [3.0, 1e-3], ids=["blurred", "not blurred"])
+def test_a_furnace_of_three_thicknesses(stage, n, mfp):
+    """Even light on a plane: each pixel gives A of its own thickness, whatever lies beside it."""
+    share = np.repeat([0.0, 0.3, 1.0], SIZE[0] // 3)
+    light = np.array([1.0, 0.7, 0.2])
+    stage.upload(flat(SIZE, 1.0, share[None, :, None], light))
+    found = stage.scatter(of_stack(laws(n), LEAST, MOST, ()), mfp, SAMPLES)
+    known = np.stack([law.total(LEAST + (MOST - LEAST) * share) for law in laws(n)], axis=-1) * light
+    np.testing.assert_allclose(found, np.broadcast_to(known, found.shape), rtol=2e-5)  # float32
+    assert np.all(np.ptp(known, axis=0) > 0.02 * light)
+
+
+def test_a_half_space_everywhere(stage):
+    """Of the three albedos, whatever the map says of thicknesses."""
+    law, alpha = profilefit.load("hazard", setting=Setting("diffuse", n=1.4)), np.array([0.95, 0.8, 0.5])
+    known = np.array([LayerLaw(law.setting, law, one, 1.0).reflectance for one in alpha])
+    for share in (0.1, 0.9):
+        stage.upload(flat(SIZE, 1.0, share))
+        for mfp in (3.0, 1e-3):
+            found = stage.scatter(of_half_space(law), mfp, SAMPLES, alpha)
+            np.testing.assert_allclose(found, np.broadcast_to(known, found.shape), rtol=2e-5)  # float32
+    assert np.all(np.diff(known) < -0.05)

@@ -1,0 +1,175 @@
+"""Stacks of layers in the shell: from a file to its record, and from the record to one file for a shader."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from profilefit.materials import CHANNELS
+from profilefit.recipes import record
+from profilefit.recipes.stack import record as stacks
+from profilefit.shader.law_file import LANGUAGES
+from tests.unit.recipes.stack.test_record import STACK, made
+
+GREY = """\
+[[layers]]
+name = "veil"
+n = 1.0
+mu_a = 0.2
+mu_s = 2.2
+g = 0.0
+thickness = 0.3
+
+[[layers]]
+name = "wall"
+n = 1.0
+mu_a = 0.8
+mu_s = 1.2
+g = 0.0
+"""
+
+
+@pytest.fixture
+def heart(command, monkeypatch):
+    """STACK as a file, whose fit takes no time."""
+    monkeypatch.setattr(stacks, "_channel", made)
+    monkeypatch.setattr("profilefit.recipes.workers.cores", lambda: 1)
+    Path("heart.toml").write_text(STACK, encoding="utf-8")
+    return "heart.toml"
+
+
+def twin(text):
+    """The functions of a Python text."""
+    names: dict = {}
+    exec(text, names)
+    return names
+
+
+def test_a_stack_becomes_a_record_and_that_a_text(command, heart):
+    status, out, err = command("regenerate", heart, "--out", "mine", "--json", "--quiet")
+    assert (status, err) == (0, "")
+    told = json.loads(out)
+    assert list(told) == ["stacks/heart"]
+    law = stacks.load(Path("mine/stacks/heart.json")).laws[1]
+    status, text, err = command("export", "heart", "--lang", "python", "--fits", "mine")
+    assert (status, err) == (0, "profilefit: records of 'mine'\n")
+    assert command("export", "mine/stacks/heart.json", "--lang", "python") == (0, text, "")
+    names, r = twin(text), np.geomspace(0.01, 10.0, 30)
+    np.testing.assert_allclose(names["heart_profile"](r, 1.0, 0.2), law.profile(r, 0.2), rtol=1e-10)
+    assert names["heart_total"](1.0, 0.2) == pytest.approx(float(law.total(0.2)), rel=1e-10)
+    assert names["heart_once_radiance"](1.0, 0.2, 0.5, 0.5, 0.0) > 0
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+def test_every_language_says_what_it_is(command, heart, lang):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    path = Path("mine/stacks/heart.json")
+    status, text, err = command("export", str(path), "--lang", lang)
+    assert (status, err) == (0, "")
+    for said in ("epicardium", stacks.load(path).digest, "no error of photons", "mm", "jackknife"):
+        assert said.lower() in text.lower(), said
+    assert text.isascii()
+    if lang == "json":
+        told = json.loads(text)
+        assert (told["label"], told["setting"]) == ("heart", {"illumination": "diffuse", "n": 1.38, "g": 0.0})
+        assert told["constants"] == record.read(path)["constants"]
+        assert list(told["numbers"]) == sorted(CHANNELS)
+        assert told["half_spaces"] == record.read(path)["half_spaces"]
+    else:
+        mark = "#" if lang == "python" else "//"
+        head = text[: text.index("\n\n")].splitlines()
+        assert all(line.startswith(mark) for line in head)
+        assert any("rel at most 0.012, ks 0.003, A 0.0015" in line for line in head)
+        assert "+- 1e-05 (dr), +- 0.002 (misfit), +- 0.03 (jackknife)" in text
+
+
+def test_a_name_of_its_own_and_files(command, heart):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    words = ("export", "mine/stacks/heart.json", "--name", "left", "--out", "left.glsl")
+    assert command(*words) == (0, "", "")
+    text = Path("left.glsl").read_text()
+    assert "float left_profile(float r, float channel, float thickness)" in text
+    assert "heart_" not in text
+    Path("mine/stacks/heart.json").rename("mine/stacks/my-heart.json")
+    assert "float my_heart_profile(" in command("export", "mine/stacks/my-heart.json")[1]
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (
+            ("--constants", "published"),
+            "--constants must be left out where NAME is a stack, got 'mine/stacks/heart.json'",
+        ),
+        (("--n", "1.4"), "--n must be left out where NAME is a stack, got 'mine/stacks/heart.json'"),
+        (("--lang", "json", "--name", "x"), "name must be left out where lang is json, which has no functions"),
+        (("--lang", "cobol"), "lang must be one of glsl, hlsl, glsl-es, python, json, got 'cobol'"),
+        (("--name", "1st"), "name must be letters, digits and single underscores"),
+    ],
+)
+def test_what_a_stack_does_not_take_is_one_line(command, heart, words, said):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    status, out, err = command("export", "mine/stacks/heart.json", *words)
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("illumination", "colour", "heart.toml: keys must be of title, unit, illumination, layers, "),
+        ('"diffuse"', '"sun"', "heart.toml: illumination must be one of searchlight, diffuse, got 'sun'"),
+        (STACK[STACK.rindex("[[layers]]") :], "", "heart.toml: layers must be two layers or more"),
+        (
+            "[1.13, 1.2, 1.3]\ng = 0.0",
+            "[1.13, 1.2, 1.3]\ng = 0.0\nthickness = 1",
+            "last layer must be infinitely thick",
+        ),
+    ],
+)
+def test_a_mistake_in_the_file_is_one_line_and_writes_nothing(command, heart, old, new, said):
+    assert STACK.count(old) == 1
+    Path(heart).write_text(STACK.replace(old, new), encoding="utf-8")
+    status, out, err = command("regenerate", heart, "--out", "mine", "--quiet")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+    assert not Path("mine/stacks").exists()
+
+
+def test_two_files_of_one_name(command, heart):
+    Path("other").mkdir()
+    Path("other/heart.toml").write_text(STACK, encoding="utf-8")
+    status, out, err = command("regenerate", heart, "other/heart.toml", "--out", "mine")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert "stacks must have different names, as their records do, got 'heart' twice" in err
+
+
+@pytest.mark.slow
+def test_a_grey_stack_is_fitted(command):
+    """Truly: a minute or two."""
+    Path("veil.toml").write_text(GREY, encoding="utf-8")
+    status, out, err = command("regenerate", "veil.toml", "--out", "mine", "--quiet")
+    assert (status, out, err) == (0, "", "")
+    path = Path("mine/stacks/veil.json")
+    content = record.read(path)
+    kinds = ["discretisation_error", "jackknife_error", "misfit_error", "model_error", "statistical_error"]
+    for one in content["constants"].values():
+        found = {key: value for key, value in one.items() if key.endswith("_error")}
+        assert sorted(found) == kinds
+        assert [key for key, value in found.items() if value is None] == ["model_error", "statistical_error"]
+        assert all(value >= 0 for value in found.values() if value is not None)
+    worst = content["quality"]["regenerated"]
+    assert max(worst["rel"]) < 0.03
+    assert max(worst["ks"]) < 0.01
+    assert worst["delta_A"] < 0.01
+    # Between the thicknesses that were fitted the law is not the light itself, nor are all constants known exactly.
+    assert max(worst["rel"]) > 1e-4
+    for lang in ("glsl", "hlsl", "python", "json"):
+        status, text, err = command("export", str(path), "--lang", lang)
+        assert (status, err) == (0, "")
+        assert "veil" in text
+    law = stacks.load(path).laws[0]
+    names = twin(command("export", str(path), "--lang", "python")[1])
+    r = np.geomspace(0.01, 3.0, 30)
+    np.testing.assert_allclose(names["veil_profile"](r, 2.0, 0.3), law.profile(r, 0.3), rtol=1e-10)

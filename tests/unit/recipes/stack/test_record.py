@@ -1,0 +1,396 @@
+"""Records of stacks: what is written is read as the same laws, and what is no such record is refused in one line."""
+
+import hashlib
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from mcml_sim import Setting
+from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.recipes import catalogue, record
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.stack import record as stacks
+from profilefit.recipes.stack.record import StackRequest, find, load, matching, request_of, require_apart
+
+STACK = """\
+title = "Muscle under its skin"
+illumination = "diffuse"
+
+[[layers]]
+name = "epicardium"
+n = 1.38
+mu_a = [0.05, 0.20, 0.35]
+mu_s = [1.8, 2.2, 2.6]
+g = 0.0
+thickness = 0.3
+source = "assumed"
+
+[[layers]]
+name = "muscle"
+n = 1.38
+mu_a = [0.20, 0.80, 1.2]
+mu_s = [1.13, 1.2, 1.3]
+g = 0.0
+"""
+VEIL = """\
+[[layers]]
+name = "veil"
+n = 1.38
+mu_a = 0.1
+mu_s = [3, 4, 5]
+g = 0.0
+thickness = 0.05
+
+"""
+THREE = VEIL + STACK[STACK.index("[[layers]]") :]
+# Near what a fit of heart muscle gives for its interface; each channel and interface here has its own.
+CONSTANTS = {"w": 0.171, "u": -0.189, "g1": 1.03, "g2": 1.49, "b1": 0.027, "b2": 0.0075, "h0": 0.81, "h1": 1.08}
+CONSTANTS |= {"k0": 1 / 7}  # of more digits than a record has
+DIGEST = "0123456789abcdef" * 4
+RADII, THICKNESSES = np.geomspace(0.01, 10.0, 20)[:, None], np.array([0.0, 0.1, 0.5])  # [mm]
+
+
+def constants(medium, number):
+    """Of an interface, counted from the surface; of each medium its own."""
+    factor = 1.0 + 0.01 * medium.layers[0].mu_s + 0.1 * number
+    return {name: value * factor for name, value in CONSTANTS.items()}
+
+
+def made(illumination, medium):
+    """What `_channel` gives after a minute, at once: exact light has no photons, and nothing was fitted."""
+    setting = Setting(illumination, n=medium.layers[0].n)
+    own = catalogue.load("hazard", setting=setting).constants()
+    number = len(medium.layers) - 1
+    errors = {"statistical_error": None, "discretisation_error": 1e-5, "model_error": None}
+    errors |= {"misfit_error": 2e-3, "jackknife_error": 3e-2}
+    told = {"published": None, "free": True, **errors}
+    return {
+        "constants": {
+            f"{i + 1}.{name}": {**told, "regenerated": value}
+            for i in range(number)
+            for name, value in constants(medium, i).items()
+        },
+        "half_spaces": [own] * len(medium.layers),
+        "thicknesses": [np.array([0.1, 0.3])] * number,
+        "quality": [{"thickness": [0.2], "rel": [0.012], "ks": [0.003], "delta_A": [-0.0015]}] * number,
+        "starts": [{"count": 5, "as_good": 3, "results": ["converged"]}] * number,
+        "fit": [{"result": "converged", "steps": 9, "condition_number": 1e3}] * number,
+        "data_digest": DIGEST,
+    }
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    monkeypatch.setattr(stacks, "_channel", made)
+
+
+@pytest.fixture
+def file(tmp_path):
+    """Writes the stack above, pieces of it replaced, and gives the file's path."""
+
+    def write(*pieces, name="heart", text=STACK):
+        for old, new in zip(pieces[::2], pieces[1::2], strict=True):
+            assert text.count(old) == 1, "the piece to replace must be there, once"
+            text = text.replace(old, new)
+        path = tmp_path / f"{name}.toml"
+        path.write_text(text, encoding="utf-8")
+        return str(path)
+
+    return write
+
+
+@pytest.fixture
+def written(at_once, file, tmp_path):
+    """The record of the stack above."""
+    return stacks.regenerate(request_of(file()), tmp_path / "mine")
+
+
+def by_hand(of: StackRequest, channel: int) -> StackLaw:
+    medium = of.stack.media[channel]
+    setting = Setting(of.illumination, n=medium.layers[0].n)
+    own = catalogue.load("hazard", setting=setting)
+    *tops, law = (LayerLaw(setting, own, layer.alpha, layer.mfp) for layer in medium.layers)
+    for number in reversed(range(len(tops))):
+        rounded = {name: float(f"{value:.12g}") for name, value in constants(medium, number).items()}
+        law = StackLaw(setting, tops[number], law, medium.layers[number].thickness, **rounded)
+    return law
+
+
+@pytest.mark.parametrize("text", [STACK, THREE], ids=["two layers", "three"])
+def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path, text):
+    said: list[str] = []
+    of = request_of(file(text=text))
+    path = stacks.regenerate(of, tmp_path / "mine", say=said.append)
+    assert path == tmp_path / "mine" / "stacks" / "heart.json"
+    assert said == [f"heart: {channel} fitted" for channel in CHANNELS]
+    found = load(path)
+    assert (found.name, found.stack.media, found.stack.names) == ("heart", of.stack.media, of.stack.names)
+    assert found.stack.sources == of.stack.sources
+    assert found.setting == Setting("diffuse", n=1.38)
+    assert found.digest == hashlib.sha256(path.read_bytes()).hexdigest()
+    assert found.content["title"] == of.title
+    for channel, law in enumerate(found.laws):
+        known = by_hand(of, channel)
+        assert law.constants() == known.constants()
+        assert law.thickness == of.stack.media[channel].layers[0].thickness
+        np.testing.assert_array_equal(law.profile(RADII, THICKNESSES), known.profile(RADII, THICKNESSES))
+    assert found.laws[0].total(0.1) != found.laws[1].total(0.1)
+    assert len({one.constants()["w"] for one in found.laws}) == 3
+    again = stacks.regenerate(of, tmp_path / "again")
+    assert again.read_bytes() == path.read_bytes()
+
+
+def test_grey_layers_are_fitted_once(monkeypatch, file, tmp_path):
+    asked = []
+    monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
+    said: list[str] = []
+    grey = [("[0.05, 0.20, 0.35]", "0.2"), ("[1.8, 2.2, 2.6]", "2"), ("[0.20, 0.80, 1.2]", "0.8")]
+    grey += [("[1.13, 1.2, 1.3]", "1.2")]
+    path = stacks.regenerate(request_of(file(*(one for pair in grey for one in pair))), tmp_path, say=said.append)
+    assert (len(asked), said) == (1, ["heart: red, green, blue fitted"])
+    red, green, blue = load(path).laws
+    assert red.constants() == green.constants() == blue.constants()
+
+
+def test_the_record_says_what_it_is_worth(written):
+    content = record.read(written)
+    assert (content["pipeline"], content["law"], content["truth"]) == ("stack", "stack", {"kind": "exact"})
+    assert content["quality"]["regenerated"] == {"rel": [0.012] * 3, "ks": [0.003] * 3, "delta_A": 0.0015}
+    assert content["fit"]["result"] == "converged"
+    assert content["layers"] == load(written).stack.layers
+    assert len(content["constants"]) == 3 * len(CONSTANTS)
+    assert content["constants"]["green.1.w"] == {
+        "published": None,
+        "regenerated": float(f"{CONSTANTS['w'] * 1.022:.12g}"),
+        "free": True,
+        "statistical_error": None,
+        "discretisation_error": 1e-5,
+        "model_error": None,
+        "misfit_error": 2e-3,
+        "jackknife_error": 3e-2,
+    }
+
+
+def changed(place, value=None):
+    """A change of what stands at a dotted place in a record: it is lost, or another value is there."""
+
+    def change(content):
+        *above, last = place.split("/")
+        for name in above:
+            content = content[int(name) if isinstance(content, list) else name]
+        last = int(last) if isinstance(content, list) else last
+        if value is None:
+            del content[last]
+        else:
+            content[last] = value
+
+    return change
+
+
+def other_half_space(content):
+    content["half_spaces"]["green"][1]["a00"] *= 1.001
+
+
+IMAGE = {"image": "thickness.png", "range": [0.1, 0.2]}
+DAMAGE = {
+    r"must be the record of a stack, got pipeline 'profile'": changed("pipeline", "profile"),
+    r"is not a record of format 1 or 2, got 9": changed("format", 9),
+    r"is damaged: 'red.1.w' is missing; regenerate it": changed("constants/red.1.w"),
+    r"is damaged: constants.red.1.w.regenerated must be a number, got \"x\"": changed(
+        "constants/red.1.w/regenerated", "x"
+    ),
+    r"is damaged: constants.blue.1.u.regenerated must be a number, got nothing": changed(
+        "constants/blue.1.u/regenerated"
+    ),
+    r"was fitted with other constants of its half spaces; regenerate it": other_half_space,
+    r"was fitted with other constants .*; regenerate it": changed("half_spaces/red/0/a00"),
+    r"is damaged: half_spaces must be a table, got 3; regenerate it": changed("half_spaces", 3),
+    r"is damaged: half_spaces.red must be a list, got \"x\"": changed("half_spaces/red", "x"),
+    r"is damaged: half_spaces must be tables of numbers, got 1": changed("half_spaces/red/0", 1),
+    r"is damaged: half_spaces must be tables of numbers, got \{": changed("half_spaces/red/0/a00", [1.0]),
+    r"is damaged: half_spaces must be 2, one a layer, got 1": changed("half_spaces/red/0"),
+    r"is damaged: 'layers' is missing": changed("layers"),
+    r"is damaged: layers must be a list, got \"x\"": changed("layers", "x"),
+    r"is damaged: layers must be tables, got 3": changed("layers/0", 3),
+    r"is damaged: the last layer must be infinitely thick, got 0.3": changed("layers/1"),
+    r"is damaged: half_spaces must be 1, one a layer, got 2": changed("layers/0"),
+    r"is damaged: the last layer must be infinitely thick, got 2": changed("layers/1/thickness", 2.0),
+    r"is damaged: \[layers\] thickness may be infinite in the last layer only": changed("layers/0/thickness"),
+    r"is damaged: \[layers 2\] mu_a must be a number, got nothing": changed("layers/1/mu_a"),
+    r"is damaged: \[layers 1\] mu_s must be a coefficient >= 0, .*, got \[1\]": changed("layers/0/mu_s", [1]),
+    r"is damaged: layers must have one n for a law of a stack": changed("layers/1/n", 1.5),
+    r"is damaged: setting.n must be that of its layers, got 1.5": changed("setting/n", 1.5),
+    # Whatever is at that place: a record is no reason to open another file.
+    r"is damaged: thickness must be a number or null, got \{\"image\"": changed("layers/0/thickness", IMAGE),
+    r"is damaged: unit must be one line of printable text, .*, got 3": changed("unit", 3),
+    r"is damaged: 'note' is missing": changed("note"),
+    r"is damaged: 'quality' is missing": changed("quality"),
+    r"is damaged: quality.regenerated.rel must be a list of numbers, got \[\]": changed("quality/regenerated/rel", []),
+    r"is damaged: quality.regenerated.rel must be a list of numbers, got nothing": changed("quality/regenerated", 1),
+    r"is damaged: 'data_digest' is missing": changed("data_digest"),
+    r"is damaged: it has no valid setting": changed("setting/illumination", "sun"),
+}
+
+
+@pytest.mark.parametrize(("message", "change"), DAMAGE.items(), ids=range(len(DAMAGE)))
+def test_a_damaged_record_is_one_line(written, message, change):
+    content = json.loads(written.read_text())
+    change(content)
+    written.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match=message) as caught:
+        load(written)
+    assert "heart" in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 400
+
+
+def test_a_record_of_another_law_is_none_of_a_stack(tmp_path):
+    with pytest.raises(RecordError, match=r"hazard\.json: must be the record of a stack, got pipeline 'profile'"):
+        load(fits_folder() / "hazard.json")
+    with pytest.raises(RecordError, match="there is no such record"):
+        load(tmp_path / "heart.json")
+
+
+def test_what_is_a_stack(file, tmp_path):
+    recipe = tmp_path / "recipe.toml"
+    recipe.write_text((fits_folder() / "hazard.toml").read_text())
+    assert stacks.is_stack(file())
+    assert stacks.is_stack("heart")
+    assert request_of("heart").stack.names == ("epicardium", "heart muscle")
+    for name in (str(recipe), "hazard", "nothing", str(tmp_path / "nothing.toml"), "a" * 300, "a" * 300 + ".toml"):
+        assert not stacks.is_stack(name)
+
+
+def test_what_a_file_says(file):
+    of = request_of(file(name="mine"))
+    assert (of.name, of.title, of.illumination) == ("mine", "Muscle under its skin", "diffuse")
+    plain = request_of(file('title = "Muscle under its skin"\nillumination = "diffuse"\n', ""))
+    assert (plain.title, plain.illumination) == (stacks.TITLE, "diffuse")
+    # A scene's file is one of a stack: what draws it is not looked at.
+    drawn = request_of(file('[[layers]]\nname = "epi', 'scene = "layers"\npose = 3\n[[layers]]\nname = "epi'))
+    assert drawn.stack.media == of.stack.media
+
+
+REFUSED = [
+    (('illumination = "diffuse"', 'colour = "red"'), r"keys must be of title, unit, illumination, .*, got 'colour'"),
+    (('"diffuse"', '"sun"'), r"illumination must be one of searchlight, diffuse, got 'sun'"),
+    (('"diffuse"', "3"), r"illumination must be one of searchlight, diffuse, got 3"),
+    (('"Muscle under its skin"', "7"), r"title must be a text of 60 characters at most, got 7"),
+    ((STACK[STACK.rindex("[[layers]]") :], ""), r"layers must be two layers or more: .*, got 1"),
+    ((STACK[STACK.index("[[layers]]") :], ""), r"table \[\[layers\]\] is missing"),
+]
+
+
+@pytest.mark.parametrize(("pieces", "message"), REFUSED)
+def test_a_mistake_in_a_file_is_one_line(file, tmp_path, pieces, message):
+    path = file(*pieces)
+    with pytest.raises(InputError, match=message) as caught:
+        request_of(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert str(caught.value).isprintable()
+
+
+@pytest.mark.parametrize(
+    ("pieces", "message"),
+    [
+        (("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), "layers must have one n for a law of a stack"),
+        (("mu_s = [1.13, 1.2, 1.3]\ng = 0.0", "mu_s = [1.13, 1.2, 1.3]\ng = 0.99"), r"layers must scatter with g in"),
+    ],
+)
+def test_what_no_law_is_for_is_refused_before_any_fit(monkeypatch, file, tmp_path, pieces, message):
+    monkeypatch.setattr(stacks, "_channel", lambda *_: pytest.fail("nothing is to be fitted"))
+    of = request_of(file(*pieces))
+    with pytest.raises(InputError, match=message):
+        stacks.regenerate(of, tmp_path / "mine")
+    assert not (tmp_path / "mine").exists()
+
+
+def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
+    """Not after two colours, either; and an old record stays as it was."""
+
+    def fails(illumination, medium):
+        if medium.layers[0].mu_a > 0.3:
+            raise FloatingPointError("blue diverges")
+        return made(illumination, medium)
+
+    of = request_of(file())
+    monkeypatch.setattr(stacks, "_channel", fails)
+    with pytest.raises(FloatingPointError, match="blue diverges"):
+        stacks.regenerate(of, tmp_path / "mine")
+    assert not (tmp_path / "mine").exists()
+    monkeypatch.setattr(stacks, "_channel", made)
+    path = stacks.regenerate(of, tmp_path / "mine")
+    before = path.read_bytes()
+    monkeypatch.setattr(stacks, "_channel", fails)
+    with pytest.raises(FloatingPointError, match="blue diverges"):
+        stacks.regenerate(replace(of, title="another"), tmp_path / "mine")
+    assert [(one.name, one.read_bytes()) for one in path.parent.iterdir()] == [("heart.json", before)]
+    (tmp_path / "full").write_text("in the way")
+    monkeypatch.setattr(stacks, "_channel", made)
+    with pytest.raises(OutputError, match=r"cannot write into .*full"):
+        stacks.regenerate(of, tmp_path / "full")
+
+
+def test_a_record_is_found_by_path_and_by_name(written, tmp_path):
+    folder = tmp_path / "mine"
+    assert find(str(written), tmp_path) == find("heart", folder) == written
+    for name in ("skin", "hazard", str(fits_folder() / "hazard.json"), str(tmp_path / "nothing.json"), "a" * 300):
+        assert find(name, folder) is None
+    assert find("heart", tmp_path) is None
+    damaged = tmp_path / "damaged.json"
+    damaged.write_text("{")
+    with pytest.raises(RecordError, match=r"damaged\.json: is not a record"):
+        find(str(damaged), folder)
+
+
+def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
+    """By whatever names; at another thickness or light, or with another coefficient, it is of something else."""
+    folder = tmp_path / "mine"
+    names = ('"epicardium"', '"bark"', '"assumed"', '"a book"', '"Muscle under its skin"', '"x"')
+    same = request_of(file(*names, name="x"))
+    found = matching(same, folder)
+    assert found is not None
+    assert found.digest == load(written).digest
+    for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
+        assert matching(request_of(file(*pieces, name="x")), folder) is None
+    assert matching(same, tmp_path) is None
+
+
+def test_a_record_matches_an_image_of_thicknesses(at_once, file, tmp_path):
+    """Whose mean has more digits than a record."""
+    Image.fromarray(np.array([[0, 1], [2, 250]], np.uint8)).save(tmp_path / "thickness.png")
+    of = request_of(file("= 0.3\n", '= { image = "thickness.png", range = [0.1, 0.4] }\n'))
+    mean = of.stack.media[0].layers[0].thickness
+    assert mean != float(f"{mean:.12g}")
+    path = stacks.regenerate(of, tmp_path / "mine")
+    found = matching(of, tmp_path / "mine")
+    assert found is not None
+    assert found.laws[0].thickness == pytest.approx(mean, rel=1e-11)
+    assert load(path).stack.map is None
+
+
+SHIPPED = sorted(path.stem for path in (fits_folder() / stacks.FOLDER).glob("*.toml"))
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_stack_has_its_record(name):
+    """Of the layers that its file has, and under the map and laws that ship today."""
+    found = matching(request_of(name), fits_folder())
+    assert found is not None
+    assert found.name == name
+    assert find(name, fits_folder()) == fits_folder() / stacks.FOLDER / f"{name}.json"
+    for channel, law in enumerate(found.laws):
+        ends = sorted([law.top.reflectance, law.below.reflectance])
+        assert ends[0] <= law.total(0.2) <= ends[1], channel
+
+
+def test_stacks_of_one_name_would_write_one_record(file):
+    of = request_of(file())
+    require_apart([of, replace(of, name="skin")])
+    with pytest.raises(RecordError, match="stacks must have different names, as their records do, got 'heart' twice"):
+        require_apart([of, replace(of, name="skin"), of])
