@@ -146,9 +146,13 @@ def main(arguments: list[str] | None = None) -> None:
     show("float32 against float64, at worst", ("stack", *Rounding._fields), errors)
     show("Cost over hazard, ratio of medians in turns", ("stack", *WORKS, "both, ns"), costs)
     if given.json is not None:
-        names = (*Rounding._fields, *WORKS)
-        values = ([*map(float, one[1:]), *map(float, other[1:-1])] for one, other in zip(errors, costs, strict=True))
-        found = {one.name: dict(zip(names, row, strict=True)) for one, row in zip(records, values, strict=True)}
+        found = {
+            one.name: {
+                "rounding": dict(zip(Rounding._fields, map(float, error[1:]), strict=True)),
+                "cost": dict(zip(WORKS, map(float, cost[1:-1]), strict=True)),
+            }
+            for one, error, cost in zip(records, errors, costs, strict=True)
+        }
         given.json.write_text(json.dumps(found, indent=1) + "\n", encoding="utf-8")
 
 
