@@ -214,8 +214,8 @@ class StackLaw(Constants):
         """Of the radii that are drawn for each term [-]: those of light that is added, not taken away."""
         image = jnp.maximum(of.image, 0.0)
         total = of.kept + of.came + image
-        scale = jnp.where(total > 0, 1.0 / jnp.where(total > 0, total, 1.0), 1.0)
-        return 1.0 - (of.came + image) * scale, of.came * scale, image * scale
+        whole = jnp.where(total > 0, total, 1.0)
+        return 1.0 - (of.came + image) / whole, of.came / whole, image / whole  # a quotient is not rounded beyond 1
 
 
 class StackTerms(NamedTuple):

@@ -133,7 +133,7 @@ def test_it_is_whole_and_loads_nothing(page):
     found.feed(page.read_text(encoding="utf-8"))
     assert found.open == []
     assert len(found.ids) == len(set(found.ids))
-    assert set(PARTS) - {"paper", "claims"} <= set(found.ids)
+    assert set(PARTS) - {"paper", "claims", "stacks"} <= set(found.ids)
     assert all(one.startswith(("#", "data:")) for one in found.loads)
     assert {one[1:] for one in found.loads if one.startswith("#")} <= set(found.ids)
     assert not re.search(r"url\((?!data:|#|&quot;|\"data:)", page.read_text(encoding="utf-8"))

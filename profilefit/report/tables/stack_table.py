@@ -25,13 +25,12 @@ def stack_table(folder: Path) -> RenderableType | None:
     worst = [one["quality"]["regenerated"] for one in stacks]
     columns = {
         "stack": [str(one["name"]) for one in stacks],
-        "layers": [", ".join(layer["name"] or "?" for layer in one["layers"]) for one in stacks],
+        "layers": [str(len(one["layers"])) for one in stacks],
         "light": [str(one["setting"]["illumination"]) for one in stacks],
         "n": [f"{one['setting']['n']:g}" for one in stacks],
         "g": [", ".join(f"{g:g}" for g in sorted({layer["g"] for layer in one["layers"]})) for one in stacks],
         "rel": [significant(max(one["rel"])) for one in worst],
         "ks": [significant(max(one["ks"])) for one in worst],
         "A": [significant(one["delta_A"]) for one in worst],
-        "fit": [str(one["fit"]["result"]) for one in stacks],
     }
-    return column_table("Stacks of layers", columns, CAPTION, left=("stack", "layers", "light", "fit"))
+    return column_table("Stacks of layers", columns, CAPTION, left=("stack", "light"))

@@ -214,7 +214,7 @@ def beams(medium: Medium, cosine: Floats) -> list[Beam]:
     squared = [(n - n0) * (n + n0) + (n0 * cosine) ** 2 for n in indices[1:]]
     cosines = [cosine, *(np.sqrt(np.maximum(one, 0.0)) / n for one, n in zip(squared, indices[1:], strict=True))]
     mirror = [
-        np.where(sines[j + 1] < 1.0, fresnel(indices[j], indices[j + 1], cosines[j])[0], 1.0)
+        np.where(cosines[j + 1] > 0.0, fresnel(indices[j], indices[j + 1], cosines[j])[0], 1.0)
         for j in range(len(indices) - 1)
     ]
     # Of light at a layer's bottom, and at its top on its way down, what comes up there: from below upwards.

@@ -1,1 +1,1 @@
-"""Where laws, maps, samplers, conversions, the exact solution and fits fail: every cell with its cause and remedy."""
+"""Where laws, maps, samplers, stacks, conversions, exact light and fits fail: every cell with its cause and remedy."""

@@ -23,14 +23,15 @@ from profilefit.studies.stability import (
     misuse,
     model_cells,
     refracting,
+    stacks,
 )
 from profilefit.studies.stability.cells import Cells
 from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.regions import Region, regions_of
 
-EXACT, CONVERT, SOLVER = "exact", "convert", "solver"
-FUNCTIONS = (EXACT, CONVERT, SOLVER)
+EXACT, CONVERT, SOLVER, STACKS = "exact", "convert", "solver", "stacks"
+FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS)
 SETTINGS = (Setting(), Setting("diffuse"))
 WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
 # Whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
@@ -46,7 +47,7 @@ DERIVED_IF_NAMED = {"hazard": (PDF,)}  # ten seconds
 DERIVED_MAPS = ("albedo-rational", "albedo-liang", "van_de_hulst, published", "chiang, published")
 # Law, objective and lanes of the fits.
 FITTED = (("rational", "reflectance", 16), ("burley", "relative", 16), ("hazard", "relative", 6))
-LONGEST = (SOLVER, "hazard", "quantile")  # begun first, so that no core waits at the end
+LONGEST = (SOLVER, STACKS, "hazard", "quantile")  # begun first, so that no core waits at the end
 # A look in seconds: what the paper prints, and what is ours; of profile laws their texts, which need no compiling.
 QUICK_ARITHMETICS = (TEXT32, TEXT16)
 QUICK = ("liang, published", "hazard", "albedo-rational", "map liang, published")
@@ -168,6 +169,7 @@ def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]
         EXACT: of_exact,
         CONVERT: lambda: _part(CONVERT, [*map_cells.conversion_cells(), *misuse.of_convert()]),
         SOLVER: of_solver,
+        STACKS: lambda: _part(STACKS, list(stacks.cells_of(folder.folder))),
     }
 
 

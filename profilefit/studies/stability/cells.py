@@ -238,14 +238,15 @@ class Rounded:
 
 
 class RoundedText:
-    """The functions of a law's or map's shader source, computed in one type throughout."""
+    """The functions of a law's or map's shader source, or of one in Python as such, computed in one type throughout."""
 
-    def __init__(self, law: AlbedoLaw | ProfileLaw, dtype: type) -> None:
+    def __init__(self, law: AlbedoLaw | ProfileLaw | str, dtype: type) -> None:
         self.dtype = dtype
-        text = emit.map_text if isinstance(law, AlbedoLaw) else emit.law_text
-        source = text(law, "python", NAME).replace(NUMPY_HEAD, "", 1)  # type: ignore[arg-type]
+        if not isinstance(law, str):
+            text = emit.map_text if isinstance(law, AlbedoLaw) else emit.law_text
+            law = text(law, "python", NAME)  # type: ignore[arg-type]
         self._names: dict[str, Any] = {"np": Rounded(dtype)}
-        exec(compile(source, f"{type(law).__name__}.py", "exec"), self._names)
+        exec(compile(law.replace(NUMPY_HEAD, "", 1), f"{NAME}.py", "exec"), self._names)
 
     def call(self, function: str, *arguments: Any) -> Any:
         """A function of the text, by its name less the prefix, of arrays that are rounded to the type first."""

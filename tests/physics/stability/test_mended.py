@@ -5,11 +5,14 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from mcml_sim import Setting, exact
+from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.convert import alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.quantile import depth, radius
+from profilefit.laws.stack import StackTerms
 from profilefit.recipes import catalogue
+from profilefit.scenes.layers.law import single_scattering
+from profilefit.studies.stability import stacks
 
 
 def test_a_dark_medium_keeps_the_digits_of_its_reflectance():
@@ -75,3 +78,24 @@ def test_lengths_without_a_square_are_refused(mfp):
         catalogue.load("hazard").profile(1.0, 0.5, mfp)
     with pytest.raises(InputError, match=r"mfp must be a mean free path > 0, from 1e-100 to 1e\+100"):
         exact.profile(1.0, 0.5, mfp)
+
+
+def test_light_that_grazes_a_matched_surface_keeps_its_digits():
+    """Its cosine inside was that of 1 - sine^2, which had lost 6e-5 of 1e-6."""
+    medium = Medium((Layer(1.0, 0.1, 0.9, 0.0, 1.0), Layer(1.0, 0.1, 0.9, 0.0)))
+    into, out = np.array([1e-9, 1e-6, 1e-3]), np.array([1e-9, 1e-6, 0.5])[:, None]
+    right = 0.9 / (4.0 * np.pi) * into / (into + out)
+    np.testing.assert_allclose(single_scattering(medium, into, out, 0.0), right, rtol=1e-12)
+
+
+def test_no_radius_of_a_stack_has_a_negative_density():
+    """1 - c (1 / c), compiled, was -1e-16: the share of a first layer of no thickness, all that is left far out."""
+    law, zero = stacks.end(*stacks.ENDS[0]).law, np.zeros(1000)
+    came = np.random.default_rng(1).random(1000)
+
+    def first(of):
+        return law.shares(of)[0]
+
+    with jax.enable_x64(True):
+        share = jax.jit(first)(StackTerms(*[jnp.asarray(zero)] * 8, jnp.asarray(came)))
+        assert np.all(np.asarray(share) == 0.0)

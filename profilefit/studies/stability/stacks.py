@@ -1,0 +1,303 @@
+"""Stacks of layers: laws over thickness and radius, recorded and at the ends of albedos; light scattered once.
+
+The half spaces of a law have cells of their own; looked at here is what a stack makes of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Layer, Medium, Setting
+from profilefit.errors import RecordError
+from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
+from profilefit.recipes import catalogue
+from profilefit.recipes.record import available
+from profilefit.recipes.stack import record
+from profilefit.scenes.layers.law import single_scattering
+from profilefit.shader.check.bounds import ROUNDING_SHARE
+from profilefit.shader.stack_text import single_text, stack_text
+from profilefit.studies.stability import model_cells
+from profilefit.studies.stability.causes_of_stacks import ENERGY, ONCE, TOTAL, cancelled, is_spared
+from profilefit.studies.stability.cells import (
+    DIMMEST,
+    EXTENDED,
+    NAME,
+    Cells,
+    Mask,
+    RoundedText,
+    absolute,
+    judged,
+    relative,
+    steps_down,
+)
+from profilefit.studies.stability.layout import CDF, DTYPES, FLOAT64, MODEL, PDF, PROFILE, SAMPLE, TEXT32, ArgumentAxis
+
+Floats = NDArray[np.float64]
+ARITHMETICS = (FLOAT64, TEXT32)
+CALLED = {PROFILE: "profile", CDF: "cdf", TOTAL: "total", SAMPLE: "sample", PDF: "pdf"}
+UNDRAWN = (PROFILE, CDF, TOTAL)  # of recorded laws in float64: samplers of each of their settings compile for seconds
+THICKNESS = (0.0, 1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 100.0, 1e3, 1e6)  # [mfp of the first layer]
+RADIUS = (1e-6, 1e-4, 1e-3, 0.01, 0.03, 0.1, 0.3, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 30.0, 50.0, 100.0, 300.0, 1e3)
+SHARE = (0.0, 1e-6, 1e-3, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
+CHANGES = tuple(float(one) for one in np.geomspace(1e-7, 1.0, 15))  # of xi that another radius may be worth
+# What is promised: R_d of all but this share of the light, which is as far as records judge it; densities of radii but
+# for this share next to the source as well; all but of what is darker than a thousandth of white.
+SEEN, NEXT_TO_SOURCE, DARKEST = 0.995, 1e-4, 1e-3
+MOST_XI = 1.0 - 2.0**-24  # of which the text draws the farthest radius
+ORDINARY = (0.01, 3e-3, 2e-3)  # errors of recorded laws: none is allowed more rounding than a tenth of these
+# Of densities, what the inverses of half spaces make of them, which go by steps; that is more farther out than `SEEN`,
+# and in their own cells.
+OF_STEPS = 3e-3
+NO_DIGITS = "extended precision has no digits of it"
+NEAREST, FARTHEST, POINTS = 1e-9, 1e3, 2000  # of the integral of R_d [mfp]: its ends, and nodes, even in ln r
+ENERGY_BOUND = 1e-4  # of that integral
+BOUNDS = (model_cells.BOUNDS[PROFILE], model_cells.BOUNDS[CDF], 0.03)  # of R_d, cdf, A: what a picture shows at once
+# What `stack_law` gives at the ends of albedos, diffuse light, n = 1.4, l alike: of the first layer and of what lies
+# below, the largest rel, ks and error of A at thicknesses between the fitted ones, and the nine constants.
+ENDS: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
+    (0.3, 0.9, (0.023, 0.0072, 0.011), (0.3727, -0.1035, 0.6363, 1.287, 1.645, 3.023, 0.01889, 1.312, 0.001297)),
+    (0.05, 0.99, (0.066, 0.032, 0.077), (0.5339, 0.2473, 0.2421, 0.7563, 1.576, 1.751, 3.399, 0.5817, 2.399e-05)),
+    (0.9, 1 - 1e-6, (0.0065, 0.0019, 0.007), (0.04453, -0.0511, 1.585, 1.414, 0.9201, 1.033, 4.258, 1.292, 0.2189)),
+    (0.99, 0.1, (0.065, 0.045, 0.026), (0.526, -0.2106, 0.8038, 55.55, 0.01873, 0.1349, 0.6059, 3.87, 2.226)),
+    (0.9, 0.0, (0.32, 0.082, 0.19), (0.557, -0.8766, 2.964, 1.221, 0.07459, 0.1353, 2.462e-06, 1.378, 1.216e-05)),
+    (1 - 1e-6, 0.999, (0.0045, 0.0019, 0.00026),
+     (0.9334, -0.0001492, 0.9792, 0.9722, 0.003057, 0.01503, 3.383, 1.413, 0.07157)),
+    (1 - 1e-6, 0.5, (0.23, 0.16, 0.46), (3.925e-05, 0.3954, 1.039, 0.4768, 2.152e-05, 1.235, 0.7187, 0.6541, 0.7062)),
+    (1 - 1e-6, 0.0, (0.87, 0.9, 0.62),
+     (2.75e-05, 0.2856, 0.07235, 1.221, 6.741e-07, 0.1353, 18.31, 0.0009186, 1.716e-05)),
+    (1.0, 0.5, (0.24, 0.17, 0.47), (2.676e-05, 0.4017, 1.034, 0.455, 2.021e-05, 1.261, 0.7092, 0.6462, 0.7017)),
+)  # fmt: skip
+BORROWER = (0.99, 0.5)  # albedos of a law that has the constants of others
+# Light scattered once: index, cosines, optical depth of the first layer, g, albedo below, cosine of the azimuth.
+INDICES = (1.0, 1.4, 2.0)
+COSINES = (1e-6, 1e-4, 1e-3, 0.01, 0.1, 0.3, 0.6, 0.9, 1.0)
+DEPTHS = (1e-6, 1e-4, 1e-3, 0.01, 0.1, 1.0, 10.0, 100.0, 1e6)
+FORWARD, BELOW, TURNED = (-0.95, -0.5, 0.0, 0.5, 0.8, 0.95), (0.0, 0.1, 0.8), (-1.0, 0.0, 1.0)
+# Of a formula that is exact: in float64 what 1 less Fresnel's reflectance keeps of light that grazes, in float32 what
+# a dozen roundings and 1 - g do.
+ONCE_BOUNDS = {FLOAT64: 1e-9, TEXT32: 1e-5}
+
+
+@dataclass(frozen=True)
+class StackCase:
+    """A law of a stack; errors  rel, ks and the error of A that it states of itself [-];  own  fitted to its layers"""
+
+    label: str
+    law: StackLaw
+    errors: tuple[float, ...]
+    own: bool = True
+
+    @property
+    def holds(self) -> bool:
+        """Whether something is promised of it: not where its errors show at once."""
+        return self.own and all(error <= bound for error, bound in zip(self.errors, BOUNDS, strict=True))
+
+    def bound(self, quantity: str) -> float:
+        """A tenth of the law's own error, or of a recorded law's, where that is less."""
+        rel, ks, of_a = (ROUNDING_SHARE * min(pair) for pair in zip(self.errors, ORDINARY, strict=True))
+        return {PROFILE: rel, PDF: OF_STEPS, TOTAL: of_a}.get(quantity, ks)
+
+    @cached_property
+    def right(self) -> RoundedText:
+        """Its text in extended precision."""
+        return self.text(EXTENDED)
+
+    def text(self, dtype: type) -> RoundedText:
+        return RoundedText(stack_text([self.law] * len(CHANNELS), "python", NAME), dtype)
+
+
+def cells_of(folder: Path) -> Iterator[Cells]:
+    """Laws of recorded stacks, at the ends of albedos, and of borrowed constants; light scattered once."""
+    recorded, ends = list(recorded_stacks(folder)), [end(*row) for row in ENDS]
+    for one in recorded:
+        yield energies(one)
+        yield from of_law(one, FLOAT64, UNDRAWN)
+        yield from of_law(one, TEXT32)
+    for one in (*ends, borrower()):
+        yield energies(one)
+        for arithmetic in ARITHMETICS:
+            yield from of_law(one, arithmetic)
+    for group in (recorded, ends):
+        if group:
+            yield from stated(group, promised=group is recorded)
+    yield from (once(n, arithmetic) for n in INDICES for arithmetic in ARITHMETICS)
+
+
+def recorded_stacks(folder: Path) -> Iterator[StackCase]:
+    """The laws of a folder's stacks, one a colour."""
+    for name, path in available(folder / record.FOLDER).items():
+        found = record.load(path)
+        for channel, law in zip(CHANNELS, found.laws, strict=True):
+            try:
+                parts = found.content["interfaces"][channel]["quality"]
+                errors = [max(abs(v) for each in parts for v in each[key]) for key in ("rel", "ks", "delta_A")]
+            except (KeyError, TypeError, ValueError):
+                raise RecordError(f"{path}: is damaged: its quality has no numbers; regenerate it") from None
+            yield StackCase(f"{name}, {channel}", law, tuple(errors))
+
+
+def end(first: float, below: float, errors: Sequence[float], constants: Sequence[float]) -> StackCase:
+    """A row of `ENDS`."""
+    setting = Setting("diffuse", n=1.4)
+    hazard = catalogue.load("hazard", setting=setting)
+    top, under = (LayerLaw(setting, hazard, alpha, 1.0) for alpha in (first, below))
+    law = StackLaw(setting, top, under, 1.0, **dict(zip(StackLaw.constant_names(), constants, strict=True)))
+    return StackCase(f"α {first:.7g} on {below:.7g}", law, tuple(errors))
+
+
+def borrower() -> StackCase:
+    """A law whose albedos were changed after its constants, those of the first of `ENDS`, were fitted."""
+    one = end(*BORROWER, *ENDS[0][2:])
+    return replace(one, label=f"{one.label}, constants of {ENDS[0][0]:g} on {ENDS[0][1]:g}", own=False)
+
+
+def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
+    """Quantities over thickness and radius or uniform number."""
+    dtype, law, channel = DTYPES[arithmetic], one.law, np.zeros(1)
+
+    def rounded(values: Sequence[float], scale: float = 1.0) -> Floats:
+        return (np.array(values) * scale).astype(dtype).astype(float)
+
+    d, r, xi = rounded(THICKNESS, law.top.mfp)[:, None], rounded(RADIUS, law.top.mfp), rounded(SHARE)
+    text = one.text(np.float32) if arithmetic == TEXT32 else None
+    python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
+    whole, within = (np.asarray(one.right.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
+    for name in names:
+        given = () if name == TOTAL else (xi if name == SAMPLE else r,)
+        reference = np.asarray(one.right.call(CALLED[name], *given, channel, d), float)
+        if text is not None:
+            value = np.asarray(text.call(CALLED[name], *given, channel, d), float)
+        else:
+            value = np.asarray(law.total(d) if name == TOTAL else python[name](*given, d))
+        if name == TOTAL:  # whose ends are known
+            ends = np.select([d == 0, d == d[-1]], [law.below.whole(), law.top.whole()], reference)
+            value, reference = value[:, 0], ends[:, 0]
+        error = _misplaced(one.right, value, xi, d) if name == SAMPLE else _off(one, name, value, reference)
+        yield _cells(one, name, arithmetic, (value, reference, error), whole, within)
+
+
+def _off(one: StackCase, name: str, value: Floats, reference: Floats) -> Floats:
+    """The error of a number [-]: NaN where extended precision has no digits of it."""
+    error = absolute(value, reference) if name == CDF else relative(value, reference)
+    if name == PROFILE:
+        error[cancelled(one.law, THICKNESS, RADIUS, reference, one.bound(name), EXTENDED)] = np.nan
+    return error
+
+
+def _cells(
+    one: StackCase, name: str, arithmetic: str, found: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
+) -> Cells:
+    """Of value, reference and error; whole, within  A (thicknesses, 1) and the cdf (thicknesses, radii)."""
+    dtype, bound, (value, reference, error) = DTYPES[arithmetic], one.bound(name), found
+    first, below = (float(each.whole()) for each in (one.law.top, one.law.below))
+    seen = within <= SEEN if name in (PROFILE, PDF) else np.ones(value.shape, bool)
+    held = seen if name == PDF else np.ones(value.shape, bool)
+    bright = (whole[:, 0] if name == TOTAL else whole) >= DARKEST
+    inside = seen & bright & one.holds & (within >= NEXT_TO_SOURCE if name == PDF else True)
+    dim: Mask | bool = False
+    wrong_way = None
+    if name in (PROFILE, PDF):
+        scaled = np.abs(reference) * one.law.top.mfp ** (2 if name == PROFILE else 1)
+        dim = (scaled < DIMMEST[dtype]) & (reference != 0)
+    elif name == CDF:  # light over A: A may be far less than what it is the difference of
+        wrong_way = steps_down(value, 1, dtype, max(first, below) / np.maximum(whole, np.finfo(dtype).tiny))
+    elif name == TOTAL:
+        wrong_way = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
+    codes = judged(value, reference, error, bound, held, dtype, dim, wrong_way)
+    return Cells(
+        one.label, one.own, name, arithmetic, _axes(name), value, reference, error, bound, inside, codes, one.law,
+        dtype, unjudged=NO_DIGITS,
+    )  # fmt: skip
+
+
+def _axes(name: str) -> tuple[ArgumentAxis, ...]:
+    first = ArgumentAxis("d/l", "-", np.array(THICKNESS))
+    if name in (TOTAL, ENERGY):
+        return (first,)
+    return first, ArgumentAxis("ξ" if name == SAMPLE else "r/l", "-", np.array(SHARE if name == SAMPLE else RADIUS))
+
+
+def _misplaced(right: RoundedText, value: Floats, xi: Floats, d: Floats) -> Floats:
+    """The least change of xi, of `CHANGES`, between whose radii, less and more, the drawn one lies [-].
+
+    Where one part of the light ends in between, and with it its radii, every radius lies there.
+    """
+    found, channel = np.full(value.shape, np.inf), np.zeros(1)
+    own = right.call("sample", xi, channel, d)
+    for change in reversed(CHANGES):
+        less, more = (right.call("sample", np.clip(xi + step, 0.0, 1.0), channel, d) for step in (-change, change))
+        ends = (less > own) | (own > more) | (xi + change >= MOST_XI)
+        found[ends | ((xi <= change) | (less <= value)) & (value <= more)] = change
+    return found
+
+
+def energies(one: StackCase) -> Cells:
+    """Integral of 2 pi r R_d to the last radius over A by the text, which the closed cdf gives as well."""
+    unit, text, channel = one.law.top.mfp, one.text(np.float64), np.zeros(1)
+    u, step = np.linspace(np.log(NEAREST), np.log(FARTHEST), POINTS, retstep=True)
+    r, d = unit * np.exp(u), unit * np.array(THICKNESS)[:, None]
+    ring = 2.0 * np.pi * r**2 * text.call("profile", r, channel, d)
+    whole = np.asarray(text.call("total", channel, d))[:, 0]
+    reference = np.asarray(text.call("cdf", r[-1:], channel, d))[:, 0]
+    light = (np.sum(ring, axis=1) - 0.5 * (ring[:, 0] + ring[:, -1])) * step
+    value = np.where(whole > 0, light / np.where(whole > 0, whole, 1.0), reference)
+    error = absolute(value, reference)
+    codes = judged(value, reference, error, ENERGY_BOUND, np.ones(value.shape, bool), np.float64)
+    inside = (whole >= DARKEST) & one.holds
+    return Cells(
+        one.label, one.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside, codes,
+        one.law,
+    )  # fmt: skip
+
+
+def stated(group: Sequence[StackCase], promised: bool) -> Iterator[Cells]:
+    """What laws state of themselves against exact light, at thicknesses that were not fitted."""
+    axis = ArgumentAxis("of", "-", np.arange(len(group), dtype=float), tuple(one.label for one in group))
+    for name, bound, error in zip((PROFILE, CDF, TOTAL), BOUNDS, np.array([o.errors for o in group]).T, strict=True):
+        inside = np.full(error.shape, promised)
+        codes = judged(error, np.ones_like(error), error, bound, np.ones_like(inside), np.float64)
+        yield Cells(
+            "stacks", True, name, MODEL, (axis,), error, np.zeros_like(error), error, bound, inside, codes,
+            tuple(one.law for one in group),
+        )  # fmt: skip
+
+
+def once(n: float, arithmetic: str) -> Cells:
+    """Light scattered once: over g, what lies below, thickness, both directions and the angle between them."""
+    dtype = DTYPES[arithmetic]
+    values = [np.array(each).astype(dtype).astype(float) for each in (DEPTHS, COSINES, COSINES, TURNED)]
+    axes = (
+        ArgumentAxis("g", "-", np.array(FORWARD)),
+        ArgumentAxis("α below", "-", np.array(BELOW)),
+        *map(ArgumentAxis, ("d/l", "cos in", "cos out", "turned"), "----", values),
+    )
+    depth, into, out, turned = np.meshgrid(*values, indexing="ij", sparse=True)
+    value, reference = np.empty((2, *(axis.values.size for axis in axes)))
+    for i, g in enumerate(FORWARD):
+        source = single_text([_two(n, g, alpha, 1.0) for alpha in BELOW], "python", NAME)
+        right, text = RoundedText(source, EXTENDED), RoundedText(source, np.float32)
+        for j, alpha in enumerate(BELOW):
+            given = (np.array(float(j)), depth, into, out, turned)  # a channel an albedo
+            reference[i, j] = right.call("radiance", *given)
+            if arithmetic == TEXT32:
+                value[i, j] = text.call("radiance", *given)
+                continue
+            for k, d in enumerate(DEPTHS):
+                value[i, j, k] = single_scattering(_two(n, g, alpha, d), into[0], out[0], np.arccos(turned[0]))
+    error, bound = relative(value, reference), ONCE_BOUNDS[arithmetic]
+    inside = np.ones(value.shape, bool)
+    codes = judged(value, reference, error, bound, inside, dtype)
+    label = f"light scattered once, n = {n:g}"
+    found = Cells(label, True, ONCE, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)
+    return replace(found, inside=~is_spared(found)) if arithmetic == TEXT32 else found
+
+
+def _two(n: float, g: float, below: float, depth: float) -> Medium:
+    return Medium((Layer(n, 0.1, 0.9, g, depth), Layer(n, 1.0 - below, below, g)))

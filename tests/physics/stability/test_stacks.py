@@ -1,0 +1,95 @@
+"""Stacks: what is recorded holds, all that does not has a cause, and constants of other layers are seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from profilefit.recipes.folder import fits_folder
+from profilefit.studies.stability import stacks
+from profilefit.studies.stability.causes_of_stacks import ONCE, TOTAL
+from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PDF, PROFILE, SAMPLE, TEXT32
+from profilefit.studies.stability.regions import regions_of
+
+ENDS = {(row[0], row[1]): stacks.end(*row) for row in stacks.ENDS}
+
+
+def reds(*cells):
+    return [region for each in cells for region in regions_of(each) if region.verdict.is_red]
+
+
+def wrong(regions):
+    """Those of ours that break their word, and those that nothing explains."""
+    return [(one.subject, one.quantity, one.where) for one in regions if one.is_failure or one.is_unexplained]
+
+
+def test_recorded_stacks_hold_in_float32():
+    recorded = list(stacks.recorded_stacks(fits_folder()))
+    assert {one.label for one in recorded} >= {"skin, red", "heart, blue", "skimmilk-on-potato, green"}
+    cells = [each for one in recorded for each in (stacks.energies(one), *stacks.of_law(one, TEXT32))]
+    found = reds(*cells, *stacks.stated(recorded, promised=True))
+    assert wrong(found) == []
+    assert {one.cause.key for one in found} == {"less than its terms"}
+    assert {one.quantity for one in found} == {PROFILE}  # beyond 99.5 % of the light
+    for one in cells:
+        if one.quantity in (CDF, TOTAL, SAMPLE):
+            assert one.verdicts == {Verdict.RIGHT}, one.subject
+
+
+def test_all_that_fails_at_the_ends_of_albedos_has_a_cause():
+    cells = [each for one in ENDS.values() for each in (stacks.energies(one), *stacks.of_law(one, TEXT32))]
+    found = reds(*cells, *stacks.stated(list(ENDS.values()), promised=False))
+    assert wrong(found) == []
+    told = {(one.cause.key, one.arithmetic) for one in found}
+    causes = ("white over dark", "black below", "absorbing first layer")
+    assert told >= {*((cause, MODEL) for cause in causes), ("less than its terms", TEXT32), ("never white", TEXT32)}
+
+
+@pytest.mark.parametrize(("albedos", "is_negative"), [((0.3, 0.9), False), ((1 - 1e-6, 0.5), True)])
+def test_laws_in_python(albedos, is_negative):
+    """One that `stack_law` fits is right everywhere; one that it does not is negative somewhere, for a cause."""
+    one = ENDS[albedos]
+    found = reds(*stacks.of_law(one, FLOAT64, stacks.UNDRAWN))
+    assert wrong(found) == []
+    assert one.holds != is_negative
+    assert {(each.verdict, each.cause.key) for each in found if each.quantity == PROFILE} == (
+        {(Verdict.NEGATIVE, "white over dark")} if is_negative else set()
+    )
+
+
+def test_constants_of_other_layers_are_a_failure():
+    """Negative control: a law whose R_d is below 0 is red, for no cause but that its constants are foreign."""
+    one = stacks.borrower()
+    owned = replace(one, own=True, errors=stacks.ORDINARY)
+    found = reds(*stacks.of_law(owned, FLOAT64, (PROFILE,)))
+    assert {(each.verdict, each.is_failure, each.is_unexplained) for each in found} == {(Verdict.NEGATIVE, True, True)}
+    told = reds(*stacks.of_law(one, FLOAT64, (PROFILE, CDF)))
+    assert {each.cause.key for each in told} == {"borrowed constants"}
+    assert {each.verdict for each in told} == {Verdict.NEGATIVE, Verdict.NOT_MONOTONE}
+
+
+@pytest.mark.parametrize(("quantity", "constant"), [(PROFILE, "g1"), (TOTAL, "u"), (SAMPLE, "b2"), (PDF, "g2")])
+def test_a_constant_that_float32_has_wrong_is_found(monkeypatch, quantity, constant):
+    """Negative control: the text of a law whose constant is off by a hundredth."""
+    one = replace(ENDS[0.3, 0.9])  # which has not read its text yet
+    off = replace(one, law=replace(one.law, **{constant: 1.01 * getattr(one.law, constant)}))
+    monkeypatch.setattr(stacks.StackCase, "right", off.text(stacks.EXTENDED))
+    (cells,) = stacks.of_law(one, TEXT32, (quantity,))
+    assert np.any(cells.failures)
+    assert any(each.is_unexplained for each in reds(cells))
+
+
+@pytest.mark.parametrize("n", stacks.INDICES)
+def test_light_scattered_once(monkeypatch, n):
+    exactly, single = stacks.once(n, FLOAT64), stacks.once(n, TEXT32)
+    assert exactly.verdicts == {Verdict.RIGHT}
+    found = reds(single)
+    assert wrong(found) == []
+    assert {(one.quantity, one.cause.key) for one in found} == {(ONCE, "thin over black"), (ONCE, "backward peak")}
+    assert np.mean(single.inside) > 0.6
+    scatter = stacks.single_scattering  # negative control: a direction that is off in the ninth digit
+    monkeypatch.setattr(
+        stacks, "single_scattering", lambda medium, *of: scatter(medium, of[0], of[1] * (1 - 1e-8), of[2])
+    )
+    assert Verdict.INACCURATE in stacks.once(n, FLOAT64).verdicts
