@@ -292,6 +292,10 @@ RUNS = (
     Run("python -m benchmarks.stack_source", "", "the text in float64; the text of hazard", EXACT, (
         ("stack-rounding", "≤ 3e-05", lambda n: max(one["rounding"]["profile"] for one in n.values()),
          "largest relative error of float32 in R_d by a stack's text, within 99.5 % of its light"),
+        ("stack-text-time", "≤ 2.5", "skimmilk-on-marble.cost.both",
+         "time of a radius and R_d there by the text of two layers over that of hazard, in a shader",
+         "median of 7 turns"),
+        ("deep-stack-text-time", "≤ 3.5", "skin.cost.both", "the same of three layers", "median of 7 turns"),
     )),
     Run("python -m benchmarks.layers", "", "surface integral with the exact stack at each point", EXACT, (
         ("head-nearer", "≥ 5", pictured(lambda n: min(one["dipole"] / one["stack"] for one in n.values())),
