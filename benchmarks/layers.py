@@ -29,8 +29,8 @@ from profilefit.scenes.layers import chart, scene
 from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import stack_table
 from profilefit.scenes.stage import head
-from profilefit.scenes.stage.judge import points
 from profilefit.scenes.stage.picture import to_srgb
+from profilefit.scenes.stage.request import EXPOSURE
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
@@ -52,15 +52,11 @@ def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
 def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
     """Rows of error and milliseconds of each way in each pose; one table of exact light serves all."""
     table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
-    laws, rows = scene.laws_of(request.stack), []
+    rows = []
     with opened() as context, Stage(context, request.size) as stage:
         for pose in scene.POSES:
-            posed = replace(request, pose=pose)
-            judge = chart.judged(stage, posed, table)
-            for kind, samples in WAYS.items():
-                way = scene.technique(replace(posed, kind=kind), laws)
-                own = replace(judge, mfp=way.mfp, alpha=way.alpha)
-                for one in points(own, way.label, way.by, request.sampling, samples):
+            for kind, found in chart.ways(stage, replace(request, pose=pose), table, WAYS).items():
+                for one in found:
                     rows.append((pose, kind, str(one.samples), f"{one.rmse:.3g}", f"{min(one.milliseconds):.3g}"))
         device = renderer(context)
     rows.append(("", device.partition(",")[0], "", "", ""))
@@ -110,7 +106,7 @@ def head_picture(file: Path) -> None:
     table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
     laws, pictures = scene.laws_of(request.stack), []
     with opened() as context, Stage(context, request.size) as stage:
-        judge = chart.judged(stage, request, table)
+        judge = scene.judged(stage, request, table)
         for kind in PICTURED:
             way = scene.technique(replace(request, kind=kind), laws)
             sampling = replace(request.sampling, samples=64)
@@ -119,7 +115,7 @@ def head_picture(file: Path) -> None:
                 off = judge.truth - stage.scatter(way.by, way.mfp, sampling, way.alpha)
                 pictures.append(radiance + off / np.pi)
             pictures.append(radiance)
-    image.imsave(file, np.concatenate([to_srgb(one[::-1], scene.EXPOSURE) for one in pictures], axis=1))
+    image.imsave(file, np.concatenate([to_srgb(one[::-1], EXPOSURE) for one in pictures], axis=1))
 
 
 def ear(file: Path) -> list[tuple[str, ...]]:

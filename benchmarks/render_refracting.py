@@ -22,8 +22,9 @@ from mcml_sim import Setting, exact
 from profilefit.laws.base import ProfileLaw
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, styled
 from profilefit.scenes.skin.law import albedo_of
-from profilefit.scenes.skin.scene import FROM, head_scene
+from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
+from profilefit.scenes.stage.request import FROM
 from profilefit.scenes.stage.world import Camera, unit
 
 Floats = NDArray[np.float64]

@@ -14,12 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
-from profilefit.scenes.skin.scene import EXPOSURE, FACE, Head, head_scene
+from profilefit.scenes.skin.scene import FACE, Head, head_scene
 from profilefit.scenes.stage import surface_integral
 from profilefit.scenes.stage.buffers import Buffers
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.picture import TruthError
+from profilefit.scenes.stage.request import EXPOSURE
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface_integral import exitance_of, own_error
 from profilefit.scenes.stage.world import Rgb

@@ -27,13 +27,12 @@ from benchmarks.table import show
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes.stack import photons
-from profilefit.recipes.stack.fit import stack_law
+from profilefit.recipes.stack.fit import NEAR_TRACED, of_rings, stack_law
 
 LIGHTS = ("searchlight", "diffuse")
 THICKNESSES = (0.03, 0.1, 0.3, 0.7, 1.5, 3.0, 8.0)  # of the first layer [mm]
 RADII, LAST = 120, 0.995
 TRACED, TRACED_SEED = 30_000_000, 77
-NEAR_TRACED = 0.1  # radius from which on traced light is judged [mfp]
 Triple = tuple[float, float, float]
 # n, and of each layer mu_s', mu_a of red, green and blue [1/mm] and the thickness [mm]. Skin: C. Donner and
 # H. W. Jensen, SIGGRAPH 2005; heart muscle: within the ranges of Am. J. Physiol. 277, H698, 1999; its epicardium, and
@@ -115,23 +114,14 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
     law, own = stack_law(forward(medium, g), light), forward(medium, g)
     seconds = time.perf_counter() - begin
     rings = photons.traced(own, light, photons.ring_edges(own.layers[0], own.layers), count, TRACED_SEED)
-    noise = np.sqrt(2.0 / np.pi) * float(np.mean(rings.noise[rings.weight > 0]))
-
-    counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.top.mfp)
-    within = np.asarray(law.cdf(rings.edges)) * law.reflectance
-    exactly = exact.solve(medium, light)
-
-    def rel(light_within: np.ndarray) -> float:
-        mean = float(np.mean(np.abs(np.diff(light_within)[counts] / rings.energy[counts] - 1)))
-        return float(np.sqrt(max(mean**2 - noise**2, 0.0)))
-
-    mine, similar = rel(within), rel(np.asarray(exactly.cdf(rings.edges)) * exactly.reflectance)
-    light_within = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
-    ks = float(np.max(np.abs(light_within - within[1:]))) / rings.whole
-    of_a = law.reflectance / rings.whole - 1
-    cells = (f"{name}, {light}", f"{seconds:.0f}", *(f"{value:.2g}" for value in (mine, noise, similar, ks, abs(of_a))))
+    found = of_rings(law, medium.layers[0].thickness, rings)
+    counts, exactly = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.top.mfp), exact.solve(medium, light)
+    apart = np.diff(np.asarray(exactly.cdf(rings.edges)) * exactly.reflectance)[counts] / rings.energy[counts] - 1
+    similar = float(np.mean(np.abs(apart)))
+    figures = (found.rel, found.noise, similar, found.ks, abs(found.delta_A))
+    cells = (f"{name}, {light}", f"{seconds:.0f}", *_short(*figures))
     print(*cells, flush=True)
-    return cells, Error(mine, similar, ks, of_a)
+    return cells, Error(found.rel, similar, found.ks, found.delta_A)
 
 
 def row(
@@ -141,8 +131,7 @@ def row(
     begin = time.perf_counter()
     law = stack_law(medium, light)
     seconds = time.perf_counter() - begin
-    first, *others = medium.layers
-    found = [error(law, replace(medium, layers=(replace(first, thickness=d), *others)), light) for d in thicknesses]
+    found = [error(law, medium.with_first(d), light) for d in thicknesses]
     own = error(law, medium, light)
     return (f"{name}, {light}", f"{seconds:.0f}", *_figures(found), *_short(own.rel, own.ks)), found, own
 

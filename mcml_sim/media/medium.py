@@ -106,6 +106,11 @@ class Medium:
         (first, *others) = self.layers
         return not others and self.is_half_space and first.g == 0 and first.n == self.n_above and first.mu_t > 0
 
+    def with_first(self, thickness: float) -> Medium:
+        """The same layers under a first one of another thickness [length]."""
+        first, *others = self.layers
+        return replace(self, layers=(replace(first, thickness=thickness), *others))
+
     @property
     def z_edges(self) -> NDArray[np.float64]:
         """Depths of the interfaces [length], (layers + 1,); the last may be infinite."""

@@ -147,6 +147,10 @@ class ProfileLaw(Constants):
         """Total reflectance A [-] that the profile integrates to: by the map `albedo`, where it has none of its own."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
 
+    def text_shape(self) -> dict[str, float] | None:
+        """The members of its shape in its shader source by their dotted names, of a law of one albedo; else None."""
+        return None
+
     @property
     def is_finite_at_source(self) -> bool:
         """Whether R_d stays finite at r = 0, where that of a half space does not."""

@@ -13,7 +13,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.entry import Entry, Text
 from profilefit.laws.escape import decay_rate
-from profilefit.laws.hazard import Shape, density, left
+from profilefit.laws.hazard import Shape
 from profilefit.laws.refracting_hazard import LEAST_W, Parts, RefractingHazardSampler, guess
 
 
@@ -66,15 +66,12 @@ class ForwardHalfSpace(ProfileLaw):
         )
 
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        of = self.parts(alpha)
         near = jnp.maximum(x, jnp.finfo(jnp.result_type(x, float)).tiny)
-        both = of.share * density(near, of.once) + of.rest * density(near, of.again)
-        return jnp.where(x > 0, self.total_reflectance * both / (2.0 * jnp.pi * near), jnp.inf)
+        value = self.total_reflectance * self.parts(alpha).density(near) / (2.0 * jnp.pi * near)
+        return jnp.where(x > 0, value, jnp.inf)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        of = self.parts(alpha)
-        both = of.share * left(x, of.once) + of.rest * left(x, of.again)
-        return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - both, 0.0, 1.0), 1.0), 0.0)
+        return self.parts(alpha).cdf(x)
 
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
         return self.total_reflectance * self.scaled_cdf(x, alpha)
@@ -92,7 +89,7 @@ class ForwardHalfSpace(ProfileLaw):
         return RefractingHazardSampler(self)
 
     def text_shape(self) -> dict[str, float]:
-        """The members of its shape in the text of `RefractingHazard`, by their dotted names."""
+        """Those of `RefractingHazard`'s text."""
         of = self.parts(jnp.asarray(0.0))
         white, slowest = guess(of)
         curve = ("kappa", "source", "w", "h", "a", "b", "c")

@@ -59,6 +59,15 @@ class Parts(NamedTuple):
     share: Array
     rest: Array
 
+    def density(self, x: Array) -> Array:
+        """2 pi x R_d / A [1/mfp]."""
+        return self.share * density(x, self.once) + self.rest * density(x, self.again)
+
+    def cdf(self, x: Array) -> Array:
+        """Share of the light within x [-]."""
+        both = self.share * left(x, self.once) + self.rest * left(x, self.again)
+        return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - both, 0.0, 1.0), 1.0), 0.0)
+
 
 class RefractingHazard(EscapeLaw):
     """2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r/l
@@ -235,13 +244,10 @@ class RefractingHazard(EscapeLaw):
         )
 
     def scaled_density(self, x: Array, alpha: Array) -> Array:
-        of = self.parts(alpha)
-        return of.share * density(x, of.once) + of.rest * density(x, of.again)
+        return self.parts(alpha).density(x)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        of = self.parts(alpha)
-        both = of.share * left(x, of.once) + of.rest * left(x, of.again)
-        return jnp.where(x > 0, jnp.where(x < jnp.inf, jnp.clip(1.0 - both, 0.0, 1.0), 1.0), 0.0)
+        return self.parts(alpha).cdf(x)
 
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
         return self.albedo.under(self.surface).reflectance(alpha) * self.scaled_cdf(x, alpha)

@@ -22,7 +22,6 @@ from profilefit.errors import InputError
 from profilefit.laws import map_classes, profile_classes
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.laws.entry import Text
-from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.rational import Normalisation
 from profilefit.shader.languages import translated
 
@@ -101,9 +100,9 @@ def shapeless(law: ProfileLaw) -> list[str]:
 
 def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
     """The members of a law's shape at an albedo, in float64, by their dotted names in its text."""
-    if isinstance(law, ForwardHalfSpace):
-        with jax.enable_x64(True):
-            return law.text_shape()
+    with jax.enable_x64(True):
+        if (known := law.text_shape()) is not None:
+            return known
     made: dict[str, Any] = {}
     exec(compile(law_text(law, "python", "law"), "law.py", "exec"), made)
 

@@ -130,10 +130,8 @@ def _fitted(
 
 def _rings(medium: Medium, d: float, illumination: str, number: int) -> TracedRings:
     """Traced light under a first layer of another thickness."""
-    first, *others = medium.layers
-    made = Medium((replace(first, thickness=d), *others), medium.n_above)
-    edges = photons.ring_edges(first, medium.layers)
-    return photons.traced(made, illumination, edges, photons.STACK_PHOTONS, SEED + 100 + number)
+    edges = photons.ring_edges(medium.layers[0], medium.layers)
+    return photons.traced(medium.with_first(d), illumination, edges, photons.STACK_PHOTONS, SEED + 100 + number)
 
 
 def errors(one: Interface) -> dict[str, dict[str, float | None]]:
@@ -191,39 +189,55 @@ def _noise(one: Interface) -> Floats:
     return np.asarray(scaled.T @ scaled)
 
 
+class StackQuality(NamedTuple):
+    """How good a law is at one thickness.
+
+    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
+    delta_A  relative error of A [-]
+    """
+
+    rel: float
+    noise: float
+    ks: float
+    delta_A: float
+
+
 def quality(one: Interface) -> dict[str, list[float]]:
     """rel, ks and the relative error of A at thicknesses that were not fitted, between those that were [length]."""
-    d = np.sqrt(one.thicknesses[:-1] * one.thicknesses[1:])
-    found: dict[str, list[float]] = {"thickness": d.tolist(), "rel": [], "ks": [], "delta_A": []}
-    for number, each in enumerate(d):
-        if one.is_traced:
-            rings = _rings(one.medium, each, one.law.setting.illumination, len(d) + 1 + number)
-            with jax.enable_x64(True):
-                within = np.asarray(one.law.within(jnp.asarray(rings.edges), jnp.asarray(each)))
-            counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * one.law.top.mfp)
-            off = np.diff(within)[counts] / rings.energy[counts] - 1.0
-            # The mean size of a Gaussian's values is sqrt(2 / pi) of its spread: noise is taken off in quadrature.
-            noise = np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts])
-            found["rel"].append(float(np.sqrt(max(np.mean(np.abs(off)) ** 2 - noise**2, 0.0))))
-            light_within = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
-            found["ks"].append(float(np.max(np.abs(light_within - within[1:]))) / rings.whole)
-            found["delta_A"].append(float(np.asarray(one.law.total(each)) / rings.whole - 1.0))
-            continue
-        light = _solution(one.medium, each, one.law.setting.illumination, NODES)
-        r = _radii(one.medium)
-        share = np.asarray(light.cdf(r))
-        near = r[share <= LAST_SHARE]
-        relative = np.asarray(one.law.profile(near, each)) / np.asarray(light.profile(near)) - 1.0
-        found["rel"].append(float(np.mean(np.abs(relative))))
-        found["ks"].append(float(np.max(np.abs(np.asarray(one.law.cdf(r, each)) - share))))
-        found["delta_A"].append(float(np.asarray(one.law.total(each)) / light.reflectance - 1.0))
-    return found
+    d, illumination = np.sqrt(one.thicknesses[:-1] * one.thicknesses[1:]), one.law.setting.illumination
+    if one.is_traced:
+        fresh = [_rings(one.medium, each, illumination, len(d) + 1 + i) for i, each in enumerate(d)]
+        found = [of_rings(one.law, each, rings) for each, rings in zip(d, fresh, strict=True)]
+    else:
+        found = [_of_exact(one, float(each)) for each in d]
+    kept = {name: [getattr(each, name) for each in found] for name in ("rel", "ks", "delta_A")}
+    return {"thickness": d.tolist(), **kept}
 
 
-def _solution(medium: Medium, d: float, illumination: str, nodes: exact.Nodes) -> exact.Solution:
-    """Its light under a first layer of another thickness."""
-    first, *others = medium.layers
-    return exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, nodes)
+def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
+    """By traced light; rel is of rings from a tenth of the first layer's mean free path."""
+    within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
+    counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
+    off = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
+    # The mean size of a Gaussian's values is sqrt(2 / pi) of its spread.
+    noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
+    light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
+    ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
+    return StackQuality(
+        float(np.sqrt(max(off**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
+    )
+
+
+def _of_exact(one: Interface, thickness: float) -> StackQuality:
+    light = exact.solve(one.medium.with_first(thickness), one.law.setting.illumination, NODES)
+    r = _radii(one.medium)
+    share = np.asarray(light.cdf(r))
+    near = r[share <= LAST_SHARE]
+    relative = np.asarray(one.law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
+    ks = float(np.max(np.abs(np.asarray(one.law.cdf(r, thickness)) - share)))
+    return StackQuality(
+        float(np.mean(np.abs(relative))), 0.0, ks, float(one.law.total(thickness)) / light.reflectance - 1
+    )
 
 
 def _radii(medium: Medium) -> Floats:
@@ -275,7 +289,7 @@ def _thicknesses(layer: Layer, is_below: bool) -> Floats:
 
 def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = NODES) -> tuple[Floats, ...]:
     """Under a first layer of thickness d: radii [length], R_d there, weights of the radii, and A."""
-    light, r = _solution(medium, d, illumination, nodes), _radii(medium)
+    light, r = exact.solve(medium.with_first(d), illumination, nodes), _radii(medium)
     seen = np.asarray(light.cdf(r)) <= LAST_SHARE
     value = np.where(seen, np.asarray(light.profile(r)), 1.0)
     return r, value, seen / np.count_nonzero(seen), np.asarray(light.reflectance)

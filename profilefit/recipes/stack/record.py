@@ -242,7 +242,7 @@ def _content(of: StackRequest, channels: Mapping[str, Mapping[str, Any]]) -> dic
             channel: {key: one[key] for key in ("fit", "quality", "starts", "thicknesses")}
             for channel, one in channels.items()
         },
-        "truth": {"kind": "orders" if is_traced else "exact"},
+        "truth": {"kind": "photons" if is_traced else "exact"},
         "preset": "quick",
         "seed": fit.SEED,
         "versions": record.versions(),

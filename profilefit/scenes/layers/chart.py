@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.media.fresnel import fresnel
-from profilefit.scenes.layers.law import one_half_space
+from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.passes import diffusely_once, once
-from profilefit.scenes.layers.scene import LayersRequest, laws_of, scene_of, technique, truth_of
-from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.judge import Judge, points
+from profilefit.scenes.layers.scene import LayersRequest, judged, laws_of, technique
+from profilefit.scenes.layers.truth import StackTable
+from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
 
@@ -67,27 +65,15 @@ def one_half_space_errors(
 
 
 def ways(
-    context: moderngl.Context, request: LayersRequest, kinds: Sequence[str], samples: Sequence[int], turns: int = 5
-) -> list[ChartPoint]:
-    """Error and cost of each kind of technique with each number of samples, of the scene that is requested."""
-    table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
-    laws = laws_of(request.stack)
-    found = []
-    with Stage(context, request.size) as stage:
-        judge = judged(stage, request, table)
-        for kind in kinds:
-            way = technique(replace(request, kind=kind), laws)
-            own = replace(judge, mfp=way.mfp, alpha=way.alpha)
-            found += points(own, way.label, way.by, request.sampling, samples, turns)
+    stage: Stage, request: LayersRequest, table: StackTable, samples: Mapping[str, Sequence[int]], turns: int = TURNS
+) -> dict[str, list[ChartPoint]]:
+    """Error and cost of each kind of technique with each of its numbers of samples, of the scene that is requested."""
+    judge, laws = judged(stage, request, table), laws_of(request.stack)
+    found = {}
+    for kind, numbers in samples.items():
+        way = technique(replace(request, kind=kind), laws)
+        found[kind] = points(way.judged(judge), way.label, way.by, request.sampling, numbers, turns)
     return found
-
-
-def judged(stage: Stage, request: LayersRequest, table: StackTable) -> Judge:
-    """The scene drawn, with its truth."""
-    stage.draw(scene_of(request))
-    buffers = stage.buffers()
-    truth = truth_of(buffers, request.stack.stack.media, table)
-    return Judge(stage, (1.0, 1.0, 1.0), truth, buffers.mask > INSIDE)
 
 
 def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:

@@ -26,13 +26,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, least_squares, minimize_scalar
+from scipy.optimize import least_squares
 
-from mcml_sim import Setting, exact
+from mcml_sim import exact
 from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
 from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
@@ -40,15 +41,11 @@ from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
 from profilefit.recipes.stack.fit import stack_law
 
-__all__ = ["OneHalfSpace", "Plate", "beams", "one_half_space", "plate_of", "single_scattering", "stack_law"]
+__all__ = ["Plate", "beams", "plate_of", "single_scattering", "stack_law"]
 
 Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
-WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
-RINGS, NEAREST_RING, FARTHEST_RING = 200, 1e-3, 200.0  # that light is summed over [mfp]
-PLACES = 40  # beside the edge
 PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
-AROUND = 1.5  # of ln l that is searched on either side of the first guess
 
 
 class Beam(NamedTuple):
@@ -98,57 +95,6 @@ def single_scattering(
     return float(radiance) if radiance.ndim == 0 else radiance
 
 
-class OneHalfSpace(NamedTuple):
-    """The half space nearest to a stack.
-
-    alpha  whose reflectance is the stack's [-];  mfp  with which it is nearest near an edge of light [length]
-    error  root mean square there of what it is wrong by, as a share of white [-];  reflectance  A of both [-]
-    """
-
-    alpha: float
-    mfp: float
-    error: float
-    reflectance: float
-
-
-def one_half_space(medium: Medium, illumination: str = "diffuse", within: float = 4.0) -> OneHalfSpace:
-    """One half space in place of a stack: by exact light, near a step edge, up to so many mean free paths from it.
-
-    InputError as of `exact.solve`, and where no half space reflects as much. Seconds.
-    """
-    stack = exact.solve(medium, illumination, NODES)
-    setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
-    whole = stack.reflectance
-    most = float(exact.reflectance(1.0 - WHITE, setting))
-    if not 0 < whole < most:
-        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {whole:.3f}")
-    alpha = float(brentq(lambda a: float(exact.reflectance(a, setting)) - whole, 0.0, 1.0 - WHITE))
-    unit = max(layer.mfp for layer in medium.layers if layer.mu_t > 0)
-    edges = np.append(0.0, np.geomspace(NEAREST_RING, FARTHEST_RING, RINGS))
-    middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
-    of_stack = np.append(np.diff(np.asarray(stack.cdf(unit * edges))), 1.0 - float(stack.cdf(unit * edges[-1])))
-    of_one = np.append(
-        np.diff(np.asarray(exact.cdf(edges, alpha, setting=setting))),
-        1.0 - float(exact.cdf(edges[-1], alpha, setting=setting)),
-    )
-
-    def beyond(d: Floats, radii: Floats, shares: Floats) -> Floats:
-        return np.arccos(np.minimum(d[:, None] / radii, 1.0)) / np.pi @ shares
-
-    def apart(u: float) -> float:
-        mfp = np.exp(u)
-        d = within * mfp * (np.arange(PLACES) + 0.5) / PLACES
-        return float(np.sqrt(np.mean((beyond(d, unit * middle, of_stack) - beyond(d, mfp * middle, of_one)) ** 2)))
-
-    def quartile(radii: Floats, shares: Floats) -> float:
-        ends = np.log(radii[[0, -1]])
-        return float(brentq(lambda u: float(beyond(np.exp([u]), radii, shares)[0]) - 0.25, *ends))
-
-    first = quartile(unit * middle, of_stack) - quartile(middle, of_one)
-    best = minimize_scalar(apart, bounds=(first - AROUND, first + AROUND), method="bounded")
-    return OneHalfSpace(alpha, float(np.exp(best.x)), whole * float(best.fun), whole)
-
-
 class Plate(NamedTuple):
     """Light through a part of a thickness D that has a stack's upper layers on both sides, over what arrives:
 
@@ -170,6 +116,7 @@ class Plate(NamedTuple):
         return self.strength / np.sinh(depth)
 
 
+@lru_cache(maxsize=32)
 def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
     """The two constants of a stack, fitted to the exact transmittance of five plates. A second; InputError as of
     `exact.solve`.

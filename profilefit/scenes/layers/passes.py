@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 from mcml_sim import Medium
 from profilefit.laws.base import ProfileLaw
 from profilefit.laws.stack import StackLaw
-from profilefit.materials import CHANNELS
 from profilefit.scenes.layers.law import Plate, single_scattering
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
@@ -25,6 +24,7 @@ Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 SCATTERED = "scattered_map"
 COSINES, SHARES = 32, 16  # of the table of what leaves after one scattering; times cosine, between them right to 2e-4
+LEAST = 1e-9  # mean free paths that stand for no first layer
 GRAZING = 1e-3  # cosine that stands for 0, where a quadrature is of no use
 RULE = 24  # directions of its quadrature, for slope and azimuth each
 
@@ -113,7 +113,7 @@ def once_table(media: Sequence[Medium], least: float, most: float) -> Singles:
     """(SHARES, COSINES, 3) exitance of light scattered once, over irradiance [-]; cosines 0 to 1 along rows."""
     cosine = np.maximum(np.linspace(0.0, 1.0, COSINES), GRAZING)
     thickness = np.linspace(least, most, SHARES)
-    rows = [[once(_with_first(one, d), cosine) for one in media] for d in thickness]
+    rows = [[once(one.with_first(max(d, LEAST * one.layers[0].mfp)), cosine) for one in media] for d in thickness]
     return np.moveaxis(np.array(rows), 1, 2).astype(np.float32)
 
 
@@ -144,14 +144,3 @@ def alike_error(medium: Medium) -> float:
     radiance = np.asarray(single_scattering(medium, mu[:, None, None], mu[:, None], 0.5 * np.pi * (node + 1.0)))
     apart = np.pi * radiance / mu[:, None, None] - once(medium, mu)[:, None, None]
     return float(np.einsum("ioa,i,o,a->", np.abs(apart), of_mu, of_mu, 0.5 * weight))
-
-
-def _with_first(medium: Medium, thickness: float) -> Medium:
-    first, *others = medium.layers
-    return Medium((replace(first, thickness=max(thickness, 1e-9 * first.mfp)), *others), medium.n_above)
-
-
-def channels_of(values: Sequence[float]) -> tuple[float, float, float]:
-    red, green, blue = (float(one) for one in values)
-    assert len(values) == len(CHANNELS)
-    return red, green, blue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import moderngl
@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Medium, Setting
-from profilefit.errors import InputError
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
@@ -19,61 +18,58 @@ from profilefit.recipes.stack import fit
 from profilefit.recipes.stack.record import StackRequest, matching, requested
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.layers import passes
-from profilefit.scenes.layers.law import OneHalfSpace, one_half_space, plate_of
+from profilefit.scenes.layers.half_space import one_half_space
+from profilefit.scenes.layers.law import plate_of
 from profilefit.scenes.layers.truth import StackTable, stack_table
-from profilefit.scenes.stage import head
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
-from profilefit.scenes.stage.judge import TURNS, Judge, points
-from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
-from profilefit.scenes.stage.picture import Drawn, to_srgb
+from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.gather import Gather
+from profilefit.scenes.stage.judge import Judge
+from profilefit.scenes.stage.picture import Drawn
+from profilefit.scenes.stage.request import Shown, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface_integral import exitance_of, own_error
-from profilefit.scenes.stage.technique import Technique
-from profilefit.scenes.stage.world import Camera, Light, Part, Rgb, Scene, deformed, unit
+from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 
 Floats = NDArray[np.float64]
 TABLES = {
-    "": ("title", "scene", "unit", "illumination", "layers", "uneven", "pose", "technique", "camera", "light"),
-    "technique": ("kind", "samples", "chart", "single"),
-    "camera": ("resolution", "distance", "height", "target"),
-    "light": ("direction", "irradiance", "ambient"),
+    **request.TABLES,
+    "": ("title", "scene", "unit", "illumination", "layers", "uneven", "pose", *request.TABLES),
+    "technique": ("kind", *request.TABLES["technique"], "single"),
 }
 KINDS = ("stack", "dipole", "half space", "none")
+OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
 POSES = ("rest", "turn", "nod")
-MOST_CHART = 8  # numbers of samples
-MOST_PIXELS = 2**16  # the truth sums over all pairs of them
-NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]
-LARGEST_VIEW, MOST_LIGHT = 1000.0, 1000.0
-TARGET, DISTANCE, FROM, HEIGHT = (4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0
-EXPOSURE = 1.1
 NEGLIGIBLE = 0.01  # share of white that directions may be wrong by before light scattered once is drawn by itself
 NO_LENGTH = 1e-6  # mean free path of light that does not leave its pixel [mm]
 COLUMNS, BLOTCHES, SEED = 256, 40, 5  # of the thickness over the head, if it is no image
 
 
 @dataclass(frozen=True)
-class LayersRequest:
+class LayersRequest(ViewRequest):
     """What a file requests.
 
     least, most  thickness of the first layer where values (rows, columns) are 0 and 1 [mm];  row 0 at the top
-    chart        other numbers of samples, whose error and cost are measured;  size  [pixels]
     single       whether light scattered once leaves in its own directions
     """
 
-    file: str
     stack: StackRequest
     least: float
     most: float
     values: NDArray[np.float32]
     pose: str
     kind: str
-    sampling: Sampling
-    chart: tuple[int, ...]
     single: bool
-    camera: Camera
-    light: Light
-    ambient: Rgb
-    size: tuple[int, int]
+
+    @property
+    def media(self) -> tuple[Medium, Medium, Medium]:
+        """Of red, green, blue."""
+        return self.stack.stack.media
+
+    @property
+    def mfp(self) -> Rgb:
+        """Of the first layer, red, green, blue [mm]."""
+        return rgb(medium.layers[0].mfp for medium in self.media)
 
 
 def read(file: str, content: Table) -> LayersRequest:
@@ -87,63 +83,40 @@ def read(file: str, content: Table) -> LayersRequest:
             raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
     if stack.stack.unit != "mm":
         raise tables.bad("", "unit", "mm, which the head is in", stack.stack.unit)
-    named, view, lit = (tables.table(content, name, {}) for name in ("technique", "camera", "light"))
+    named = tables.table(content, "technique", {})
     least, most, values = _thickness(tables, content, stack)
-    direction = tables.three("light", "direction", lit, Light().direction, -1e6, 1e6)
-    if not np.linalg.norm(direction) > 1e-6:
-        raise tables.bad("light", "direction", "a direction, not 0", list(direction))
-    size = tables.sides("camera", "resolution", view, (160, 120), 1024)
-    if size[0] * size[1] > MOST_PIXELS:
-        raise tables.bad("camera", "resolution", f"{MOST_PIXELS} pixels at most, which the truth sums over", list(size))
     return LayersRequest(
-        file=file,
+        **request.view(tables, content),
         stack=stack,
         least=least,
         most=most,
         values=values,
         pose=tables.text("", "pose", content, POSES[0], POSES),
         kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
-        sampling=tables.made("technique", lambda: Sampling(named.get("samples", 16))),
-        chart=_chart(tables, named),
         single=_single(tables, named, stack),
-        camera=_camera(tables, view),
-        light=Light(direction, tables.three("light", "irradiance", lit, Light().irradiance, 0.0, MOST_LIGHT)),
-        ambient=tables.three("light", "ambient", lit, Scene(()).ambient, 0.0, MOST_LIGHT),
-        size=size,
     )
 
 
-def draw(context: moderngl.Context, request: LayersRequest) -> Drawn:
+def draw(context: moderngl.Context, of: LayersRequest) -> Drawn:
     """The picture, its truth, error and cost: some minutes, most of them for exact light at nine thicknesses."""
-    media, light = request.stack.stack.media, request.stack.illumination
-    scene = scene_of(request)
-    with Stage(context, (2 * request.size[0], 2 * request.size[1])) as stage:
+    scene = scene_of(of)
+    with Stage(context, (2 * of.size[0], 2 * of.size[1])) as stage:
         stage.draw(scene)
         fine = stage.buffers()
-    _require_lit(request.file, fine)  # before the minutes that exact light takes
-    table = stack_table(media, request.least, request.most, light)
-    way = technique(request, laws_of(request.stack) if request.kind in ("stack", "none") else None)
-    with Stage(context, request.size) as stage:
-        stage.draw(scene)
-        buffers = stage.buffers()
-        _require_lit(request.file, buffers)
-        judge = Judge(stage, way.mfp, truth_of(buffers, media, table), buffers.mask > INSIDE, alpha=way.alpha)
-        numbers = tuple(dict.fromkeys((request.sampling.samples, *request.chart)))
-        point, *others = points(judge, way.label, way.by, request.sampling, numbers)
-        exitance = stage.scatter(way.by, way.mfp, request.sampling, way.alpha)
-        seen = way.shown(request, media)
-        radiance = stage.render(seen, way.mfp, request.sampling, way.alpha)
-        frame = tuple(stage.time(seen, way.mfp, request.sampling, TURNS, "frame", way.alpha))
-    true = radiance + (judge.truth - exitance) / np.pi
-    return Drawn(
-        picture=to_srgb(radiance[::-1], EXPOSURE),
-        truth=to_srgb(true[::-1], EXPOSURE),
-        error=judge.relative_error(exitance)[::-1],
-        point=point,
-        chart=tuple(sorted((point, *others), key=lambda one: one.samples)),
-        frame=frame,
-        truth_error=own_error(fine, mfp_of(media), table),
-    )
+    request.require_lit(of.file, fine)  # before the minutes that exact light takes
+    table = stack_table(of.media, of.least, of.most, of.stack.illumination)
+    way = technique(of, laws_of(of.stack) if of.kind in OF_LAW else None)
+    with Stage(context, of.size) as stage:
+        judge = way.judged(judged(stage, of, table))
+        return request.drawn(judge, of, way.shown(of), own_error(fine, of.mfp, table))
+
+
+def judged(stage: Stage, of: LayersRequest, table: StackTable) -> Judge:
+    """The scene drawn, with its truth: the stack at each point, by the surface integral."""
+    stage.draw(scene_of(of))
+    buffers = stage.buffers()
+    request.require_lit(of.file, buffers)
+    return Judge(stage, of.mfp, exitance_of(buffers, of.mfp, table), buffers.mask > INSIDE)
 
 
 @dataclass(frozen=True)
@@ -151,42 +124,38 @@ class Way:
     """A technique, and what the stage is told besides: lengths [mm] and, of half spaces, albedos of the three."""
 
     label: str
-    by: Technique
+    by: Gather
     mfp: Rgb
     alpha: Rgb | None = None
 
-    def shown(self, request: LayersRequest, media: tuple[Medium, Medium, Medium]) -> Technique:
+    def judged(self, judge: Judge) -> Judge:
+        """What judges it."""
+        return replace(judge, mfp=self.mfp, alpha=self.alpha)
+
+    def shown(self, of: LayersRequest) -> Shown:
         """With light scattered once in its own directions, where that is requested."""
-        if not request.single or not isinstance(self.by, passes.Gather):
-            return self.by
-        return passes.WithSingle.of(self.by, media, request.least, request.most)
+        seen = passes.WithSingle.of(self.by, of.media, of.least, of.most) if of.single else self.by
+        return Shown(self.label, self.by, seen)
 
 
-def technique(request: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Way:
-    """By `kind`: the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none."""
-    media = request.stack.stack.media
-    setting = Setting(request.stack.illumination, n=media[0].layers[0].n)
-    if request.kind in ("stack", "none"):  # of which the last one's light does not leave its pixel
+def technique(of: LayersRequest, laws: tuple[StackLaw, ...] | None) -> Way:
+    """By `kind`: the stack's law, the first layer's dipole (Zhao et al., (10)), the nearest half space, or none.
+
+    laws  of red, green, blue, which the first and the last of these need
+    """
+    light, n = of.stack.illumination, of.media[0].layers[0].n
+    if of.kind in OF_LAW:  # of which the last one's light does not leave its pixel
         assert laws is not None
-        plates = [plate_of(medium, request.stack.illumination) for medium in media]
-        lengths = mfp_of(media) if request.kind == "stack" else (NO_LENGTH,) * 3
-        return Way(request.kind, passes.of_stack(laws, request.least, request.most, plates), lengths)
-    if request.kind == "dipole":
-        alpha = passes.channels_of([medium.layers[0].alpha for medium in media])
-        dipole = catalogue.load("dipole", setting=Setting(n=setting.n))
-        return Way("dipole of the first layer", passes.of_half_space(dipole), mfp_of(media), alpha)
-    near = nearest(media, request.stack.illumination)
-    return Way(
-        "half space",
-        passes.of_half_space(catalogue.load("hazard", setting=setting)),
-        passes.channels_of([one.mfp for one in near]),
-        passes.channels_of([one.alpha for one in near]),
-    )
-
-
-def nearest(media: tuple[Medium, Medium, Medium], illumination: str) -> list[OneHalfSpace]:
-    """The half space nearest to each colour's stack."""
-    return [one_half_space(medium, illumination) for medium in media]
+        plates = [plate_of(medium, light) for medium in of.media]
+        lengths = of.mfp if of.kind == "stack" else (NO_LENGTH,) * 3
+        return Way(of.kind, passes.of_stack(laws, of.least, of.most, plates), lengths)
+    if of.kind == "dipole":
+        dipole = catalogue.load("dipole", setting=Setting(n=n))
+        alpha = rgb(medium.layers[0].alpha for medium in of.media)
+        return Way("dipole of the first layer", passes.of_half_space(dipole), of.mfp, alpha)
+    near = [one_half_space(medium, light) for medium in of.media]
+    hazard = catalogue.load("hazard", setting=Setting(light, n=n))
+    return Way(of.kind, passes.of_half_space(hazard), rgb(one.mfp for one in near), rgb(one.alpha for one in near))
 
 
 def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
@@ -199,22 +168,14 @@ def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
     return red, green, blue
 
 
-def truth_of(buffers: Buffers, media: tuple[Medium, Medium, Medium], table: StackTable) -> Floats:
-    """(h, w, 3) radiant exitance by the stack at each point: the surface integral; Lambert's where nothing scatters."""
-    return exitance_of(buffers, mfp_of(media), table)
-
-
-def mfp_of(media: tuple[Medium, Medium, Medium]) -> Rgb:
-    """Of the first layer, red, green, blue [mm]."""
-    return passes.channels_of([medium.layers[0].mfp for medium in media])
-
-
-def scene_of(request: LayersRequest) -> Scene:
+def scene_of(of: LayersRequest) -> Scene:
     """The head in its pose; what its texture holds is the share of the way from the least thickness to the most."""
-    values = np.repeat(request.values[::-1, :, None], len(CHANNELS), axis=-1)
+    n = of.media[0].layers[0].n
+    f0 = ((n - 1.0) / (n + 1.0)) ** 2  # what the surface mirrors head-on
+    values = np.repeat(of.values[::-1, :, None], len(CHANNELS), axis=-1)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
-    parts = tuple(Part(deformed(mesh, lambda points: posed(points, request.pose)), values) for mesh in meshes)
-    return Scene(parts, request.light, request.ambient, request.camera, _mirrored(request))
+    parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)
+    return Scene(parts, of.light, of.ambient, of.camera, f0)
 
 
 def posed(points: Floats, pose: str) -> Floats:
@@ -228,12 +189,6 @@ def posed(points: Floats, pose: str) -> Floats:
         return np.stack([x, c * up - s * out - 110.0, s * up + c * out - 22.0], axis=1)
     out = z + 22.0
     return np.stack([c * x + s * out, y, c * out - s * x - 22.0], axis=1)
-
-
-def _mirrored(request: LayersRequest) -> float:
-    """What the surface mirrors head-on [-]."""
-    n = request.stack.stack.media[0].layers[0].n
-    return ((n - 1.0) / (n + 1.0)) ** 2
 
 
 def _thickness(tables: Tables, content: Table, stack: StackRequest) -> tuple[float, float, NDArray[np.float32]]:
@@ -272,29 +227,3 @@ def _single(tables: Tables, named: Table, stack: StackRequest) -> bool:
     if value != "auto":
         raise tables.bad("technique", "single", "true, false or auto", value)
     return max(map(passes.alike_error, stack.stack.media)) > NEGLIGIBLE
-
-
-def _chart(tables: Tables, named: Table) -> tuple[int, ...]:
-    numbers: Any = named.get("chart", [])
-    whole = isinstance(numbers, list) and all(type(one) is int and 1 <= one <= MOST_SAMPLES for one in numbers)
-    if not whole or len(numbers) > MOST_CHART:
-        accepted = f"at most {MOST_CHART} numbers of samples in 1 ... {MOST_SAMPLES}"
-        raise tables.bad("technique", "chart", accepted, numbers)
-    return tuple(numbers)
-
-
-def _camera(tables: Tables, view: Table) -> Camera:
-    """Looks from the front; without a height its lens stays the same at every distance."""
-    target = tables.three("camera", "target", view, TARGET, -150.0, 150.0)
-    distance = tables.number("camera", "distance", view, DISTANCE, FARTHEST)
-    if distance < NEAREST:
-        raise tables.bad("camera", "distance", f"a length in {NEAREST:g} ... {FARTHEST:g} mm", view["distance"])
-    height = tables.number("camera", "height", view, HEIGHT * distance / DISTANCE, LARGEST_VIEW)
-    x, y, z = (np.array(target) + distance * unit(FROM)).tolist()
-    return Camera((x, y, z), target, height)
-
-
-def _require_lit(file: str, buffers: Buffers) -> None:
-    inside = buffers.mask > INSIDE
-    if not np.any(buffers.irradiance[inside] > 0):
-        raise InputError(f"{file}: the view must show something that light scatters in, and light must reach it")

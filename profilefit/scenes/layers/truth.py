@@ -6,7 +6,7 @@ in thickness does besides is in no closed form here.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -102,15 +102,14 @@ def stack_table(
 
 def _rows(medium: Medium, thicknesses: Floats, illumination: str, y: Floats, rate: float) -> list[Row]:
     """Of each thickness of the first layer."""
-    first, *others = medium.layers
     shapes: dict[float, tuple[Floats, Floats]] = {}
 
     def under(d: float) -> exact.Solution:
-        return exact.solve(Medium((replace(first, thickness=d), *others), medium.n_above), illumination, NODES)
+        return exact.solve(medium.with_first(d), illumination, NODES)
 
     rows = []
     for d in thicknesses.tolist():
-        seen = max(d, THINNEST * first.mfp)
+        seen = max(d, THINNEST * medium.layers[0].mfp)
         if seen not in shapes:
             shapes[seen] = _shape(under(seen), y, rate)
         rows.append((*shapes[seen], under(d).reflectance))

@@ -16,7 +16,7 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
 from profilefit.scenes.stage.exact_law import DIFFUSE
-from profilefit.scenes.stage.world import Rgb
+from profilefit.scenes.stage.world import Rgb, rgb
 
 Floats = NDArray[np.float64]
 AROUND, UP = 500.0, 320.0  # lengths that u and v in [0, 1] span on the head [mm], near its middle
@@ -42,12 +42,7 @@ def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:
     if name not in BY_NAME:
         raise InputError(f"material must be one of {', '.join(BY_NAME)}, got {name!r}")
     alpha = np.array(BY_NAME[name].alpha)
-    return Translucent(name, _rgb(alpha), _rgb(BY_NAME[name].mfp), _rgb(exact.reflectance(alpha, setting)))
-
-
-def _rgb(values) -> Rgb:
-    red, green, blue = (float(value) for value in values)
-    return red, green, blue
+    return Translucent(name, rgb(alpha), rgb(BY_NAME[name].mfp), rgb(np.asarray(exact.reflectance(alpha, setting))))
 
 
 def skin(reflectance: ArrayLike, columns: int = 2048, seed: int = 7) -> NDArray[np.float32]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 import moderngl
 import numpy as np
@@ -16,17 +15,17 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.skin.material import Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
-from profilefit.scenes.stage import head
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage import head, request
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.gather import technique
-from profilefit.scenes.stage.judge import TURNS, Judge, points
-from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
-from profilefit.scenes.stage.picture import Drawn, to_srgb
+from profilefit.scenes.stage.judge import Judge
+from profilefit.scenes.stage.picture import Drawn
+from profilefit.scenes.stage.request import Shown, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.surface_integral import exitance_of, own_error
 from profilefit.scenes.stage.technique import Lambert, Technique
-from profilefit.scenes.stage.world import Camera, Light, Part, Rgb, Scene, unit
+from profilefit.scenes.stage.world import Camera, Part, Scene
 
 
 @dataclass(frozen=True)
@@ -64,100 +63,47 @@ def head_scene(
 
 
 TABLES = {
-    "": ("scene", "material", "technique", "camera", "light"),
-    "technique": ("kind", "law", "constants", "illumination", "samples", "chart"),
-    "camera": ("resolution", "distance", "height", "target"),
-    "light": ("direction", "irradiance", "ambient"),
+    **request.TABLES,
+    "": ("scene", "material", *request.TABLES),
+    "technique": ("kind", "law", "constants", "illumination", *request.TABLES["technique"]),
 }
 SAMPLED = "samples"
 KINDS: dict[str, Technique] = {"separable": SeparableFilter(), "none": Lambert()}
 OF_LAW = ("law", "constants", "illumination")
-MOST_CHART = 8  # numbers of samples
-# The truth sums over all pairs of pixels, six minutes on a core for so many.
-MOST_PIXELS = 2**16
-NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the band is 122 mm from the middle
-LARGEST_VIEW = 1000.0  # [mm]
-MOST_LIGHT = 1000.0
-# What a file's camera looks at, from which distance and in which direction, and how much of it is seen [mm].
-TARGET, DISTANCE, FROM, HEIGHT = (4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0
-EXPOSURE = 1.1  # of the pictures: few of their pixels are clipped by it
 
 
 @dataclass(frozen=True)
-class SceneRequest:
-    """What a file requests. chart  other numbers of samples, whose error and cost are measured;  size  [pixels]"""
+class SceneRequest(ViewRequest):
+    """What a file requests."""
 
-    file: str
     label: str
     technique: Technique
-    sampling: Sampling
-    chart: tuple[int, ...]
     material: str
-    camera: Camera
-    light: Light
-    ambient: Rgb
-    size: tuple[int, int]
 
 
 def read(file: str, content: Table) -> SceneRequest:
     """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
-    named, view, lit = (tables.table(content, name, {}) for name in ("technique", "camera", "light"))
-    label, by = _technique(tables, named)
-    light = Light()
-    direction = tables.three("light", "direction", lit, light.direction, -1e6, 1e6)
-    if not np.linalg.norm(direction) > 1e-6:
-        raise tables.bad("light", "direction", "a direction, not 0", list(direction))
-    size = tables.sides("camera", "resolution", view, (160, 120), 1024)
-    if size[0] * size[1] > MOST_PIXELS:
-        raise tables.bad("camera", "resolution", f"{MOST_PIXELS} pixels at most, which the truth sums over", list(size))
-    return SceneRequest(
-        file=file,
-        label=label,
-        technique=by,
-        sampling=tables.made("technique", lambda: Sampling(named.get("samples", 16))),
-        chart=_chart(tables, named),
-        material=tables.text("", "material", content, "skin1", tuple(BY_NAME)),
-        camera=_camera(tables, view),
-        light=Light(direction, tables.three("light", "irradiance", lit, light.irradiance, 0.0, MOST_LIGHT)),
-        ambient=tables.three("light", "ambient", lit, Scene(()).ambient, 0.0, MOST_LIGHT),
-        size=size,
-    )
+    label, by = _technique(tables, tables.table(content, "technique", {}))
+    material = tables.text("", "material", content, "skin1", tuple(BY_NAME))
+    return SceneRequest(**request.view(tables, content), label=label, technique=by, material=material)
 
 
-def draw(context: moderngl.Context, request: SceneRequest) -> Drawn:
+def draw(context: moderngl.Context, of: SceneRequest) -> Drawn:
     """The picture, its truth, error and cost: a minute for 26 000 pixels, which the truth takes."""
-    scene = replace(
-        head_scene(request.material, request.camera),
-        light=request.light,
-        ambient=request.ambient,
-        camera=request.camera,
-    )
-    mfp, by, sampling = scene.material.mfp, request.technique, request.sampling
-    with Stage(context, (2 * request.size[0], 2 * request.size[1])) as stage:
+    scene = replace(head_scene(of.material, of.camera), light=of.light, ambient=of.ambient, camera=of.camera)
+    mfp = scene.material.mfp
+    with Stage(context, (2 * of.size[0], 2 * of.size[1])) as stage:
         stage.draw(scene)
         fine = stage.buffers()
-    with Stage(context, request.size) as stage:
+    with Stage(context, of.size) as stage:
         stage.draw(scene)
         buffers = stage.buffers()
-        _require_lit(request.file, buffers)
+        request.require_lit(of.file, buffers)
         judge = Judge(stage, mfp, exitance_of(buffers, mfp), buffers.mask > INSIDE)
-        numbers = dict.fromkeys((sampling.samples, *request.chart))
-        point, *others = points(judge, request.label, by, sampling, tuple(numbers))
-        exitance, radiance = stage.scatter(by, mfp, sampling), stage.render(by, mfp, sampling)
-        frame = tuple(stage.time(by, mfp, sampling, TURNS, "frame"))
-    # What the surface mirrors and what shines through thin parts is the stage's own in both.
-    true = radiance + (judge.truth - exitance) / np.pi
-    return Drawn(
-        picture=to_srgb(radiance[::-1], EXPOSURE),
-        truth=to_srgb(true[::-1], EXPOSURE),
-        error=judge.relative_error(exitance)[::-1],
-        point=point,
-        chart=tuple(sorted((point, *others), key=lambda one: one.samples)),
-        frame=frame,
-        truth_error=own_error(fine, mfp),
-    )
+        shown = Shown(of.label, of.technique, of.technique)
+        return request.drawn(judge, of, shown, own_error(fine, mfp))
 
 
 def _technique(tables: Tables, named: Table) -> tuple[str, Technique]:
@@ -174,29 +120,3 @@ def _technique(tables: Tables, named: Table) -> tuple[str, Technique]:
     return f"{law}, {constants}", tables.made(
         "technique", lambda: technique(catalogue.load(law, constants, Setting(light)))
     )
-
-
-def _chart(tables: Tables, named: Table) -> tuple[int, ...]:
-    numbers: Any = named.get("chart", [])
-    whole = isinstance(numbers, list) and all(type(one) is int and 1 <= one <= MOST_SAMPLES for one in numbers)
-    if not whole or len(numbers) > MOST_CHART:
-        accepted = f"at most {MOST_CHART} numbers of samples in 1 ... {MOST_SAMPLES}"
-        raise tables.bad("technique", "chart", accepted, numbers)
-    return tuple(numbers)
-
-
-def _camera(tables: Tables, view: Table) -> Camera:
-    """Looks from the front; without a height its lens stays the same at every distance."""
-    target = tables.three("camera", "target", view, TARGET, -150.0, 150.0)
-    distance = tables.number("camera", "distance", view, DISTANCE, FARTHEST)
-    if distance < NEAREST:
-        raise tables.bad("camera", "distance", f"a length in {NEAREST:g} ... {FARTHEST:g} mm", view["distance"])
-    height = tables.number("camera", "height", view, HEIGHT * distance / DISTANCE, LARGEST_VIEW)
-    x, y, z = (np.array(target) + distance * unit(FROM)).tolist()
-    return Camera((x, y, z), target, height)
-
-
-def _require_lit(file: str, buffers: Buffers) -> None:
-    inside = buffers.mask > INSIDE
-    if not np.any(buffers.irradiance[inside] > 0):
-        raise InputError(f"{file}: the view must show something that light scatters in, and light must reach it")

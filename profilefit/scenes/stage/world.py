@@ -5,7 +5,7 @@ World and view space are in millimetres, y up; a view looks along -z.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from typing import Self
 
@@ -110,6 +110,12 @@ class Scene:
     def zoomed(self, height: float) -> Self:
         """The same seen by a camera that shows `height` [mm] at its target."""
         return replace(self, camera=replace(self.camera, height=height))
+
+
+def rgb(values: Iterable[float]) -> Rgb:
+    """Three numbers, of red, green and blue, as floats."""
+    red, green, blue = (float(value) for value in values)
+    return red, green, blue
 
 
 def looking(eye: ArrayLike, target: ArrayLike) -> Floats:

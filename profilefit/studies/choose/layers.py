@@ -14,25 +14,29 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from mcml_sim import Estimate, Grid, Medium, Orders, Setting, simulate, simulate_orders
 from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack
-from profilefit.scenes.layers.law import one_half_space
+from profilefit.scenes.layers.half_space import (
+    FARTHEST,
+    NEAREST,
+    RINGS,
+    WHITE,
+    RingShares,
+    nearest_length,
+    one_half_space,
+    places,
+)
 from profilefit.scenes.layers.passes import alike_error
 from profilefit.studies.choose.case import Within
 
 Floats = NDArray[np.float64]
-RINGS = 200
-NEAREST, FARTHEST = 1e-3, 200.0  # the rings' first and last edge [mfp]
 FEWEST, MOST = 2**18, 2**22  # photons
 PRECISE = 10.0  # photons as its square over that of the tolerance: the light's error is then a twentieth of it
-PLACES = 40  # of the edge
-SPAN = 1.5  # of ln l that is searched on either side of the first guess
 REPLICATES, SEED = 200, 1
 SURE = 2.0  # standard errors
-FLATTEST = 1.0 - 1e-6  # largest albedo
 
 
 @dataclass(frozen=True)
@@ -61,20 +65,6 @@ class OneLayer:
         return "not enough" if self.error - SURE * self.standard_error > tolerance else "undecided"
 
 
-@dataclass(frozen=True)
-class RingShares:
-    """Shares of the light that leaves (rings,) in each ring of the radii, with their standard errors [-]."""
-
-    radius: Floats
-    share: Floats
-    error: Floats
-
-    def beyond(self, d: Floats, share: Floats | None = None) -> Floats:
-        """F(d), the share from beyond an edge at each distance (m,)."""
-        across = np.arccos(np.minimum(d[:, None] / self.radius, 1.0)) / np.pi
-        return (self.share if share is None else share) @ across.T
-
-
 def one_layer(
     stack: Medium, tolerance: float, within: Within, photons: int | None = None, progress: bool | None = None
 ) -> OneLayer:
@@ -100,7 +90,7 @@ def one_layer(
     alpha = _alpha(white, reflectance)
     of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
-    mfp = _length(of_stack, of_one, within)
+    mfp = nearest_length(of_stack, of_one, within.mfp)
     error, standard_error = _difference(of_stack, of_one, mfp, within)
     once = alike_error(stack)
     return OneLayer(reflectance, alpha, mfp, n, reflectance * error, reflectance * standard_error, number, once)
@@ -123,42 +113,21 @@ def of_each_colour(
 
 def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:
     """With one ring more, at the last edge, for the light beyond it."""
-    middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
-    value = np.append(energy.value, overflow.value)
     spread = np.append(energy.standard_error, overflow.standard_error)
-    return RingShares(middle, value / value.sum(), spread / value.sum())
+    return RingShares.of(edges, np.append(energy.value, overflow.value), spread)
 
 
 def _alpha(white: Orders, reflectance: float) -> float:
     """The albedo that reflects as much."""
-    most = float(white.reflectance(FLATTEST).value)
+    most = float(white.reflectance(1.0 - WHITE).value)
     if not 0 < reflectance < most:
         raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
-    return float(brentq(lambda alpha: float(white.reflectance(alpha).value) - reflectance, 0.0, FLATTEST))
-
-
-def _places(mfp: float, within: Within) -> Floats:
-    return within.mfp * mfp * (np.arange(PLACES) + 0.5) / PLACES
-
-
-def _length(stack: RingShares, one: RingShares, within: Within) -> float:
-    """The mean free path that makes the difference least."""
-
-    def quartile(rings: RingShares) -> float:
-        return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
-
-    first = quartile(stack) - quartile(one)
-
-    def missed(u: float) -> float:
-        d = _places(np.exp(u), within)
-        return float(np.mean((stack.beyond(d) - one.beyond(d / np.exp(u))) ** 2))
-
-    return float(np.exp(minimize_scalar(missed, bounds=(first - SPAN, first + SPAN), method="bounded").x))
+    return float(brentq(lambda alpha: float(white.reflectance(alpha).value) - reflectance, 0.0, 1.0 - WHITE))
 
 
 def _difference(stack: RingShares, one: RingShares, mfp: float, within: Within) -> tuple[float, float]:
     """Root mean square difference, and its standard error, over replicates of both by their rings' own errors."""
-    random, d = np.random.default_rng(SEED), _places(mfp, within)
+    random, d = np.random.default_rng(SEED), places(mfp, within.mfp)
     apart = stack.beyond(d) - one.beyond(d / mfp)
 
     def drawn(rings: RingShares, at: Floats) -> Floats:

@@ -8,9 +8,10 @@ import pytest
 from mcml_sim import Layer, Medium
 from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack
+from profilefit.scenes.layers.half_space import RingShares
 from profilefit.studies.choose import layers as module
 from profilefit.studies.choose.case import Within
-from profilefit.studies.choose.layers import OneLayer, RingShares, of_each_colour, one_layer
+from profilefit.studies.choose.layers import OneLayer, of_each_colour, one_layer
 
 WITHIN = Within()
 

@@ -1,0 +1,104 @@
+"""One half space in place of a stack: the one of its reflectance whose light near a step edge is nearest."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq, minimize_scalar
+
+from mcml_sim import Setting, exact
+from mcml_sim.media.medium import Medium
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+NODES = exact.Nodes(12, 16, 16, 10)  # right to 1e-4
+WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
+RINGS, NEAREST, FARTHEST = 200, 1e-3, 200.0  # that light is summed over [mfp]
+PLACES = 40  # beside the edge
+SPAN = 1.5  # of ln l that is searched on either side of the first guess
+
+
+@dataclass(frozen=True)
+class RingShares:
+    """Shares of the light that leaves (rings,) in each ring of the radii, with their standard errors [-]."""
+
+    radius: Floats
+    share: Floats
+    error: Floats
+
+    @classmethod
+    def of(cls, edges: Floats, energy: ArrayLike, error: ArrayLike) -> RingShares:
+        """edges  (rings,) of which the first is 0;  energy, error  (rings,), those beyond the last edge at the end."""
+        middle = np.append(np.sqrt(np.maximum(edges[:-1], 0.25 * edges[1]) * edges[1:]), edges[-1])
+        value = np.asarray(energy, float)
+        return cls(middle, value / value.sum(), np.asarray(error, float) / value.sum())
+
+    def beyond(self, d: Floats, share: Floats | None = None) -> Floats:
+        """F(d), the share from beyond an edge at each distance (m,)."""
+        across = np.arccos(np.minimum(d[:, None] / self.radius, 1.0)) / np.pi
+        return (self.share if share is None else share) @ across.T
+
+
+class OneHalfSpace(NamedTuple):
+    """The half space nearest to a stack.
+
+    alpha  whose reflectance is the stack's [-];  mfp  with which it is nearest near an edge of light [length]
+    error  root mean square there of what it is wrong by, as a share of white [-];  reflectance  A of both [-]
+    """
+
+    alpha: float
+    mfp: float
+    error: float
+    reflectance: float
+
+
+@lru_cache(maxsize=32)
+def one_half_space(medium: Medium, illumination: str = "diffuse", within: float = 4.0) -> OneHalfSpace:
+    """One half space in place of a stack: by exact light, near a step edge, up to so many mean free paths from it.
+
+    InputError as of `exact.solve`, and where no half space reflects as much. Seconds.
+    """
+    stack = exact.solve(medium, illumination, NODES)
+    setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
+    whole = stack.reflectance
+    most = float(exact.reflectance(1.0 - WHITE, setting))
+    if not 0 < whole < most:
+        raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {whole:.3f}")
+    alpha = float(brentq(lambda a: float(exact.reflectance(a, setting)) - whole, 0.0, 1.0 - WHITE))
+    unit = max(layer.mfp for layer in medium.layers if layer.mu_t > 0)
+    edges = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
+    of_stack, of_one = (
+        RingShares.of(length * edges, np.diff(np.append(within_edges, 1.0)), np.zeros(edges.size))
+        for length, within_edges in (
+            (unit, np.asarray(stack.cdf(unit * edges))),
+            (1.0, np.asarray(exact.cdf(edges, alpha, setting=setting))),
+        )
+    )
+    mfp = nearest_length(of_stack, of_one, within)
+    d = places(mfp, within)
+    error = float(np.sqrt(np.mean((of_stack.beyond(d) - of_one.beyond(d / mfp)) ** 2)))
+    return OneHalfSpace(alpha, mfp, whole * error, whole)
+
+
+def places(mfp: float, within: float) -> Floats:
+    """Distances from an edge that are judged, up to so many mean free paths [length]."""
+    return within * mfp * (np.arange(PLACES) + 0.5) / PLACES
+
+
+def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
+    """The mean free path of a half space, whose rings are in it, that makes the difference at an edge least."""
+
+    def quartile(rings: RingShares) -> float:
+        return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
+
+    first = quartile(stack) - quartile(one)
+
+    def missed(u: float) -> float:
+        d = places(np.exp(u), within)
+        return float(np.mean((stack.beyond(d) - one.beyond(d / np.exp(u))) ** 2))
+
+    return float(np.exp(minimize_scalar(missed, bounds=(first - SPAN, first + SPAN), method="bounded").x))
