@@ -16,6 +16,7 @@ from profilefit.laws.evaluate import evaluated
 
 KNOWN = {"closed": True}  # of a field that is no constant: what the law is a law of
 THICKEST = 1e6  # mean free paths that stand for an infinite first layer
+LEAST_DECAY = 1e-4  # over l: where nothing is absorbed A tends to A_1 all the same, within 1e-4
 LEAST_RATE = 1e-9  # over the image's height: a rate of 0 has no logarithm
 NEWTON_STEPS = 4  # of an image's radius: to rounding
 
@@ -102,6 +103,7 @@ class StackLaw(Constants):
     top        the first layer's half space;  below  what lies under it
     thickness  of the first layer, where no other is given [length]
 
+    In e kappa_1 is 1e-4 / l at least: A tends to A_1 where nothing is absorbed as well, within 1e-4.
     Where layers scatter forward, l, alpha and kappa are those of similar isotropic ones.
     """
 
@@ -155,10 +157,14 @@ class StackLaw(Constants):
         """Rate at which the light decays far off [1/length]: the slowest of its layers'."""
         return jnp.minimum(self.top.decay(), self.below.decay())
 
+    def fading(self) -> Array:
+        """Rate at which what lies below is seen less under a thicker first layer [1/length]."""
+        return jnp.maximum(self.top.decay(), LEAST_DECAY / self.top.mfp)
+
     def whole(self, thickness: Array | None = None) -> Array:
         """A [-]."""
         d = self._bounded(thickness)
-        e = jnp.exp(-2.0 * self.top.decay() * d + self.u * jnp.expm1(-d / self.top.mfp))
+        e = jnp.exp(-2.0 * self.fading() * d + self.u * jnp.expm1(-d / self.top.mfp))
         first, second = self.top.whole(), self.below.whole()
         return first + (second - first) * (1.0 - self.w) * e / (1.0 - self.w * e)
 

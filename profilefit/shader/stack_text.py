@@ -63,9 +63,10 @@ def channel_numbers(law: StackLaw) -> Numbers:
     with jax.enable_x64(True):
         found: Numbers = {
             "mfp": unit,
-            "kappa": float(law.top.decay()) * unit,
+            "kappa": float(law.fading()) * unit,
             "slowest": float(law.decay()) * unit,
             "below": float(law.below.whole()),
+            "open": 1.0 - law.w,
             **law.constants(),
         }
         one: StackLaw | LayerLaw = law

@@ -9,6 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, NamedTuple
 
+import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -41,7 +42,7 @@ TIMID = 1e-3  # weight of a constant's distance from its start: those that nothi
 # ln, but of w its logit, and u a multiple of the least one with which A is monotone in d.
 START = (0.0, 0.0, 0.2, 0.2, -2.0, -2.0, -1.0, 0.0, -2.0)
 MOST_FORWARD = 0.95
-STARTS, SPREAD, SEED = 5, 0.8, 1
+STARTS, SPREAD, SEED = 6, 0.8, 1
 NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
@@ -300,9 +301,19 @@ def _searched(
 ) -> tuple[Optimum, tuple[Optimum, ...]]:
     """The best optimum of several starts, and all."""
     random = np.random.default_rng(SEED)
-    starts = [np.array(START), *(START + SPREAD * random.standard_normal((STARTS - 1, len(START))))]
+    spread = START + SPREAD * random.standard_normal((STARTS - 2, len(START)))
+    starts = [np.array(START), _as_slabs_add(top, below), *spread]
     found = tuple(_solved(start, top, below, d, lights) for start in starts)
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf), found
+
+
+def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
+    """A start whose A(d) is that of slabs of isotropic light that add up, T^2 A_2 / (1 - A_1 A_2) beside A_1: u = 0, w
+    = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over dark a white layer's A falls as h / (d + h), which no other start finds."""
+    law = _made(jnp.array(START), top, below, 0.0)
+    first, second, rate = (float(one) for one in (top.whole(), below.whole(), 2.0 * law.fading() * top.mfp))
+    w = np.clip(first * (first - second) / (1.0 - first * second + 1e-12), 1e-4, 1.0 - min(rate, 0.5))
+    return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
 
 def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights) -> Optimum:
@@ -340,6 +351,6 @@ def _ring_residual(parameters, data):
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:
     """A law of unbounded parameters."""
     w, u, *others = at
-    least = -2.0 * LOWEST * top.decay() * top.mfp
-    constants: list[Any] = [jax.nn.sigmoid(w), least + jnp.logaddexp(0.0, u), *map(jnp.exp, others)]
-    return StackLaw(top.setting, top, below, thickness, *constants)
+    constants: list[Any] = [jax.nn.sigmoid(w), jnp.logaddexp(0.0, u), *map(jnp.exp, others)]
+    law = StackLaw(top.setting, top, below, thickness, *constants)
+    return eqx.tree_at(lambda one: one.u, law, law.u - 2.0 * LOWEST * law.fading() * top.mfp)

@@ -12,14 +12,16 @@ from numpy.typing import NDArray
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.media.fresnel import fresnel
 from profilefit.scenes.layers.half_space import one_half_space
-from profilefit.scenes.layers.passes import diffusely_once, once
-from profilefit.scenes.layers.scene import LayersRequest, judged, laws_of, technique
+from profilefit.scenes.layers.law import plate_of
+from profilefit.scenes.layers.passes import diffusely_once, of_table, once
+from profilefit.scenes.layers.scene import LayersRequest, Way, judged, laws_of, technique
 from profilefit.scenes.layers.truth import StackTable
 from profilefit.scenes.stage.judge import TURNS, points
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
 
 Floats = NDArray[np.float64]
+TABLE = "exact table"
 
 
 class Split(NamedTuple):
@@ -67,11 +69,17 @@ def one_half_space_errors(
 def ways(
     stage: Stage, request: LayersRequest, table: StackTable, samples: Mapping[str, Sequence[int]], turns: int = TURNS
 ) -> dict[str, list[ChartPoint]]:
-    """Error and cost of each kind of technique with each of its numbers of samples, of the scene that is requested."""
+    """Error and cost of each kind of technique with each of its numbers of samples, of the scene that is requested.
+
+    samples  of the kinds of a file, and of `TABLE`: exact light by tables of each thickness
+    """
     judge, laws = judged(stage, request, table), laws_of(request.stack)
+    plates = [plate_of(medium, request.stack.illumination) for medium in request.media]
     found = {}
     for kind, numbers in samples.items():
-        way = technique(replace(request, kind=kind), laws)
+        way = Way(TABLE, of_table(table, plates), request.mfp)
+        if kind != TABLE:
+            way = technique(replace(request, kind=kind), laws)
         found[kind] = points(way.judged(judge), way.label, way.by, request.sampling, numbers, turns)
     return found
 

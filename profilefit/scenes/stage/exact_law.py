@@ -5,6 +5,7 @@ For tests and references: what any closed form would give if it had no error.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 
@@ -15,6 +16,7 @@ from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.shader.emit import literal, text_beside
 
+Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
 DIFFUSE = Setting("diffuse")  # the light that irradiance is
 NAME = "exact"
@@ -43,23 +45,44 @@ class ExactLaw:
     def text(self, name: str) -> str:
         """The law's text with the prefix `name`; it needs the textures of `textures(name)`."""
         reflectance = np.atleast_1d(exact.reflectance(self.alpha, self.setting))
-        values = {
-            "ROWS": str(len(self.alpha)),
-            "ALPHAS": ", ".join(literal(a) for a in self.alpha),
-            "REFLECTANCES": ", ".join(literal(float(a)) for a in reflectance),
-            "MOST_DEPTH": literal(MOST_DEPTH),
-            "LARGEST_U": literal(float(np.arcsinh(FARTHEST / NEAR))),
-            "NEAR": literal(NEAR),
-        }
-        text = text_beside(__name__, "glsl/exact_law.glsl").replace("LAW_", f"{name}_")
-        for key, value in values.items():
-            text = text.replace(f"@{key}@", value)
-        return text
+        return table_text(name, reflectance, self.alpha)
 
     def textures(self, name: str) -> dict[str, Singles]:
         """Float textures (rows, columns, channels) by the names of their samplers."""
         drawn, known = _tables(self.alpha, self.setting)
         return {f"{name}_drawn": drawn, f"{name}_known": known}
+
+
+def table_text(name: str, reflectance: Iterable[float], alpha: Iterable[float]) -> str:
+    """GLSL of a table: A of its rows [-], and the albedos by which a row is found."""
+    reflectances = [literal(float(a)) for a in reflectance]
+    values = {
+        "ROWS": str(len(reflectances)),
+        "ALPHAS": ", ".join(literal(a) for a in alpha),
+        "REFLECTANCES": ", ".join(reflectances),
+        "MOST_DEPTH": literal(MOST_DEPTH),
+        "LARGEST_U": literal(float(np.arcsinh(FARTHEST / NEAR))),
+        "NEAR": literal(NEAR),
+    }
+    text = text_beside(__name__, "glsl/exact_law.glsl").replace("LAW_", f"{name}_")
+    for key, value in values.items():
+        text = text.replace(f"@{key}@", value)
+    return text
+
+
+def columns() -> tuple[Floats, Floats]:
+    """t (DRAWN,) of the radii that are drawn, and x (KNOWN,) [mfp] of density and cdf: a table's columns."""
+    t = np.linspace(0.0, MOST_DEPTH, DRAWN)
+    t[0] = 1e-4 * t[1]
+    return t, np.maximum(NEAR * np.sinh(np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOWN)), NEAREST)
+
+
+def row(radius: Floats, ring: Floats, share: Floats) -> tuple[Singles, Singles]:
+    """Of x at each t, density 2 pi x R_d / A and cdf at each x of `columns`: ln(x/t) (DRAWN, 1), and ln density and
+    -ln(1 - cdf) (KNOWN, 2)."""
+    left = np.maximum(1.0 - share, np.exp(-MOST_DEPTH - 10.0))
+    known = np.stack([np.log(np.maximum(ring, LEAST_DENSITY)), -np.log(left)], axis=-1)
+    return np.log(np.minimum(radius, FARTHEST) / columns()[0])[:, None].astype(np.float32), known.astype(np.float32)
 
 
 @cache
@@ -71,12 +94,7 @@ def _tables(alpha: tuple[float, ...], setting: Setting) -> tuple[Singles, Single
 
 @cache
 def _table(alpha: float, setting: Setting) -> tuple[Singles, Singles]:
-    """ln(x/t) over even t (DRAWN, 1), and ln density and -ln(1 - cdf) over even u (KNOWN, 2)."""
-    t = np.linspace(0.0, MOST_DEPTH, DRAWN)
-    t[0] = 1e-4 * t[1]
-    radius = np.minimum(exact.quantile(-np.expm1(-t), alpha, setting=setting), FARTHEST)
-    x = np.maximum(NEAR * np.sinh(np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOWN)), NEAREST)
+    t, x = columns()
     ring = 2.0 * np.pi * x * exact.profile(x, alpha, setting=setting) / exact.reflectance(alpha, setting)
-    left = np.maximum(1.0 - exact.cdf(x, alpha, setting=setting), np.exp(-MOST_DEPTH - 10.0))
-    known = np.stack([np.log(np.maximum(ring, LEAST_DENSITY)), -np.log(left)], axis=-1)
-    return np.log(radius / t)[:, None].astype(np.float32), known.astype(np.float32)
+    radius = np.asarray(exact.quantile(-np.expm1(-t), alpha, setting=setting))
+    return row(radius, ring, np.asarray(exact.cdf(x, alpha, setting=setting)))

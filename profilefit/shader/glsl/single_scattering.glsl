@@ -45,10 +45,9 @@ float LAW_radiance(float channel, float thickness, float cos_in, float cos_out, 
     float sum = 0.0;
 //% for 2
     float alpha@h = LAW_of(channel, LAW_red_alpha@h, LAW_green_alpha@h, LAW_blue_alpha@h);
-    float through@h = exp(-b * depth@h);
     float phase@h = LAW_phase(away, LAW_of(channel, LAW_red_g@h, LAW_green_g@h, LAW_blue_g@h));
-    sum = sum + kept@h * (1.0 - through@h) * alpha@h * phase@h;
-    float kept@i = kept@h * through@h;
+    sum = sum + kept@h * LAW_faded(b * depth@h) * alpha@h * phase@h;
+    float kept@i = kept@h * exp(-b * depth@h);
 //% end
     float alpha@n = LAW_of(channel, LAW_red_alpha@n, LAW_green_alpha@n, LAW_blue_alpha@n);
     float phase@n = LAW_phase(away, LAW_of(channel, LAW_red_g@n, LAW_green_g@n, LAW_blue_g@n));

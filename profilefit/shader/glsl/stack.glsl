@@ -138,8 +138,9 @@ LAW_Shape LAW_shape(float channel, float thickness) {
     float above = LAW_layer_reflectance(s.layer1);
     float below = LAW_of(channel, LAW_red_below, LAW_green_below, LAW_blue_below);
     float w = LAW_of(channel, LAW_red_w, LAW_green_w, LAW_blue_w);
-    float early = LAW_of(channel, LAW_red_u, LAW_green_u, LAW_blue_u) * (1.0 - exp(-x));
-    float e = exp(-2.0 * LAW_of(channel, LAW_red_kappa, LAW_green_kappa, LAW_blue_kappa) * x - early);
+    float open = LAW_of(channel, LAW_red_open, LAW_green_open, LAW_blue_open);
+    float early = LAW_of(channel, LAW_red_u, LAW_green_u, LAW_blue_u) * LAW_faded(x);
+    float t = 2.0 * LAW_of(channel, LAW_red_kappa, LAW_green_kappa, LAW_blue_kappa) * x + early;
     PfEdge edge;
     edge.gone = LAW_of(channel, LAW_red_g1, LAW_green_g1, LAW_blue_g1) * x;
     edge.back = LAW_of(channel, LAW_red_g2, LAW_green_g2, LAW_blue_g2) * x;
@@ -151,7 +152,7 @@ LAW_Shape LAW_shape(float channel, float thickness) {
     edge.rate = LAW_of(channel, LAW_red_slowest, LAW_green_slowest, LAW_blue_slowest) + faster;
     edge.passed = LAW_layer_cumulated(edge.gone, s.layer1);
     edge.began = LAW_below_within(edge.back, s);
-    s.reflectance = above + (below - above) * (1.0 - w) * e / (1.0 - w * e);
+    s.reflectance = above + (below - above) * open * exp(-t) / (open + w * LAW_faded(t));
     float kept = above - edge.lost * above * (1.0 - edge.passed);
     float brought = edge.came * max(below - edge.began, 0.0);
     edge.image = s.reflectance - kept - brought;

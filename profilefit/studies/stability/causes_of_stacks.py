@@ -16,11 +16,8 @@ Floats = NDArray[np.float64]
 TOTAL, ENERGY, ONCE = "A(d)", "energy", "L, once"
 ROUNDINGS = 16.0  # units in the last place that the largest term of a sum may be off by
 ALMOST_GONE = 0.01  # mean free paths of a first layer that few radii come from
-WHITE, DARK, ABSORBING = 0.999, 0.1, 0.3  # albedos beyond which `stack_law` is known to be off
-HALF_AS_DARK = 0.9  # of A_1: what is as bright as that below a white layer does not count as dark
-ENDLESS = 100.0  # mean free paths
-# Optical depth, albedo below and g short of which the text of light scattered once loses digits in float32.
-THIN, BLACK, BACKWARD = 0.01, 0.01, -0.5
+BACKWARD = -0.5  # g short of which the text of light scattered once loses digits in float32
+DARK, ABSORBING = 0.1, 0.3  # albedos short of which `stack_law` is known to be off
 
 
 def cancelled(law: StackLaw, thickness: ArrayLike, radius: ArrayLike, value: Floats, bound: float, dtype: type) -> Mask:
@@ -48,15 +45,6 @@ def _largest(law: StackLaw, d: ArrayLike, r: Floats) -> Floats:
         inner = _largest(law.below, law.below.thickness, np.hypot(r, law.g2 * np.asarray(d)))
         found = np.maximum(found, np.exp(-law.b2 * np.asarray(d) / unit) * inner)
     return found
-
-
-def is_spared(cells: Cells) -> Mask:
-    """Where the text of light scattered once is not held to its bound."""
-    return _thin_over_black(cells) | _backward(cells)
-
-
-def _white_over_dark(law: StackLaw) -> bool:
-    return law.top.alpha > WHITE and float(law.below.whole()) < HALF_AS_DARK * float(law.top.whole())
 
 
 def _black_below(law: StackLaw) -> bool:
@@ -109,18 +97,8 @@ def _at_each(cells: Cells, found: NDArray[np.bool_]) -> Mask:
     return np.broadcast_to(found.reshape(-1, *[1] * (len(cells.axes) - 1)), cells.shape)
 
 
-def _never_white(cells: Cells) -> Mask:
-    """Under a first layer that absorbs nothing, however thick."""
-    ends = isinstance(cells.law, StackLaw) and cells.law.top.alpha == 1.0
-    return (cells.spread("d/l", 0.0) >= ENDLESS) & ends
-
-
-def _thin_over_black(cells: Cells) -> Mask:
-    of_text = cells.quantity == ONCE and cells.arithmetic == TEXT32
-    return (cells.spread("d/l", 1.0) < 1.01 * THIN) & (cells.spread("α below", 1.0) < BLACK) & of_text
-
-
-def _backward(cells: Cells) -> Mask:
+def is_backward(cells: Cells) -> Mask:
+    """Where the text of light scattered once is not held to its bound."""
     return (cells.spread("g", 0.0) < BACKWARD) & (cells.quantity == ONCE and cells.arithmetic == TEXT32)
 
 
@@ -142,20 +120,6 @@ STACKS = (
         OF_FITS,
     ),
     Cause(
-        "never white",
-        "where alpha = 1 in the first layer kappa_1 = 0: A stays at e = e^-u however thick it is, under a high image",
-        "take alpha = 1 - 1e-6 there, or the first layer's half space beyond a hundred mean free paths",
-        _never_white,
-        OFF,
-    ),
-    Cause(
-        "white over dark",
-        "A of white over dark goes as d / (d + h): e^(-2 kappa d) does so as w nears 1, and the fit starts at 1/2",
-        "`exact.solve`; or start the fit also at w = A_1 (A_1 - A_2) / (1 - A_1 A_2) and u = 0",
-        _fit_of(_white_over_dark),
-        OF_FITS,
-    ),
-    Cause(
         "black below",
         "nothing comes back from below: R_1(r) - c_1 R_1(s_1) and the image are all, no form of a thin layer's light",
         "`exact.solve`, or `single_scattering` where the first layer is thin",
@@ -170,17 +134,10 @@ STACKS = (
         OF_FITS,
     ),
     Cause(
-        "thin over black",
-        "1 - e^(-b d) of less than a hundredth keeps few of float32's digits, and nothing below adds to it",
-        "none for pictures: off by 1e-7 of white; else t - t^2/2 + t^3/6 for t = b d < 0.02",
-        _thin_over_black,
-        OFF,
-    ),
-    Cause(
         "backward peak",
         "the denominator of p, (1 - g)^2 + 2 g (1 - cos), cancels where g nears -1 and light turns back",
-        "g >= -0.5, beyond which nothing known scatters; else (1 + g)^2 - 2 g (1 + cos)",
-        _backward,
+        "g >= -0.5, beyond which nothing known scatters",
+        is_backward,
         OFF,
     ),
 )

@@ -24,7 +24,7 @@ from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.stack_text import single_text, stack_text
 from profilefit.studies.stability import model_cells
-from profilefit.studies.stability.causes_of_stacks import ENERGY, ONCE, TOTAL, cancelled, is_spared
+from profilefit.studies.stability.causes_of_stacks import ENERGY, ONCE, TOTAL, cancelled, is_backward
 from profilefit.studies.stability.cells import (
     DIMMEST,
     EXTENDED,
@@ -67,12 +67,13 @@ ENDS: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
     (0.9, 1 - 1e-6, (0.0065, 0.0019, 0.007), (0.04453, -0.0511, 1.585, 1.414, 0.9201, 1.033, 4.258, 1.292, 0.2189)),
     (0.99, 0.1, (0.065, 0.045, 0.026), (0.526, -0.2106, 0.8038, 55.55, 0.01873, 0.1349, 0.6059, 3.87, 2.226)),
     (0.9, 0.0, (0.32, 0.082, 0.19), (0.557, -0.8766, 2.964, 1.221, 0.07459, 0.1353, 2.462e-06, 1.378, 1.216e-05)),
-    (1 - 1e-6, 0.999, (0.0045, 0.0019, 0.00026),
-     (0.9334, -0.0001492, 0.9792, 0.9722, 0.003057, 0.01503, 3.383, 1.413, 0.07157)),
-    (1 - 1e-6, 0.5, (0.23, 0.16, 0.46), (3.925e-05, 0.3954, 1.039, 0.4768, 2.152e-05, 1.235, 0.7187, 0.6541, 0.7062)),
-    (1 - 1e-6, 0.0, (0.87, 0.9, 0.62),
-     (2.75e-05, 0.2856, 0.07235, 1.221, 6.741e-07, 0.1353, 18.31, 0.0009186, 1.716e-05)),
-    (1.0, 0.5, (0.24, 0.17, 0.47), (2.676e-05, 0.4017, 1.034, 0.455, 2.021e-05, 1.261, 0.7092, 0.6462, 0.7017)),
+    (1 - 1e-6, 0.999, (0.005, 0.0025, 0.0002),
+     (0.9337, -0.0002761, 1.418, 1.284, 0.004419, 0.0009545, 0.007687, 1.338, 0.4432)),
+    (1 - 1e-6, 0.5, (0.025, 0.013, 0.015),
+     (0.9905, -0.001405, 1.056, 1.438, 4.655e-05, 0.01147, 0.8126, 1.658, 0.8786)),
+    (1 - 1e-6, 0.0, (0.28, 0.084, 0.14),
+     (0.9929, -0.002392, 0.9386, 1.221, 0.01733, 0.1353, 8.647e-05, 1.249, 3.278)),
+    (1.0, 0.5, (0.025, 0.014, 0.016), (0.9994, -8.088e-05, 1.056, 1.436, 4.647e-05, 0.01146, 0.8121, 1.659, 0.8803)),
 )  # fmt: skip
 BORROWER = (0.99, 0.5)  # albedos of a law that has the constants of others
 # Light scattered once: index, cosines, optical depth of the first layer, g, albedo below, cosine of the azimuth.
@@ -296,7 +297,7 @@ def once(n: float, arithmetic: str) -> Cells:
     codes = judged(value, reference, error, bound, inside, dtype)
     label = f"light scattered once, n = {n:g}"
     found = Cells(label, True, ONCE, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)
-    return replace(found, inside=~is_spared(found)) if arithmetic == TEXT32 else found
+    return replace(found, inside=~is_backward(found))
 
 
 def _two(n: float, g: float, below: float, depth: float) -> Medium:

@@ -168,3 +168,18 @@ def test_fitted_thicknesses_hold_the_layer_s_own():
     own = stacks._thicknesses(Layer(1.4, 0.1, 1.0, 0.0, 0.37), is_below=False)
     assert 0.37 in own
     assert own[0] == pytest.approx(0.1 / 1.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("absorbed", [0.0, 1e-6])
+def test_a_white_layer_over_a_dark_one(absorbed):
+    """A falls as h / (d + h) under a thicker one, not as a power of e; an endless one that absorbs nothing is white."""
+    white, dark = Layer(1.4, absorbed, 1.0 - absorbed, 0.0, 1.0), Layer(1.4, 0.5, 0.5, 0.0)
+    law = stack_law(Medium((white, dark)), "diffuse")
+    for thickness in (0.3, 2.0, 8.0):
+        medium = Medium((replace(white, thickness=thickness), dark))
+        assert error(law, thickness, medium, "diffuse")[2] < 0.02
+    assert float(law.total(1e6)) == pytest.approx(float(law.top.whole()), abs=1e-6)
+    # Negative control: as a fit ends that starts where others do.
+    lost = replace(law, w=3e-5, u=0.4)
+    assert abs(float(lost.total(2.0)) / float(law.total(2.0)) - 1.0) > 0.1

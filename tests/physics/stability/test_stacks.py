@@ -42,11 +42,11 @@ def test_all_that_fails_at_the_ends_of_albedos_has_a_cause():
     found = reds(*cells, *stacks.stated(list(ENDS.values()), promised=False))
     assert wrong(found) == []
     told = {(one.cause.key, one.arithmetic) for one in found}
-    causes = ("white over dark", "black below", "absorbing first layer")
-    assert told >= {*((cause, MODEL) for cause in causes), ("less than its terms", TEXT32), ("never white", TEXT32)}
+    causes = ("black below", "absorbing first layer")
+    assert told >= {*((cause, MODEL) for cause in causes), ("less than its terms", TEXT32)}
 
 
-@pytest.mark.parametrize(("albedos", "is_negative"), [((0.3, 0.9), False), ((1 - 1e-6, 0.5), True)])
+@pytest.mark.parametrize(("albedos", "is_negative"), [((0.3, 0.9), False), ((0.9, 0.0), True)])
 def test_laws_in_python(albedos, is_negative):
     """One that `stack_law` fits is right everywhere; one that it does not is negative somewhere, for a cause."""
     one = ENDS[albedos]
@@ -54,7 +54,7 @@ def test_laws_in_python(albedos, is_negative):
     assert wrong(found) == []
     assert one.holds != is_negative
     assert {(each.verdict, each.cause.key) for each in found if each.quantity == PROFILE} == (
-        {(Verdict.NEGATIVE, "white over dark")} if is_negative else set()
+        {(Verdict.NEGATIVE, "black below")} if is_negative else set()
     )
 
 
@@ -86,8 +86,8 @@ def test_light_scattered_once(monkeypatch, n):
     assert exactly.verdicts == {Verdict.RIGHT}
     found = reds(single)
     assert wrong(found) == []
-    assert {(one.quantity, one.cause.key) for one in found} == {(ONCE, "thin over black"), (ONCE, "backward peak")}
-    assert np.mean(single.inside) > 0.6
+    assert {(one.quantity, one.cause.key) for one in found} == {(ONCE, "backward peak")}
+    assert np.mean(single.inside) > 0.8
     scatter = stacks.single_scattering  # negative control: a direction that is off in the ninth digit
     monkeypatch.setattr(
         stacks, "single_scattering", lambda medium, *of: scatter(medium, of[0], of[1] * (1 - 1e-8), of[2])

@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 
 import profilefit
-from mcml_sim import Layer, Medium, Setting, half_space
+from mcml_sim import Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact.single_scattering import reflected
 from profilefit.laws.stack import LayerLaw, StackLaw
-from profilefit.scenes.layers import passes
+from profilefit.scenes.layers import passes, truth
 from profilefit.scenes.layers.law import single_scattering
-from profilefit.scenes.layers.passes import WithSingle, diffusely_once, of_half_space, of_stack, once, once_table
+from profilefit.scenes.layers.passes import (
+    WithSingle,
+    diffusely_once,
+    of_half_space,
+    of_stack,
+    of_table,
+    once,
+    once_table,
+)
 from profilefit.scenes.stage.buffers import flat
+from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import unit
@@ -237,3 +246,19 @@ def test_a_half_space_everywhere(stage):
             found = stage.scatter(of_half_space(law), mfp, SAMPLES, alpha)
             np.testing.assert_allclose(found, np.broadcast_to(known, found.shape), rtol=2e-5)  # float32
     assert np.all(np.diff(known) < -0.05)
+
+
+def test_a_table_of_one_material_draws_the_exact_half_space(stage, monkeypatch):
+    """Whatever the map says of thicknesses; half of the light lies left of an edge. Another albedo is seen."""
+    monkeypatch.setattr(truth, "THICKNESSES", 4)
+    layer, setting = Layer(1.4, 0.5, 9.5, 0.0, 0.2), Setting("diffuse", n=1.4)
+    table = truth.stack_table((Medium((layer, replace(layer, thickness=np.inf))),) * 3, 0.1, 0.3)
+    light = (np.arange(SIZE[0]) < SIZE[0] / 2)[None, :, None].astype(float)
+    stage.upload(flat(SIZE, 1.0, np.linspace(0.0, 1.0, SIZE[1])[:, None, None], light))
+    own = stage.scatter(of_table(table, ()), 3.0, Sampling(64))
+    stage.upload(flat(SIZE, 1.0, float(exact.reflectance(0.95, setting)), light))
+    known, other = (
+        stage.scatter(ExactLaw((alpha,), setting), 3.0, Sampling(64), (alpha,) * 3) for alpha in (0.95, 0.94)
+    )
+    np.testing.assert_allclose(own, known, atol=1e-3)
+    assert np.max(np.abs(own - other)) > 4e-3
