@@ -36,7 +36,15 @@ from profilefit.scenes.stage.world import Camera, Light, Part
 from profilefit.shader import opened, renderer
 
 FILE = "layers-head.toml"
-WAYS = {"stack": (4, 16, 64), chart.TABLE: (4, 16, 64), "dipole": (64,), "half space": (64,), "none": (1,)}
+WAYS = {
+    "stack": (4, 16, 64),
+    chart.TABLE: (4, 16, 64),
+    "gaussians:4": (64,),
+    "gaussians:6": (64,),
+    "dipole": (64,),
+    "half space": (64,),
+    "none": (1,),
+}
 SIZES, DETAILS = ((128, 128), (256, 256), (512, 512), (1024, 1024)), (1, 2)
 PICTURED, LARGE = ("stack", "dipole", "half space"), (200, 200)
 BEHIND, PARTS = Camera((250.0, 10.0, 600.0), (78.0, 2.0, -10.0), 110.0), (2.0, 5.0)  # of the ear; parts [mm]

@@ -3,6 +3,7 @@
     python -m benchmarks.stacks               # twenty minutes on two cores
     python -m benchmarks.stacks --random 20   # ten minutes: 2 to 4 layers, seeded
     python -m benchmarks.stacks --forward 0.9 --light searchlight   # an hour: g in every layer, against photons
+    python -m benchmarks.stacks --gaussians   # two minutes: sums of 1 to 8, each fitted at the stack's own thickness
 
 Held against `exact.solve`. rel is the mean relative error of R_d over radii even in ln r, from a hundredth of a mean
 free path to 99.5 % of the light; ks the largest error of the cdf. Beside it stands the half space of the first layer.
@@ -25,8 +26,9 @@ import numpy as np
 
 from benchmarks.table import show
 from mcml_sim import Layer, Medium, Setting, exact
+from profilefit.laws.gaussians import MOST
 from profilefit.materials import BY_NAME, CHANNELS
-from profilefit.recipes.stack import photons
+from profilefit.recipes.stack import gaussians, photons
 from profilefit.recipes.stack.fit import NEAR_TRACED, of_rings, stack_law
 
 LIGHTS = ("searchlight", "diffuse")
@@ -124,6 +126,14 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
     return cells, Error(found.rel, similar, found.ks, found.delta_A)
 
 
+def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], list[float]]:
+    """rel of sums of 1 to 8 Gaussians, of rings even in ln r."""
+    of = gaussians.sum_light(medium, light)
+    found = [np.asarray(gaussians.fitted(of, count).residuals) / of.weight for count in range(1, MOST + 1)]
+    rel = [float(np.mean(np.abs(one))) for one in found]
+    return (f"{name}, {light}", *_short(*rel)), rel
+
+
 def row(
     name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]
 ) -> tuple[tuple[str, ...], list[Error], Error]:
@@ -154,6 +164,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--random", type=int, default=0, metavar="N", help="so many random stacks in place of the four")
     parser.add_argument("--forward", type=float, default=0.0, metavar="G", help="g of every layer, in (0, 0.95]")
+    parser.add_argument("--gaussians", action="store_true", help="sums of Gaussians in place of the law")
     parser.add_argument("--stack", choices=tuple(stacks(0)), help="one of the four; all by default")
     parser.add_argument("--light", choices=LIGHTS, help="one of the two lights; both by default")
     parser.add_argument(
@@ -162,14 +173,23 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--json", type=Path, metavar="FILE", help="write the figures of all there too")
     given = parser.parse_args(arguments)
     lights = (given.light,) if given.light else LIGHTS
+    every = [
+        (f"{name}, {CHANNELS[channel]}", light, medium)
+        for light in lights
+        for channel in range(3)
+        for name, medium in stacks(channel).items()
+        if given.stack in (None, name)
+    ]
+    if given.gaussians:
+        cells, by_stack = zip(*(sums_row(*one) for one in every), strict=True)
+        counts = [str(count) for count in range(1, MOST + 1)]
+        figures_of = {"mean": np.mean(by_stack, axis=0), "worst": np.max(by_stack, axis=0)}
+        ends = [(what, *_short(*values)) for what, values in figures_of.items()]
+        show("rel of sums of so many Gaussians", ("stack", *counts), [*cells, *ends])
+        _write(given.json, {what: dict(zip(counts, one.tolist(), strict=True)) for what, one in figures_of.items()})
+        return
     if given.forward:
-        made = [
-            traced_row(f"{name}, {CHANNELS[channel]}", light, medium, given.forward, given.photons)
-            for light in lights
-            for channel in range(3)
-            for name, medium in stacks(channel).items()
-            if given.stack in (None, name)
-        ]
+        made = [traced_row(*one, given.forward, given.photons) for one in every]
         rows, errors = zip(*made, strict=True)
         figures = _summary(list(errors))
         own = f"{figures['rel']:.2g}, at most {figures['worst']:.2g}"
@@ -183,13 +203,7 @@ def main(arguments: list[str] | None = None) -> None:
         media = [(f"{number}", random_stack(number)) for number in range(count)]
         jobs = [(name, LIGHTS[int(name) % 2], medium, (medium.layers[0].thickness,)) for name, medium in media]
     else:
-        jobs = [
-            (f"{name}, {CHANNELS[channel]}", light, medium, THICKNESSES)
-            for light in lights
-            for channel in range(3)
-            for name, medium in stacks(channel).items()
-            if given.stack in (None, name)
-        ]
+        jobs = [(*one, THICKNESSES) for one in every]
     rows, errors, own_errors = zip(*(row(*job) for job in jobs), strict=True)
     figures, at_own = _summary([one for some in errors for one in some]), _summary(list(own_errors))
     own = (f"{at_own['rel']:.2g}, at most {at_own['worst']:.2g}", f"{at_own['ks']:.2g}")

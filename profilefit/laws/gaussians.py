@@ -46,17 +46,54 @@ EXTRA_STEPS = 12
 FARTHEST = 1e8  # x [mfp]: no light is left, and its square is finite in float32
 
 
-class Gaussians(ProfileLaw):
+class GaussianSum(ProfileLaw):
     """R_d = A sum_i w_i e^{-x^2 / 2 v_i} / (2 pi v_i),  cdf = 1 - sum_i w_i e^{-x^2 / 2 v_i},  x = r/l.
 
-    With s = sqrt(1 - alpha), i = 2 ... N:
+    Weights are positive and sum to one. Finite at x = 0, where no half space is, and far away below any.
+    """
+
+    @abc.abstractmethod
+    def count(self) -> int:
+        """The number N of Gaussians."""
+
+    @abc.abstractmethod
+    def variances(self, alpha) -> Array:
+        """v_i(alpha) [mfp^2], rising, along a last axis."""
+
+    @abc.abstractmethod
+    def log_weights(self, alpha) -> Array:
+        """ln w_i(alpha) [-] along a last axis."""
+
+    def scaled_profile(self, x: Array, alpha: Array) -> Array:
+        variance = self.variances(alpha)
+        terms = jnp.exp(self.log_weights(alpha) - 0.5 * jnp.asarray(x)[..., None] ** 2 / variance) / variance
+        return self.total(alpha) * jnp.sum(terms, axis=-1) / (2.0 * jnp.pi)
+
+    def scaled_cdf(self, x: Array, alpha: Array) -> Array:
+        share = -jnp.expm1(-0.5 * jnp.asarray(x)[..., None] ** 2 / self.variances(alpha))
+        return jnp.sum(jnp.exp(self.log_weights(alpha)) * share, axis=-1)
+
+    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
+        return self.total(alpha) * self.scaled_cdf(x, alpha)
+
+    def source_strength(self, alpha: Array) -> Array:
+        """0: no Gaussian rises as 1/x, so a limit at the source cannot be fitted."""
+        return jnp.zeros_like(alpha)
+
+    @property
+    def sampler(self) -> GaussiansSampler:
+        """The cdf inverted by Newton's method."""
+        return GaussiansSampler(self)
+
+
+class Gaussians(GaussianSum):
+    """A sum for every albedo: with s = sqrt(1 - alpha), i = 2 ... N:
 
     ln v_1 = v1 + f1 s + f2 s^2,  ln (v_i / v_{i-1}) = ln(1 + e^{vi})    variances rise with i, and with s by one factor
     w_i / w_1 = e^{wi0 + wi1 s}                                        weights are positive and sum to one
 
     3 N constants. (A quadratic of its own for each variance ratio and each weight, 6 N - 3 constants, lowers the misfit
-    of four Gaussians by 0.4 %.) A is the reflectance at alpha by `albedo` (held fixed). Finite at x = 0, where the half
-    space is not, and far away below any half space. Valid for alpha in [0, 1].
+    of four Gaussians by 0.4 %.) A is the reflectance at alpha by `albedo` (held fixed). Valid for alpha in [0, 1].
     """
 
     albedo: eqx.AbstractVar[Normalisation]
@@ -105,27 +142,6 @@ class Gaussians(ProfileLaw):
         logits = [jnp.zeros_like(s), *(level + slope * s for level, slope in pairs)]
         return jax.nn.log_softmax(jnp.stack(logits, axis=-1), axis=-1)
 
-    def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        variance = self.variances(alpha)
-        terms = jnp.exp(self.log_weights(alpha) - 0.5 * jnp.asarray(x)[..., None] ** 2 / variance) / variance
-        return self.albedo.reflectance(alpha) * jnp.sum(terms, axis=-1) / (2.0 * jnp.pi)
-
-    def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        share = -jnp.expm1(-0.5 * jnp.asarray(x)[..., None] ** 2 / self.variances(alpha))
-        return jnp.sum(jnp.exp(self.log_weights(alpha)) * share, axis=-1)
-
-    def unscaled_energy(self, x: Array, alpha: Array) -> Array:
-        return self.albedo.reflectance(alpha) * self.scaled_cdf(x, alpha)
-
-    def source_strength(self, alpha: Array) -> Array:
-        """0: no Gaussian rises as 1/x, so a limit at the source cannot be fitted."""
-        return jnp.zeros_like(alpha)
-
-    @property
-    def sampler(self) -> GaussiansSampler:
-        """The cdf inverted by Newton's method."""
-        return GaussiansSampler(self)
-
 
 class GaussiansSampler(Sampler):
     """x = sqrt(q) with ln sum_i w_i e^{-q / 2 v_i} = ln(1 - xi), by Newton's method from the left.
@@ -135,7 +151,7 @@ class GaussiansSampler(Sampler):
     variances up to e^10, measured on random sums.
     """
 
-    law: Gaussians
+    law: GaussianSum
 
     @eqx.filter_jit  # the steps are a loop, which would compile anew at each call
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
@@ -156,6 +172,42 @@ class GaussiansSampler(Sampler):
         variance = self.law.variances(alpha)
         r = jnp.minimum(jnp.asarray(x), FARTHEST)[..., None]
         return jnp.sum(jnp.exp(self.law.log_weights(alpha) - 0.5 * r**2 / variance) * r / variance, axis=-1)
+
+
+class MediumGaussians(GaussianSum):
+    """A sum for one medium, a stack of layers under its own thicknesses, x in mean free paths of the first one.
+
+    It has the medium's own A: arguments alpha are not looked at.
+    """
+
+    setting: Setting = eqx.field(static=True)
+    total_reflectance: float  # A [-]
+    variance: tuple[float, ...]  # v_i [mfp^2], rising
+    weight: tuple[float, ...]  # w_i [-]
+    own_reflectance = True
+
+    @property
+    def entry(self) -> Entry:  # type: ignore[override]
+        """Its text's blocks stand once for each Gaussian."""
+        return Entry("gaussians", text=Text("gaussians", count=self.count()))
+
+    def count(self) -> int:
+        return len(self.weight)
+
+    def variances(self, alpha) -> Array:
+        return jnp.stack([jnp.asarray(one, float) for one in self.variance]) + jnp.zeros_like(alpha)[..., None]
+
+    def log_weights(self, alpha) -> Array:
+        return jnp.log(jnp.stack([jnp.asarray(one, float) for one in self.weight])) + jnp.zeros_like(alpha)[..., None]
+
+    def total(self, alpha) -> Array:
+        return self.total_reflectance + jnp.zeros_like(alpha)
+
+    def text_shape(self) -> dict[str, float]:
+        """Those of `Gaussians`' text."""
+        pairs = enumerate(zip(self.variance, self.weight, strict=True), start=1)
+        each = {name: value for i, (v, w) in pairs for name, value in ((f"rate{i}", 0.5 / v), (f"weight{i}", w))}
+        return {"reflectance": self.total_reflectance, **each}
 
 
 def law_class(count: int = DEFAULT) -> type[Gaussians]:

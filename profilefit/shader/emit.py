@@ -32,7 +32,8 @@ NORMALISED = "rational"  # the part that stands for the text of the map which no
 # @n is the last one, anywhere.
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
 # The function that makes a shape of an albedo: a text that has its shapes as numbers leaves it out.
-SHAPE = re.compile(r"^//% shape\n(.*?)^//% end\n", re.MULTILINE | re.DOTALL)
+SHAPE = re.compile(r"^//% shape\n(.*?)^//% end shape\n", re.MULTILINE | re.DOTALL)
+ON_SHAPES = ("survival",)  # parts that work on shapes, however these were made
 # A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
 PREFIX = re.compile(r"(?!gl_|PF_|pf_|LAW\b)[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*")
 # A second include of the same text is skipped; one of other constants under the same names would be so in silence.
@@ -95,7 +96,8 @@ def parts(law: ProfileLaw) -> list[str]:
 def shapeless(law: ProfileLaw) -> list[str]:
     """What of a law's text works on shapes that are made elsewhere."""
     text = _text(law, ProfileLaw)
-    return [SHAPE.sub("", read_text(part)) for part in ("common", "survival", text.file)]
+    needed = [part for part in text.parts if part in ON_SHAPES]
+    return [SHAPE.sub("", read_text(part)) for part in ("common", *needed, text.file)]
 
 
 def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:

@@ -10,6 +10,7 @@ import jax.numpy as jnp
 
 from mcml_sim.media.medium import Medium
 from profilefit.errors import InputError
+from profilefit.laws.gaussians import MediumGaussians
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.shader import emit
@@ -57,6 +58,20 @@ def single_text(media: Sequence[Medium], lang: str = "glsl", name: str = f"{NAME
     )
 
 
+def gaussians_text(sums: Sequence[MediumGaussians], lang: str = "glsl", name: str = "gaussians") -> str:
+    """Sums of as many Gaussians for red, green and blue: NAME_shape(channel), and what works on shapes.
+
+    lang, name  as for `emit.law_text`;  InputError on sums of unlike numbers
+    """
+    if len(sums) != len(CHANNELS) or len({one.count() for one in sums}) > 1:
+        told = ", ".join(str(one.count()) for one in sums) or "none"
+        raise InputError(f"sums must be three of one number of Gaussians, of red, green and blue, got {told}")
+    shapes = [_rounded(one.text_shape()) for one in sums]
+    prefix = emit.PLACEHOLDER.removesuffix("_")
+    texts = [*emit.shapeless(sums[0]), emit.read_text("channel"), _of_channel(prefix, "_shape", shapes)]
+    return emit.filled(texts, name, {}, sums[0].count(), lang, {})
+
+
 def channel_numbers(law: StackLaw) -> Numbers:
     """The numbers of one channel's text, lengths in mean free paths of its first layer; mfp itself as it is."""
     unit = law.top.mfp
@@ -86,25 +101,29 @@ def _layer_texts(laws: Sequence[StackLaw]) -> list[str]:
     each = [[_rounded(emit.shape_numbers(one.law, one.alpha)) for one in law.layers] for law in laws]
     prefix = f"{emit.PLACEHOLDER}{LAYER}"
     keys = list(each[0][0])
-    curves = list(dict.fromkeys(key.partition(".")[0] for key in keys if "." in key))
+    texts = [_of_channel(prefix, str(number), layers) for number, layers in enumerate(zip(*each, strict=True), start=1)]
+    differ = {key for key in keys if len({one[key] for layers in each for one in layers}) > 1}
+    either = {key: f"PF_SELECT(first > 0.5, one.{key}, other.{key})" if key in differ else f"one.{key}" for key in keys}
+    return [*texts, _function(prefix, f"_either(float first, {prefix}_Shape one, {prefix}_Shape other)", either)]
 
-    def function(head: str, values: Mapping[str, str]) -> str:
-        lines = [f"{prefix}_Shape {prefix}{head} {{", f"    {prefix}_Shape s;"]
-        lines += [f"    PfCurve {curve};" for curve in curves]
-        lines += [f"    {key if '.' in key else f's.{key}'} = {value};" for key, value in values.items()]
-        lines += [f"    s.{curve} = {curve};" for curve in curves]
-        return "\n".join([*lines, "    return s;", "}"]) + "\n"
+
+def _of_channel(prefix: str, name: str, shapes: Sequence[Mapping[str, str]]) -> str:
+    """The function that gives one of three shapes."""
 
     def chosen(values: Sequence[str]) -> str:
         return values[0] if len(set(values)) == 1 else f"{emit.PLACEHOLDER}of(channel, {', '.join(values)})"
 
-    texts = [
-        function(f"{number}(float channel)", {key: chosen([one[key] for one in layers]) for key in keys})
-        for number, layers in enumerate(zip(*each, strict=True), start=1)
-    ]
-    differ = {key for key in keys if len({one[key] for layers in each for one in layers}) > 1}
-    either = {key: f"PF_SELECT(first > 0.5, one.{key}, other.{key})" if key in differ else f"one.{key}" for key in keys}
-    return [*texts, function(f"_either(float first, {prefix}_Shape one, {prefix}_Shape other)", either)]
+    return _function(prefix, f"{name}(float channel)", {key: chosen([one[key] for one in shapes]) for key in shapes[0]})
+
+
+def _function(prefix: str, head: str, values: Mapping[str, str]) -> str:
+    """A function that fills a shape, whose curves are structures in it."""
+    curves = list(dict.fromkeys(key.partition(".")[0] for key in values if "." in key))
+    lines = [f"{prefix}_Shape {prefix}{head} {{", f"    {prefix}_Shape s;"]
+    lines += [f"    PfCurve {curve};" for curve in curves]
+    lines += [f"    {key if '.' in key else f's.{key}'} = {value};" for key, value in values.items()]
+    lines += [f"    s.{curve} = {curve};" for curve in curves]
+    return "\n".join([*lines, "    return s;", "}"]) + "\n"
 
 
 def _rounded(numbers: Numbers) -> dict[str, str]:

@@ -94,7 +94,7 @@ def fitted(medium: Medium, illumination: str) -> tuple[StackLaw | LayerLaw, tupl
     """The law, and the fit at each interface from the surface down; none of a half space."""
     require(medium)
     require_illumination(illumination)
-    setting = Setting(illumination, n=medium.layers[0].n / medium.n_above)
+    setting = setting_of(medium, illumination)
     if all(layer.g == 0 for layer in medium.layers):
         hazard = catalogue.load("hazard", setting=setting)
         return _fitted(medium, [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers])
@@ -231,7 +231,7 @@ def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQualit
 
 def _of_exact(one: Interface, thickness: float) -> StackQuality:
     light = exact.solve(one.medium.with_first(thickness), one.law.setting.illumination, NODES)
-    r = _radii(one.medium)
+    r = radii(one.medium)
     share = np.asarray(light.cdf(r))
     near = r[share <= LAST_SHARE]
     relative = np.asarray(one.law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
@@ -241,7 +241,7 @@ def _of_exact(one: Interface, thickness: float) -> StackQuality:
     )
 
 
-def _radii(medium: Medium) -> Floats:
+def radii(medium: Medium) -> Floats:
     """As far as light of its slowest layer goes [length]."""
     slowest = max(
         min(layer.mfp / max(float(half_space.decay_rate(layer.alpha)), 1e-12), LONGEST_DECAY * layer.mfp)
@@ -279,6 +279,11 @@ def require(medium: Medium) -> None:
             raise InputError(f"layers must have one n for a law of a stack, got {got}")
 
 
+def setting_of(medium: Medium, illumination: str) -> Setting:
+    """Of a stack's light: of its half spaces, where all scatter isotropically."""
+    return Setting(illumination, n=medium.layers[0].n / medium.n_above)
+
+
 def _thicknesses(layer: Layer, is_below: bool) -> Floats:
     """Those to fit at, the layer's own among them [length]."""
     if is_below:
@@ -290,7 +295,7 @@ def _thicknesses(layer: Layer, is_below: bool) -> Floats:
 
 def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = NODES) -> tuple[Floats, ...]:
     """Under a first layer of thickness d: radii [length], R_d there, weights of the radii, and A."""
-    light, r = exact.solve(medium.with_first(d), illumination, nodes), _radii(medium)
+    light, r = exact.solve(medium.with_first(d), illumination, nodes), radii(medium)
     seen = np.asarray(light.cdf(r)) <= LAST_SHARE
     value = np.where(seen, np.asarray(light.profile(r)), 1.0)
     return r, value, seen / np.count_nonzero(seen), np.asarray(light.reflectance)

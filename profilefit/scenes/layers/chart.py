@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 
 from mcml_sim import Layer, Medium, exact
 from mcml_sim.media.fresnel import fresnel
+from profilefit.laws.stack import StackLaw
+from profilefit.recipes.stack.gaussians import medium_gaussians
 from profilefit.scenes.layers.half_space import one_half_space
 from profilefit.scenes.layers.law import plate_of
-from profilefit.scenes.layers.passes import diffusely_once, of_table, once
+from profilefit.scenes.layers.passes import diffusely_once, of_gaussians, of_table, once
 from profilefit.scenes.layers.scene import LayersRequest, Way, judged, laws_of, technique
 from profilefit.scenes.layers.truth import StackTable
 from profilefit.scenes.stage.judge import TURNS, points
@@ -21,7 +23,7 @@ from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.stage import Stage
 
 Floats = NDArray[np.float64]
-TABLE = "exact table"
+TABLE, GAUSSIANS = "exact table", "gaussians"
 
 
 class Split(NamedTuple):
@@ -71,17 +73,27 @@ def ways(
 ) -> dict[str, list[ChartPoint]]:
     """Error and cost of each kind of technique with each of its numbers of samples, of the scene that is requested.
 
-    samples  of the kinds of a file, and of `TABLE`: exact light by tables of each thickness
+    samples  of the kinds of a file, of `TABLE`, exact light by tables of each thickness, and of "gaussians:N", N
+             Gaussians fitted at the thickness of the file
     """
     judge, laws = judged(stage, request, table), laws_of(request.stack)
-    plates = [plate_of(medium, request.stack.illumination) for medium in request.media]
     found = {}
     for kind, numbers in samples.items():
-        way = Way(TABLE, of_table(table, plates), request.mfp)
-        if kind != TABLE:
-            way = technique(replace(request, kind=kind), laws)
+        way = _way(kind, request, table, laws)
         found[kind] = points(way.judged(judge), way.label, way.by, request.sampling, numbers, turns)
     return found
+
+
+def _way(kind: str, request: LayersRequest, table: StackTable, laws: tuple[StackLaw, ...]) -> Way:
+    light = request.stack.illumination
+    plates = [plate_of(medium, light) for medium in request.media]
+    if kind == TABLE:
+        return Way(kind, of_table(table, plates), request.mfp)
+    name, _, count = kind.partition(":")
+    if name == GAUSSIANS:
+        sums = [medium_gaussians(medium, light, int(count)) for medium in request.media]
+        return Way(f"{count} Gaussians", of_gaussians(sums, plates), request.mfp)
+    return technique(replace(request, kind=kind), laws)
 
 
 def _layer(n: float, alpha: float, mfp: float, thickness: float) -> Layer:

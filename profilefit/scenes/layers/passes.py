@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import Medium
 from profilefit.laws.base import ProfileLaw
+from profilefit.laws.gaussians import MediumGaussians
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.scenes.layers.law import Plate, single_scattering
@@ -21,7 +22,7 @@ from profilefit.scenes.stage.exact_law import columns, row, table_text
 from profilefit.scenes.stage.gather import Gather
 from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps
 from profilefit.shader.emit import law_text, literal, prefix, text_beside
-from profilefit.shader.stack_text import single_text, stack_text
+from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 
 Floats = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -96,6 +97,13 @@ def _radii(t: Floats, x: Floats, share: Floats) -> Floats:
     before = np.searchsorted(depth, depth[told] - 1.0)
     rate = (x[told] - x[before]) / (depth[told] - depth[before])
     return np.where(far, x[told] + rate * (t - depth[told]), np.where(first, x[0] * t / depth[0], np.exp(ln)))
+
+
+def of_gaussians(sums: Sequence[MediumGaussians], plates: Sequence[Plate]) -> StackGather:
+    """Samples of sums of Gaussians, of red, green and blue, which are of one thickness everywhere."""
+    text = gaussians_text(sums, name=LAW)
+    law = LawText("gaussians", text, {}, f"{LAW}_shape(float(c))", f"{LAW}_reflectance(shape)")
+    return StackGather(law, tuple(plates))
 
 
 def of_half_space(law: ProfileLaw) -> Gather:

@@ -12,6 +12,7 @@ struct LAW_Shape {
 //% end
 };
 
+//% shape
 // All that depends on alpha only: once a material, or once a pixel where A is a texture.
 LAW_Shape LAW_shape(float alpha) {
     LAW_Shape s;
@@ -36,6 +37,7 @@ LAW_Shape LAW_shape(float alpha) {
 //% end
     return s;
 }
+//% end shape
 
 float LAW_reflectance(LAW_Shape s) {
     return s.reflectance;

@@ -27,7 +27,7 @@ LAW_Shape LAW_shape(float alpha) {
     shape.curve = s;
     return shape;
 }
-//% end
+//% end shape
 
 float LAW_reflectance(LAW_Shape s) {
     return s.reflectance;

@@ -50,7 +50,7 @@ LAW_Shape LAW_shape(float alpha) {
     shape.slowest = rate * (1.0 + kappa * (2.1187 - 1.4458 * kappa));
     return shape;
 }
-//% end
+//% end shape
 
 float LAW_reflectance(LAW_Shape s) {
     return s.reflectance;

@@ -12,12 +12,13 @@ import pytest
 import profilefit
 from mcml_sim import Layer, Medium, Setting
 from profilefit.errors import InputError, ShaderError
+from profilefit.laws.gaussians import MediumGaussians
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.shader_law import PROFILE, _Pass
 from profilefit.shader.context import program
 from profilefit.shader.emit import law_text
-from profilefit.shader.stack_text import single_text, stack_text
+from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
 from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
 
 NAMES = StackLaw.constant_names()
@@ -363,3 +364,30 @@ def refused_media():
 def test_media_that_are_no_stack_are_refused(message, given):
     with pytest.raises(InputError, match=message):
         single_text(given)
+
+
+SUMS = [
+    MediumGaussians(Setting("diffuse", n=1.4), 0.5 + 0.1 * i, (0.01, 0.3 + i, 9.0), (0.2, 0.5, 0.3)) for i in range(3)
+]
+
+
+def test_sums_of_gaussians_are_the_laws():
+    names = {}
+    exec(compile(gaussians_text(SUMS, "python", "sums"), "sums.py", "exec"), names)
+    x, xi = np.geomspace(1e-3, 20.0, 50), np.linspace(0.0, 0.999, 50)
+    for channel, law in enumerate(SUMS):
+        shape = names["sums_shape"](float(channel))
+        assert names["sums_reflectance"](shape) == pytest.approx(law.total_reflectance)
+        ring = 2.0 * np.pi * x * law.profile(x, 0.5) / law.total_reflectance
+        np.testing.assert_allclose(names["sums_density"](x, shape), ring, rtol=1e-10)
+        np.testing.assert_allclose(names["sums_cumulated"](x, shape), law.cdf(x, 0.5), rtol=1e-10)
+        np.testing.assert_allclose(names["sums_radius"](xi, shape), law.sampler.sample(xi, 0.5), atol=1e-8)
+    other = names["sums_shape"](0.0)  # the comparison can fail
+    assert np.max(np.abs(names["sums_cumulated"](x, other) - SUMS[2].cdf(x, 0.5))) > 0.1
+
+
+def test_sums_of_unlike_numbers_are_refused():
+    unlike = replace(SUMS[0], variance=(1.0,), weight=(1.0,))
+    for sums, told in (([SUMS[0], SUMS[1], unlike], "3, 3, 1"), (SUMS[:2], "3, 3"), ([], "none")):
+        with pytest.raises(InputError, match=f"got {told}$"):
+            gaussians_text(sums)

@@ -1,4 +1,4 @@
-// The exact half space from tables: a row for each albedo.
+// Exact light from tables: a row for each albedo, or thickness.
 
 uniform sampler2D LAW_drawn; // ln(x / t) over t = -ln(1 - xi), even
 uniform sampler2D LAW_known; // ln density and -ln(1 - cdf) over u, x = near sinh u, even

@@ -1,0 +1,105 @@
+"""Sums of Gaussians fitted to the light of a stack under its own thicknesses: what blurs that are separable need."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Medium, Setting, exact
+from mcml_sim.media.setting import require_illumination
+from profilefit.errors import InputError
+from profilefit.fitting.solver import Optimum, solve
+from profilefit.laws.gaussians import MOST, MediumGaussians
+from profilefit.recipes.stack import fit, photons
+
+Floats = NDArray[np.float64]
+NARROWEST = (0.05, 0.2, 0.01)  # radii of the narrowest Gaussian that fits start from [mfp of the first layer]
+WIDEST = 0.5  # and of the widest, over that within which all light counts
+SEED = 300
+
+
+class SumLight(NamedTuple):
+    """Rings of light that a sum is fitted to.
+
+    edges   (n + 1,) radii [mfp of the first layer];  energy  (n,) between them [-];  whole  A [-]
+    weight  (n,) of a relative residual, their squares sum to 1;  noise  (n,) relative standard errors, 0 of exact light
+    """
+
+    edges: Floats
+    energy: Floats
+    weight: Floats
+    whole: float
+    noise: Floats
+
+
+def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES) -> SumLight:
+    """Rings even in ln r to 99.5 % of the light: exact, or of photons where a layer scatters forward."""
+    fit.require(medium)
+    first = medium.layers[0]
+    unit = first.similar.mfp
+    if any(layer.g > 0 for layer in medium.layers):
+        rings = photons.traced(
+            medium, illumination, photons.ring_edges(first, medium.layers), photons.STACK_PHOTONS, SEED
+        )
+        counts = rings.weight > 0
+        first_ring, last_ring = np.flatnonzero(counts)[[0, -1]]
+        inside = slice(first_ring, last_ring + 1)
+        weight = np.where(counts, 1.0, 0.0)[inside] / np.sqrt(np.count_nonzero(counts))
+        edges = rings.edges[first_ring : last_ring + 2] / unit
+        return SumLight(edges, rings.energy[inside], weight, rings.whole, rings.noise[inside])
+    light, r = exact.solve(medium, illumination, nodes), fit.radii(medium)
+    share = np.asarray(light.cdf(r))
+    seen = share <= fit.LAST_SHARE
+    energy = np.diff(share[seen]) * light.reflectance
+    weight = np.full(energy.size, 1.0 / np.sqrt(energy.size))
+    return SumLight(r[seen] / unit, energy, weight, light.reflectance, np.zeros(energy.size))
+
+
+def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
+    """The sum of 1 to 8 Gaussians nearest to the light of a stack of one index, relatively, over rings even in ln r.
+
+    A is the stack's own. InputError as of `stack_law`, and on another count.
+    """
+    if isinstance(count, bool) or count not in range(1, MOST + 1):
+        raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
+    require_illumination(illumination)
+    light = sum_light(medium, illumination)
+    return made(fitted(light, count).parameters, light.whole, fit.setting_of(medium, illumination))
+
+
+def fitted(light: SumLight, count: int) -> Optimum:
+    """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1, unbounded."""
+    widest = 2.0 * np.log(WIDEST * light.edges[-1])
+    found = []
+    for narrowest in NARROWEST:
+        rise = (widest - 2.0 * np.log(narrowest)) / max(count - 1, 1)
+        start = [2.0 * np.log(narrowest), *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * (count - 1)]
+        found.append(solve(_residual, np.array(start), (light.edges, light.energy, light.weight, light.whole)))
+    return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
+
+
+def made(parameters: Floats, whole: float, setting: Setting) -> MediumGaussians:
+    """The sum of unbounded parameters."""
+    with jax.enable_x64(True):
+        level, logit = (np.asarray(one).tolist() for one in _of(jnp.asarray(parameters)))
+    return MediumGaussians(setting, whole, tuple(np.exp(level).tolist()), tuple(np.exp(logit).tolist()))
+
+
+def _of(parameters: jax.Array) -> tuple[jax.Array, jax.Array]:
+    """ln v and ln w."""
+    count = (parameters.size + 1) // 2
+    level = jnp.cumsum(jnp.concatenate([parameters[:1], jax.nn.softplus(parameters[1:count])]))
+    return level, jax.nn.log_softmax(jnp.concatenate([jnp.zeros(1), parameters[count:]]))
+
+
+def _residual(parameters, data):
+    edges, energy, weight, whole = data
+    level, logit = _of(parameters)
+    depth = 0.5 * edges[:, None] ** 2 * jnp.exp(-level)
+    # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
+    rings = jnp.exp(logit - depth[:-1]) * -jnp.expm1(depth[:-1] - depth[1:])
+    return weight * (whole * jnp.sum(rings, axis=1) / energy - 1.0)

@@ -1,0 +1,62 @@
+"""Sums of Gaussians of a stack: a sum is found again, and light of a stack is as near as more of them come."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import Layer, Medium, Setting
+from profilefit.errors import InputError
+from profilefit.laws.gaussians import MediumGaussians
+from profilefit.recipes.stack import gaussians
+from profilefit.recipes.stack.gaussians import SumLight, medium_gaussians
+
+HEART = Medium((Layer(1.38, 0.20, 2.2, 0.0, 0.3), Layer(1.38, 0.80, 1.2, 0.0)))
+
+
+def rings_of(law: MediumGaussians) -> SumLight:
+    edges = np.geomspace(0.01, 20.0, 80)
+    energy = np.diff(law.cdf(edges, 0.5)) * law.total_reflectance
+    return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79))
+
+
+def test_a_sum_is_found_again():
+    known = MediumGaussians(Setting(), 0.4, (0.02, 0.5, 6.0), (0.3, 0.5, 0.2))
+    light = rings_of(known)
+    best = gaussians.fitted(light, 3)
+    found = gaussians.made(best.parameters, light.whole, Setting())
+    np.testing.assert_allclose(found.variance, known.variance, rtol=1e-4)
+    np.testing.assert_allclose(found.weight, known.weight, rtol=1e-4)
+    assert gaussians.fitted(light, 2).cost > 1e4 * best.cost  # two are not three
+
+
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_more_of_them_are_nearer(illumination):
+    light = gaussians.sum_light(HEART, illumination)
+    rel = []
+    for count in (2, 4, 6):
+        best = gaussians.fitted(light, count)
+        law = gaussians.made(best.parameters, light.whole, Setting(illumination, n=1.38))
+        assert sum(law.weight) == pytest.approx(1.0)
+        assert np.all(np.diff(law.variance) > 0)
+        energy = np.diff(law.cdf(light.edges, 0.5)) * law.total_reflectance
+        rel.append(float(np.mean(np.abs(energy / light.energy - 1.0))))
+    assert rel[0] > 0.4 > rel[1] > 0.1 > rel[2] > 0.02
+
+
+def test_counts_are_checked():
+    for count in (0, 9, True, 2.5):
+        with pytest.raises(InputError, match=f"1 ... 8, got {count!r}"):
+            medium_gaussians(HEART, "diffuse", count)
+
+
+@pytest.mark.slow
+def test_light_that_is_traced():
+    """Of layers that scatter forward; the similar stack's sum is another."""
+    forward = Medium(tuple(Layer(1.38, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
+    light, similar = gaussians.sum_light(forward, "searchlight"), gaussians.sum_light(HEART, "searchlight")
+    assert np.mean(light.noise) < 0.05
+    best = gaussians.fitted(light, 8)
+    counts = light.weight > 0
+    assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
+    lost = gaussians.made(gaussians.fitted(similar, 8).parameters, similar.whole, Setting(n=1.38))
+    energy = np.diff(lost.cdf(light.edges, 0.5)) * lost.total_reflectance
+    assert np.mean(np.abs(energy[counts] / light.energy[counts] - 1.0)) > 0.5
