@@ -3,6 +3,7 @@
 from mcml_sim.errors import InputError, Notice, OutputError, SettingError, StoreError
 
 __all__ = [
+    "DamagedRecord",
     "InputError",
     "Notice",
     "OtherRecords",
@@ -22,6 +23,10 @@ class RecipeError(InputError):
 
 class RecordError(InputError):
     """A record that is missing, malformed or belongs to something else."""
+
+
+class DamagedRecord(Notice):
+    """A record that cannot be read and is not asked for is passed over."""
 
 
 class OtherRecords(Notice):

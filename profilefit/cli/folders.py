@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.errors import InputError, OtherRecords
-from profilefit.recipes.folder import EVIDENCE, LOCAL, fits_folder
+from profilefit.recipes.folder import EVIDENCE, LOCAL, STACKS, fits_folder
 
 
 def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
@@ -31,6 +31,17 @@ def known_folder(requested: Path | None = None) -> Path:
         from profilefit.recipes.record import available
 
     return requested or (LOCAL if available(LOCAL) else fits_folder())
+
+
+def known_stacks(requested: Path | None = None) -> dict[str, Path]:
+    """The records of stacks by name: of the folder requested or, if none was, of ./fits beside those shipped."""
+    with interruptible(__name__):
+        from profilefit.recipes.record import available
+
+    found: dict[str, Path] = {}
+    for one in (requested,) if requested else (fits_folder(), LOCAL):
+        found |= available(one / STACKS)
+    return dict(sorted(found.items()))
 
 
 def evidence_folder(records: Path, requested: Path | None = None) -> Path:

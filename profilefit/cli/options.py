@@ -13,7 +13,7 @@ from typing import Annotated, Any
 import typer
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.folders import known_folder
+from profilefit.cli.folders import known_folder, known_stacks
 from profilefit.laws import MAPS, PROFILES
 from profilefit.recipes.folder import fits_folder
 
@@ -52,8 +52,8 @@ def in_options(text: Any) -> Any:
 
 
 def records(ctx: typer.Context, incomplete: str) -> Iterator[str]:
-    """Names of the records in the folder that the command has been given so far."""
-    return _starting(incomplete, _known_records(ctx))
+    """Names of the records, and of those of stacks, in the folder that the command has been given so far."""
+    return _starting(incomplete, dict.fromkeys((*_known_records(ctx), *known_stacks(_folder(ctx)))))
 
 
 def recipes(incomplete: str) -> Iterator[str]:
@@ -99,8 +99,12 @@ def _known_records(ctx: typer.Context) -> list[str]:
     with interruptible(__name__):
         from profilefit.recipes.record import available
 
+    return list(available(known_folder(_folder(ctx))))
+
+
+def _folder(ctx: typer.Context) -> Path | None:
     requested = ctx.params.get("fits")
-    return list(available(known_folder(Path(requested) if requested else None)))
+    return Path(requested) if requested else None
 
 
 def _starting(incomplete: str, known: Iterable[str]) -> Iterator[str]:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+import warnings
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -10,9 +11,9 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.folders import evidence_folder, records_folder
+from profilefit.cli.folders import evidence_folder, known_stacks, records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
-from profilefit.errors import InputError, ShaderError
+from profilefit.errors import InputError, OtherRecords, ShaderError
 
 if TYPE_CHECKING:
     from profilefit.report.tables.law_tables import Qualities
@@ -24,7 +25,10 @@ MOST_MARKDOWN = 2**24  # bytes of a page whose tables are filled in
 def report(
     names: Annotated[
         list[str] | None,
-        typer.Argument(help="Names of records; a summary of all if none is named.", autocompletion=options.records),
+        typer.Argument(
+            help="Names of records, of stacks as well; a summary of all if none is named.",
+            autocompletion=options.records,
+        ),
     ] = None,
     quality: Annotated[
         bool, typer.Option("--quality", help="Measure every law against the exact half space instead (a minute).")
@@ -55,12 +59,13 @@ def report(
 ) -> None:
     """Show constants, their errors, and how good they are.
 
-    Also quality by albedo, and the state of fits and chains. --quality prints instead how good every law, map and
-    sampler is, printed ones too; or those of the records named.
+    Also quality by albedo, or by thickness of a stack of layers, and the state of fits and chains. --quality prints
+    instead how good every law, map and sampler is, printed ones too; or those of the records named.
 
     \b
     Examples:
       profilefit report hazard
+      profilefit report skin
       profilefit report liang-whole --figures figures
       profilefit report --html report.html
     """
@@ -75,17 +80,23 @@ def report(
     printed = {"--json": as_json, "--quality": quality and not as_json, "--claims": claims and not as_json}
     _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
-    only_stacks = not names and not any(printed.values()) and not record.available(folder)
-    if only_stacks and (stacks := stack_table(folder)) is not None:
-        show([stacks], screen())
+    ordinary, known = record.available(folder), known_stacks(fits)
+    only_stacks = not names and not any((*printed.values(), markdown, html)) and not ordinary
+    if only_stacks and (table := stack_table(folder)) is not None:
+        show([table], screen())
         return
-    contents = record.chosen(folder, names)
+    stacks = {name: known[name] for name in names or () if name in known and name not in ordinary}
+    _take_stacks(stacks, folder, {"--quality": quality, "--html": html, "--figures": figures_to})
+    if markdown is not None and not names:
+        stacks = known_stacks(folder)
+    others = [name for name in names if name not in stacks] if names else list(ordinary)
+    contents = record.chosen(folder, others, list(known) if names else ()) if others or not stacks else {}
     if markdown is not None:
-        _fill(markdown, contents, folder, quiet)
+        _fill(markdown, contents, folder, stacks, quiet)
     elif html is not None:
         _page(html, folder, evidence_folder(folder, evidence), names, quiet)
     elif as_json:
-        body: dict[str, Any] = {"records": contents}
+        body: dict[str, Any] = {"records": _told(contents, stacks, names)}
         if quality:
             body["quality"] = law_tables.content(_measured(folder, names, quiet))
         if claims:
@@ -96,7 +107,7 @@ def report(
     elif claims:
         _show_claims(evidence_folder(folder, evidence), folder, quiet)
     else:
-        _show(contents, folder, bool(names))
+        _show(_told(contents, stacks, names), folder, bool(names))
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
 
@@ -106,6 +117,26 @@ def _require_one(flags: dict[str, object]) -> None:
     if len(given) > 1:
         accepted = f"one of {', '.join(flags)}, or --json with --quality or --claims"
         raise InputError(f"report takes {accepted}, got {' and '.join(given)}")
+
+
+def _take_stacks(stacks: Mapping[str, Path], folder: Path, others: dict[str, object]) -> None:
+    """Say where those are from that are not of the folder in use; InputError on an option that no stack takes."""
+    for name, path in stacks.items():
+        if given := [option for option, value in others.items() if value]:
+            raise InputError(f"{given[0]} must be left out where NAME is a stack, got {name!r}")
+        if path.parent.parent != folder:
+            warnings.warn(f"stack {name!r} is of {str(path.parent.parent)!r}", OtherRecords, stacklevel=2)
+
+
+def _told(
+    contents: dict[str, dict[str, Any]], stacks: Mapping[str, Path], names: list[str] | None
+) -> dict[str, dict[str, Any]]:
+    """What is said of records and of stacks, in the order of their names."""
+    with interruptible(__name__):
+        from profilefit.recipes.stack.schema import read
+
+    told = contents | {name: read(path) for name, path in stacks.items()}
+    return {name: told[name] for name in names or told}
 
 
 def _show(contents: dict[str, dict[str, Any]], folder: Path, named: bool) -> None:
@@ -175,12 +206,15 @@ def _page(path: Path, folder: Path, evidence: Path, names: list[str] | None, qui
     notes(quiet).print(f"wrote {path}, {path.stat().st_size / MEGABYTE:.1f} MB", markup=False)
 
 
-def _fill(path: Path, contents: dict[str, dict[str, Any]], folder: Path, quiet: bool) -> None:
+def _fill(
+    path: Path, contents: dict[str, dict[str, Any]], folder: Path, stacks: Mapping[str, Path], quiet: bool
+) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.whole_file import read_whole, write_whole
         from mcml_sim.runs.progress import working
         from profilefit.report import fill, markdown_sections, sections
+        from profilefit.report.tables.stack_table import stack_sections
 
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
@@ -192,11 +226,11 @@ def _fill(path: Path, contents: dict[str, dict[str, Any]], folder: Path, quiet: 
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     measured = {}
-    for name, make in markdown_sections(folder).items():
+    for name, make in (markdown_sections(folder) | stack_sections(stacks)).items():
         if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
             try:
                 with working(f"measuring the table {name}", quiet):
                     measured[name] = make()
             except ShaderError as error:
                 notes(quiet).print(f"{path}: the table {name!r} stays as it was: {error}", markup=False)
-    write_whole(path, fill(text, sections(contents) | measured))
+    write_whole(path, fill(text, (sections(contents) if contents else {}) | measured))

@@ -6,6 +6,7 @@ from importlib import resources
 from pathlib import Path
 
 LOCAL = Path("fits")
+STACKS = "stacks"  # in a folder of records: the folder of those of stacks
 EVIDENCE = Path("evidence")  # what was measured with records: shader check, failures, times
 
 

@@ -170,23 +170,28 @@ def available(folder: Path) -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.json"))}
 
 
-def chosen(folder: Path, names: Sequence[str] | None = None) -> dict[str, dict[str, Any]]:
-    """The records of these names, or all of a folder, as `read` gives them; RecordError names the nearest there are."""
+def chosen(folder: Path, names: Sequence[str] | None = None, stacks: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """The records of these names, or all of a folder, as `read` gives them; RecordError names the nearest there are.
+
+    stacks  names of other records, which the error lists, since they are accepted where these are
+    """
     known = available(folder)
-    if not known:
+    if not known and not stacks:
         raise RecordError(f"{folder} has no records: `profilefit regenerate` makes them")
     for name in names or ():
         if name not in known:
-            raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known))}")
+            raise RecordError(f"there is no record {name!r} in {folder}; {_nearest(name, list(known), stacks)}")
     return {name: read(known[name], whole=True) for name in (names or known)}
 
 
-def _nearest(name: str, known: list[str]) -> str:
-    """What may have been meant: names that begin so, or differ by a few letters."""
-    begun = sorted((one for one in known if one.startswith(name.lower())), key=len)
-    near = begun or get_close_matches(name.lower(), known, n=NEAREST, cutoff=ALIKE)
+def _nearest(name: str, known: list[str], stacks: Sequence[str]) -> str:
+    """What may have been meant: names that begin so, or differ by a few letters; and all stacks."""
+    every = [*known, *stacks]
+    begun = sorted((one for one in every if one.startswith(name.lower())), key=len)
+    near = begun or get_close_matches(name.lower(), every, n=NEAREST, cutoff=ALIKE)
     hint = f"did you mean {', '.join(near[:NEAREST])}? " if near else ""
-    return f"{hint}`profilefit report` lists them"
+    others = f"stacks are {', '.join(stacks)}, and " if stacks else ""
+    return f"{hint}{others}`profilefit report` lists {'records' if stacks else 'them'}"
 
 
 def digest(*arrays: np.ndarray) -> str:

@@ -235,7 +235,7 @@ def problem(content: dict[str, Any], whole: bool) -> str | None:
         if pipeline not in PIPELINES:
             return f"pipeline must be one of {', '.join(PIPELINES)}, got {shown(pipeline)}"
         kinds += [TOLD, PIPELINES[str(pipeline)][1]]
-    found = _unfit(content) or next((text for one in kinds if (text := _mistyped(content, one))), None)
+    found = _unfit(content) or next((text for one in kinds if (text := mistyped(content, one))), None)
     return found or (_mismatched(content) if whole and pipeline != "evidence" else None)
 
 
@@ -258,7 +258,7 @@ def _unfit(value: Any, place: str = "", depth: int = 0) -> str | None:
     return None
 
 
-def _mistyped(content: dict[str, Any], kinds: Kinds) -> str | None:
+def mistyped(content: dict[str, Any], kinds: Kinds) -> str | None:
     """The first key that is absent or of another kind."""
     for key, kind in kinds.items():
         for place, value in _each(content, key.split(".")):

@@ -43,7 +43,6 @@ TIMID = 1e-3  # weight of a constant's distance from its start: those that nothi
 START = (0.0, 0.0, 0.2, 0.2, -2.0, -2.0, -1.0, 0.0, -2.0)
 MOST_FORWARD = 0.95
 STARTS, SPREAD, SEED = 6, 0.8, 1
-NEAR_TRACED = 0.1  # radius from which on rel is of traced light [mfp]
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
@@ -118,7 +117,7 @@ def _fitted(
         d = _thicknesses(layer.similar, is_below=place > 0)
         lights: Lights = []
         if begun:
-            lights += [_rings(here, each, illumination, number) for number, each in enumerate(d)]
+            lights += [rings_of(here, each, illumination, number) for number, each in enumerate(d)]
             best = _solved(begun[place].best.parameters, top, law, d, lights)
             found: tuple[Optimum, ...] = (best,)
         else:
@@ -129,7 +128,7 @@ def _fitted(
     return law, tuple(done)
 
 
-def _rings(medium: Medium, d: float, illumination: str, number: int) -> TracedRings:
+def rings_of(medium: Medium, d: float, illumination: str, number: int) -> TracedRings:
     """Traced light under a first layer of another thickness."""
     edges = photons.ring_edges(medium.layers[0], medium.layers)
     return photons.traced(medium.with_first(d), illumination, edges, photons.STACK_PHOTONS, SEED + 100 + number)
@@ -188,57 +187,6 @@ def _noise(one: Interface) -> Floats:
     rest = np.zeros(len(one.best.residuals) - len(of_rings) - len(of_whole))  # those that keep constants near a start
     scaled = np.concatenate([of_rings, of_whole, rest])[:, None] * one.best.jacobian
     return np.asarray(scaled.T @ scaled)
-
-
-class StackQuality(NamedTuple):
-    """How good a law is at one thickness.
-
-    rel  mean relative error of R_d [-];  noise  that was taken off it in quadrature;  ks  largest error of the cdf
-    delta_A  relative error of A [-]
-    """
-
-    rel: float
-    noise: float
-    ks: float
-    delta_A: float
-
-
-def quality(one: Interface) -> dict[str, list[float]]:
-    """rel, ks and the relative error of A at thicknesses that were not fitted, between those that were [length]."""
-    d, illumination = np.sqrt(one.thicknesses[:-1] * one.thicknesses[1:]), one.law.setting.illumination
-    if one.is_traced:
-        fresh = [_rings(one.medium, each, illumination, len(d) + 1 + i) for i, each in enumerate(d)]
-        found = [of_rings(one.law, each, rings) for each, rings in zip(d, fresh, strict=True)]
-    else:
-        found = [_of_exact(one, float(each)) for each in d]
-    kept = {name: [getattr(each, name) for each in found] for name in ("rel", "ks", "delta_A")}
-    return {"thickness": d.tolist(), **kept}
-
-
-def of_rings(law: StackLaw, thickness: float, rings: TracedRings) -> StackQuality:
-    """By traced light; rel is of rings from a tenth of the first layer's mean free path."""
-    within = np.asarray(law.cdf(rings.edges, thickness)) * float(law.total(thickness))
-    counts = (rings.weight > 0) & (rings.edges[:-1] > NEAR_TRACED * law.layers[0].mfp)
-    off = float(np.mean(np.abs(np.diff(within)[counts] / rings.energy[counts] - 1.0)))
-    # The mean size of a Gaussian's values is sqrt(2 / pi) of its spread.
-    noise = float(np.sqrt(2.0 / np.pi) * np.mean(rings.noise[counts]))
-    light = np.cumsum(np.where(rings.weight > 0, rings.energy, np.diff(within)))
-    ks = float(np.max(np.abs(light - within[1:]))) / rings.whole
-    return StackQuality(
-        float(np.sqrt(max(off**2 - noise**2, 0.0))), noise, ks, float(law.total(thickness)) / rings.whole - 1
-    )
-
-
-def _of_exact(one: Interface, thickness: float) -> StackQuality:
-    light = exact.solve(one.medium.with_first(thickness), one.law.setting.illumination, NODES)
-    r = radii(one.medium)
-    share = np.asarray(light.cdf(r))
-    near = r[share <= LAST_SHARE]
-    relative = np.asarray(one.law.profile(near, thickness)) / np.asarray(light.profile(near)) - 1.0
-    ks = float(np.max(np.abs(np.asarray(one.law.cdf(r, thickness)) - share)))
-    return StackQuality(
-        float(np.mean(np.abs(relative))), 0.0, ks, float(one.law.total(thickness)) / light.reflectance - 1
-    )
 
 
 def radii(medium: Medium) -> Floats:

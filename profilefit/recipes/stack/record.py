@@ -6,7 +6,9 @@ Records of stacks lie in a folder of their own, FITS/stacks: none of them is a l
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Mapping, Sequence
+import warnings
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,18 +19,18 @@ import numpy as np
 from mcml_sim import Medium, Setting
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError, RecordError
+from profilefit.errors import DamagedRecord, InputError, RecordError
 from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, kinds, record
-from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.stack import fit
+from profilefit.recipes.folder import STACKS, fits_folder
+from profilefit.recipes.stack import fit, quality
 from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.recipes.workers import Workers
 
-FOLDER, PIPELINE = "stacks", "stack"
+FOLDER, PIPELINE = STACKS, "stack"
 TITLE = "Layers under a first one of any thickness"
 EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + (g_i d)^2, c_i = e^(-b_i d / l)"
 NOTE = (
@@ -140,25 +142,15 @@ def regenerate(of: StackRequest, out: Path, processes: int = 1, say: Callable[[s
 
 def load(path: Path) -> StackRecord:
     """The laws of a record; RecordError on one that is damaged, or whose half spaces have other constants by now."""
-    content = record.read(path)
-    if content["pipeline"] != PIPELINE:
-        raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
-    try:
-        stack = _stack(str(path), content)
-        setting = record.record_setting(content)
+    content = of_stack(path)
+    with _damage(path):
+        stack, setting = _stack(str(path), content), record.record_setting(content)
         if setting.n != stack.media[0].layers[0].n:
             raise InputError(f"setting.n must be that of its layers, got {setting.n:g}")
-        made = [
+        red, green, blue = (
             _law(content, channel, medium, _tops(path, medium, setting, content["half_spaces"][channel]))
             for channel, medium in zip(CHANNELS, stack.media, strict=True)
-        ]
-    except RecordError:
-        raise
-    except InputError as error:
-        raise RecordError(f"{path}: is damaged: {str(error).removeprefix(f'{path}: ')}; regenerate it") from None
-    except KeyError as error:
-        raise RecordError(f"{path}: is damaged: {error} is missing; regenerate it") from None
-    red, green, blue = made
+        )
     return StackRecord(path.stem, stack, (red, green, blue), content, hashlib.sha256(path.read_bytes()).hexdigest())
 
 
@@ -171,13 +163,44 @@ def find(name: str, folder: Path) -> Path | None:
 
 
 def matching(of: StackRequest, folder: Path) -> StackRecord | None:
-    """The record in a folder that is of these very layers and this light, by whatever name; None if there is none."""
+    """The record in a folder that is of these very layers and this light, by whatever name; None if there is none.
+
+    RecordError where that one is damaged; one whose layers cannot be read is passed over, with a DamagedRecord warning.
+    """
     wanted = record.plain(of.stack.media)  # to the digits of a record: the mean of an image has more
     for path in record.available(folder / FOLDER).values():
-        one = load(path)
-        if record.plain(one.stack.media) == wanted and one.setting.illumination == of.illumination:
-            return one
+        try:
+            content = of_stack(path)
+            with _damage(path):
+                media, setting = _stack(str(path), content).media, record.record_setting(content)
+        except RecordError as error:
+            text = f"{path} is passed over: {str(error).removeprefix(f'{path}: ')}"
+            warnings.warn(text, DamagedRecord, stacklevel=2)
+            continue
+        if record.plain(media) == wanted and setting.illumination == of.illumination:
+            return load(path)
     return None
+
+
+def of_stack(path: Path) -> dict[str, Any]:
+    """What a record says; RecordError on one that cannot be read or is of no stack."""
+    content = record.read(path)
+    if content["pipeline"] != PIPELINE:
+        raise RecordError(f"{path}: must be the record of a stack, got pipeline {content['pipeline']!r}")
+    return content
+
+
+@contextmanager
+def _damage(path: Path) -> Iterator[None]:
+    """What is wrong inside a record as RecordError."""
+    try:
+        yield
+    except RecordError:
+        raise
+    except InputError as error:
+        raise RecordError(f"{path}: is damaged: {str(error).removeprefix(f'{path}: ')}; regenerate it") from None
+    except KeyError as error:
+        raise RecordError(f"{path}: is damaged: {error} is missing; regenerate it") from None
 
 
 def _shipped(name: str) -> Path:
@@ -206,7 +229,7 @@ def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
         "constants": constants,
         "half_spaces": [layer.law.constants() for layer in law.layers],
         "thicknesses": [one.thicknesses for one in interfaces],
-        "quality": [fit.quality(one) for one in interfaces],
+        "quality": [quality.between(one) for one in interfaces],
         "starts": starts,
         "fit": [
             {"result": one.result.partition(" in ")[0], "steps": one.steps, "condition_number": one.condition_number}

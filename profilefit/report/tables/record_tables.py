@@ -13,6 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.recipes.stack.record import PIPELINE as STACK
 from profilefit.recipes.starts import SAME_COST
 from profilefit.report.records import (
     TOTAL,
@@ -27,6 +28,7 @@ from profilefit.report.records import (
 from profilefit.report.tables.cells import ABSENT, column_table, interval, on_the_point, significant, to_error
 from profilefit.report.tables.evidence_tables import evidence_tables
 from profilefit.report.tables.quality_tables import quality_tables, spark_table
+from profilefit.report.tables.stack_table import stack_tables
 from profilefit.report.tables.summary_tables import summary, truth
 
 __all__ = ["constants_table", "record_tables", "summary"]
@@ -55,6 +57,8 @@ def record_tables(content: Content) -> list[RenderableType]:
     """Everything about one record: where it comes from, constants, the state of fit and chains, quality."""
     if _is_evidence(content):
         return _spaced([_title(content), *evidence_tables(content)])
+    if content["pipeline"] == STACK:
+        return _spaced([_title(content), *stack_tables(content)])
     parts = [_title(content), constants_table(content), intervals_table(content)]
     if "derived" in content:
         parts.append(derived_table(content["derived"], at_index(content)))

@@ -1,25 +1,42 @@
-"""Records of stacks of layers: what they are of, and how good their laws are."""
+"""Records of stacks of layers: what they are of, how good their laws are, and each one with all its constants."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
 
 from rich.console import RenderableType
 
+from profilefit.laws.stack import StackLaw
 from profilefit.recipes import record
+from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.record import FOLDER, PIPELINE
-from profilefit.report.tables.cells import column_table, significant
+from profilefit.recipes.stack.schema import BY_THICKNESS, interfaces, read
+from profilefit.report.records import Content, largest_error
+from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
+from profilefit.report.tables.markdown import markdown_table
 
-CAPTION = (
-    "rel: mean relative error of R_d over radii, ks: error of the cdf, A: relative error of the reflectance, each the "
-    "worst of three colours and of the thicknesses between those that were fitted"
-)
+Stacks = Mapping[str, Content]
+Rows = tuple[tuple[str, ...], list[tuple[str, ...]]]  # headers, the first that of the stack's name, and what is below
+MEASURES = "rel: mean relative error of R_d over radii, ks: error of the cdf, A: relative error of the reflectance"
+CAPTION = f"{MEASURES}, each the worst of three colours and of the thicknesses between those that were fitted"
+OF_THICKNESS = f"{MEASURES}; those of a deeper interface are of the stack from its upper layer down"
+MEANING_OF_ERROR = {
+    "photons": "noise of the simulation",
+    "dr": "exact light of fewer nodes",
+    "model": "the law's misfit, as a random function",
+    "misfit": "the misfit taken for independent noise, which it is not",
+    "jackknife": "leaving out one thickness after the other",
+}
+OF_FIT = "Constants that trade against each other do not converge, and may be good all the same: see their errors above"
+LEFT = ("layer", "channel", "interface", "constant", "result")
 
 
 def stack_table(folder: Path) -> RenderableType | None:
     """The records of stacks that lie in a folder of records; None where there are none."""
-    found = [record.read(path) for path in record.available(folder / FOLDER).values()]
-    stacks = [one for one in found if one["pipeline"] == PIPELINE]
+    paths = record.available(folder / FOLDER).values()
+    stacks = [read(path) for path in paths if record.read(path)["pipeline"] == PIPELINE]
     if not stacks:
         return None
     worst = [one["quality"]["regenerated"] for one in stacks]
@@ -34,3 +51,84 @@ def stack_table(folder: Path) -> RenderableType | None:
         "A": [significant(one["delta_A"]) for one in worst],
     }
     return column_table("Stacks of layers", columns, CAPTION, left=("stack", "light"))
+
+
+def stack_tables(content: Content) -> list[RenderableType]:
+    """Of one record, as `read` gives it: layers, errors by thickness, constants with their errors, how fits ended."""
+    unit, layers, of = content["unit"], content["layers"], {content["name"]: content}
+    columns = {
+        "layer": [one["name"] for one in layers],
+        "thickness": ["infinite" if one["thickness"] is None else f"{one['thickness']:g} {unit}" for one in layers],
+        **{key: [f"{one[key]:g}" for one in layers] for key in ("n", "g")},
+    }
+    for key in ("mu_a", "mu_s"):
+        columns[f"{key} [1/{unit}]"] = [" ".join(f"{each:g}" for each in one[key]) for one in layers]
+    known = [f"{word}: {MEANING_OF_ERROR[word]}" for word in _known_errors(of).values()]
+    return [
+        column_table("Layers, from the surface down; red, green, blue", columns, left=LEFT, fold=("layer",)),
+        _table("Errors at thicknesses of an interface's upper layer that were not fitted", _errors(of), OF_THICKNESS),
+        _table("Constants of each colour and interface, none with a unit", _constants(of), "; ".join(known)),
+        _table("Fits", _fits(of), OF_FIT),
+    ]
+
+
+def stack_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
+    """The tables of these records of stacks for Markdown, by the names of their marks; none where there is none."""
+    tables = {"stack-errors": _errors, "stack-constants": _constants} if paths else {}
+
+    def made(rows_of: Callable[[Stacks], Rows]) -> str:
+        return markdown_table(*rows_of({name: read(path) for name, path in paths.items()}))
+
+    return {name: partial(made, rows_of) for name, rows_of in tables.items()}
+
+
+def _table(title: str, rows: Rows, caption: str) -> RenderableType:
+    """Of one stack, whose name stands above."""
+    columns = dict(zip(rows[0], map(list, zip(*rows[1], strict=True)), strict=True))
+    shown = {key: cells if key in LEFT else on_the_point(cells) for key, cells in columns.items() if key != "stack"}
+    return column_table(title, shown, caption, left=LEFT)
+
+
+def _errors(stacks: Stacks) -> Rows:
+    rows: list[tuple[str, ...]] = []
+    for name, content in stacks.items():
+        for channel, number in interfaces(content):
+            quality = content["interfaces"][channel]["quality"][number - 1]
+            for d, *values in zip(*(quality[key] for key in BY_THICKNESS), strict=True):
+                thickness = f"{significant(d, 3)} {content['unit']}"
+                rows.append((name, channel, str(number), thickness, *map(significant, values)))
+        worst = content["quality"]["regenerated"]
+        of_all = (max(worst["rel"]), max(worst["ks"]), worst["delta_A"])
+        rows.append((name, "worst", "", "", *map(significant, of_all)))
+    return ("stack", "channel", "interface", "thickness", "rel", "ks", "A"), rows
+
+
+def _constants(stacks: Stacks) -> Rows:
+    known, rows = _known_errors(stacks), []
+    for name, content in stacks.items():
+        for channel, number in interfaces(content):
+            for constant in StackLaw.constant_names():
+                one = content["constants"][f"{channel}.{number}.{constant}"]
+                value = to_error(one["regenerated"], largest_error(one))
+                rows.append(
+                    (name, channel, str(number), constant, value, *(significant(one.get(key)) for key in known))
+                )
+    errors = (f"± {word}" for word in known.values())
+    return ("stack", "channel", "interface", "constant", "regenerated", *errors), rows
+
+
+def _fits(stacks: Stacks) -> Rows:
+    rows: list[tuple[str, ...]] = []
+    for name, content in stacks.items():
+        for channel, number in interfaces(content):
+            fit, starts = (content["interfaces"][channel][key][number - 1] for key in ("fit", "starts"))
+            steps, condition = str(fit["steps"]), significant(fit["condition_number"], 3)
+            as_good = f"{starts['as_good']} of {starts['count']}"
+            rows.append((name, channel, str(number), fit["result"], steps, condition, as_good))
+    return ("stack", "channel", "interface", "result", "steps", "condition number", "starts as good"), rows
+
+
+def _known_errors(stacks: Stacks) -> dict[str, str]:
+    """Those of `ERRORS` that any constant has: exact light has none of photons, traced light none of nodes."""
+    constants = [one for content in stacks.values() for one in content["constants"].values()]
+    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in constants)}

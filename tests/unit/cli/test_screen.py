@@ -52,13 +52,21 @@ def test_json_has_null_for_what_is_not_finite(command):
 def test_a_mistake_is_no_json(command):
     status, out, err = command("report", "hazzard", "--json")
     assert (status, out) == (2, "")
+    stacks = ", ".join(record.available(FITS / "stacks"))
     assert err == (
-        f"profilefit: there is no record 'hazzard' in {FITS}; did you mean hazard? `profilefit report` lists them\n"
+        f"profilefit: there is no record 'hazzard' in {FITS}; did you mean hazard? stacks are {stacks}, and "
+        "`profilefit report` lists records\n"
     )
 
 
 @pytest.mark.parametrize(
-    ("name", "near"), [("liang", "liang-whole, liang-as-published, liang-inverse-whole? "), ("zzz", None)]
+    ("name", "near"),
+    [
+        ("liang", "liang-whole, liang-as-published, liang-inverse-whole? "),
+        ("skim", "skimmilk-on-marble, skimmilk-on-potato? "),
+        ("hearts", "heart? "),
+        ("zzz", None),
+    ],
 )
 def test_an_unknown_record_names_the_nearest(command, name, near):
     _, _, err = command("report", name)
@@ -67,7 +75,7 @@ def test_an_unknown_record_names_the_nearest(command, name, near):
 
 
 @pytest.mark.parametrize("width", [40, 80, *(pytest.param(one, marks=pytest.mark.slow) for one in (60, 100, 120))])
-@pytest.mark.parametrize("words", [("report",), ("report", "liang-whole", "reproduction")])
+@pytest.mark.parametrize("words", [("report",), ("report", "liang-whole", "reproduction"), ("report", "skin")])
 def test_tables_are_whole_at_any_width(command, monkeypatch, width, words):
     monkeypatch.setenv("COLUMNS", str(width))
     status, out, _ = command(*words)

@@ -8,6 +8,7 @@ import pytest
 
 from profilefit.materials import CHANNELS
 from profilefit.recipes import record
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.stack import record as stacks
 from profilefit.shader.law_file import LANGUAGES
 from tests.unit.recipes.stack.test_record import STACK, made
@@ -143,6 +144,84 @@ def test_two_files_of_one_name(command, heart):
     status, out, err = command("regenerate", heart, "other/heart.toml", "--out", "mine")
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "stacks must have different names, as their records do, got 'heart' twice" in err
+
+
+def test_a_stack_is_reported_by_its_name(command, heart):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    content = record.read(Path("mine/stacks/heart.json"))
+    status, out, err = command("report", "heart", "--fits", "mine", "--quiet")
+    assert (status, err) == (0, "")
+    assert out.startswith("heart  Muscle under its skin")
+    rows = [line.split() for line in out.splitlines()]
+    for name in content["constants"]:
+        assert [row[:3] for row in rows].count(name.split(".")) == 1
+    assert ["green", "1", "0.200", "mm", "0.012", "0.0030", "-0.0015"] in rows
+    both = json.loads(command("report", "heart", "hazard", "--json")[1])
+    assert list(both["records"]) == ["heart", "hazard"]
+    told = json.loads(command("report", "heart", "--fits", "mine", "--json")[1])
+    assert told == {"records": {"heart": content}}
+
+
+def test_tables_of_stacks_in_markdown(command, heart):
+    """Of those named; of all in the folder, if none is; and of none the tables stay as they were."""
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    marks = ("stack-errors", "stack-constants", "constants")
+    text = "".join(f"<!-- {mark} -->\nold\n<!-- /{mark} -->\n" for mark in marks)
+    for names in (("heart",), ()):
+        Path("page.md").write_text(text, encoding="utf-8")
+        assert command("report", *names, "--fits", "mine", "--markdown", "page.md", "--quiet") == (0, "", "")
+        filled = Path("page.md").read_text(encoding="utf-8")
+        assert "| heart | red     | 1         | 0.200 mm  | 0.012 | 0.0030 | -0.0015 |" in filled
+        assert filled.count("| heart | blue    |") == 1 + 9
+        assert filled.count("old") == 1, "no table of other records"
+    Path("page.md").write_text(text, encoding="utf-8")
+    command("report", "hazard", "--markdown", "page.md")
+    assert Path("page.md").read_text(encoding="utf-8").count("old") == 2
+
+
+def test_a_stack_beside_other_records(command, heart):
+    """In ./fits, and shipped: where it is from is said if that is not where the records are from."""
+    command("regenerate", heart, "--quiet")
+    status, out, err = command("report", "heart", "hazard")
+    assert (status, err) == (0, "profilefit: stack 'heart' is of 'fits'\n")
+    assert "Muscle under its skin" in out
+    assert command("report", "skin")[::2] == (0, "")
+    Path("fits/hazard.json").write_bytes((fits_folder() / "hazard.json").read_bytes())
+    other = "profilefit: records of 'fits' in the folder that you are in; --fits chooses others\n"
+    assert command("report", "heart")[::2] == (0, other)
+    assert command("report", "skin")[::2] == (0, f"{other}profilefit: stack 'skin' is of {str(fits_folder())!r}\n")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("heart", "--quality"), "--quality must be left out where NAME is a stack, got 'heart'"),
+        (("heart", "--figures", "figures"), "--figures must be left out where NAME is a stack, got 'heart'"),
+        (("heart", "--html", "page.html"), "--html must be left out where NAME is a stack, got 'heart'"),
+        (("hart",), "no record 'hart' in mine; did you mean heart? stacks are heart, and `profilefit report` lists "),
+        (("skin",), "no record 'skin' in mine; stacks are heart, and `profilefit report` lists records"),
+        (("--json",), "mine has no records: `profilefit regenerate` makes them"),
+    ],
+)
+def test_what_a_report_of_a_stack_is_not_is_one_line(command, heart, words, said):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    status, out, err = command("report", *words, "--fits", "mine", "--quiet")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert said in err
+
+
+@pytest.mark.parametrize("words", [("heart",), ("heart", "--json"), ()])
+def test_a_damaged_stack_is_no_report(command, heart, words):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    path = Path("mine/stacks/heart.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    content["interfaces"]["red"]["quality"] = []
+    path.write_text(json.dumps(content), encoding="utf-8")
+    status, out, err = command("report", *words, "--fits", "mine", "--quiet")
+    assert (status, out) == (2, "")
+    said = "heart.json: is damaged: interfaces.red.quality must be 1, one an interface, got 0; regenerate it\n"
+    assert err.endswith(said)
+    assert err.count("\n") == 1
 
 
 @pytest.mark.slow

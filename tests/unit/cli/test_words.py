@@ -47,6 +47,8 @@ def completed(command, monkeypatch):
         (("report", "burley"), {name for name in record.available(FITS) if name.startswith("burley")}),
         (("report", "--fits", str(FITS), "reproduct"), {"reproduction"}),
         (("report", "--fits", "nowhere", "reproduct"), set()),
+        (("report", "skim"), {"skimmilk-on-marble", "skimmilk-on-potato"}),
+        (("report", "--fits", "nowhere", "skim"), set()),
         (("export", "hazard", "--lang", "glsl"), {"glsl", "glsl-es"}),
         (("fit", "x.csv", "--law", "quan"), {"quantile"}),
         (("check", "--constants", "c"), {"corrected"}),

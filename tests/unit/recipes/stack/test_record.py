@@ -9,13 +9,14 @@ import pytest
 from PIL import Image
 
 from mcml_sim import Setting
-from profilefit.errors import InputError, OutputError, RecordError
+from profilefit.errors import DamagedRecord, InputError, OutputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.stack import record as stacks
 from profilefit.recipes.stack.record import StackRequest, find, load, matching, request_of, require_apart
+from profilefit.recipes.stack.schema import read
 
 STACK = """\
 title = "Muscle under its skin"
@@ -359,6 +360,76 @@ def test_a_record_matches_the_layers_that_it_is_of(written, file, tmp_path):
     for pieces in (("0.3\n", "0.31\n"), ('"diffuse"', '"searchlight"'), ("0.80", "0.8000001"), ("2.6", "2.7")):
         assert matching(request_of(file(*pieces, name="x")), folder) is None
     assert matching(same, tmp_path) is None
+
+
+CAUSES = {
+    r"is not a record: ": "{",
+    r"is not a record of format 1 or 2, got 'list'": "[]",
+    r"must be the record of a stack, got pipeline 'profile'": changed("pipeline", "profile"),
+    r"is damaged: 'layers' is missing; regenerate it": changed("layers"),
+    r"is damaged: layers must be tables, got 3; regenerate it": changed("layers/0", 3),
+    r"record 'heart' is damaged: it has no valid setting": changed("setting/illumination", "sun"),
+}
+
+
+@pytest.mark.parametrize(("cause", "damage"), CAUSES.items(), ids=range(len(CAUSES)))
+def test_a_damaged_record_of_something_else_stops_nothing(written, file, tmp_path, cause, damage):
+    """It comes first; whether the record that is asked for is there or not, one line names it and says why."""
+    folder, first = tmp_path / "mine", written.with_name("first.json")
+    content = json.loads(written.read_text())
+    if isinstance(damage, str):
+        first.write_text(damage)
+    else:
+        damage(content)
+        first.write_text(json.dumps(content))
+    for pieces, name in (((), "heart"), (("0.3\n", "0.31\n"), None)):
+        with pytest.warns(DamagedRecord, match=rf"first\.json is passed over: {cause}") as said:
+            found = matching(request_of(file(*pieces)), folder)
+        assert (found and found.name) == name
+        assert len(said) == 1
+        assert str(said[0].message).isprintable()
+
+
+def test_the_record_that_is_asked_for_must_be_whole(written, file, tmp_path):
+    """Its layers say which one it is: to go on without it would hide that."""
+    content = json.loads(written.read_text())
+    other_half_space(content)
+    written.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match="was fitted with other constants of its half spaces; regenerate it"):
+        matching(request_of(file()), tmp_path / "mine")
+    assert matching(request_of(file("0.3\n", "0.31\n")), tmp_path / "mine") is None
+
+
+NOT_SHOWN = {
+    r"must be the record of a stack, got pipeline 'profile'": changed("pipeline", "profile"),
+    r"is damaged: unit must be one line of printable text, .*, got 3": changed("unit", 3),
+    r"is damaged: interfaces must be a table, got nothing": changed("interfaces"),
+    r"is damaged: interfaces.green must be a table, got nothing": changed("interfaces/green"),
+    r"is damaged: interfaces.blue.quality.0.rel must be a list of numbers, got nothing": changed(
+        "interfaces/blue/quality/0/rel"
+    ),
+    r"is damaged: interfaces.blue.quality must have thickness, rel, ks, delta_A of one length": changed(
+        "interfaces/blue/quality/0/ks", [0.1, 0.2]
+    ),
+    r"is damaged: interfaces.red.fit must be 1, one an interface, got 0": changed("interfaces/red/fit/0"),
+    r"is damaged: interfaces.red.starts.0.count must be a whole number, got 0.5": changed(
+        "interfaces/red/starts/0/count", 0.5
+    ),
+    r"is damaged: layers.1.mu_a must be a list of numbers, got 1": changed("layers/1/mu_a", 1),
+    r"is damaged: constants.green.1.k0 must be a table, got nothing": changed("constants/green.1.k0"),
+    r"is damaged: quality.regenerated must be a table, got nothing": changed("quality/regenerated"),
+}
+
+
+@pytest.mark.parametrize(("message", "change"), NOT_SHOWN.items(), ids=range(len(NOT_SHOWN)))
+def test_what_no_report_can_show_is_one_line(written, message, change):
+    assert read(written) == record.read(written)
+    content = json.loads(written.read_text())
+    change(content)
+    written.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match=message) as caught:
+        read(written)
+    assert str(caught.value).startswith(f"{written}: ")
 
 
 def test_a_record_matches_an_image_of_thicknesses(at_once, file, tmp_path):
