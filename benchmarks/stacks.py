@@ -130,7 +130,7 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
 def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], list[float]]:
     """rel of sums of 1 to 8 Gaussians, of rings even in ln r."""
     of = gaussians.sum_light(medium, light)
-    found = [np.asarray(gaussians.fitted(of, count).residuals) / of.weight for count in range(1, MOST + 1)]
+    found = [np.asarray(gaussians.fitted([of], count).residuals) / of.weight for count in range(1, MOST + 1)]
     rel = [float(np.mean(np.abs(one))) for one in found]
     return (f"{name}, {light}", *_short(*rel)), rel
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import jax
@@ -9,7 +10,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Medium, Setting, exact
+from mcml_sim import Medium, exact
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.solver import Optimum, solve
@@ -17,7 +18,7 @@ from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.recipes.stack import fit, photons
 
 Floats = NDArray[np.float64]
-NARROWEST = (0.05, 0.2, 0.01)  # radii of the narrowest Gaussian that fits start from [mfp of the first layer]
+NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
 WIDEST = 0.5  # and of the widest, over that within which all light counts
 SEED = 300
 
@@ -64,42 +65,65 @@ def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: i
 
     A is the stack's own. InputError as of `stack_law`, and on another count.
     """
+    (found,) = alike((medium,), illumination, count)
+    return found
+
+
+def alike(media: Sequence[Medium], illumination: str = "searchlight", count: int = 6) -> tuple[MediumGaussians, ...]:
+    """Sums of the same 1 to 8 variances, in one unit of length, for media of one unit: red, green and blue, say.
+
+    Each x is in mean free paths of its own first layer.
+    """
     if isinstance(count, bool) or count not in range(1, MOST + 1):
         raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
     require_illumination(illumination)
-    light = sum_light(medium, illumination)
-    return made(fitted(light, count).parameters, light.whole, fit.setting_of(medium, illumination))
+    lights = [sum_light(medium, illumination) for medium in media]
+    units = [medium.layers[0].similar.mfp for medium in media]
+    scaled = [light._replace(edges=light.edges * unit) for light, unit in zip(lights, units, strict=True)]
+    variances, weights = made(fitted(scaled, count).parameters, len(media))
+    return tuple(
+        MediumGaussians(
+            fit.setting_of(medium, illumination), light.whole, tuple((variances / unit**2).tolist()), tuple(weight)
+        )
+        for medium, light, unit, weight in zip(media, lights, units, weights.tolist(), strict=True)
+    )
 
 
-def fitted(light: SumLight, count: int) -> Optimum:
-    """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1, unbounded."""
-    widest = 2.0 * np.log(WIDEST * light.edges[-1])
+def fitted(lights: Sequence[SumLight], count: int) -> Optimum:
+    """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1 of each light, unbounded."""
+    shortest, longest = min(light.edges[0] for light in lights), max(light.edges[-1] for light in lights)
+    widest = 2.0 * np.log(WIDEST * longest)
+    data = [(light.edges, light.energy, light.weight, light.whole) for light in lights]
     found = []
     for narrowest in NARROWEST:
-        rise = (widest - 2.0 * np.log(narrowest)) / max(count - 1, 1)
-        start = [2.0 * np.log(narrowest), *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * (count - 1)]
-        found.append(solve(_residual, np.array(start), (light.edges, light.energy, light.weight, light.whole)))
+        low = 2.0 * np.log(narrowest * shortest)
+        rise = (widest - low) / max(count - 1, 1)
+        start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
+        found.append(solve(_residual, np.array(start), data))
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
-def made(parameters: Floats, whole: float, setting: Setting) -> MediumGaussians:
-    """The sum of unbounded parameters."""
+def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
+    """Variances (N,) and weights (lights, N) of unbounded parameters."""
     with jax.enable_x64(True):
-        level, logit = (np.asarray(one).tolist() for one in _of(jnp.asarray(parameters)))
-    return MediumGaussians(setting, whole, tuple(np.exp(level).tolist()), tuple(np.exp(logit).tolist()))
+        level, logit = _of(jnp.asarray(parameters), lights)
+    return np.exp(np.asarray(level)), np.exp(np.asarray(logit))
 
 
-def _of(parameters: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """ln v and ln w."""
-    count = (parameters.size + 1) // 2
+def _of(parameters: jax.Array, lights: int) -> tuple[jax.Array, jax.Array]:
+    """ln v and, of each light, ln w."""
+    count = (parameters.size + lights) // (lights + 1)
     level = jnp.cumsum(jnp.concatenate([parameters[:1], jax.nn.softplus(parameters[1:count])]))
-    return level, jax.nn.log_softmax(jnp.concatenate([jnp.zeros(1), parameters[count:]]))
+    logits = jnp.concatenate([jnp.zeros((lights, 1)), parameters[count:].reshape(lights, count - 1)], axis=1)
+    return level, jax.nn.log_softmax(logits, axis=1)
 
 
 def _residual(parameters, data):
-    edges, energy, weight, whole = data
-    level, logit = _of(parameters)
-    depth = 0.5 * edges[:, None] ** 2 * jnp.exp(-level)
-    # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
-    rings = jnp.exp(logit - depth[:-1]) * -jnp.expm1(depth[:-1] - depth[1:])
-    return weight * (whole * jnp.sum(rings, axis=1) / energy - 1.0)
+    level, logits = _of(parameters, len(data))
+    found = []
+    for logit, (edges, energy, weight, whole) in zip(logits, data, strict=True):
+        depth = 0.5 * edges[:, None] ** 2 * jnp.exp(-level)
+        # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
+        rings = jnp.exp(logit - depth[:-1]) * -jnp.expm1(depth[:-1] - depth[1:])
+        found.append(weight * (whole * jnp.sum(rings, axis=1) / energy - 1.0))
+    return jnp.concatenate(found)

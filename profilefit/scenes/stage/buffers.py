@@ -119,6 +119,7 @@ def step_edge(size: tuple[int, int], pixel: float, reflectance: ArrayLike) -> Bu
 
 
 SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
+PLACE = "place_map"  # u, v, and 1 where a surface is
 
 
 class Targets:
@@ -126,7 +127,7 @@ class Targets:
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
         self.context, self.size = context, size
-        self._maps = {name: float_texture(context, size, 4) for name in SURFACE}
+        self._maps = {name: float_texture(context, size, 4) for name in (*SURFACE, PLACE)}
         self._depth = context.depth_renderbuffer(size)
         self.surface = context.framebuffer(list(self._maps.values()), self._depth)
         self._into: dict[str, moderngl.Framebuffer] = {}

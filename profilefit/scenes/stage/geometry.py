@@ -1,4 +1,4 @@
-"""Passes 1 and 2: the depth along the light, and from the camera all that the others need, in four targets at once."""
+"""Passes 1 and 2: the depth along the light, and from the camera all that the others need, in five targets at once."""
 
 from __future__ import annotations
 
@@ -43,20 +43,39 @@ class Geometry:
         self._target = context.framebuffer([self._map], self._depth)
         self._parts: tuple[Part, ...] = ()
         self._drawn: list[_Drawn] = []
+        self._unwrapped: ShaderProgram | None = None
 
     def draw(self, scene: Scene, target: moderngl.Framebuffer) -> None:
-        """Both passes; the target has four float textures and a depth. Parts seen before are not sent again."""
+        """Both passes; the target has five float textures and a depth. Parts seen before are not sent again."""
         if scene.parts is not self._parts:
             self._release_parts()
-            self._drawn = [_Drawn(self.context, part, self._shadow.compiled, self._surface) for part in scene.parts]
+            self._drawn = [_Drawn(self.context, part, self._shadow.compiled) for part in scene.parts]
             self._parts = scene.parts
         sphere = _around(scene)
         light = self._light(scene, sphere)
         self._draw_shadow(light)
         self._draw_surface(scene, light, sphere, target)
 
+    def unwrap(self, part: Part, scene: Scene, target: moderngl.Framebuffer, inset: tuple[float, float]) -> None:
+        """After `draw` of the scene: one of its parts laid out over its uv, positions and normals in the world.
+
+        inset  share of the target that u and v from 0 to 1 take
+        """
+        if self._unwrapped is None:
+            texts = (text_beside(__name__, f"glsl/{file}") for file in ("surface.frag", "atlas.vert"))
+            self._unwrapped = ShaderProgram(self.context, "atlas", *texts)
+        drawn = next(one for one in self._drawn if one.part is part)
+        light = self._light(scene, _around(scene))
+        values = {**light, **self._shading(scene), "view": np.eye(4), "inset": inset}
+        with self.context.scope(target, enable_only=moderngl.NOTHING):
+            target.clear()
+            drawn.draw_surface(self._map, values, self._unwrapped)
+        check_errors(self.context, "atlas")
+
     def release(self) -> None:
         self._release_parts()
+        if self._unwrapped is not None:
+            self._unwrapped.release()
         for one in (self._target, self._depth, self._map, self._surface, self._shadow):
             one.release()
 
@@ -89,29 +108,30 @@ class Geometry:
         near = max(depth - MARGIN * sphere.radius, 0.01 * sphere.radius)
         values = {
             **light,
-            "shadow_pixel": 2.0 * MARGIN * sphere.radius / self._map.width,
+            **self._shading(scene),
             "view": camera.view(),
             "projection": camera.projection(target.width / target.height, near, depth + MARGIN * sphere.radius),
-            "light": scene.light.irradiance,
-            "ambient": scene.ambient,
         }
         with self.context.scope(target, enable_only=moderngl.DEPTH_TEST):
             target.clear(depth=1.0)
             for part in self._drawn:
-                part.draw_surface(self._map, values)
+                part.draw_surface(self._map, values, self._surface)
         check_errors(self.context, "surface")
+
+    def _shading(self, scene: Scene) -> Values:
+        pixel = 2.0 * MARGIN * _around(scene).radius / self._map.width
+        return {"shadow_pixel": pixel, "light": scene.light.irradiance, "ambient": scene.ambient}
 
 
 class _Drawn:
     """A part on the GPU, for as long as it is drawn."""
 
-    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program, surface: ShaderProgram):
-        self.part, self._shader = part, surface
+    def __init__(self, context: moderngl.Context, part: Part, shadow: moderngl.Program):
+        self.context, self.part = context, part
         self._vertices = context.buffer(part.mesh.vertices().tobytes())
         self._triangles = context.buffer(part.mesh.triangles.astype("i4").tobytes())
         self.shadow = context.vertex_array(shadow, [(self._vertices, "3f 5x4", "position")], self._triangles)
-        names = "position", "normal", "uv"
-        self._surface = context.vertex_array(surface.compiled, [(self._vertices, "3f 3f 2f", *names)], self._triangles)
+        self._seen: dict[ShaderProgram, moderngl.VertexArray] = {}
         rows, columns = part.reflectance.shape[:2]
         self._skin = context.texture((columns, rows), 3, part.reflectance.astype("f4").tobytes(), dtype="f4")
         self._skin.repeat_y = False
@@ -119,13 +139,18 @@ class _Drawn:
         self._skin.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
         self._skin.anisotropy = ANISOTROPY
 
-    def draw_surface(self, shadow_map: moderngl.Texture, values: Values) -> None:
+    def draw_surface(self, shadow_map: moderngl.Texture, values: Values, by: ShaderProgram) -> None:
         own = {"translucent": float(self.part.is_translucent), "roughness": self.part.roughness}
-        self._shader.assign({"skin": self._skin, "shadow_map": shadow_map}, {**values, **own})
-        self._surface.render(moderngl.TRIANGLES)
+        by.assign({"skin": self._skin, "shadow_map": shadow_map}, {**values, **own})
+        if by not in self._seen:
+            content = [(self._vertices, "3f 3f 2f", "position", "normal", "uv")]
+            self._seen[by] = self.context.vertex_array(by.compiled, content, self._triangles)
+        self._seen[by].render(moderngl.TRIANGLES)
 
     def release(self) -> None:
-        for one in (self.shadow, self._surface, self._vertices, self._triangles, self._skin):
+        for array in (self.shadow, *self._seen.values()):
+            array.release()
+        for one in (self._vertices, self._triangles, self._skin):
             one.release()
 
 

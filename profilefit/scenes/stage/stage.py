@@ -25,7 +25,7 @@ from profilefit.scenes.stage.gather import Law, technique
 from profilefit.scenes.stage.geometry import SHADOW_SIDE, Geometry
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.technique import EXITANCE, RADIANCE, Frame, FullScreen, Pass, Technique, combination
-from profilefit.scenes.stage.world import Scene
+from profilefit.scenes.stage.world import Part, Scene
 
 Floats = NDArray[np.float64]
 DEFAULT = Sampling()
@@ -64,6 +64,16 @@ class Stage:
         self._geometry.draw(scene, self.targets.surface)
         camera = scene.camera
         self._seen(camera.pixel(self.size[1]), camera.is_perspective, scene)
+
+    def unwrap(self, part: Part, target: moderngl.Framebuffer, inset: tuple[float, float]) -> None:
+        """A part of the scene last drawn, laid out over its uv into four float textures: positions in the world.
+
+        inset  share of the target that u and v from 0 to 1 take
+        """
+        self._alive()
+        if self._scene is None or not any(one is part for one in self._scene.parts):
+            raise InputError("part must be one of the scene last drawn, got another one")
+        self._geometry.unwrap(part, self._scene, target, inset)
 
     def upload(self, buffers: Buffers) -> None:
         """A G-buffer of numpy arrays in place of a scene; there is no light then, so `render` has no highlights."""

@@ -37,12 +37,13 @@ UNIFORM = re.compile(r"\buniform\s+(?:(?:low|medium|high)p\s+)?\w+\s+([^;]+);")
 class Pass:
     """A fragment shader over the whole screen.
 
-    reads     sampler -> the map of that name, or an array (rows, columns, channels);  writes  the map that it fills
+    reads     sampler -> the map of that name, an array (rows, columns, channels), or a texture of other targets
+    writes    the map that it fills
     source    GLSL after its version line;  uniforms  values by name; every one of the source, and no other
     """
 
     name: str
-    reads: Mapping[str, str | Singles]
+    reads: Mapping[str, str | Singles | moderngl.Texture]
     writes: str
     source: str
     uniforms: Mapping[str, Any]
@@ -219,10 +220,12 @@ class FullScreen:
 
     def run(self, one: Pass, targets: Targets) -> None:
         """Fill the map that the pass writes."""
-        textures = {
-            sampler: targets.map(read) if isinstance(read, str) else self._table(sampler, read)
-            for sampler, read in one.reads.items()
-        }
+        textures = {}
+        for sampler, read in one.reads.items():
+            if isinstance(read, np.ndarray):
+                textures[sampler] = self._table(sampler, read)
+            else:
+                textures[sampler] = targets.map(read) if isinstance(read, str) else read
         self.program.assign(textures, one.uniforms)
         with self.context.scope(targets.into(one.writes), enable_only=moderngl.NOTHING):
             self._triangle.render(moderngl.TRIANGLES, vertices=3)

@@ -18,14 +18,19 @@ def rings_of(law: MediumGaussians) -> SumLight:
     return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79))
 
 
+def sum_of(light: SumLight, best) -> MediumGaussians:
+    variances, (weights,) = gaussians.made(best.parameters)
+    return MediumGaussians(Setting(), light.whole, tuple(variances), tuple(weights))
+
+
 def test_a_sum_is_found_again():
     known = MediumGaussians(Setting(), 0.4, (0.02, 0.5, 6.0), (0.3, 0.5, 0.2))
     light = rings_of(known)
-    best = gaussians.fitted(light, 3)
-    found = gaussians.made(best.parameters, light.whole, Setting())
-    np.testing.assert_allclose(found.variance, known.variance, rtol=1e-4)
-    np.testing.assert_allclose(found.weight, known.weight, rtol=1e-4)
-    assert gaussians.fitted(light, 2).cost > 1e4 * best.cost  # two are not three
+    best = gaussians.fitted([light], 3)
+    variances, (weights,) = gaussians.made(best.parameters)
+    np.testing.assert_allclose(variances, known.variance, rtol=1e-4)
+    np.testing.assert_allclose(weights, known.weight, rtol=1e-4)
+    assert gaussians.fitted([light], 2).cost > 1e4 * best.cost  # two are not three
 
 
 @pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
@@ -33,13 +38,26 @@ def test_more_of_them_are_nearer(illumination):
     light = gaussians.sum_light(HEART, illumination)
     rel = []
     for count in (2, 4, 6):
-        best = gaussians.fitted(light, count)
-        law = gaussians.made(best.parameters, light.whole, Setting(illumination, n=1.38))
+        law = sum_of(light, gaussians.fitted([light], count))
         assert sum(law.weight) == pytest.approx(1.0)
         assert np.all(np.diff(law.variance) > 0)
         energy = np.diff(law.cdf(light.edges, 0.5)) * law.total_reflectance
         rel.append(float(np.mean(np.abs(energy / light.energy - 1.0))))
     assert rel[0] > 0.4 > rel[1] > 0.1 > rel[2] > 0.02
+
+
+def test_colours_share_their_variances():
+    """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
+    blue = Medium((Layer(1.38, 0.35, 2.6, 0.0, 0.3), Layer(1.38, 1.2, 1.3, 0.0)))
+    both = gaussians.alike((HEART, blue), "diffuse", 4)
+    units = [medium.layers[0].mfp for medium in (HEART, blue)]
+    first, second = (np.array(one.variance) * unit**2 for one, unit in zip(both, units, strict=True))
+    np.testing.assert_allclose(first, second, rtol=1e-12)
+    for medium, one in zip((HEART, blue), both, strict=True):
+        light = gaussians.sum_light(medium, "diffuse")
+        alone = gaussians.fitted([light], 4).cost
+        energy = np.diff(one.cdf(light.edges, 0.5)) * one.total_reflectance
+        assert alone < np.sum((light.weight * (energy / light.energy - 1.0)) ** 2) < 1.5 * alone
 
 
 def test_counts_are_checked():
@@ -54,9 +72,9 @@ def test_light_that_is_traced():
     forward = Medium(tuple(Layer(1.38, one.mu_a, 10.0 * one.mu_s, 0.9, one.thickness) for one in HEART.layers))
     light, similar = gaussians.sum_light(forward, "searchlight"), gaussians.sum_light(HEART, "searchlight")
     assert np.mean(light.noise) < 0.05
-    best = gaussians.fitted(light, 8)
+    best = gaussians.fitted([light], 8)
     counts = light.weight > 0
     assert np.mean(np.abs(best.residuals[counts] / light.weight[counts])) < 0.04
-    lost = gaussians.made(gaussians.fitted(similar, 8).parameters, similar.whole, Setting(n=1.38))
+    lost = sum_of(similar, gaussians.fitted([similar], 8))
     energy = np.diff(lost.cdf(light.edges, 0.5)) * lost.total_reflectance
     assert np.mean(np.abs(energy[counts] / light.energy[counts] - 1.0)) > 0.5

@@ -14,7 +14,7 @@ uniform vec2 size; // of the screen [pixels]
 uniform float pixel; // its side [mm], in perspective at a depth of 1 mm
 uniform float perspective; // 1, or 0 for parallel rays
 
-out vec4 exitance;
+out vec4 exitance; // and the share of the law's energy that was found on the screen, least of the three [-]
 
 const float TAU = 6.283185307179586;
 const float NEAR = 1e-6; // least radius [mfp]: p and density are finite there
@@ -91,7 +91,7 @@ float radius_density(float r) {
 #endif
 }
 
-vec3 gathered(ivec2 here, float depth, vec3 own) {
+vec4 gathered(ivec2 here, float depth, vec3 own) {
     float per_pixel = world_per_pixel(depth);
     vec2 place_in_cell = shift(here);
     vec2 moved = place_in_cell.x * cell.xy + place_in_cell.y * cell.zw;
@@ -130,7 +130,8 @@ vec3 gathered(ivec2 here, float depth, vec3 own) {
         light += w * texelFetch(irradiance_map, there, 0).rgb;
         weight += w;
     }
-    return light / weight;
+    vec3 found = weight / float(samples) - OWN;
+    return vec4(light / weight, min(found.x, min(found.y, found.z)));
 }
 
 void main() {
@@ -139,7 +140,7 @@ void main() {
     vec3 own = texelFetch(irradiance_map, here, 0).rgb;
     vec3 surface = texelFetch(reflectance_map, here, 0).rgb;
     vec3 colour = surface;
-    vec3 light = own;
+    vec4 light = vec4(own, 1.0);
     // So short a mean free path does not leave the pixel: Lambert, to a part in 1000.
     vec3 across = mfp / world_per_pixel(-centre.z);
     vec3 blurred = clamp((across - LAMBERT.x) / (LAMBERT.y - LAMBERT.x), 0.0, 1.0);
@@ -151,7 +152,10 @@ void main() {
             reach[c] = law_radius(MOST_UNIFORM, shape[c]);
 #endif
         }
-        if (any(greaterThan(blurred, vec3(0.0)))) light = mix(own, gathered(here, -centre.z, own), blurred);
+        if (any(greaterThan(blurred, vec3(0.0)))) {
+            vec4 found = gathered(here, -centre.z, own);
+            light = vec4(mix(own, found.rgb, blurred), found.w);
+        }
     }
-    exitance = vec4(colour * light, centre.w);
+    exitance = vec4(colour * light.rgb, light.w);
 }

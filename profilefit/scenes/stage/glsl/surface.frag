@@ -18,6 +18,7 @@ layout(location = 0) out vec4 irradiance_thickness;
 layout(location = 1) out vec4 reflectance_visibility;
 layout(location = 2) out vec4 position_mask;
 layout(location = 3) out vec4 normal_roughness;
+layout(location = 4) out vec4 place;
 
 const float EMPTY = 1e5; // depth where nothing is [mm]
 // In texels: out of the surface against shadows of itself, as far as the filter's slope asks; into it for the thickness.
@@ -76,4 +77,5 @@ void main() {
     reflectance_visibility = vec4(texture(skin, texture_place).rgb, seen);
     position_mask = vec4((view * vec4(world_position, 1.0)).xyz, translucent);
     normal_roughness = vec4(mat3(view) * normal, roughness);
+    place = vec4(texture_place, 0.0, 1.0);
 }

@@ -1,0 +1,73 @@
+"""The balance of texture and screen: a kernel split by scale, and the screen's share of what is far.
+
+Yang et al. (2018) blend light that was blurred in texture space and on the screen by a balance function that their text
+does not give. Here R = R_near + R_far: Gaussians narrower than a crossover are blurred on the screen, which has all
+detail; wider ones in the atlas, which sees hidden parts; and those, too, on the screen where it sees nearly all of
+their light. Both blur the same irradiance, and the weights of both parts together are those of the kernel: light is
+counted once.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from profilefit.errors import InputError
+from profilefit.scenes.heart.truth import surface_blur
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Kernel:
+    """sum_k w_k e^{-d^2 / 2 v_k} / (2 pi v_k): variances (N,), rising [length^2]; weights (N,) or (N, c) [-]."""
+
+    variances: Floats
+    weights: Floats
+
+    @property
+    def energy(self) -> Floats:
+        """Of each channel [-]."""
+        return np.sum(self.weights, axis=0)
+
+
+class NearFar(NamedTuple):
+    """The two parts of a kernel; their weights are those of the whole one."""
+
+    near: Kernel
+    far: Kernel
+
+
+def split(kernel: Kernel, crossover: float) -> NearFar:
+    """Gaussians with sigma below a crossover [length], and the others; either may be empty."""
+    if not crossover >= 0:
+        raise InputError(f"crossover must be a length >= 0, got {crossover!r}")
+    is_near = np.sqrt(kernel.variances) < crossover
+    near, far = (Kernel(kernel.variances[one], kernel.weights[one]) for one in (is_near, ~is_near))
+    return NearFar(near, far)
+
+
+def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: Kernel, at: ArrayLike) -> Floats:
+    """Of the light that a kernel gathers at points, the share that comes from what is seen [-], (m,) or (m, c).
+
+    points, areas, seen  (n, 3), (n,), (n,) of the whole surface, seen 0 or 1;  at  (m, 3)
+    """
+    visible = np.broadcast_to(np.asarray(seen, float), np.shape(areas))
+    of = (kernel.variances, kernel.weights)
+    channels = np.ones(np.shape(kernel.weights)[1:])
+    some, whole = (
+        surface_blur(points, areas, np.multiply.outer(light, channels), *of, at=at)
+        for light in (visible, np.ones_like(visible))
+    )
+    return some / np.maximum(whole, np.finfo(float).tiny)
+
+
+def balance(near: ArrayLike, far_on_screen: ArrayLike, far_in_atlas: ArrayLike, share: ArrayLike, threshold: float):
+    """The light of both parts: what is near, and what is far by the screen where its share is above the threshold.
+
+    All broadcast; a smooth weight would mix in a gather that misses light, which is wrong in all of it.
+    """
+    return np.asarray(near) + np.where(np.asarray(share) > threshold, far_on_screen, far_in_atlas)

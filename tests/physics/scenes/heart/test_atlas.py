@@ -1,0 +1,147 @@
+"""Light in texture space against the oracle of a sphere, and where an atlas fails if it is made carelessly."""
+
+import numpy as np
+import pytest
+from scipy.special import erf
+
+from profilefit.errors import InputError
+from profilefit.scenes.heart.atlas import SUMS, Atlas
+from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart.links import links
+from profilefit.scenes.heart.truth import sphere_blur
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.world import Part, Scene
+from tests.physics.scenes.heart.surfaces import ball, bumps
+
+KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
+RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24
+WHITE = np.ones((1, 1, 3), np.float32)
+
+
+@pytest.fixture
+def stage(context):
+    with Stage(context, (32, 32), shadow_side=64) as stage:
+        yield stage
+
+
+@pytest.fixture
+def sphere(stage):
+    part = Part(ball(RADIUS), WHITE)
+    stage.draw(Scene((part,)))
+    with Atlas(stage.context, SIZE, MARGIN) as atlas:
+        atlas.draw(stage, part)
+        yield atlas
+
+
+def lit(atlas: Atlas, light: np.ndarray) -> None:
+    """Irradiance (rows, columns) of the atlas, in place of the scene's."""
+    texels = np.repeat(light[..., None], 4, axis=-1).astype(np.float32)
+    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(texels).tobytes())
+
+
+def blurred(atlas: Atlas, light: np.ndarray, kernel: Kernel = KERNEL) -> np.ndarray:
+    lit(atlas, light)
+    return atlas.read(atlas.blur(kernel))[..., 0].astype(float)
+
+
+def cosine(atlas: Atlas, direction=(0.6, 0.64, 0.48)) -> np.ndarray:
+    return atlas.read("normal_map")[..., :3].astype(float) @ np.array(direction)
+
+
+def rms(off: np.ndarray, weight: np.ndarray) -> float:
+    return float(np.sqrt(np.average(off**2, weights=weight)))
+
+
+def test_a_sphere_is_its_oracle(sphere):
+    place, towards = sphere.read("position_map"), cosine(sphere)
+    off = blurred(sphere, 1.0 + towards) - sphere_blur(RADIUS, towards, KERNEL.variances, KERNEL.weights)
+    height = np.where(place[..., 3] > 0.5, np.abs(place[..., 1]) / RADIUS, 2.0)
+    area = np.sqrt(np.clip(1.0 - height**2, 0.0, 1.0))
+    assert rms(off, np.where(height < np.sin(np.radians(60.0)), area, 0.0)) < 0.0015
+    assert rms(off, np.where(height <= 1.0, area, 0.0)) < 0.006
+    # Negative control: a blur by half of the variances.
+    half = blurred(sphere, 1.0 + towards, Kernel(0.5 * KERNEL.variances, KERNEL.weights))
+    half = half - sphere_blur(RADIUS, towards, KERNEL.variances, KERNEL.weights)
+    assert rms(half, np.where(height < 0.8, area, 0.0)) > 0.004
+
+
+def test_a_furnace(sphere):
+    """Even light stays even: over seams, poles and what is outside of all charts; weights need not sum to 1."""
+    inside = sphere.read("position_map")[..., 3] > 0.5
+    found = blurred(sphere, np.full(inside.shape, 2.0), Kernel(KERNEL.variances, 0.5 * KERNEL.weights))
+    np.testing.assert_allclose(found[inside], 1.0, atol=1e-6)
+    np.testing.assert_array_equal(found[~inside], 0.0)
+
+
+def test_no_step_at_the_seam(sphere):
+    """An edge of light along it is blurred as that on the other side of the sphere is; unlinked it would stay."""
+    place = sphere.read("position_map")
+    inside = place[..., 3] > 0.5
+    rows, columns = (slice(MARGIN + 24, -MARGIN - 24), slice(MARGIN, -MARGIN))
+    half = (place[..., 0] > 0).astype(float)
+
+    def steps():
+        found = blurred(sphere, half, Kernel(np.array([0.5]), np.ones(1)))[rows, columns]
+        return np.abs(found[:, 0] - found[:, -1]).max(), np.abs(np.diff(found, axis=1)).max()
+
+    across, within = steps()
+    assert across < 1.2 * within
+    sphere._links = np.where(inside[..., None], sphere._links, 0.0).astype(np.float32)
+    across, within = steps()
+    assert across > 2.0 * within
+
+
+def test_an_open_sheet_ends_at_its_edge(stage):
+    """No light comes from beyond, and none is lost: half lit, the sum stays what it was, next to the edge as well."""
+    part = Part(bumps(10.0, 0.0, 20.0), WHITE)
+    stage.draw(Scene((part,)))
+    with Atlas(stage.context, (120, 120), 20) as atlas:
+        atlas.draw(stage, part)
+        assert np.all(atlas._links[:20, :, 2] == 0.0)
+        place = atlas.read("position_map")
+        found = blurred(atlas, (place[..., 0] > 0).astype(float), Kernel(np.array([1.0]), np.ones(1)))
+        inside = place[..., 3] > 0.5
+        np.testing.assert_allclose(
+            found[inside & (np.abs(place[..., 0]) > 5.0)],
+            place[inside & (np.abs(place[..., 0]) > 5.0), 0] > 0,
+            atol=1e-5,
+        )
+        expected = 0.5 + 0.5 * erf(place[..., 0] / np.sqrt(2.0))
+        np.testing.assert_allclose(found[inside], expected[inside], atol=0.01)
+
+
+def test_links_of_a_sphere():
+    """A row goes on at its other end, a meridian at the one opposite, and nowhere without a seam to cross."""
+    rows, columns, margin = 24, 48, 8
+    turn, height = 2 * np.pi * (np.arange(columns) + 0.5) / columns, np.pi * ((np.arange(rows) + 0.5) / rows - 0.5)
+    across = np.cos(height)[:, None]
+    points = np.stack([across * np.sin(turn), np.sin(height)[:, None] + 0 * turn, across * np.cos(turn)], axis=-1)
+    position = np.pad(points, ((margin, margin), (margin, margin), (0, 0)))
+    inside = np.pad(np.ones((rows, columns), bool), margin)
+    found = links(position, inside, margin)
+    own = np.stack(np.meshgrid(np.arange(columns + 2 * margin), np.arange(rows + 2 * margin)), axis=-1)
+    np.testing.assert_allclose(found[inside][:, :2], own[inside])
+    wrapped = found[margin : margin + rows, :margin]
+    np.testing.assert_allclose(wrapped[..., 0], own[margin : margin + rows, :margin, 0] + columns, atol=0.4)
+    np.testing.assert_allclose(wrapped[..., 1], own[margin : margin + rows, :margin, 1], atol=0.1)
+    over = found[:margin, margin : margin + columns]
+    opposite = margin + (own[:margin, margin : margin + columns, 0] - margin + columns // 2) % columns
+    np.testing.assert_allclose(over[..., 0], opposite, atol=0.1)
+    np.testing.assert_allclose(over[..., 1], 2 * margin - 1 - own[:margin, margin : margin + columns, 1], atol=0.4)
+    half = position * [1.0, 1.0, 1.0]
+    half[:, margin + columns // 2 :] = 0.0
+    cut = inside.copy()
+    cut[:, margin + columns // 2 :] = False
+    alone = links(half, cut, margin)  # of half a sphere: beyond its rim nothing goes on
+    assert np.all(alone[margin + 6 : margin + rows - 6, :margin, 2] == 0.0)
+
+
+def test_bad_input(stage):
+    part = Part(ball(RADIUS), WHITE)
+    stage.draw(Scene((part,)))
+    other = Part(ball(RADIUS), WHITE)
+    with Atlas(stage.context, (64, 48), 8) as atlas, pytest.raises(InputError, match="part must be one of the scene"):
+        atlas.draw(stage, other)
+    with pytest.raises(InputError, match="margin must be texels from 1 to less than half of 48, got 24"):
+        Atlas(stage.context, (64, 48), 24)
+    assert len(set(SUMS)) == 2
