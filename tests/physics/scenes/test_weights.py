@@ -32,7 +32,7 @@ WRONG_MOMENTS = [
 
 def mean_weight(context, alter, law, kind, channels):
     """Sum of the weights over the number of samples (3,), and its standard error, from 16 seeds of 4 samples."""
-    alter("return light / weight;", "return weight / float(samples) - OWN;")
+    alter("vec4(light / weight,", "vec4(weight / float(samples) - OWN,")
     with Stage(context, SIZE, shadow_side=16) as stage:
         stage.upload(flat(SIZE, 1.0, 1.0))
         runs = [stage.scatter(law, MFP, Sampling(4, kind, channels, seed=seed), ALPHA) for seed in range(16)]
