@@ -8,11 +8,11 @@ share of a texel that is surface goes along with its light: nothing seeps in fro
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Self
 
 import moderngl
 import numpy as np
-from numpy.typing import NDArray
 
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
@@ -23,9 +23,10 @@ from profilefit.scenes.stage.technique import FullScreen, Pass, maps
 from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 
-REACH = 3.3  # sigma of a blur, as in blur.frag
+REACH = 3.3  # of a blur's taps, in its sigma
 SHORTEST = 0.2  # of texels are shorter than those whose margins blurs are made for
 LIGHT, FILLED, STRETCH = "light_map", "filled_map", "stretch_map"
+BLURRED = "blurred_map"  # by a whole kernel
 SUMS = ("sum_map", "other_sum_map")
 
 
@@ -61,13 +62,14 @@ class Atlas:
         if self._links is None:
             place = pixels(self.targets.map("position_map"))
             self._links = links(place[..., :3].astype(float), place[..., 3] > INSIDE, self.margin)
-        self._run(self._pass("stretch", STRETCH, "position_map"))
+        self._run(self._filled("position_map"))
+        self._run(self._pass("stretch", STRETCH, "position_map", FILLED))
         if not self._texel:
             stretch = self.read(STRETCH)
             self._texel = float(np.quantile(stretch[stretch[..., 2] > INSIDE, :2], SHORTEST))
 
-    def blur(self, kernel: Kernel) -> str:
-        """The name of the map that has sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel."""
+    def blur(self, kernel: Kernel) -> moderngl.Texture:
+        """sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel, with margins; until the next blur."""
         self._run(self._pass("begin", LIGHT, "irradiance_map", STRETCH))
         weights = np.broadcast_to(np.atleast_2d(kernel.weights.T).T, (kernel.variances.size, 3))
         self.targets.into(SUMS[1]).clear()
@@ -77,9 +79,10 @@ class Atlas:
                 self._run(one)
             done = variance
             into, before = SUMS[number % 2], SUMS[1 - number % 2]
-            source = self._pass("add", into, LIGHT, weight=tuple(map(float, weight)))
-            self._run(Pass(source.name, {**source.reads, "sum_map": before}, into, source.source, source.uniforms))
-        return SUMS[(kernel.variances.size - 1) % 2]
+            add = self._pass("add", into, weight=tuple(map(float, weight)))
+            self._run(replace(add, reads={LIGHT: LIGHT, "sum_map": before}))
+        self._run(self._filled(SUMS[(kernel.variances.size - 1) % 2], BLURRED))
+        return self.targets.map(BLURRED)
 
     def read(self, name: str) -> Singles:
         """(rows, columns, 4) of a map, row 0 at the bottom."""
@@ -103,23 +106,20 @@ class Atlas:
         parts = int(np.ceil((sigma / (widest * self._texel)) ** 2))
         for number in range(parts):
             before = float(np.sqrt(done + (variance - done) * number / parts))
-            given = {"sigma": float(sigma / np.sqrt(parts)), "before": before, "widest": widest}
+            given = {"sigma": float(sigma / np.sqrt(parts)), "before": before, "widest": widest, "reach": REACH}
             for along in ((1.0, 0.0), (0.0, 1.0)):
-                yield self._pass("fill", FILLED, LIGHT)
-                one = self._pass("blur", LIGHT, STRETCH, along=along, **given)
-                yield Pass(one.name, {**one.reads, LIGHT: FILLED}, LIGHT, one.source, one.uniforms)
+                yield self._filled(LIGHT)
+                yield self._pass("blur", LIGHT, FILLED, STRETCH, along=along, **given)
+
+    def _filled(self, name: str, into: str = FILLED) -> Pass:
+        """A map with its margins."""
+        reads: dict[str, str | Singles | moderngl.Texture] = {LIGHT: name, "link_map": self.links}
+        return replace(self._pass("fill", into), reads=reads)
 
     def _pass(self, name: str, into: str, *reads: str, **uniforms: object) -> Pass:
-        source = text_beside(__name__, f"glsl/{name}.frag")
-        linked = {"link_map": self.links} if "link_map" in source else {}
-        return Pass(name, {**maps(*reads), **linked}, into, source, uniforms)
+        return Pass(name, maps(*reads), into, text_beside(__name__, f"glsl/{name}.frag"), uniforms)
 
     def _run(self, one: Pass) -> None:
         if one.source not in self._passes:
             self._passes[one.source] = FullScreen(self.context, one)
         self._passes[one.source].run(one, self.targets)
-
-
-def laid_out(position: NDArray[np.floating], stretch: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Areas of texels [mm^2], of how far their columns and rows lead: of an atlas whose lines cross at right angles."""
-    return np.where(position[..., 3] > INSIDE, stretch[..., 0] * stretch[..., 1], 0.0).astype(float)

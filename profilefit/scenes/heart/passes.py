@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
@@ -41,38 +42,42 @@ def gather_of(part: Kernel, mfp: Sequence[float]) -> Gather:
 
 @dataclass(frozen=True, eq=False)
 class Balanced(Technique):
-    """A kernel split at a crossover [mm]: near on the screen, far in the atlas but where the screen sees enough.
+    """A kernel in two parts: near on the screen, far in texture space but where the screen sees enough of it.
 
-    atlas  that has light of this frame (`Atlas.draw`);  threshold  share from which on the screen has the far part, too
-    With crossover 0 and a threshold of `ATLAS` all is texture space, with an endless one all is the screen's.
+    near, far  samples of either, None where there is none or it is not asked for;  energies  of both (2, 3) [-]
+    light      blurred by the far part, of this frame (`Atlas.blur`);  inset  share of it that u and v from 0 to 1 take
+    threshold  share from which on the screen has the far part, too
     """
 
-    atlas: Atlas
-    kernel: Kernel
-    crossover: float
+    near: Gather | None
+    far: Gather | None
+    energies: Floats
+    light: moderngl.Texture
+    inset: tuple[float, float]
     threshold: float
 
+    @classmethod
+    def of(cls, atlas: Atlas, kernel: Kernel, crossover: float, threshold: float, mfp: Sequence[float]) -> Balanced:
+        """Of a kernel split at a crossover [mm], with an atlas that has light of this frame (`Atlas.draw`).
+
+        With crossover 0 and a threshold of `ATLAS` all is texture space, with an endless one all is the screen's.
+        """
+        parts = split(kernel, crossover)
+        near, far = (gather_of(part, mfp) if part.variances.size else None for part in parts)
+        light = atlas.targets.map("irradiance_map") if far is None else atlas.blur(parts.far)
+        seen = SCREEN if far is None else threshold  # no light is 0 times the screen's
+        energies = np.array([np.broadcast_to(part.energy, 3) for part in parts])
+        return cls(near, far if threshold < ATLAS else None, energies, light, atlas.inset, seen)
+
     def passes(self, frame: Frame) -> Sequence[Pass]:
-        parts = split(self.kernel, self.crossover)
-        reads = maps("place_map", "position_map", "irradiance_map", "reflectance_map")
+        reads = {**maps("place_map", "position_map", "irradiance_map", "reflectance_map"), "atlas_map": self.light}
         found: list[Pass] = []
-        for part, into in zip(parts, (NEAR, FAR), strict=True):
-            if part.variances.size and (into == NEAR or self.threshold < ATLAS):
-                (one,) = gather_of(part, frame.mfp.tolist()).passes(frame)
-                found.append(replace(one, writes=into))
-                reads[into] = into
-            else:
-                reads[into] = "irradiance_map"
-        has_far = parts.far.variances.size > 0  # else the far light is 0 times the screen's
-        light = self.atlas.targets.map(self.atlas.blur(parts.far) if has_far else "irradiance_map")
-        uniforms = {
-            "near_energy": tuple(np.broadcast_to(parts.near.energy, 3).tolist()),
-            "far_energy": tuple(np.broadcast_to(parts.far.energy, 3).tolist()),
-            "inset": self.atlas.inset,
-            "threshold": self.threshold if has_far else SCREEN,
-        }
-        textures = {**reads, "atlas_map": light, "atlas_link_map": self.atlas.links}
-        return [*found, Pass("balance", textures, EXITANCE, text_beside(__name__, "glsl/balance.frag"), uniforms)]
+        for part, into in ((self.near, NEAR), (self.far, FAR)):
+            reads[into] = "irradiance_map" if part is None else into
+            found += [] if part is None else [replace(one, writes=into) for one in part.passes(frame)]
+        near, far = (tuple(one) for one in self.energies.tolist())
+        uniforms = {"near_energy": near, "far_energy": far, "inset": self.inset, "threshold": self.threshold}
+        return [*found, Pass("balance", reads, EXITANCE, text_beside(__name__, "glsl/balance.frag"), uniforms)]
 
     def through(self) -> LawText:
         return LawText("heart", through_text("1.0"))

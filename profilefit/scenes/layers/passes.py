@@ -81,7 +81,7 @@ def of_table(table: StackTable, plates: Sequence[Plate]) -> StackGather:
     rings = 2.0 * np.pi * x * curves.density(every)
     rows = [row(_radii(t, x, share), ring, share) for share, ring in zip(shares, rings, strict=True)]
     drawn, known = (np.stack(column) for column in zip(*rows, strict=True))
-    text = table_text(LAW, curves.reflectance, [0.0] * values.size)
+    text = table_text(LAW, curves.reflectance)
     shape = f"{LAW}_Shape(c + {len(CHANNELS)} * int(surface.r * {ROWS - 1}.0 + 0.5))"
     textures = {f"{LAW}_drawn": drawn, f"{LAW}_known": known}
     return StackGather(LawText("table", text, textures, shape, f"{LAW}_reflectance(shape)"), tuple(plates))

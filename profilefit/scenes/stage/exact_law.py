@@ -5,7 +5,7 @@ For tests and references: what any closed form would give if it had no error.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 
@@ -45,7 +45,8 @@ class ExactLaw:
     def text(self, name: str) -> str:
         """The law's text with the prefix `name`; it needs the textures of `textures(name)`."""
         reflectance = np.atleast_1d(exact.reflectance(self.alpha, self.setting))
-        return table_text(name, reflectance, self.alpha)
+        rows = {"ROWS": str(len(self.alpha)), "ALPHAS": ", ".join(literal(a) for a in self.alpha)}
+        return table_text(name, reflectance) + _filled("exact_law", name, rows)
 
     def textures(self, name: str) -> dict[str, Singles]:
         """Float textures (rows, columns, channels) by the names of their samplers."""
@@ -53,18 +54,21 @@ class ExactLaw:
         return {f"{name}_drawn": drawn, f"{name}_known": known}
 
 
-def table_text(name: str, reflectance: Iterable[float], alpha: Iterable[float]) -> str:
-    """GLSL of a table: A of its rows [-], and the albedos by which a row is found."""
+def table_text(name: str, reflectance: Iterable[float]) -> str:
+    """GLSL of a table, whose shapes are rows, of A [-] each."""
     reflectances = [literal(float(a)) for a in reflectance]
     values = {
         "ROWS": str(len(reflectances)),
-        "ALPHAS": ", ".join(literal(a) for a in alpha),
         "REFLECTANCES": ", ".join(reflectances),
         "MOST_DEPTH": literal(MOST_DEPTH),
         "LARGEST_U": literal(float(np.arcsinh(FARTHEST / NEAR))),
         "NEAR": literal(NEAR),
     }
-    text = text_beside(__name__, "glsl/exact_law.glsl").replace("LAW_", f"{name}_")
+    return _filled("exact_table", name, values)
+
+
+def _filled(file: str, name: str, values: Mapping[str, str]) -> str:
+    text = text_beside(__name__, f"glsl/{file}.glsl").replace("LAW_", f"{name}_")
     for key, value in values.items():
         text = text.replace(f"@{key}@", value)
     return text

@@ -1,31 +1,26 @@
 // Light of both parts of a kernel, times its reflectance: what is near from the screen; what is far from the screen too
 // where it sees nearly all of it, else from the atlas.
 
-uniform sampler2D near_map, far_map, atlas_map, atlas_link_map, place_map, position_map, irradiance_map, reflectance_map;
+uniform sampler2D near_map, far_map, atlas_map, place_map, position_map, irradiance_map, reflectance_map;
 uniform vec3 near_energy, far_energy; // [-], their sum is the kernel's
 uniform vec2 inset; // share of the atlas that u and v from 0 to 1 take
 uniform float threshold; // of the share that the screen sees
 
 out vec4 exitance;
 
-// Bilinear between texels that are surface, those of the margin by where it goes on.
+// Bilinear between texels that are surface.
 vec4 atlas_at(vec2 uv) {
-    vec2 size = vec2(textureSize(atlas_map, 0));
-    vec2 place = (0.5 + (uv - 0.5) * inset) * size - 0.5;
+    ivec2 size = textureSize(atlas_map, 0);
+    vec2 place = (0.5 + (uv - 0.5) * inset) * vec2(size) - 0.5;
     vec2 corner = floor(place), rest = place - corner;
     vec4 sum = vec4(0.0);
-    float total = 0.0;
     for (int i = 0; i < 4; ++i) {
         ivec2 step = ivec2(i & 1, i >> 1);
-        ivec2 texel = clamp(ivec2(corner) + step, ivec2(0), ivec2(size) - 1);
-        vec3 link = texelFetch(atlas_link_map, texel, 0).xyz;
-        vec4 there = texelFetch(atlas_map, clamp(ivec2(link.xy + 0.5), ivec2(0), ivec2(size) - 1), 0);
         vec2 near = mix(1.0 - rest, rest, vec2(step));
-        float weight = link.z * there.w > 0.5 ? near.x * near.y : 0.0;
-        sum += weight * there;
-        total += weight;
+        vec4 there = texelFetch(atlas_map, clamp(ivec2(corner) + step, ivec2(0), size - 1), 0);
+        sum += near.x * near.y * there.w * vec4(there.rgb, 1.0);
     }
-    return total > 0.0 ? sum / total : vec4(0.0);
+    return sum.w > 0.0 ? sum / sum.w : vec4(0.0);
 }
 
 void main() {

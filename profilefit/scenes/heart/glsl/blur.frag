@@ -3,14 +3,14 @@
 // counts by sqrt(h across / h along), h how far a texel leads. Taps are a whole number of texels apart: one, where the
 // light has edges; more, where a blur before took them away.
 
-uniform sampler2D light_map, stretch_map;
+uniform sampler2D filled_map, stretch_map;
 uniform vec2 along; // (1, 0) or (0, 1)
 uniform float sigma; // [mm]
 uniform float before; // sigma of the blurs so far [mm]
+uniform float reach; // of the taps [sigma]
 uniform float widest; // sigma at most, where a texel is next to nothing [texels]
 out vec4 blurred;
 
-const float REACH = 3.3; // sigma
 const float SMOOTH = 0.7; // taps that far apart, in sigma of what was blurred, miss nothing of it
 
 float counts(ivec2 texel) {
@@ -24,17 +24,17 @@ void main() {
     float texel = max(dot(stretch.xy, along), 1e-20);
     float width = min(sigma / texel, widest); // [texels]
     int apart = max(1, int(min(0.5 * width, SMOOTH * min(before / texel, widest)) + 0.5));
-    int taps = int(ceil(REACH * width / float(apart)));
-    vec4 sum = counts(here) * texelFetch(light_map, here, 0);
+    int taps = int(ceil(reach * width / float(apart)));
+    vec4 sum = counts(here) * texelFetch(filled_map, here, 0);
     float rate = 0.5 * float(apart * apart) / max(width * width, 1e-12);
-    ivec2 last = textureSize(light_map, 0) - 1;
+    ivec2 last = textureSize(filled_map, 0) - 1;
     for (int i = 1; i <= taps; ++i) {
         float weight = exp(-rate * float(i * i));
         ivec2 step = ivec2(along) * i * apart;
         for (int side = -1; side <= 1; side += 2) {
             ivec2 there = here + side * step;
             if (all(greaterThanEqual(there, ivec2(0))) && all(lessThanEqual(there, last))) {
-                sum += weight * counts(there) * texelFetch(light_map, there, 0);
+                sum += weight * counts(there) * texelFetch(filled_map, there, 0);
             }
         }
     }

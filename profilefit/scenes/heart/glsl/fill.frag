@@ -1,4 +1,4 @@
-// Light in the margin: that of the places where the surface goes on. Coverage goes with it.
+// A map with its margin: there what it has where the surface goes on. Coverage, its fourth number, goes with it.
 
 uniform sampler2D light_map, link_map;
 out vec4 filled;

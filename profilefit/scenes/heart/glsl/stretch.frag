@@ -1,23 +1,12 @@
 // How far a column and a row of the atlas lead on the surface [mm], in margins as where the surface goes on; 1 inside a
 // chart; 1 where there is a surface.
 
-uniform sampler2D position_map, link_map;
+uniform sampler2D position_map, filled_map; // of a chart, and with its margin
 out vec4 stretch;
 
-// A point and 1 where the surface goes on, else 0.
 vec4 point_at(ivec2 texel) {
-    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, textureSize(link_map, 0)))) return vec4(0.0);
-    vec3 link = texelFetch(link_map, texel, 0).xyz;
-    if (link.z < 0.5) return vec4(0.0);
-    vec2 corner = floor(link.xy), rest = link.xy - corner;
-    vec4 sum = vec4(0.0);
-    for (int i = 0; i < 4; ++i) {
-        ivec2 step = ivec2(i & 1, i >> 1);
-        vec2 near = mix(1.0 - rest, rest, vec2(step));
-        vec4 there = texelFetch(position_map, clamp(ivec2(corner) + step, ivec2(0), textureSize(position_map, 0) - 1), 0);
-        sum += near.x * near.y * vec4(there.xyz * there.w, there.w);
-    }
-    return sum.w > 0.0 ? vec4(sum.xyz / sum.w, 1.0) : vec4(0.0);
+    if (any(lessThan(texel, ivec2(0))) || any(greaterThanEqual(texel, textureSize(filled_map, 0)))) return vec4(0.0);
+    return texelFetch(filled_map, texel, 0);
 }
 
 float along(ivec2 here, vec3 own, ivec2 step) {

@@ -5,10 +5,11 @@ import pytest
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.atlas import SUMS, Atlas
+from profilefit.scenes.heart.atlas import Atlas
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
 from profilefit.scenes.heart.truth import sphere_blur
+from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
 from tests.physics.scenes.heart.surfaces import ball, bumps
@@ -41,7 +42,7 @@ def lit(atlas: Atlas, light: np.ndarray) -> None:
 
 def blurred(atlas: Atlas, light: np.ndarray, kernel: Kernel = KERNEL) -> np.ndarray:
     lit(atlas, light)
-    return atlas.read(atlas.blur(kernel))[..., 0].astype(float)
+    return pixels(atlas.blur(kernel))[..., 0].astype(float)
 
 
 def cosine(atlas: Atlas, direction=(0.6, 0.64, 0.48)) -> np.ndarray:
@@ -70,7 +71,6 @@ def test_a_furnace(sphere):
     inside = sphere.read("position_map")[..., 3] > 0.5
     found = blurred(sphere, np.full(inside.shape, 2.0), Kernel(KERNEL.variances, 0.5 * KERNEL.weights))
     np.testing.assert_allclose(found[inside], 1.0, atol=1e-6)
-    np.testing.assert_array_equal(found[~inside], 0.0)
 
 
 def test_no_step_at_the_seam(sphere):
@@ -108,6 +108,7 @@ def test_an_open_sheet_ends_at_its_edge(stage):
         )
         expected = 0.5 + 0.5 * erf(place[..., 0] / np.sqrt(2.0))
         np.testing.assert_allclose(found[inside], expected[inside], atol=0.01)
+        np.testing.assert_array_equal(found[~inside], 0.0)
 
 
 def test_links_of_a_sphere():
@@ -144,4 +145,3 @@ def test_bad_input(stage):
         atlas.draw(stage, other)
     with pytest.raises(InputError, match="margin must be texels from 1 to less than half of 48, got 24"):
         Atlas(stage.context, (64, 48), 24)
-    assert len(set(SUMS)) == 2
