@@ -1,6 +1,6 @@
 """The balance of texture and screen: a kernel split by scale, and the screen's share of what is far.
 
-Yang et al. (2018) blend light that was blurred in texture space and on the screen by a balance function that their text
+Yang et al. blend light that was blurred in texture space and on the screen by a balance function that their text
 does not give. Here R = R_near + R_far: Gaussians narrower than a crossover are blurred on the screen, which has all
 detail; wider ones in the atlas, which sees hidden parts; and those, too, on the screen where it sees nearly all of
 their light. Both blur the same irradiance, and the weights of both parts together are those of the kernel: light is
