@@ -289,6 +289,10 @@ RUNS = (
         ("stack-ks", "≤ 0.02", "own.ks", "largest error of the law of a stack's cdf, at its own thickness"),
         ("stack-energy", "≤ 1 %", lambda n: 100 * n["A"], "largest relative error of its reflectance"),
     )),
+    Run("python -m benchmarks.stacks --random 20", "", "exact light of 20 random stacks of 2 to 4 layers", EXACT, (
+        ("random-stacks", "≤ 10 %", lambda n: 100 * n["own"]["worst"],
+         "error of R_d by the law of a stack, mean over radii, worst of the stacks"),
+    )),
     Run("python -m benchmarks.stacks --forward 0.9 --light searchlight --stack heart", "", "3e7 photons a colour",
         "photons, taken off in quadrature", (
         ("forward-stack", "≤ 5 %", lambda n: 100 * n["rel"],
