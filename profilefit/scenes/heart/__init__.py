@@ -4,15 +4,15 @@ from mcml_sim.cli.lazy import attributes
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
-    from profilefit.scenes.heart.law import balance, screen_share, split
+    from profilefit.scenes.heart.law import balance, crossover_of, screen_share, split
     from profilefit.scenes.heart.truth import surface_blur
 else:
     __getattr__ = attributes(
         __name__,
-        {**dict.fromkeys(("balance", "screen_share", "split"), "law"), "surface_blur": "truth"},
+        {**dict.fromkeys(("balance", "crossover_of", "screen_share", "split"), "law"), "surface_blur": "truth"},
     )
 
-__all__ = ["balance", "screen_share", "split", "surface_blur"]
+__all__ = ["balance", "crossover_of", "screen_share", "split", "surface_blur"]
 
 
 def __dir__() -> list[str]:

@@ -18,8 +18,7 @@ from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
 from profilefit.scenes.stage.buffers import INSIDE, Singles, Targets, pixels
-from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.technique import FullScreen, Pass, maps
+from profilefit.scenes.stage.technique import FullScreen, Pass, Unwraps, maps
 from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 
@@ -41,7 +40,8 @@ class Atlas:
         self.targets = Targets(context, size)
         self._passes: dict[str, FullScreen] = {}
         self._links: Singles | None = None
-        self._texel = 0.0  # what a texel leads at least, but for those at poles [mm]
+        self._shortest = 0.0  # what a texel leads at least, but for those at poles [mm]
+        self.texel = 0.0  # mean side of a texel, once a surface was drawn [mm]
 
     @property
     def links(self) -> Singles:
@@ -56,7 +56,7 @@ class Atlas:
         columns, rows = self.size
         return 1.0 - 2.0 * self.margin / columns, 1.0 - 2.0 * self.margin / rows
 
-    def draw(self, stage: Stage, part: Part) -> None:
+    def draw(self, stage: Unwraps, part: Part) -> None:
         """Irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
         stage.unwrap(part, self.targets.surface, self.inset)
         if self._links is None:
@@ -64,9 +64,11 @@ class Atlas:
             self._links = links(place[..., :3].astype(float), place[..., 3] > INSIDE, self.margin)
         self._run(self._filled("position_map"))
         self._run(self._pass("stretch", STRETCH, "position_map", FILLED))
-        if not self._texel:
+        if not self.texel:
             stretch = self.read(STRETCH)
-            self._texel = float(np.quantile(stretch[stretch[..., 2] > INSIDE, :2], SHORTEST))
+            sides = stretch[stretch[..., 2] > INSIDE, :2].astype(float)
+            self._shortest = float(np.quantile(sides, SHORTEST))
+            self.texel = float(np.sqrt(np.mean(np.prod(sides, axis=1))))
 
     def blur(self, kernel: Kernel) -> moderngl.Texture:
         """sum_k w_k times the light blurred by v_k, of all Gaussians of a kernel, with margins; until the next blur."""
@@ -103,7 +105,7 @@ class Atlas:
     def _gaussian(self, done: float, variance: float) -> Iterator[Pass]:
         """From one variance to another [mm^2], in as many parts as it takes for each to stay within the margin."""
         widest, sigma = self.margin / REACH, np.sqrt(variance - done)
-        parts = int(np.ceil((sigma / (widest * self._texel)) ** 2))
+        parts = int(np.ceil((sigma / (widest * self._shortest)) ** 2))
         for number in range(parts):
             before = float(np.sqrt(done + (variance - done) * number / parts))
             given = {"sigma": float(sigma / np.sqrt(parts)), "before": before, "widest": widest, "reach": REACH}

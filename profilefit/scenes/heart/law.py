@@ -34,6 +34,10 @@ class Kernel:
         return np.sum(self.weights, axis=0)
 
 
+# By `trials.fitted`: 0.54 (0.43 to 0.54) of sixty random scenes, 0.48 of sixty others.
+CROSSOVER = 0.5
+
+
 class NearFar(NamedTuple):
     """The two parts of a kernel; their weights are those of the whole one."""
 
@@ -48,6 +52,16 @@ def split(kernel: Kernel, crossover: float) -> NearFar:
     is_near = np.sqrt(kernel.variances) < crossover
     near, far = (Kernel(kernel.variances[one], kernel.weights[one]) for one in (is_near, ~is_near))
     return NearFar(near, far)
+
+
+def crossover_of(texel: float, pixel: float, constant: float = CROSSOVER) -> float:
+    """Where to split: constant * texel^2 / pixel, the mean sides of what both spaces have [length].
+
+    The coarser the atlas, the more is left to the screen; less, the coarser the screen is itself.
+    """
+    if not (texel > 0 and pixel > 0):
+        raise InputError(f"texel and pixel must be lengths > 0, got {texel!r} and {pixel!r}")
+    return constant * texel**2 / pixel
 
 
 def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: Kernel, at: ArrayLike) -> Floats:

@@ -5,16 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import moderngl
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
 from profilefit.laws.gaussians import MediumGaussians
-from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.atlas import BLURRED, Atlas
 from profilefit.scenes.heart.law import Kernel, split
 from profilefit.scenes.stage.gather import Gather
-from profilefit.scenes.stage.technique import EXITANCE, LAW, Frame, LawText, Pass, Technique, maps, through_text
+from profilefit.scenes.stage.technique import (
+    EXITANCE,
+    LAW,
+    Frame,
+    LawText,
+    Pass,
+    Technique,
+    Unwraps,
+    maps,
+    through_text,
+)
+from profilefit.scenes.stage.world import Part
 from profilefit.shader.emit import text_beside
 from profilefit.shader.stack_text import gaussians_text
 
@@ -45,38 +55,54 @@ class Balanced(Technique):
     """A kernel in two parts: near on the screen, far in texture space but where the screen sees enough of it.
 
     near, far  samples of either, None where there is none or it is not asked for;  energies  of both (2, 3) [-]
-    light      blurred by the far part, of this frame (`Atlas.blur`);  inset  share of it that u and v from 0 to 1 take
-    threshold  share from which on the screen has the far part, too
+    atlas      whose light is blurred by the far part each time, after `part` was drawn into it; without a part it keeps
+               the light that it has
+    kernel     the far part;  threshold  share from which on the screen has it, too
     """
 
     near: Gather | None
     far: Gather | None
     energies: Floats
-    light: moderngl.Texture
-    inset: tuple[float, float]
+    atlas: Atlas
+    part: Part | None
+    kernel: Kernel
     threshold: float
 
     @classmethod
-    def of(cls, atlas: Atlas, kernel: Kernel, crossover: float, threshold: float, mfp: Sequence[float]) -> Balanced:
-        """Of a kernel split at a crossover [mm], with an atlas that has light of this frame (`Atlas.draw`).
+    def of(
+        cls,
+        atlas: Atlas,
+        part: Part | None,
+        kernel: Kernel,
+        crossover: float,
+        threshold: float,
+        mfp: Sequence[float] = (1.0,) * 3,
+    ) -> Balanced:
+        """Of a kernel split at a crossover [mm]; mfp  what `scatter` is told, the unit of the samples' texts [mm].
 
         With crossover 0 and a threshold of `ATLAS` all is texture space, with an endless one all is the screen's.
         """
         parts = split(kernel, crossover)
         near, far = (gather_of(part, mfp) if part.variances.size else None for part in parts)
-        light = atlas.targets.map("irradiance_map") if far is None else atlas.blur(parts.far)
         seen = SCREEN if far is None else threshold  # no light is 0 times the screen's
         energies = np.array([np.broadcast_to(part.energy, 3) for part in parts])
-        return cls(near, far if threshold < ATLAS else None, energies, light, atlas.inset, seen)
+        return cls(near, far if threshold < ATLAS else None, energies, atlas, part, parts.far, seen)
+
+    def before(self, stage: Unwraps) -> None:
+        if self.kernel.variances.size and self.threshold > SCREEN:
+            if self.part is not None:
+                self.atlas.draw(stage, self.part)
+            self.atlas.blur(self.kernel)
 
     def passes(self, frame: Frame) -> Sequence[Pass]:
-        reads = {**maps("place_map", "position_map", "irradiance_map", "reflectance_map"), "atlas_map": self.light}
+        surface = maps("place_map", "position_map", "irradiance_map", "reflectance_map")
+        reads = {**surface, "atlas_map": self.atlas.targets.map(BLURRED)}
         found: list[Pass] = []
         for part, into in ((self.near, NEAR), (self.far, FAR)):
             reads[into] = "irradiance_map" if part is None else into
             found += [] if part is None else [replace(one, writes=into) for one in part.passes(frame)]
         near, far = (tuple(one) for one in self.energies.tolist())
-        uniforms = {"near_energy": near, "far_energy": far, "inset": self.inset, "threshold": self.threshold}
+        uniforms = {"near_energy": near, "far_energy": far, "inset": self.atlas.inset, "threshold": self.threshold}
         return [*found, Pass("balance", reads, EXITANCE, text_beside(__name__, "glsl/balance.frag"), uniforms)]
 
     def through(self) -> LawText:

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.spatial import cKDTree
 
 from profilefit.errors import InputError
 
 Floats = NDArray[np.float64]
-AT_ONCE = 2**22  # pairs
-NOTHING = 60.0  # d^2 / 2 v from which on e^-that is none
+NEIGHBOURS = 64  # points that gather together
+NOTHING = 25.0  # d^2 / 2 v from which on e^-that, 1e-11, counts as none
 
 
 def surface_blur(
@@ -49,12 +50,16 @@ def surface_blur(
     own, others = gathering - centre, where - centre
     square, powers = np.sum(others**2, axis=1), light * area.reshape(-1, *[1] * (light.ndim - 1))
     found = np.zeros((len(own), *light.shape[1:]))
-    step = max(1, AT_ONCE // len(where))
-    for start in range(0, len(own), step):
-        part = slice(start, start + step)
-        apart = np.maximum(np.sum(own[part] ** 2, axis=1)[:, None] + square - 2.0 * own[part] @ others.T, 0.0)
+    order = cKDTree(own, leafsize=NEIGHBOURS).indices  # leaf by leaf: neighbours in space
+    for start in range(0, len(own), NEIGHBOURS):
+        part = order[start : start + NEIGHBOURS]
+        here = own[part]
+        outside = np.maximum(np.maximum(here.min(axis=0) - others, others - here.max(axis=0)), 0.0)
+        beyond = np.sum(outside**2, axis=1)  # of the box around those that gather
         for v, w in zip(variance, weight, strict=True):
-            found[part] += w / (2.0 * np.pi * v) * (np.exp(-np.minimum(apart / (2.0 * v), NOTHING)) @ powers)
+            near = np.flatnonzero(beyond < 2.0 * NOTHING * v)
+            apart = np.sum(here**2, axis=1)[:, None] + square[near] - 2.0 * here @ others[near].T
+            found[part] += w / (2.0 * np.pi * v) * (np.exp(-np.maximum(apart, 0.0) / (2.0 * v)) @ powers[near])
     return found
 
 

@@ -172,6 +172,7 @@ class Stage:
     ) -> tuple[Technique, Frame]:
         by, view = technique(law), self._ready()
         frame = Frame(self.size, *view, sampling, _lengths(mfp), _albedos(fixed_alpha), self._mean, self._scene)
+        by.before(self)
         for one in by.passes(frame):
             self._run(one)
         return by, frame

@@ -10,7 +10,7 @@ import time
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 import moderngl
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from profilefit.errors import ShaderError
 from profilefit.scenes.stage.buffers import Singles, Targets, float_texture
 from profilefit.scenes.stage.pattern import Sampling
-from profilefit.scenes.stage.world import Scene, unit
+from profilefit.scenes.stage.world import Part, Scene, unit
 from profilefit.shader.context import check_errors, full_screen, program
 from profilefit.shader.emit import text_beside
 
@@ -110,8 +110,17 @@ class LawText:
         return f"{self.text}\n{macros}{shader}"
 
 
+class Unwraps(Protocol):
+    """A stage, as far as `Technique.before` needs it."""
+
+    def unwrap(self, part: Part, target: moderngl.Framebuffer, inset: tuple[float, float]) -> None: ...
+
+
 class Technique(ABC):
     """A way to scatter light."""
+
+    def before(self, stage: Unwraps) -> None:  # noqa: B027, most draw nowhere else
+        """What it draws elsewhere, each time ahead of its passes."""
 
     @abstractmethod
     def passes(self, frame: Frame) -> Sequence[Pass]:

@@ -8,11 +8,11 @@ from profilefit.errors import InputError
 from profilefit.scenes.heart.atlas import Atlas
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
+from profilefit.scenes.heart.meshes import ball, bumps
 from profilefit.scenes.heart.truth import sphere_blur
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
-from tests.physics.scenes.heart.surfaces import ball, bumps
 
 KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
 RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24

@@ -7,12 +7,12 @@ from mcml_sim import Setting
 from profilefit.laws.gaussians import MediumGaussians
 from profilefit.scenes.heart.atlas import Atlas
 from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart.meshes import ball, bumps
 from profilefit.scenes.heart.passes import ATLAS, SCREEN, Balanced, gather_of, kernel_of
 from profilefit.scenes.heart.truth import surface_blur
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Light, Part, Scene
-from tests.physics.scenes.heart.surfaces import ball, bumps
 
 WEIGHTS = np.stack([[0.2, 0.5, 0.3], [0.3, 0.5, 0.2], [0.5, 0.3, 0.2]], axis=1)
 KERNEL = Kernel(np.array([0.1, 0.8, 5.0]), WEIGHTS)
@@ -39,7 +39,7 @@ def test_a_furnace(stage, crossover, threshold):
     part = drawn(stage, ball(8.0), Camera((0.0, 500.0, 300.0), height=20.0), (0.0,) * 3, (1.0, 1.0, 1.0))
     with Atlas(stage.context, (120, 72), 12) as atlas:
         atlas.draw(stage, part)
-        found = stage.scatter(Balanced.of(atlas, KERNEL, crossover, threshold, UNITS), 1.0, SAMPLES)
+        found = stage.scatter(Balanced.of(atlas, part, KERNEL, crossover, threshold, UNITS), 1.0, SAMPLES)
     inside = stage.buffers().mask > 0.5
     np.testing.assert_allclose(found[inside], np.broadcast_to(COLOUR, found[inside].shape), rtol=2e-5)
     assert inside.mean() > 0.3
@@ -50,13 +50,13 @@ def test_ends_are_one_method_alone(stage):
     with Atlas(stage.context, (112, 112), 16) as atlas:
         atlas.draw(stage, part)
         screen = stage.scatter(gather_of(KERNEL, UNITS), 1.0, SAMPLES) * stage.buffers().reflectance
-        alone = stage.scatter(Balanced.of(atlas, KERNEL, 99.0, ATLAS, UNITS), 1.0, SAMPLES)
+        alone = stage.scatter(Balanced.of(atlas, part, KERNEL, 99.0, ATLAS, UNITS), 1.0, SAMPLES)
         np.testing.assert_allclose(alone, screen, atol=1e-6)
-        texture = stage.scatter(Balanced.of(atlas, KERNEL, 0.0, ATLAS, UNITS), 1.0, SAMPLES)
+        texture = stage.scatter(Balanced.of(atlas, part, KERNEL, 0.0, ATLAS, UNITS), 1.0, SAMPLES)
         assert np.max(np.abs(texture - screen)) > 0.02
-        seen = stage.scatter(Balanced.of(atlas, KERNEL, 0.0, SCREEN, UNITS), 1.0, SAMPLES)
+        seen = stage.scatter(Balanced.of(atlas, part, KERNEL, 0.0, SCREEN, UNITS), 1.0, SAMPLES)
         np.testing.assert_allclose(seen, screen, atol=1e-6)  # all is far, and from the screen
-        both = stage.scatter(Balanced.of(atlas, KERNEL, 0.6, ATLAS, UNITS), 1.0, SAMPLES)
+        both = stage.scatter(Balanced.of(atlas, part, KERNEL, 0.6, ATLAS, UNITS), 1.0, SAMPLES)
         assert np.max(np.abs(both - screen)) > 0.003 < np.max(np.abs(both - texture))
 
 
@@ -77,7 +77,9 @@ def test_hidden_light_comes_from_the_atlas(stage):
         known = surface_blur(place[inside][:, :3], areas, light[inside][:, :3], wide.variances, wide.weights, at=at)
 
         def rms(crossover, threshold):
-            found = stage.scatter(Balanced.of(atlas, wide, crossover, threshold, UNITS), 1.0, Sampling(256)) / COLOUR
+            found = (
+                stage.scatter(Balanced.of(atlas, part, wide, crossover, threshold, UNITS), 1.0, Sampling(256)) / COLOUR
+            )
             return float(np.sqrt(np.mean((found[tuple(chosen.T)] - known) ** 2)))
 
         screen, texture, both = rms(99.0, ATLAS), rms(0.0, ATLAS), rms(1.0, 0.97)

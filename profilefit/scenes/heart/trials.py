@@ -1,0 +1,337 @@
+"""Many small scenes, drawn at random from a seed: what a balance of texture and screen is fitted to, and judged on.
+
+Of each the light of every Gaussian is kept apart as both spaces have it, so that the error of any crossover and any
+threshold is a sum over pixels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.scenes.heart import meshes
+from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.law import Kernel, crossover_of
+from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
+from profilefit.scenes.heart.truth import surface_blur
+from profilefit.scenes.stage.buffers import INSIDE, pixels
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.technique import EXITANCE
+from profilefit.scenes.stage.world import Camera, Light, Mesh, Part, Scene, unit
+
+Floats = NDArray[np.float64]
+KINDS = ("ball", "bumps", "heart")
+# Of both ends of what is drawn; lengths in the kernel's mean sigma.
+RADII = {"ball": (3.0, 20.0), "bumps": (5.0, 20.0), "heart": (6.0, 25.0)}  # of bumps the period
+STEEPNESS = 0.05, 0.3  # amplitude of bumps, in their period
+TEXELS, PIXELS, STRIPES = (0.1, 1.0), (0.08, 0.4), (2.0, 8.0)
+VIEWS, LAMPS = (0.0, 65.0), (20.0, 70.0)  # degrees, of the eye from z, and of the lamp from the eye
+PERIODS = 3.0  # of a sheet of bumps
+LARGEST = 200  # pixels of a side, and texels of half of one
+FINE = 700  # texels of the truth, of a side at most
+COARSE = 0.6  # sigma, in its texels, below which a Gaussian is none for the truth: light does not leave the pixel
+SAMPLES, CHOSEN = 64, 400
+EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
+SHADOWS = 1024
+
+
+@dataclass(frozen=True)
+class RandomScene:
+    """A surface of one kind under a lamp, as a camera sees it, its atlas, and the kernel of its medium.
+
+    size     radius, or period of bumps [mm];  steepness  amplitude of those, in their period
+    eye, lamp  directions to them;  stripes  period of the lamp's pattern [mm], 0 for even light
+    texel, pixel  mean sides [mm]
+    """
+
+    kind: str
+    size: float
+    steepness: float
+    eye: tuple[float, float, float]
+    lamp: tuple[float, float, float]
+    stripes: float
+    texel: float
+    pixel: float
+    kernel: Kernel
+
+    @property
+    def mesh(self) -> Mesh:
+        if self.kind == "bumps":
+            return meshes.bumps(self.size, self.steepness * self.size, PERIODS * self.size)
+        return getattr(meshes, self.kind)(self.size)
+
+    @property
+    def camera(self) -> Camera:
+        """It sees all of the surface, in parallel rays."""
+        half = np.max(np.linalg.norm(self.mesh.position, axis=1))
+        x, y, z = (10.0 * half * unit(self.eye)).tolist()
+        return Camera((x, y, z), height=2.1 * half, kind="orthographic")
+
+    def pattern(self, points: Floats) -> Floats:
+        """What the lamp's stripes leave of its light at points (..., 3) [-]."""
+        if self.stripes == 0:
+            return np.ones(points.shape[:-1])
+        across = unit(np.cross(self.lamp, (0.3, 1.0, 0.2)))
+        return (np.mod(points @ across / self.stripes, 1.0) < 0.5).astype(float)
+
+
+@dataclass(frozen=True)
+class SplitLight:
+    """Pixels (n,) of a trial, in linear light where white is 1; of splits after m = 0 ... N narrow Gaussians.
+
+    truth    (n, 3);  lambert  (n, 3) without any blur
+    near     (N + 1, n, 3) of the m narrow ones on the screen;  far, atlas  (N + 1, n, 3) of the others, on the screen
+             and in texture space;  share  (N + 1, n) of the light of the others that the screen sees
+    facing   (n,) cosine of normal and ray;  texel, pixel  mean sides [mm];  sigma  (N,) [mm]
+    """
+
+    truth: Floats
+    lambert: Floats
+    near: Floats
+    far: Floats
+    atlas: Floats
+    share: Floats
+    facing: Floats
+    texel: float
+    pixel: float
+    sigma: Floats
+
+    def light(self, crossover: float, threshold: float) -> Floats:
+        """(n, 3) by a split at a crossover [mm] and a threshold of the share [-]."""
+        m = int(np.count_nonzero(self.sigma < crossover))
+        return self.near[m] + np.where(self.share[m][:, None] > threshold, self.far[m], self.atlas[m])
+
+    def rms(self, light: Floats) -> float:
+        """Root mean square error [-]."""
+        return float(np.sqrt(np.mean((light - self.truth) ** 2)))
+
+    @property
+    def texture(self) -> Floats:
+        """Texture space alone (n, 3)."""
+        return self.atlas[0]
+
+    @property
+    def screen(self) -> Floats:
+        """The screen alone (n, 3)."""
+        return self.far[0]
+
+
+def drawn(kernels: Sequence[Kernel], count: int, seed: int) -> list[RandomScene]:
+    """So many trials, each of one of the kernels; lengths are drawn evenly in their logarithm."""
+    random = np.random.default_rng(seed)
+    found = []
+    for number in range(count):
+        kernel = kernels[int(random.integers(len(kernels)))]
+        kind = KINDS[number % len(KINDS)]
+        unit_length = mean_sigma(kernel)
+
+        def length(ends: tuple[float, float], unit_length: float = unit_length) -> float:
+            return float(unit_length * np.exp(random.uniform(*np.log(ends))))
+
+        turn, angle = random.uniform(0.0, 2.0 * np.pi), np.radians(random.uniform(*VIEWS))
+        eye = unit([np.sin(angle) * np.cos(turn), np.sin(angle) * np.sin(turn), np.cos(angle)])
+        if kind != "bumps":  # a closed surface from any side
+            eye = unit(random.standard_normal(3))
+        lamp = _aside(eye, np.radians(random.uniform(*LAMPS)), random.uniform(0.0, 2.0 * np.pi))
+        if kind == "bumps":
+            lamp = unit([lamp[0], lamp[1], max(lamp[2], 0.35)])
+        size = length(RADII[kind])
+        found.append(
+            RandomScene(
+                kind,
+                size,
+                float(random.uniform(*STEEPNESS)),
+                tuple(eye.tolist()),
+                tuple(lamp.tolist()),
+                length(STRIPES) if random.random() < 0.5 else 0.0,
+                length(TEXELS),
+                length(PIXELS),
+                kernel,
+            )
+        )
+    return found
+
+
+class Balance(NamedTuple):
+    """constant  of `crossover_of`;  threshold  of the share, above 1 if all that is far comes from the atlas [-]"""
+
+    constant: float
+    threshold: float
+
+
+class Errors(NamedTuple):
+    """Root mean square errors of scenes (n,): what both spaces have alone, and each balance of `GRID` (n, c, t)."""
+
+    texture: Floats
+    screen: Floats
+    balanced: Floats
+
+    @property
+    def better(self) -> Floats:
+        """Of texture and screen (n,)."""
+        return np.minimum(self.texture, self.screen)
+
+
+GRID = (
+    np.geomspace(0.1, 6.0, 40),
+    np.array([-1.0, 0.5, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 2.0]),
+)
+
+
+def errors(scenes: Sequence[SplitLight]) -> Errors:
+    """Of every balance of `GRID`."""
+    balanced = np.empty((len(scenes), *(one.size for one in GRID)))
+    for number, one in enumerate(scenes):
+        known: dict[int, list[float]] = {}
+        for row, constant in enumerate(GRID[0].tolist()):
+            at = crossover_of(one.texel, one.pixel, constant)
+            m = int(np.count_nonzero(one.sigma < at))
+            if m not in known:
+                known[m] = [one.rms(one.light(at, threshold)) for threshold in GRID[1].tolist()]
+            balanced[number, row] = known[m]
+    alone = ([one.rms(light) for one, light in zip(scenes, each, strict=True)] for each in _alone(scenes))
+    texture, screen = map(np.array, alone)
+    return Errors(texture, screen, balanced)
+
+
+def fitted(found: Errors, draws: int = 200, seed: int = 1) -> tuple[Balance, NDArray[np.float64]]:
+    """The balance of `GRID` with the least mean of ln(error / that of the better space), and (draws, 2) refits.
+
+    Refits are to scenes drawn again with replacement: their spread is the error of both constants.
+    """
+    gain = np.log(found.balanced / found.better[:, None, None])
+    random = np.random.default_rng(seed)
+
+    def best(rows: NDArray[np.int64]) -> Balance:
+        mean = gain[rows].mean(axis=0)
+        # Of many that are as good, as all are where a share is never so large, the middle one.
+        row, column = np.argwhere(mean <= mean.min() + 1e-9).mean(axis=0).astype(int)
+        return Balance(float(GRID[0][row]), float(GRID[1][column]))
+
+    own = np.arange(len(gain))
+    return best(own), np.array([best(random.choice(own, own.size)) for _ in range(draws)])
+
+
+def _alone(scenes: Sequence[SplitLight]) -> tuple[list[Floats], list[Floats]]:
+    return [one.texture for one in scenes], [one.screen for one in scenes]
+
+
+def mean_sigma(kernel: Kernel) -> float:
+    """The mean of sigma over the light of all channels [mm]."""
+    weight = np.atleast_2d(kernel.weights.T).mean(axis=0)
+    return float(weight @ np.sqrt(kernel.variances) / weight.sum())
+
+
+def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
+    """Draw a trial in every way, and sum its truth at some hundred pixels: some seconds."""
+    mesh, camera = trial.mesh, trial.camera
+    side = int(min(np.ceil(camera.height / trial.pixel), LARGEST))
+    part = Part(mesh, np.ones((1, 1, 3), np.float32))
+    scene = Scene((part,), Light(trial.lamp, (0.9, 0.9, 0.9)), (0.1, 0.1, 0.1), camera)
+    size, margin = atlas_size(mesh, trial.texel, LARGEST)
+    finest, _ = atlas_size(mesh, 0.0, FINE)
+    with (
+        Stage(context, (side, side), SHADOWS) as stage,
+        Atlas(context, size, margin) as atlas,
+        Atlas(context, finest, 2) as fine,
+    ):
+        stage.draw(scene)
+        for one in (atlas, fine):
+            one.draw(stage, part)
+            _lit(one, trial)
+        buffers = stage.buffers()
+        view = camera.view()
+        world = (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
+        light = np.where(trial.pattern(world)[..., None] > 0, buffers.irradiance, 0.1).astype(np.float32)
+        stage.upload(replace(buffers, irradiance=light))
+        chosen = _chosen(trial, buffers.mask > INSIDE, world)
+        at = tuple(chosen.T)
+        truth = _truth(fine, trial.kernel, world[at], light[at].astype(float))
+        near, far, seen, share = _splits(stage, atlas, trial.kernel, at)
+        facing = np.abs(buffers.normal[at][:, 2]).astype(float)
+        return SplitLight(
+            truth,
+            light[at].astype(float),
+            near,
+            far,
+            seen,
+            share,
+            facing,
+            atlas.texel,
+            camera.height / side,
+            np.sqrt(trial.kernel.variances),
+        )
+
+
+def atlas_size(mesh: Mesh, texel: float, most: int) -> tuple[tuple[int, int], int]:
+    """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin."""
+    a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
+    p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
+    flat = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
+    good = np.abs(flat) > 0
+    by_u = ((b - a) * (r - p)[:, 1:] - (c - a) * (q - p)[:, 1:])[good] / flat[good, None]
+    by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
+    area = np.abs(flat[good])
+    extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
+    inner = np.maximum(np.round(extent / max(texel, extent.max() / most)), 8).astype(int)
+    margin = int(np.clip(inner.min() // 12, 2, 24))
+    columns, rows = (inner + 2 * margin).tolist()
+    return (columns, rows), margin
+
+
+def _aside(eye: Floats, angle: float, turn: float) -> Floats:
+    """A direction at an angle from another one."""
+    across = unit(np.cross(eye, (0.31, 0.87, 0.39)))
+    up = np.cross(eye, across)
+    return np.cos(angle) * eye + np.sin(angle) * (np.cos(turn) * across + np.sin(turn) * up)
+
+
+def _lit(atlas: Atlas, trial: RandomScene) -> None:
+    """The lamp's pattern over the irradiance of an atlas."""
+    light, place = atlas.read("irradiance_map"), atlas.read("position_map")
+    pattern = trial.pattern(place[..., :3].astype(float))
+    light[..., :3] = np.where(pattern[..., None] > 0, light[..., :3], 0.1)
+    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(light).tobytes())
+
+
+def _chosen(trial: RandomScene, inside: NDArray[np.bool_], world: Floats) -> NDArray[np.int64]:
+    """Some of the pixels (n, 2) that see the surface, away from where it ends."""
+    if trial.kind == "bumps":
+        half = 0.5 * PERIODS * trial.size - min(EDGE * np.sqrt(trial.kernel.variances[-1]), 0.3 * PERIODS * trial.size)
+        inside = inside & np.all(np.abs(world[..., :2]) < half, axis=-1)
+    found = np.argwhere(inside)
+    return found[np.linspace(0, len(found) - 1, min(CHOSEN, len(found))).astype(int)]
+
+
+def _truth(fine: Atlas, kernel: Kernel, at: Floats, own: Floats) -> Floats:
+    place, stretch, light = (fine.read(name) for name in ("position_map", "stretch_map", "irradiance_map"))
+    inside = place[..., 3] > INSIDE
+    areas = (stretch[..., 0] * stretch[..., 1])[inside].astype(float)
+    wide = np.sqrt(kernel.variances) > COARSE * fine.texel
+    blurred = surface_blur(
+        place[inside][:, :3], areas, light[inside][:, :3], kernel.variances[wide], kernel.weights[wide], at=at
+    )
+    return blurred + kernel.weights[~wide].sum(axis=0) * own
+
+
+def _splits(
+    stage: Stage, atlas: Atlas, kernel: Kernel, at: tuple[NDArray[np.int64], ...]
+) -> tuple[Floats, Floats, Floats, Floats]:
+    count, sampling, mfp = kernel.variances.size, Sampling(SAMPLES), (1.0, 1.0, 1.0)
+    near, far, texture = np.zeros((3, count + 1, len(at[0]), 3))
+    share = np.ones((count + 1, len(at[0])))
+    for m in range(count + 1):
+        parts = [Kernel(kernel.variances[one], kernel.weights[one]) for one in (slice(m), slice(m, None))]
+        if m > 0:
+            near[m] = stage.scatter(gather_of(parts[0], mfp), 1.0, sampling)[at] * parts[0].energy
+        if m < count:
+            far[m] = stage.scatter(gather_of(parts[1], mfp), 1.0, sampling)[at] * parts[1].energy
+            share[m] = pixels(stage.targets.map(EXITANCE))[at][:, 3]
+            texture[m] = stage.scatter(Balanced.of(atlas, None, parts[1], 0.0, ATLAS, mfp), 1.0, sampling)[at]
+    return near, far, texture, share
