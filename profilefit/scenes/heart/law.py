@@ -34,7 +34,7 @@ class Kernel:
         return np.sum(self.weights, axis=0)
 
 
-# By `trials.fitted`: 0.54 (0.43 to 0.54) of sixty random scenes, 0.48 of sixty others.
+# By `fit.fitted`: 0.54 (0.43 to 0.54) of sixty random scenes, 0.48 of sixty others.
 CROSSOVER = 0.5
 
 

@@ -1,14 +1,10 @@
-"""Many small scenes, drawn at random from a seed: what a balance of texture and screen is fitted to, and judged on.
-
-Of each the light of every Gaussian is kept apart as both spaces have it, so that the error of any crossover and any
-threshold is a sum over pixels.
-"""
+"""Small scenes drawn at random from a seed, each in texture space, on the screen, and as its truth."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from functools import cached_property
 
 import moderngl
 import numpy as np
@@ -16,7 +12,8 @@ from numpy.typing import NDArray
 
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas
-from profilefit.scenes.heart.law import Kernel, crossover_of
+from profilefit.scenes.heart.fit import SplitLight
+from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
 from profilefit.scenes.heart.truth import surface_blur
 from profilefit.scenes.stage.buffers import INSIDE, pixels
@@ -39,6 +36,7 @@ COARSE = 0.6  # sigma, in its texels, below which a Gaussian is none for the tru
 SAMPLES, CHOSEN = 64, 400
 EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SHADOWS = 1024
+LIGHT, AMBIENT = 0.9, 0.1  # irradiance of the lamp, and from everywhere: white is 1
 
 
 @dataclass(frozen=True)
@@ -60,66 +58,25 @@ class RandomScene:
     pixel: float
     kernel: Kernel
 
-    @property
+    @cached_property
     def mesh(self) -> Mesh:
         if self.kind == "bumps":
             return meshes.bumps(self.size, self.steepness * self.size, PERIODS * self.size)
         return getattr(meshes, self.kind)(self.size)
 
-    @property
+    @cached_property
     def camera(self) -> Camera:
         """It sees all of the surface, in parallel rays."""
         half = np.max(np.linalg.norm(self.mesh.position, axis=1))
         x, y, z = (10.0 * half * unit(self.eye)).tolist()
         return Camera((x, y, z), height=2.1 * half, kind="orthographic")
 
-    def pattern(self, points: Floats) -> Floats:
-        """What the lamp's stripes leave of its light at points (..., 3) [-]."""
+    def striped(self, light: NDArray[np.floating], points: Floats) -> NDArray[np.floating]:
+        """What the lamp's stripes leave of irradiance (..., 3) at points (..., 3)."""
         if self.stripes == 0:
-            return np.ones(points.shape[:-1])
+            return light
         across = unit(np.cross(self.lamp, (0.3, 1.0, 0.2)))
-        return (np.mod(points @ across / self.stripes, 1.0) < 0.5).astype(float)
-
-
-@dataclass(frozen=True)
-class SplitLight:
-    """Pixels (n,) of a trial, in linear light where white is 1; of splits after m = 0 ... N narrow Gaussians.
-
-    truth    (n, 3);  lambert  (n, 3) without any blur
-    near     (N + 1, n, 3) of the m narrow ones on the screen;  far, atlas  (N + 1, n, 3) of the others, on the screen
-             and in texture space;  share  (N + 1, n) of the light of the others that the screen sees
-    facing   (n,) cosine of normal and ray;  texel, pixel  mean sides [mm];  sigma  (N,) [mm]
-    """
-
-    truth: Floats
-    lambert: Floats
-    near: Floats
-    far: Floats
-    atlas: Floats
-    share: Floats
-    facing: Floats
-    texel: float
-    pixel: float
-    sigma: Floats
-
-    def light(self, crossover: float, threshold: float) -> Floats:
-        """(n, 3) by a split at a crossover [mm] and a threshold of the share [-]."""
-        m = int(np.count_nonzero(self.sigma < crossover))
-        return self.near[m] + np.where(self.share[m][:, None] > threshold, self.far[m], self.atlas[m])
-
-    def rms(self, light: Floats) -> float:
-        """Root mean square error [-]."""
-        return float(np.sqrt(np.mean((light - self.truth) ** 2)))
-
-    @property
-    def texture(self) -> Floats:
-        """Texture space alone (n, 3)."""
-        return self.atlas[0]
-
-    @property
-    def screen(self) -> Floats:
-        """The screen alone (n, 3)."""
-        return self.far[0]
+        return np.where(np.mod(points @ across / self.stripes, 1.0)[..., None] < 0.5, light, AMBIENT)
 
 
 def drawn(kernels: Sequence[Kernel], count: int, seed: int) -> list[RandomScene]:
@@ -158,70 +115,6 @@ def drawn(kernels: Sequence[Kernel], count: int, seed: int) -> list[RandomScene]
     return found
 
 
-class Balance(NamedTuple):
-    """constant  of `crossover_of`;  threshold  of the share, above 1 if all that is far comes from the atlas [-]"""
-
-    constant: float
-    threshold: float
-
-
-class Errors(NamedTuple):
-    """Root mean square errors of scenes (n,): what both spaces have alone, and each balance of `GRID` (n, c, t)."""
-
-    texture: Floats
-    screen: Floats
-    balanced: Floats
-
-    @property
-    def better(self) -> Floats:
-        """Of texture and screen (n,)."""
-        return np.minimum(self.texture, self.screen)
-
-
-GRID = (
-    np.geomspace(0.1, 6.0, 40),
-    np.array([-1.0, 0.5, 0.7, 0.8, 0.85, 0.9, 0.93, 0.95, 0.97, 0.98, 0.99, 0.995, 2.0]),
-)
-
-
-def errors(scenes: Sequence[SplitLight]) -> Errors:
-    """Of every balance of `GRID`."""
-    balanced = np.empty((len(scenes), *(one.size for one in GRID)))
-    for number, one in enumerate(scenes):
-        known: dict[int, list[float]] = {}
-        for row, constant in enumerate(GRID[0].tolist()):
-            at = crossover_of(one.texel, one.pixel, constant)
-            m = int(np.count_nonzero(one.sigma < at))
-            if m not in known:
-                known[m] = [one.rms(one.light(at, threshold)) for threshold in GRID[1].tolist()]
-            balanced[number, row] = known[m]
-    alone = ([one.rms(light) for one, light in zip(scenes, each, strict=True)] for each in _alone(scenes))
-    texture, screen = map(np.array, alone)
-    return Errors(texture, screen, balanced)
-
-
-def fitted(found: Errors, draws: int = 200, seed: int = 1) -> tuple[Balance, NDArray[np.float64]]:
-    """The balance of `GRID` with the least mean of ln(error / that of the better space), and (draws, 2) refits.
-
-    Refits are to scenes drawn again with replacement: their spread is the error of both constants.
-    """
-    gain = np.log(found.balanced / found.better[:, None, None])
-    random = np.random.default_rng(seed)
-
-    def best(rows: NDArray[np.int64]) -> Balance:
-        mean = gain[rows].mean(axis=0)
-        # Of many that are as good, as all are where a share is never so large, the middle one.
-        row, column = np.argwhere(mean <= mean.min() + 1e-9).mean(axis=0).astype(int)
-        return Balance(float(GRID[0][row]), float(GRID[1][column]))
-
-    own = np.arange(len(gain))
-    return best(own), np.array([best(random.choice(own, own.size)) for _ in range(draws)])
-
-
-def _alone(scenes: Sequence[SplitLight]) -> tuple[list[Floats], list[Floats]]:
-    return [one.texture for one in scenes], [one.screen for one in scenes]
-
-
 def mean_sigma(kernel: Kernel) -> float:
     """The mean of sigma over the light of all channels [mm]."""
     weight = np.atleast_2d(kernel.weights.T).mean(axis=0)
@@ -233,7 +126,7 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
     mesh, camera = trial.mesh, trial.camera
     side = int(min(np.ceil(camera.height / trial.pixel), LARGEST))
     part = Part(mesh, np.ones((1, 1, 3), np.float32))
-    scene = Scene((part,), Light(trial.lamp, (0.9, 0.9, 0.9)), (0.1, 0.1, 0.1), camera)
+    scene = Scene((part,), Light(trial.lamp, (LIGHT,) * 3), (AMBIENT,) * 3, camera)
     size, margin = atlas_size(mesh, trial.texel, LARGEST)
     finest, _ = atlas_size(mesh, 0.0, FINE)
     with (
@@ -248,7 +141,7 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
         buffers = stage.buffers()
         view = camera.view()
         world = (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
-        light = np.where(trial.pattern(world)[..., None] > 0, buffers.irradiance, 0.1).astype(np.float32)
+        light = trial.striped(buffers.irradiance, world).astype(np.float32)
         stage.upload(replace(buffers, irradiance=light))
         chosen = _chosen(trial, buffers.mask > INSIDE, world)
         at = tuple(chosen.T)
@@ -295,8 +188,7 @@ def _aside(eye: Floats, angle: float, turn: float) -> Floats:
 def _lit(atlas: Atlas, trial: RandomScene) -> None:
     """The lamp's pattern over the irradiance of an atlas."""
     light, place = atlas.read("irradiance_map"), atlas.read("position_map")
-    pattern = trial.pattern(place[..., :3].astype(float))
-    light[..., :3] = np.where(pattern[..., None] > 0, light[..., :3], 0.1)
+    light[..., :3] = trial.striped(light[..., :3], place[..., :3].astype(float))
     atlas.targets.map("irradiance_map").write(np.ascontiguousarray(light).tobytes())
 
 

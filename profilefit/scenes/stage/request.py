@@ -28,22 +28,11 @@ MOST_CHART = 8  # numbers of samples
 # The truth sums over all pairs of pixels, six minutes on a core for so many.
 MOST_PIXELS = 2**16
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
-FARTHEST_TARGET = 150.0  # [mm]
 LARGEST_VIEW = 1000.0  # [mm]
 MOST_LIGHT = 1000.0
-DISTANCE = 650.0  # of the camera from its target, if a file says nothing [mm]
+# What a file's camera looks at, from which distance and in which direction, and how much of it is seen [mm].
+TARGET, DISTANCE, FROM, HEIGHT = (4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0
 EXPOSURE = 1.1  # of the pictures: few of their pixels are clipped by it
-
-
-class Viewpoint(NamedTuple):
-    """Where a scene is seen from, if a file says nothing: target, direction from there, and the height seen [mm]."""
-
-    target: Rgb
-    direction: Rgb
-    height: float
-
-
-HEAD = Viewpoint((4.0, -6.0, 60.0), (-109.0, -4.0, 640.0), 130.0)
 
 
 @dataclass(frozen=True)
@@ -70,7 +59,7 @@ class Shown(NamedTuple):
     seen: Technique
 
 
-def view(tables: Tables, content: Table, usual: Viewpoint = HEAD) -> dict[str, Any]:
+def view(tables: Tables, content: Table) -> dict[str, Any]:
     """The fields of a `ViewRequest`; InputError that names file, table and key, what was got and what is accepted."""
     named, seen, lit = (tables.table(content, name, {}) for name in TABLES)
     light = Light()
@@ -82,7 +71,7 @@ def view(tables: Tables, content: Table, usual: Viewpoint = HEAD) -> dict[str, A
         "file": tables.file,
         "sampling": tables.made("technique", lambda: Sampling(named.get("samples", 16))),
         "chart": _chart(tables, named),
-        "camera": _camera(tables, seen, usual),
+        "camera": _camera(tables, seen),
         "light": Light(direction, tables.three("light", "irradiance", lit, light.irradiance, 0.0, MOST_LIGHT)),
         "ambient": tables.three("light", "ambient", lit, Scene(()).ambient, 0.0, MOST_LIGHT),
         "size": size,
@@ -127,19 +116,20 @@ def _chart(tables: Tables, named: Table) -> tuple[int, ...]:
 
 
 def _direction(tables: Tables, where: str, table: Table, default: Rgb) -> Rgb:
+    """Of any length but 0."""
     direction = tables.three(where, "direction", table, default, -1e6, 1e6)
     if not np.linalg.norm(direction) > 1e-6:
         raise tables.bad(where, "direction", "a direction, not 0", list(direction))
     return direction
 
 
-def _camera(tables: Tables, seen: Table, usual: Viewpoint) -> Camera:
-    """Without a height its lens stays the same at every distance."""
-    target = tables.three("camera", "target", seen, usual.target, -FARTHEST_TARGET, FARTHEST_TARGET)
+def _camera(tables: Tables, seen: Table) -> Camera:
+    """Looks from the front, if a file says nothing; without a height its lens stays the same at every distance."""
+    target = tables.three("camera", "target", seen, TARGET, -150.0, 150.0)
     distance = tables.number("camera", "distance", seen, DISTANCE, FARTHEST)
     if distance < NEAREST:
         raise tables.bad("camera", "distance", f"a length in {NEAREST:g} ... {FARTHEST:g} mm", seen["distance"])
-    height = tables.number("camera", "height", seen, usual.height * distance / DISTANCE, LARGEST_VIEW)
-    direction = _direction(tables, "camera", seen, usual.direction)
+    height = tables.number("camera", "height", seen, HEIGHT * distance / DISTANCE, LARGEST_VIEW)
+    direction = _direction(tables, "camera", seen, FROM)
     x, y, z = (np.array(target) + distance * unit(direction)).tolist()
     return Camera((x, y, z), target, height)

@@ -1,18 +1,17 @@
-"""Random scenes: what is kept of them is what the passes draw, and a balance that was put in is found again."""
+"""Random scenes: what is kept of them is what the passes draw; a heart of six charts."""
 
 import numpy as np
 import pytest
 
-from profilefit.errors import InputError
-from profilefit.scenes.heart import crossover_of, trials
+from profilefit.scenes.heart import trials
 from profilefit.scenes.heart.atlas import Atlas
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.meshes import heart
-from profilefit.scenes.heart.passes import ATLAS, Balanced
+from profilefit.scenes.heart.passes import Balanced
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.world import Camera, Part, Scene
+from profilefit.scenes.stage.world import Camera, Light, Part, Scene
 
 WEIGHTS = np.stack([[0.2, 0.5, 0.3], [0.3, 0.5, 0.2], [0.5, 0.3, 0.2]], axis=1)
 KERNEL = Kernel(np.array([0.04, 0.5, 4.0]), WEIGHTS)
@@ -26,7 +25,7 @@ def test_a_trial_is_what_the_passes_draw(context):
     side = round(camera.height / found.pixel)
     size, margin = trials.atlas_size(mesh, trial.texel, trials.LARGEST)
     part = Part(mesh, np.ones((1, 1, 3), np.float32))
-    scene = Scene((part,), trials.Light(trial.lamp, (0.9,) * 3), (0.1,) * 3, camera)
+    scene = Scene((part,), Light(trial.lamp, (trials.LIGHT,) * 3), (trials.AMBIENT,) * 3, camera)
     with Stage(context, (side, side), trials.SHADOWS) as stage, Atlas(context, size, margin) as atlas:
         stage.draw(scene)
         by = Balanced.of(atlas, part, KERNEL, 0.5, 0.9)
@@ -38,33 +37,12 @@ def test_a_trial_is_what_the_passes_draw(context):
     assert found.rms(found.light(0.5, 0.9)) < found.rms(found.lambert)
 
 
-def test_a_balance_is_found_again():
-    """Scenes whose light is right at one split only: the constant is that of the split, and its refits say so."""
-    random = np.random.default_rng(3)
-    sigma = np.geomspace(0.02, 5.0, 24)
-    scenes = []
-    for _ in range(20):
-        texel, pixel = random.uniform(0.2, 0.6), random.uniform(0.1, 0.3)
-        right = np.count_nonzero(sigma < crossover_of(texel, pixel, 0.8))
-        off = 0.01 * (1.0 + np.abs(np.arange(25) - right))[:, None, None] * np.ones((25, 6, 3))
-        ones, none = np.ones((6, 3)), np.zeros((25, 6, 3))
-        scenes.append(
-            trials.SplitLight(ones, ones, none, 2.0 + off, 1.0 + off, np.ones((25, 6)), ones[:, 0], texel, pixel, sigma)
-        )
-    best, refits = trials.fitted(trials.errors(scenes))
-    assert best.constant == pytest.approx(0.8, rel=0.1)
-    assert best.threshold > 1.0  # the screen's far light is wrong everywhere
-    assert np.ptp(refits[:, 0]) < 0.2
-
-
 def test_a_heart_of_six_charts_is_a_furnace(context):
     """Even light stays even over its seams, and they are no steps for the light of a lamp."""
     part = Part(heart(8.0, 24), np.ones((1, 1, 3), np.float32))
     size, margin = trials.atlas_size(part.mesh, 0.3, 150)
     with Stage(context, (16, 16), 64) as stage, Atlas(context, size, min(margin, 4)) as atlas:
-        stage.draw(
-            Scene((part,), ambient=(0.5,) * 3, camera=Camera(height=40.0), light=trials.Light(irradiance=(0.0,) * 3))
-        )
+        stage.draw(Scene((part,), ambient=(0.5,) * 3, camera=Camera(height=40.0), light=Light(irradiance=(0.0,) * 3)))
         atlas.draw(stage, part)
         found = pixels(atlas.blur(KERNEL))
         inside = atlas.read("position_map")[..., 3] > 0.5
@@ -85,10 +63,3 @@ def test_trials_are_those_of_their_seed():
     one, again, other = (trials.drawn([KERNEL], 3, seed) for seed in (1, 1, 2))
     assert [(a.size, a.lamp, a.texel) for a in one] == [(a.size, a.lamp, a.texel) for a in again]
     assert one[0].size != other[0].size
-    assert ATLAS > 1.0
-
-
-def test_the_crossover():
-    assert crossover_of(0.4, 0.2, 0.5) == pytest.approx(0.4)
-    with pytest.raises(InputError, match=r"texel and pixel must be lengths > 0, got 0\.4 and nan"):
-        crossover_of(0.4, np.nan)

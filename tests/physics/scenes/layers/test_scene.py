@@ -71,6 +71,7 @@ REFUSED = [
     ("camera.resolution", [0, 9], r"\[camera\] resolution must be two whole numbers of pixels in 1 ... 1024"),
     ("camera.distance", 10.0, r"\[camera\] distance must be a length in 300 ... 10000 mm, got 10.0"),
     ("camera.target", [0.0, 0.0, 151.0], r"\[camera\] target must be three numbers in -150 ... 150"),
+    ("camera.direction", [0.0, 0.0, 0.0], r"\[camera\] direction must be a direction, not 0"),
     ("light.direction", [0.0, 0.0, 0.0], r"\[light\] direction must be a direction, not 0"),
     ("light.ambient", [1.0, 1.0], r"\[light\] ambient must be three numbers in 0 ... 1000"),
     ("illumination", "sun", "illumination must be one of searchlight, diffuse, got 'sun'"),
