@@ -15,7 +15,7 @@ HEART = Medium((Layer(1.38, 0.20, 2.2, 0.0, 0.3), Layer(1.38, 0.80, 1.2, 0.0)))
 def rings_of(law: MediumGaussians) -> SumLight:
     edges = np.geomspace(0.01, 20.0, 80)
     energy = np.diff(law.cdf(edges, 0.5)) * law.total_reflectance
-    return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79))
+    return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79), 0.0)
 
 
 def sum_of(light: SumLight, best) -> MediumGaussians:
