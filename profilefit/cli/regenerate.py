@@ -13,7 +13,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import Quiet
 from profilefit.errors import InputError
-from profilefit.recipes.folder import LOCAL, fits_folder
+from profilefit.recipes.folder import LOCAL, STACKS, SUMS, fits_folder
 
 PHOTON_STORE = ".photons"
 SEED = 1
@@ -55,7 +55,7 @@ def regenerate(
     only: photons that are traced stay, and the same command resumes.
 
     A file of layers is a stack: its law is fitted to exact light in two to four minutes, longer where a layer scatters
-    forward, and its record goes to OUT/stacks.
+    forward, and its record goes to OUT/stacks. That of its sums of Gaussians, two minutes more, goes to OUT/gaussians.
 
     \b
     Examples, the last on a file of profilefit examples:
@@ -71,6 +71,7 @@ def regenerate(
         from profilefit.recipes.regenerate import regenerate as regenerate_records
         from profilefit.recipes.run import RecipeRun
         from profilefit.recipes.stack import record as stack_record
+        from profilefit.recipes.stack import sum_record
         from profilefit.recipes.workers import cores
         from profilefit.report.tables.summary_tables import outcome, spent
 
@@ -102,9 +103,10 @@ def regenerate(
     written = {step.name: step.path for step in steps if step.path}
     seconds = {step.name: step.seconds for step in steps}
     for stack in stacks:
-        start, name = time.perf_counter(), f"{stack_record.FOLDER}/{stack.name}"
-        written[name] = stack_record.regenerate(stack, out, cores(), run.say)
-        seconds[name] = time.perf_counter() - start
+        for folder, made in ((STACKS, stack_record.regenerate), (SUMS, sum_record.regenerate)):
+            start, name = time.perf_counter(), f"{folder}/{stack.name}"
+            written[name] = made(stack, out, cores(), run.say)
+            seconds[name] = time.perf_counter() - start
     if len(written) > 1:
         put(spent(seconds, written), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")

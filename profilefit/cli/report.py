@@ -16,6 +16,7 @@ from profilefit.cli.options import AsJson, Fits, Quiet
 from profilefit.errors import InputError, OtherRecords, ShaderError
 
 if TYPE_CHECKING:
+    from profilefit.recipes.stack.sum_record import SumRecord
     from profilefit.report.tables.law_tables import Qualities
 
 MEGABYTE = 1e6
@@ -59,8 +60,9 @@ def report(
 ) -> None:
     """Show constants, their errors, and how good they are.
 
-    Also quality by albedo, or by thickness of a stack of layers, and the state of fits and chains. --quality prints
-    instead how good every law, map and sampler is, printed ones too; or those of the records named.
+    Also quality by albedo, or by thickness of a stack of layers and by number of Gaussians, and the state of fits and
+    chains. --quality prints instead how good every law, map and sampler is, printed ones too; or those of the records
+    named.
 
     \b
     Examples:
@@ -97,6 +99,8 @@ def report(
         _page(html, folder, evidence_folder(folder, evidence), names, quiet)
     elif as_json:
         body: dict[str, Any] = {"records": _told(contents, stacks, names)}
+        if sums := _sums(stacks):
+            body["gaussians"] = {name: one.content for name, one in sums.items()}
         if quality:
             body["quality"] = law_tables.content(_measured(folder, names, quiet))
         if claims:
@@ -107,7 +111,7 @@ def report(
     elif claims:
         _show_claims(evidence_folder(folder, evidence), folder, quiet)
     else:
-        _show(_told(contents, stacks, names), folder, bool(names))
+        _show(_told(contents, stacks, names), _sums(stacks), folder, bool(names))
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
 
@@ -139,13 +143,25 @@ def _told(
     return {name: told[name] for name in names or told}
 
 
-def _show(contents: dict[str, dict[str, Any]], folder: Path, named: bool) -> None:
+def _sums(stacks: Mapping[str, Path]) -> dict[str, SumRecord]:
+    """The records of sums of Gaussians that lie beside those of stacks."""
+    with interruptible(__name__):
+        from profilefit.recipes.stack.sum_record import beside, load
+
+    return {name: load(found) for name, path in stacks.items() if (found := beside(path)) is not None}
+
+
+def _show(contents: dict[str, dict[str, Any]], sums: Mapping[str, SumRecord], folder: Path, named: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import put, screen
         from profilefit.report import record_tables, summary
         from profilefit.report.tables.stack_table import stack_table
+        from profilefit.report.tables.sum_table import sum_tables
 
-    parts = [part for one in contents.values() for part in record_tables(one)] if named else [summary(contents)]
+    parts = [] if named else [summary(contents)]
+    for name in contents if named else ():
+        parts += record_tables(contents[name])
+        parts += sum_tables(sums[name]) if name in sums else []
     if not named and (stacks := stack_table(folder)) is not None:
         parts.append(stacks)
     console = screen()
@@ -215,6 +231,7 @@ def _fill(
         from mcml_sim.runs.progress import working
         from profilefit.report import fill, markdown_sections, sections
         from profilefit.report.tables.stack_table import stack_sections
+        from profilefit.report.tables.sum_table import sum_sections
 
     if path.exists() and not path.is_file():  # to read a pipe would wait for ever
         raise InputError(f"--markdown must be a file whose tables are filled in, got {path}, which is none")
@@ -226,7 +243,7 @@ def _fill(
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     measured = {}
-    for name, make in (markdown_sections(folder) | stack_sections(stacks)).items():
+    for name, make in (markdown_sections(folder) | stack_sections(stacks) | sum_sections(stacks)).items():
         if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
             try:
                 with working(f"measuring the table {name}", quiet):

@@ -7,6 +7,7 @@ from pathlib import Path
 
 LOCAL = Path("fits")
 STACKS = "stacks"  # in a folder of records: the folder of those of stacks
+SUMS = "gaussians"  # and that of their sums of Gaussians
 EVIDENCE = Path("evidence")  # what was measured with records: shader check, failures, times
 
 

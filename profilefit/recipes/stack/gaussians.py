@@ -3,17 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import nnls
 
 from mcml_sim import Medium, exact
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
+from profilefit.fitting.estimate import judged
 from profilefit.fitting.solver import Optimum, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.recipes.stack import fit, photons
@@ -21,12 +22,13 @@ from profilefit.recipes.stack import fit, photons
 Floats = NDArray[np.float64]
 NARROWEST = (5.0, 20.0, 1.0)  # radii of the narrowest Gaussian that fits start from, over that of the first ring
 WIDEST = 0.5  # and of the widest, over that within which all light counts
-DENSE = (
-    0.25,
-    0.7,
-    0.4,
-)  # narrowest and widest sigma of a dense sum, over the first and the last ring; steps of ln sigma
+# Narrowest and widest sigma of a dense sum, over the first and the last ring; steps of ln sigma.
+DENSE = (0.25, 0.7, 0.4)
+ALONE = 8  # starts of one Gaussian
 SEED = 300
+# Of the row by which non-negative least squares makes weights sum to one: the optimum that follows does so to rounding.
+TO_ONE = 1e3
+TURNS = 10  # of weights that are held at 0 and variances that move, and of fits that go on; three do
 
 
 class SumLight(NamedTuple):
@@ -34,6 +36,7 @@ class SumLight(NamedTuple):
 
     edges   (n + 1,) radii [mfp of the first layer];  energy  (n,) between them [-];  whole  A [-]
     weight  (n,) of a relative residual, their squares sum to 1;  noise  (n,) relative standard errors, 0 of exact light
+    inside  of the light within the first edge [-], NaN where photons are too few to say
     """
 
     edges: Floats
@@ -41,6 +44,26 @@ class SumLight(NamedTuple):
     weight: Floats
     whole: float
     noise: Floats
+    inside: float
+
+
+class JointSum(NamedTuple):
+    """One set of variances for several lights, each with weights of its own.
+
+    variances  (N,) [length^2], rising;  weights (m, N) [-], each row sums to 1; those that would be negative are 0
+    slopes     (N + m N, p) of ln variances and then weights by the parameters of `best`, all of which move something
+    best       the optimum in ln variances and the weights that are free, but the largest of each light
+    """
+
+    variances: Floats
+    weights: Floats
+    slopes: Floats
+    best: Optimum
+
+    @property
+    def free(self) -> NDArray[np.bool_]:
+        """(N + m N,) whether a constant was fitted: neither a weight that is held at 0 nor one that is alone."""
+        return np.any(self.slopes != 0, axis=1)
 
 
 def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES) -> SumLight:
@@ -57,13 +80,19 @@ def sum_light(medium: Medium, illumination: str, nodes: exact.Nodes = fit.NODES)
         inside = slice(first_ring, last_ring + 1)
         weight = np.where(counts, 1.0, 0.0)[inside] / np.sqrt(np.count_nonzero(counts))
         edges = rings.edges[first_ring : last_ring + 2] / unit
-        return SumLight(edges, rings.energy[inside], weight, rings.whole, rings.noise[inside])
+        return SumLight(edges, rings.energy[inside], weight, rings.whole, rings.noise[inside], np.nan)
     light, r = exact.solve(medium, illumination, nodes), fit.radii(medium)
     share = np.asarray(light.cdf(r))
     seen = share <= fit.LAST_SHARE
     energy = np.diff(share[seen]) * light.reflectance
     weight = np.full(energy.size, 1.0 / np.sqrt(energy.size))
-    return SumLight(r[seen] / unit, energy, weight, light.reflectance, np.zeros(energy.size))
+    return SumLight(r[seen] / unit, energy, weight, light.reflectance, np.zeros(energy.size), float(share[0]))
+
+
+def lights_of(media: Sequence[Medium], illumination: str, nodes: exact.Nodes = fit.NODES) -> tuple[SumLight, ...]:
+    """`sum_light` of media of one unit of length, edges in that unit; of equal media once."""
+    found = {medium: sum_light(medium, illumination, nodes) for medium in dict.fromkeys(media)}
+    return tuple(found[medium]._replace(edges=found[medium].edges * medium.layers[0].similar.mfp) for medium in media)
 
 
 def medium_gaussians(medium: Medium, illumination: str = "searchlight", count: int = 6) -> MediumGaussians:
@@ -83,53 +112,140 @@ def alike(media: Sequence[Medium], illumination: str = "searchlight", count: int
     if isinstance(count, bool) or count not in range(1, MOST + 1):
         raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
     require_illumination(illumination)
-    lights = [sum_light(medium, illumination) for medium in media]
+    lights = lights_of(media, illumination)
+    found = joint(lights, count)
     units = [medium.layers[0].similar.mfp for medium in media]
-    scaled = [light._replace(edges=light.edges * unit) for light, unit in zip(lights, units, strict=True)]
-    variances, weights = made(fitted(scaled, count).parameters, len(media))
     return tuple(
         MediumGaussians(
-            fit.setting_of(medium, illumination), light.whole, tuple((variances / unit**2).tolist()), tuple(weight)
+            fit.setting_of(medium, illumination),
+            light.whole,
+            tuple((found.variances / unit**2).tolist()),
+            tuple(weight),
         )
-        for medium, light, unit, weight in zip(media, lights, units, weights.tolist(), strict=True)
+        for medium, light, unit, weight in zip(media, lights, units, found.weights.tolist(), strict=True)
     )
 
 
-def dense(media: Sequence[Medium], illumination: str = "searchlight") -> tuple[Floats, Floats]:
-    """Exact light, so to speak: variances (N,) [unit^2], even in their logarithm, and weights (media, N) that sum to 1.
+def dense(lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
+    """Exact light, so to speak: variances (N,) [length^2], even in their logarithm, and weights (lights, N) >= 0.
 
-    Of stacks of g = 0 in one unit. Rings to 99.5 % of the light are right to 1e-3 (root mean square, relative) by some
-    twenty-five Gaussians >= 0: too many to draw with, but they sum over any surface. InputError as of `exact.solve`.
+    Of exact lights with edges in one unit. Rings are right to 1e-3 (root mean square, relative) by some twenty-five
+    Gaussians: too many to draw with, but they sum over any surface. Weights sum to 1.
     """
-    lights = {medium: exact.solve(medium, illumination, fit.NODES) for medium in dict.fromkeys(media)}
-    radii = {medium: fit.radii(medium) for medium in lights}
-    within = {medium: np.asarray(light.cdf(radii[medium])) for medium, light in lights.items()}
-    last = {medium: radii[medium][within[medium] <= fit.LAST_SHARE][-1] for medium in lights}
-    shortest, longest = min(r[0] for r in radii.values()), max(last.values())
+    shortest, longest = min(light.edges[0] for light in lights), max(light.edges[-1] for light in lights)
     count = int(np.ceil(np.log(longest / shortest) / DENSE[2])) + 1
     variances = np.geomspace(DENSE[0] * shortest, DENSE[1] * longest, count) ** 2
-    weights = {}
-    for medium, r in radii.items():
-        seen = r <= last[medium]
-        share = np.diff(within[medium][seen], prepend=0.0, append=1.0)  # of the disc inside and of all beyond, too
-        left = np.exp(-0.5 * r[seen, None] ** 2 / variances)
-        rings = -np.diff(left, axis=0, prepend=1.0, append=0.0)
-        weights[medium], _ = nnls(rings / share[:, None], np.ones(share.size), maxiter=100 * count)
-    found = np.array([weights[medium] for medium in media])
-    return variances, found / found.sum(axis=1, keepdims=True)
+    found = []
+    for light in lights:
+        rings = light.energy / light.whole
+        share = np.concatenate([[light.inside], rings, [1.0 - light.inside - rings.sum()]])
+        edges = np.concatenate([[0.0], light.edges, [np.inf]])
+        weight, _ = nnls(ring_shares(edges, variances) / share[:, None], np.ones(share.size), maxiter=100 * count)
+        found.append(weight / weight.sum())
+    return variances, np.array(found)
+
+
+def joint(lights: Sequence[SumLight], count: int) -> JointSum:
+    """The sum nearest to all lights, whose edges are in one unit; weights that would be negative are held at 0.
+
+    Given the variances, the weights are a problem of least squares with one optimum, which says which of them are 0.
+    """
+    variances, _ = made(fitted(lights, count).parameters, len(lights))
+    weights = _weights(lights, variances)
+    for _ in range(TURNS):
+        offset, slopes = _places(weights)
+        start = slopes.T @ (np.concatenate([np.log(variances), weights.ravel()]) - offset)
+        best = _settled(start, (_rings_of(lights), offset, slopes))
+        constants = offset + slopes @ best.parameters
+        variances, own = np.exp(constants[:count]), constants[count:].reshape(weights.shape)
+        held, weights = weights == 0, _weights(lights, variances)
+        if np.array_equal(weights == 0, held):
+            break
+    names = [f"v{i + 1}" if i < count else f"w{i % count + 1} of light {i // count}" for i in range(len(offset))]
+    return JointSum(variances, own, slopes, judged(best, tuple(names[i] for i in np.argmax(slopes != 0, axis=0))))
+
+
+def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+    """ln variances and then weights (N + m N,) of the sum nearest to other lights, those at 0 held there.
+
+    NaN where that fit does not converge.
+    """
+    offset, slopes = _places(found.weights)
+    best = _settled(found.best.parameters, (_rings_of(lights), offset, slopes))
+    return offset + slopes @ best.parameters if best.converged else np.full(len(offset), np.nan)
+
+
+def _settled(start: Floats, data: object) -> Optimum:
+    """The optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
+    for _ in range(TURNS):
+        best = solve(_linear_residual, start, data)
+        if best.converged:
+            break
+        start = best.parameters
+    return best
+
+
+def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
+    """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
+    offset, slopes = _places(found.weights)
+    with jax.enable_x64(True):
+        return np.asarray(_hessian(jnp.asarray(found.best.parameters), (_rings_of(lights), offset, slopes)))
+
+
+def _rings_of(lights: Sequence[SumLight]) -> list[tuple[ArrayLike, ...]]:
+    return [(light.edges, light.energy, light.weight, np.asarray(light.whole)) for light in lights]
+
+
+def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
+    """The best non-negative weights (m, N) of these variances."""
+    found = []
+    for light in lights:
+        rings = ring_shares(light.edges, variances) * (light.weight * light.whole / light.energy)[:, None]
+        columns = np.vstack([rings, np.full(variances.size, TO_ONE)])
+        weights, _ = nnls(columns, np.append(light.weight, TO_ONE))
+        found.append(weights)
+    return np.array(found)
+
+
+def _places(weights: Floats) -> tuple[Floats, Floats]:
+    """offset (N + m N,), slopes (N + m N, p): ln variances and weights are offset + slopes @ parameters.
+
+    Parameters are ln variances and the weights that are not 0, but the largest of each light, which is what the others
+    leave of 1.
+    """
+    lights, count = weights.shape
+    size = count * (1 + lights)
+    offset, columns = np.zeros(size), list(np.eye(size)[:count])
+    for number, row in enumerate(weights):
+        first, largest = count * (1 + number), int(np.argmax(row))
+        offset[first + largest] = 1.0
+        for place in np.flatnonzero(row):
+            if place != largest:
+                column = np.zeros(size)
+                column[[first + place, first + largest]] = 1.0, -1.0
+                columns.append(column)
+    return offset, np.array(columns).T
+
+
+def ring_shares(edges: ArrayLike, variances: ArrayLike, xp: Any = np) -> Any:
+    """What each Gaussian of variances (N,) [length^2] has in rings between edges (n + 1,) [length]: (n, N) [-]."""
+    depth = 0.5 * xp.asarray(edges)[:, None] ** 2 / variances
+    # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
+    return xp.exp(-depth[:-1]) * -xp.expm1(depth[:-1] - depth[1:])
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Optimum:
     """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1 of each light, unbounded."""
     shortest, longest = min(light.edges[0] for light in lights), max(light.edges[-1] for light in lights)
     widest = 2.0 * np.log(WIDEST * longest)
-    data = [(light.edges, light.energy, light.weight, light.whole) for light in lights]
     found = []
-    for narrowest in NARROWEST:
-        low = 2.0 * np.log(narrowest * shortest)
+    lows = 2.0 * np.log(np.array(NARROWEST) * shortest)
+    if count == 1:  # one alone has optima of its own near each colour's light
+        lows = np.linspace(lows.min(), widest, ALONE, endpoint=False)
+    for low in lows:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
-        found.append(solve(_residual, np.array(start), data))
+        found.append(solve(_residual, np.array(start), _rings_of(lights)))
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
@@ -150,10 +266,24 @@ def _of(parameters: jax.Array, lights: int) -> tuple[jax.Array, jax.Array]:
 
 def _residual(parameters, data):
     level, logits = _of(parameters, len(data))
+    return _off(jnp.exp(level), jnp.exp(logits), data)
+
+
+def _linear_residual(parameters, data):
+    lights, offset, slopes = data
+    constants = offset + slopes @ parameters
+    count = constants.size // (len(lights) + 1)
+    return _off(jnp.exp(constants[:count]), constants[count:].reshape(len(lights), count), lights)
+
+
+@jax.jit
+def _hessian(parameters, data):
+    return jax.hessian(lambda at: 0.5 * jnp.sum(_linear_residual(at, data) ** 2))(parameters)
+
+
+def _off(variances, weights, lights):
+    """Weighted relative errors of all rings."""
     found = []
-    for logit, (edges, energy, weight, whole) in zip(logits, data, strict=True):
-        depth = 0.5 * edges[:, None] ** 2 * jnp.exp(-level)
-        # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
-        rings = jnp.exp(logit - depth[:-1]) * -jnp.expm1(depth[:-1] - depth[1:])
-        found.append(weight * (whole * jnp.sum(rings, axis=1) / energy - 1.0))
+    for own, (edges, energy, weight, whole) in zip(weights, lights, strict=True):
+        found.append(weight * (whole * (ring_shares(edges, variances, jnp) @ own) / energy - 1.0))
     return jnp.concatenate(found)

@@ -143,8 +143,8 @@ def regenerate(of: StackRequest, out: Path, processes: int = 1, say: Callable[[s
 def load(path: Path) -> StackRecord:
     """The laws of a record; RecordError on one that is damaged, or whose half spaces have other constants by now."""
     content = of_stack(path)
-    with _damage(path):
-        stack, setting = _stack(str(path), content), record.record_setting(content)
+    with damage(path):
+        stack, setting = told_stack(str(path), content), record.record_setting(content)
         if setting.n != stack.media[0].layers[0].n:
             raise InputError(f"setting.n must be that of its layers, got {setting.n:g}")
         red, green, blue = (
@@ -171,8 +171,8 @@ def matching(of: StackRequest, folder: Path) -> StackRecord | None:
     for path in record.available(folder / FOLDER).values():
         try:
             content = of_stack(path)
-            with _damage(path):
-                media, setting = _stack(str(path), content).media, record.record_setting(content)
+            with damage(path):
+                media, setting = told_stack(str(path), content).media, record.record_setting(content)
         except RecordError as error:
             text = f"{path} is passed over: {str(error).removeprefix(f'{path}: ')}"
             warnings.warn(text, DamagedRecord, stacklevel=2)
@@ -191,7 +191,7 @@ def of_stack(path: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def _damage(path: Path) -> Iterator[None]:
+def damage(path: Path) -> Iterator[None]:
     """What is wrong inside a record as RecordError."""
     try:
         yield
@@ -284,9 +284,9 @@ def _result(fits: Sequence[Mapping[str, Any]]) -> str:
     return next((one["result"] for one in fits if one["result"] != "converged"), "converged")
 
 
-def _stack(file: str, content: Mapping[str, Any]) -> LayerStack:
-    """The layers of a record, of which some law is; InputError where what it holds is of another kind."""
-    for key, kind in TOLD.items():
+def told_stack(file: str, content: Mapping[str, Any], told: Mapping[str, kinds.Kind] = TOLD) -> LayerStack:
+    """The layers of a record, of which some law is; InputError where what is `told` in it is of another kind."""
+    for key, kind in told.items():
         value: Any = content
         for name in key.split("."):
             if not isinstance(value, Mapping):

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
+from profilefit.recipes import record
+from profilefit.recipes.folder import SUMS
 from profilefit.recipes.workers import Workers
 from profilefit.report.figures.albedo_figure import albedo_figure
 from profilefit.report.figures.coefficient_figures import a_figure, b_figure, c_figure, constants_figure, has_printed
@@ -15,6 +17,8 @@ from profilefit.report.figures.inverse_figure import inverse_figure, inversion_f
 from profilefit.report.figures.profile_figures import error_figure, profile_figure
 from profilefit.report.figures.quality_figure import quality_figure, record_quality_figure
 from profilefit.report.figures.residual_figure import residual_figure
+from profilefit.report.figures.sum_figure import NAME as OF_SUMS
+from profilefit.report.figures.sum_figure import sum_figure
 from profilefit.report.records import Source, converged, measures
 
 Draw = Callable[..., list[Path]]
@@ -91,7 +95,7 @@ def _drawn(source: Source, out: Path, plan: Plan) -> list[Path]:
 
 
 def plans(source: Source) -> tuple[Plan, ...]:
-    """The paper's figures, those of all laws, and of each record residuals, quality and a corner plot."""
+    """The paper's figures, those of all laws and stacks, and of each record residuals, quality and a corner plot."""
     profiles = tuple(name for name in source.paths if measures(source.content(name), "rel"))
     lacking = "" if profiles else f"{source.folder} has no record of a profile law"
     printed = has_printed(source)
@@ -100,6 +104,7 @@ def plans(source: Source) -> tuple[Plan, ...]:
         *PAPER,
         Plan("constants", (), printed, constants_figure, unprinted),
         Plan("quality", (), profiles, quality_figure, lacking),
+        *([Plan(OF_SUMS, (), (), sum_figure)] if record.available(source.folder / SUMS) else []),
         *(plan for name in source.paths for plan in record_plans(source, name)),
     )
 

@@ -97,12 +97,13 @@ def drawn(plan: Plan, source: Source) -> str:
     return drawing(plan.name, lambda out: plan.draw(source, out, name=plan.name))
 
 
-def drawing(name: str, draw: Callable[[Path], list[Path]]) -> str:
-    """The figure `name` that `draw` writes into a folder."""
+def drawing(name: str, draw: Callable[[Path], list[Path]], title: str = "") -> str:
+    """The figure `name` that `draw` writes into a folder; its title is its name's `caption` where none is given."""
     with tempfile.TemporaryDirectory() as folder, only("svg"):
         (file,) = draw(Path(folder))
         svg = file.read_text(encoding="utf-8")
-    return figure(inline(svg, name, caption(name)), caption(name))
+    shown = title or caption(name)
+    return figure(inline(svg, name, shown), shown)
 
 
 def caption(name: str) -> str:

@@ -7,12 +7,16 @@ from html import escape
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
 from profilefit.report.drawing import address
+from profilefit.report.figures.sum_figure import NAME as OF_SUMS
+from profilefit.report.figures.sum_figure import sum_caption, sum_figure, sums_of
+from profilefit.report.page.fits import drawing
 from profilefit.report.page.markup import details, element, figure, markup, paragraph
 from profilefit.report.page.measured import EvidenceFolder, Told, missing
 from profilefit.report.records import Source
 from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.stack_table import stack_table
+from profilefit.report.tables.sum_table import sum_tables
 from profilefit.studies.stability.cells import Verdict
 
 # `python -m benchmarks.render` makes them.
@@ -50,11 +54,15 @@ def shader(found: EvidenceFolder) -> Iterator[str]:
 
 
 def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section: records of stacks, and pictures; none where there is no record."""
+    """The parts of the section: records of stacks, sums of Gaussians, and pictures; none where there is no record."""
     table = None if source.names else stack_table(source.folder)
     if table is None:
         return
     yield markup(table)
+    if sums := sums_of(source.folder):
+        yield drawing(OF_SUMS, lambda out: sum_figure(source, out), sum_caption(sums))
+        for name, one in sums.items():
+            yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     for name, title in OF_LAYERS.items():
         path = found.folder / name
         if path.exists():

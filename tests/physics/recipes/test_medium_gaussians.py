@@ -15,7 +15,7 @@ HEART = Medium((Layer(1.38, 0.20, 2.2, 0.0, 0.3), Layer(1.38, 0.80, 1.2, 0.0)))
 def rings_of(law: MediumGaussians) -> SumLight:
     edges = np.geomspace(0.01, 20.0, 80)
     energy = np.diff(law.cdf(edges, 0.5)) * law.total_reflectance
-    return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79))
+    return SumLight(edges, energy, np.full(79, 79**-0.5), law.total_reflectance, np.zeros(79), 0.0)
 
 
 def sum_of(light: SumLight, best) -> MediumGaussians:
@@ -58,6 +58,23 @@ def test_colours_share_their_variances():
         alone = gaussians.fitted([light], 4).cost
         energy = np.diff(one.cdf(light.edges, 0.5)) * one.total_reflectance
         assert alone < np.sum((light.weight * (energy / light.energy - 1.0)) ** 2) < 1.5 * alone
+
+
+def test_many_fixed_ones_are_exact_light():
+    """Of two colours at once, and far nearer than six that are fitted."""
+    blue = Medium((Layer(1.38, 0.35, 2.6, 0.0, 0.3), Layer(1.38, 1.2, 1.3, 0.0)))
+    lights = gaussians.lights_of((HEART, blue), "diffuse")
+    variances, weights = gaussians.dense(lights)
+    np.testing.assert_allclose(weights.sum(axis=1), 1.0)
+    assert np.all(weights >= 0)
+    assert variances.size < 30
+    for light, own in zip(lights, weights, strict=True):
+        off = gaussians.ring_shares(light.edges, variances) @ own * light.whole / light.energy - 1.0
+        assert np.sqrt(np.mean(off**2)) < 1e-3
+        assert np.abs(off).max() < 3e-3
+    six = gaussians.joint(lights, 6)
+    off = gaussians.ring_shares(lights[0].edges, six.variances) @ six.weights[0] * lights[0].whole / lights[0].energy
+    assert np.sqrt(np.mean((off - 1.0) ** 2)) > 0.02
 
 
 def test_counts_are_checked():

@@ -10,8 +10,10 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.stack import record as stacks
+from profilefit.recipes.stack import sum_record
 from profilefit.shader.law_file import LANGUAGES
 from tests.unit.recipes.stack.test_record import STACK, made
+from tests.unit.recipes.stack.test_sum_record import made_sums
 
 GREY = """\
 [[layers]]
@@ -35,6 +37,7 @@ g = 0.0
 def heart(command, monkeypatch):
     """STACK as a file, whose fit takes no time."""
     monkeypatch.setattr(stacks, "_channel", made)
+    monkeypatch.setattr(sum_record, "_of_light", made_sums)
     monkeypatch.setattr("profilefit.recipes.workers.cores", lambda: 1)
     Path("heart.toml").write_text(STACK, encoding="utf-8")
     return "heart.toml"
@@ -51,7 +54,8 @@ def test_a_stack_becomes_a_record_and_that_a_text(command, heart):
     status, out, err = command("regenerate", heart, "--out", "mine", "--json", "--quiet")
     assert (status, err) == (0, "")
     told = json.loads(out)
-    assert list(told) == ["stacks/heart"]
+    assert list(told) == ["stacks/heart", "gaussians/heart"]
+    assert told["gaussians/heart"]["constants"]["diffuse.6.red.w1"]["jackknife_error"] == 1e-3
     law = stacks.load(Path("mine/stacks/heart.json")).laws[1]
     status, text, err = command("export", "heart", "--lang", "python", "--fits", "mine")
     assert (status, err) == (0, "profilefit: records of 'mine'\n")
@@ -159,13 +163,21 @@ def test_a_stack_is_reported_by_its_name(command, heart):
     both = json.loads(command("report", "heart", "hazard", "--json")[1])
     assert list(both["records"]) == ["heart", "hazard"]
     told = json.loads(command("report", "heart", "--fits", "mine", "--json")[1])
-    assert told == {"records": {"heart": content}}
+    sums = record.read(Path("mine/gaussians/heart.json"))
+    assert told == {"records": {"heart": content}, "gaussians": {"heart": sums}}
+    rows = [line.split() for line in out.splitlines()]
+    assert ["diffuse", "6", "0.017", "0.033", "0.050", "0.050", "0.050", "0.050"] in rows
+    assert sum(row[:1] == ["searchlight"] for row in rows) == 8
+    Path("mine/gaussians/heart.json").unlink()
+    alone = command("report", "heart", "--fits", "mine", "--quiet")[1]
+    assert alone == out[: len(alone)]
+    assert "Gaussians" not in alone
 
 
 def test_tables_of_stacks_in_markdown(command, heart):
     """Of those named; of all in the folder, if none is; and of none the tables stay as they were."""
     command("regenerate", heart, "--out", "mine", "--quiet")
-    marks = ("stack-errors", "stack-constants", "constants")
+    marks = ("stack-errors", "stack-constants", "stack-gaussians", "constants")
     text = "".join(f"<!-- {mark} -->\nold\n<!-- /{mark} -->\n" for mark in marks)
     for names in (("heart",), ()):
         Path("page.md").write_text(text, encoding="utf-8")
@@ -173,10 +185,11 @@ def test_tables_of_stacks_in_markdown(command, heart):
         filled = Path("page.md").read_text(encoding="utf-8")
         assert "| heart | red     | 1         | 0.200 mm  | 0.012 | 0.0030 | -0.0015 |" in filled
         assert filled.count("| heart | blue    |") == 1 + 9
+        assert "| heart | diffuse     | 0.30 | 0.15 | 0.10 | 0.075 | 0.060 | 0.050 | 0.043 | 0.037 | 0.050" in filled
         assert filled.count("old") == 1, "no table of other records"
     Path("page.md").write_text(text, encoding="utf-8")
     command("report", "hazard", "--markdown", "page.md")
-    assert Path("page.md").read_text(encoding="utf-8").count("old") == 2
+    assert Path("page.md").read_text(encoding="utf-8").count("old") == 3
 
 
 def test_a_stack_beside_other_records(command, heart):
@@ -224,6 +237,17 @@ def test_a_damaged_stack_is_no_report(command, heart, words):
     assert err.count("\n") == 1
 
 
+def test_damaged_sums_are_no_report(command, heart):
+    command("regenerate", heart, "--out", "mine", "--quiet")
+    path = Path("mine/gaussians/heart.json")
+    content = json.loads(path.read_text(encoding="utf-8"))
+    del content["sums"]["diffuse"]
+    path.write_text(json.dumps(content), encoding="utf-8")
+    status, out, err = command("report", "heart", "--fits", "mine", "--quiet")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.endswith("heart.json: is damaged: sums.diffuse must be a table, got nothing; regenerate it\n")
+
+
 @pytest.mark.slow
 def test_a_grey_stack_is_fitted(command):
     """Truly: a minute or two."""
@@ -248,6 +272,12 @@ def test_a_grey_stack_is_fitted(command):
         status, text, err = command("export", str(path), "--lang", lang)
         assert (status, err) == (0, "")
         assert "veil" in text
+    sums = sum_record.load(Path("mine/gaussians/veil.json"))
+    assert sums.content["fit"]["result"] == "converged"
+    red, green, blue = sums.laws("diffuse", 8)
+    assert red == green == blue  # one grey light, fitted with itself
+    known = sums.content["constants"]["diffuse.6.v1"]
+    assert [key for key in kinds if known[key] is None] == ["statistical_error"]
     law = stacks.load(path).laws[0]
     names = twin(command("export", str(path), "--lang", "python")[1])
     r = np.geomspace(0.01, 3.0, 30)

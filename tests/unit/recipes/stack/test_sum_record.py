@@ -1,0 +1,234 @@
+"""Records of sums of Gaussians: read as the laws that were written, refused in one line, and what those shipped say."""
+
+import json
+
+import numpy as np
+import pytest
+
+from mcml_sim import Setting
+from mcml_sim.media.setting import ILLUMINATIONS
+from profilefit.errors import InputError, RecordError
+from profilefit.materials import CHANNELS
+from profilefit.recipes import record
+from profilefit.recipes.folder import STACKS, SUMS, fits_folder
+from profilefit.recipes.schema import ERRORS
+from profilefit.recipes.stack import sum_record
+from profilefit.recipes.stack.record import request_of
+from profilefit.recipes.stack.sum_errors import constant_names
+from profilefit.recipes.stack.sum_record import COUNTS, beside, load
+from tests.unit.recipes.stack.test_record import STACK, changed
+
+SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
+EDGES = np.geomspace(0.01, 10.0, 6)
+
+
+def made_sums(media, illumination):
+    """What `_of_light` gives after a minute, at once; each light, number, colour and Gaussian has its own."""
+    shift = 1.0 + ILLUMINATIONS.index(illumination)
+    constants, by_count = {}, []
+    for count in COUNTS:
+        weights = np.arange(1.0, count + 1)[::-1] ** np.array([[1.0], [2.0], [0.0]])
+        values = [*(shift * 0.1 * 3.0 ** np.arange(count)), *(weights / weights.sum(axis=1, keepdims=True)).ravel()]
+        errors = dict.fromkeys(ERRORS, 1e-3) | {"statistical_error": None}
+        for name, value in zip(constant_names(count), values, strict=True):
+            constants[f"{count}.{name}"] = {"published": None, "regenerated": value, "free": True, **errors}
+        measured = {key: [place / count for place in (0.1, 0.2, 0.3)] for key in sum_record.MEASURED}
+        by_count.append({"result": "converged", "steps": 9, "condition_number": 3.0, **measured})
+    whole = [0.5, 0.4, 0.3][: len(media)]
+    energy = np.full(5, 0.05)
+    arrays = {
+        f"{channel}_{key}": value
+        for channel, a in zip(CHANNELS, whole, strict=True)
+        for key, value in zip(
+            sum_record.ARRAYS,
+            (EDGES * shift, energy * a, np.full(5, 5**-0.5), np.zeros(5), np.array([a, 0.02])),
+            strict=True,
+        )
+    }
+    return {
+        "constants": constants,
+        "reflectance": whole,
+        "share": [0.25] * 3,
+        "by_count": by_count,
+        "arrays": arrays,
+    }
+
+
+@pytest.fixture
+def written(monkeypatch, tmp_path):
+    """The record of a stack whose fit takes no time."""
+    monkeypatch.setattr(sum_record, "_of_light", made_sums)
+    (tmp_path / "heart.toml").write_text(STACK, encoding="utf-8")
+    return sum_record.regenerate(request_of(str(tmp_path / "heart.toml")), tmp_path / "mine")
+
+
+def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
+    assert written == tmp_path / "mine" / "gaussians" / "heart.json"
+    found, of = load(written), request_of(str(tmp_path / "heart.toml"))
+    assert found.stack.media == of.stack.media
+    for light in ILLUMINATIONS:
+        known = made_sums(of.stack.media, light)
+        for count in COUNTS:
+            for channel, law, medium in zip(CHANNELS, found.laws(light, count), of.stack.media, strict=True):
+                assert law.setting == Setting(light, n=1.38)
+                assert law.total_reflectance == known["reflectance"][CHANNELS.index(channel)]
+                unit = medium.layers[0].mfp
+                variance = [known["constants"][f"{count}.v{i + 1}"]["regenerated"] / unit**2 for i in range(count)]
+                weight = [known["constants"][f"{count}.{channel}.w{i + 1}"]["regenerated"] for i in range(count)]
+                np.testing.assert_allclose(law.variance, variance, rtol=1e-11)
+                np.testing.assert_allclose(law.weight, weight, rtol=1e-11)
+        for channel, one in zip(CHANNELS, found.lights(light), strict=True):
+            np.testing.assert_array_equal(one.edges, known["arrays"][f"{channel}_edges"])
+            assert [one.whole, one.inside] == known["arrays"][f"{channel}_ends"].tolist()
+    first, second = (found.laws(light)[0].variance for light in ILLUMINATIONS)
+    assert first != second
+    again = sum_record.regenerate(of, tmp_path / "again")
+    assert again.read_bytes() == written.read_bytes()
+    assert again.with_suffix(".npz").read_bytes() == written.with_suffix(".npz").read_bytes()
+
+
+def test_it_belongs_to_the_record_of_its_stack(written, tmp_path):
+    assert beside(tmp_path / "mine" / STACKS / "heart.json") == written
+    assert beside(tmp_path / "mine" / STACKS / "skin.json") is None
+
+
+DAMAGE = {
+    r"must be a record of sums of Gaussians, got pipeline 'stack'": changed("pipeline", "stack"),
+    r"is not a record of format 1 or 2, got 9": changed("format", 9),
+    r"is damaged: sums must be a table, got nothing": changed("sums"),
+    r"is damaged: sums.diffuse must be a table, got nothing": changed("sums/diffuse"),
+    r"is damaged: sums.diffuse.by_count must be 8, one a number of Gaussians, got 7": changed(
+        "sums/diffuse/by_count/7"
+    ),
+    r"is damaged: sums.searchlight.by_count.3.rel must be a list of numbers, got \"x\"": changed(
+        "sums/searchlight/by_count/3/rel", "x"
+    ),
+    r"is damaged: sums.searchlight.by_count.3.ks must be 3, one a colour, got 2": changed(
+        "sums/searchlight/by_count/3/ks", [0.1, 0.2]
+    ),
+    r"is damaged: sums.searchlight.reflectance must be in \(0, 1\]": changed(
+        "sums/searchlight/reflectance", [0.5, 0.4, -0.3]
+    ),
+    r"is damaged: constants.diffuse.6.green.w2 must be a table, got nothing": changed("constants/diffuse.6.green.w2"),
+    r"is damaged: constants.diffuse.6.v2.regenerated must be a number, got \"x\"": changed(
+        "constants/diffuse.6.v2/regenerated", "x"
+    ),
+    r"is damaged: constants.diffuse.6.v1 and on must rise from above 0": changed(
+        "constants/diffuse.6.v2/regenerated", 1e-9
+    ),
+    r"is damaged: constants.diffuse.1.v1 and on must rise from above 0": changed(
+        "constants/diffuse.1.v1/regenerated", -1.0
+    ),
+    r"is damaged: constants.diffuse.6: weights of a colour must be >= 0 and sum to 1": changed(
+        "constants/diffuse.6.red.w2/regenerated", 0.9
+    ),
+    r"is damaged: constants.diffuse.6.v1.jackknife_error must be a number or null": changed(
+        "constants/diffuse.6.v1/jackknife_error", "x"
+    ),
+    r"is damaged: layers must be a list, got \"x\"": changed("layers", "x"),
+    r"is damaged: the last layer must be infinitely thick, got 2": changed("layers/1/thickness", 2.0),
+    r"is damaged: it has no valid setting": changed("setting/illumination", "sun"),
+}
+
+
+@pytest.mark.parametrize(("message", "change"), DAMAGE.items(), ids=range(len(DAMAGE)))
+def test_a_damaged_record_is_one_line(written, message, change):
+    load(written)
+    content = json.loads(written.read_text())
+    change(content)
+    written.write_text(json.dumps(content))
+    with pytest.raises(RecordError, match=message) as caught:
+        load(written)
+    assert "heart" in str(caught.value)
+    assert str(caught.value).isprintable()
+    assert len(str(caught.value)) < 400
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("red_edges", None),
+        ("red_edges", EDGES[::-1]),
+        ("red_energy", np.ones(4)),
+        ("blue_ends", np.array([0.5])),
+        ("green_weight", np.ones((5, 1))),
+    ],
+)
+def test_damaged_arrays_are_one_line(written, name, value):
+    file = written.with_suffix(".npz")
+    arrays = record.read_arrays(written)
+    arrays[f"diffuse_{name}"] = value
+    np.savez(file, **{key: one for key, one in arrays.items() if one is not None})
+    load(written).lights("searchlight")
+    with pytest.raises(RecordError, match=rf"heart\.npz: is damaged: diffuse_{name[: name.index('_')]} is no light"):
+        load(written).lights("diffuse")
+    file.unlink()
+    with pytest.raises(RecordError, match=r"heart\.npz: .* missing; regenerate it"):
+        load(written).lights("searchlight")
+
+
+def test_what_no_sums_are_for_is_refused_before_any_fit(monkeypatch, tmp_path):
+    monkeypatch.setattr(sum_record, "_of_light", lambda *_: pytest.fail("nothing is to be fitted"))
+    path = tmp_path / "heart.toml"
+    path.write_text(STACK.replace("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), encoding="utf-8")
+    with pytest.raises(InputError, match="layers must have one n for a law of a stack"):
+        sum_record.regenerate(request_of(str(path)), tmp_path / "mine")
+    assert not (tmp_path / "mine").exists()
+
+
+@pytest.fixture(scope="module")
+def shipped():
+    return {name: load(fits_folder() / SUMS / f"{name}.json") for name in SHIPPED}
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_stack_has_its_sums(shipped, name):
+    """Of the layers that its file has; all fits converged, each error there where it applies."""
+    found = shipped[name]
+    assert record.plain(found.stack.media) == record.plain(request_of(name).stack.media)
+    assert found.content["fit"]["result"] == "converged"
+    for place, one in found.content["constants"].items():
+        known = {key for key in ERRORS if one[key] is not None}
+        assert known == (set(ERRORS) - {"statistical_error"} if one["free"] else set()), place
+        assert one["free"] or one["regenerated"] in (0, 1), place
+        assert all(one[key] > 0 for key in known), place
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_shipped_record_is_as_far_from_its_light_as_it_says(shipped, name):
+    """By the laws that it makes, in their own lengths; those of another colour are farther."""
+    found = shipped[name]
+    units = [medium.layers[0].mfp for medium in found.stack.media]
+
+    def within(laws, units, rings):
+        for law, unit, one in zip(laws, units, rings, strict=True):
+            yield np.asarray(law.cdf(one.edges / unit, 0.5), float)
+
+    def rel(shares, rings):
+        pairs = zip(shares, rings, strict=True)
+        return [np.mean(np.abs(np.diff(share) * one.whole / one.energy - 1.0)) for share, one in pairs]
+
+    for light in ILLUMINATIONS:
+        rings = found.lights(light)
+        data = [one.inside + np.append(0.0, np.cumsum(one.energy)) / one.whole for one in rings]
+        for count in (2, 6):
+            laws, told = found.laws(light, count), found.content["sums"][light]["by_count"][count - 1]
+            shares = list(within(laws, units, rings))
+            np.testing.assert_allclose(rel(shares, rings), told["rel"], rtol=1e-3)  # float32
+            ks = [np.max(np.abs(share - one)) for share, one in zip(shares, data, strict=True)]
+            np.testing.assert_allclose(ks, told["ks"], rtol=1e-3)
+            swapped = within((*laws[1:], laws[0]), (*units[1:], units[0]), rings)
+            assert np.mean(rel(swapped, rings)) > 1.02 * np.mean(told["rel"])
+
+
+def test_what_six_cost(shipped):
+    """The worst of heart and skin in both lights; variances of their own serve each colour better than shared ones."""
+    six = [shipped[name].content["sums"][light]["by_count"][5] for name in ("heart", "skin") for light in ILLUMINATIONS]
+    assert 0.15 < max(max(one["alone"]) for one in six) <= 0.16
+    assert 0.16 < max(max(one["rel"]) for one in six) < 0.17
+    for name in SHIPPED:
+        for light in ILLUMINATIONS:
+            by_count = shipped[name].content["sums"][light]["by_count"]
+            rms = np.array([one["rms"] for one in by_count])
+            assert np.all(np.diff(np.sum(rms**2, axis=1)) < 0)  # what the fit makes small
+            assert all(np.mean(one["alone"]) <= 1.02 * np.mean(one["rel"]) for one in by_count)
