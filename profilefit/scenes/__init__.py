@@ -47,6 +47,7 @@ else:
 SCENES = {
     "skin": ("profilefit.scenes.skin.scene", "skin-head.toml"),
     "layers": ("profilefit.scenes.layers.scene", "layers-head.toml"),
+    "heart": ("profilefit.scenes.heart.scene", "heart.toml"),
 }
 
 __all__ = [

@@ -53,7 +53,7 @@ TRACED_NOTE = (
 )
 ALIKE = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 # Of STACK.toml, those that only draw a scene among them.
-KEYS = ("title", "unit", "illumination", "layers", "scene", "uneven", "pose", "technique", "camera", "light")
+KEYS = ("title", "unit", "illumination", "layers", "scene", "surface", "uneven", "pose", "technique", "camera", "light")
 
 
 @dataclass(frozen=True)

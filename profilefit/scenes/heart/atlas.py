@@ -13,15 +13,22 @@ from typing import Self
 
 import moderngl
 import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_erosion, distance_transform_cdt, label
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from profilefit.errors import InputError
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
+from profilefit.scenes.heart.truth import Elements
 from profilefit.scenes.stage.buffers import INSIDE, Singles, Targets, pixels
 from profilefit.scenes.stage.technique import FullScreen, Pass, Unwraps, maps
-from profilefit.scenes.stage.world import Part
+from profilefit.scenes.stage.world import Mesh, Part
 from profilefit.shader.emit import text_beside
 
+Floats = NDArray[np.float64]
+EIGHT = np.ones((3, 3))  # a texel and its neighbours
 REACH = 3.3  # of a blur's taps, in its sigma
 SHORTEST = 0.2  # of texels are shorter than those whose margins blurs are made for
 LIGHT, FILLED, STRETCH = "light_map", "filled_map", "stretch_map"
@@ -58,10 +65,14 @@ class Atlas:
 
     def draw(self, stage: Unwraps, part: Part) -> None:
         """Irradiance and place of a part of the scene that the stage has drawn. Links are made the first time."""
+        if self._links is None:
+            _require_charts(part.mesh)
         stage.unwrap(part, self.targets.surface, self.inset)
         if self._links is None:
             place = pixels(self.targets.map("position_map"))
-            self._links = links(place[..., :3].astype(float), place[..., 3] > INSIDE, self.margin)
+            inside = place[..., 3] > INSIDE
+            self._require_apart(part.mesh, inside)
+            self._links = links(place[..., :3].astype(float), inside, self.margin)
         self._run(self._filled("position_map"))
         self._run(self._pass("stretch", STRETCH, "position_map", FILLED))
         if not self.texel:
@@ -90,6 +101,12 @@ class Atlas:
         """(rows, columns, 4) of a map, row 0 at the bottom."""
         return pixels(self.targets.map(name))
 
+    def elements(self) -> Elements:
+        """The surface that is drawn, each texel's light and area."""
+        place, stretch, light = (self.read(name).astype(float) for name in ("position_map", STRETCH, "irradiance_map"))
+        inside = place[..., 3] > INSIDE
+        return Elements(place[inside][:, :3], stretch[inside][:, 3], light[inside][:, :3], self.texel)
+
     def release(self) -> None:
         for one in self._passes.values():
             one.release()
@@ -101,6 +118,31 @@ class Atlas:
 
     def __exit__(self, *error: object) -> None:
         self.release()
+
+    def _require_apart(self, mesh: Mesh, inside: NDArray[np.bool_]) -> None:
+        """InputError where two triangles lie on one texel, or two charts nearer than their margins are wide."""
+        places = (0.5 + (mesh.uv - 0.5) * self.inset) * self.size
+        flat = places[mesh.triangles]
+        (ax, ay), (bx, by) = (flat[:, 1] - flat[:, 0]).T, (flat[:, 2] - flat[:, 0]).T
+        covered, texels = 0.5 * np.abs(ax * by - ay * bx).sum(), np.count_nonzero(inside)
+        edge = np.count_nonzero(inside & ~binary_erosion(inside, EIGHT))
+        if not texels:
+            raise InputError(f"mesh must cover texels of the atlas, got none of {self.size[0]} x {self.size[1]}")
+        if covered > texels + edge:
+            raise InputError(
+                f"charts must not overlap, nor triangles turn over: they cover {covered:.0f} texels, of which "
+                f"{texels} are one or another's"
+            )
+        charts, count = label(inside, EIGHT)
+        away, nearest = distance_transform_cdt(charts == 0, "chessboard", return_indices=True)
+        owner = charts[tuple(nearest)]
+        for axis in (0, 1):
+            (one, other), (there, here) = ((np.delete(of, -1, axis), np.delete(of, 0, axis)) for of in (owner, away))
+            if np.any((one != other) & (there + here < 2 * self.margin)):
+                raise InputError(
+                    f"charts must lie {2 * self.margin} texels apart, twice the margin of this atlas, got some of "
+                    f"{count} that are nearer"
+                )
 
     def _gaussian(self, done: float, variance: float) -> Iterator[Pass]:
         """From one variance to another [mm^2], in as many parts as it takes for each to stay within the margin."""
@@ -125,3 +167,50 @@ class Atlas:
         if one.source not in self._passes:
             self._passes[one.source] = FullScreen(self.context, one)
         self._passes[one.source].run(one, self.targets)
+
+
+def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tuple[int, int], int]:
+    """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin.
+
+    step  of which columns and rows within the margin are multiples, as `most` is
+    """
+    a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
+    p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
+    flat = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
+    good = np.abs(flat) > 0
+    by_u = ((b - a) * (r - p)[:, 1:] - (c - a) * (q - p)[:, 1:])[good] / flat[good, None]
+    by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
+    area = np.abs(flat[good])
+    extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
+    inner = step * np.maximum(np.round(extent / max(texel, extent.max() / most) / step), np.ceil(8 / step)).astype(int)
+    margin = int(np.clip(min(inner.min() // 12, _apart(mesh, inner) // 2), 2, 24))
+    columns, rows = (inner + 2 * margin).tolist()
+    return (columns, rows), margin
+
+
+def _require_charts(mesh: Mesh) -> None:
+    """InputError on a mesh that cannot be laid out."""
+    count = len(mesh.position)
+    if mesh.uv.shape != (count, 2) or not np.all(np.isfinite(mesh.uv)):
+        raise InputError(f"mesh must have a finite uv at each of {count} vertices, got an array of {mesh.uv.shape}")
+    if not np.all((mesh.uv >= 0) & (mesh.uv <= 1)):
+        raise InputError(f"uv must be in [0, 1], got {mesh.uv[~((mesh.uv >= 0) & (mesh.uv <= 1))][0]:g}")
+    a, b, c = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
+    flat = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    if not np.all(np.abs(flat) > 0):
+        at = int(np.argmin(np.abs(flat)))
+        raise InputError(f"triangles must have an area in the atlas, got 0 of triangle {at} of {len(flat)}")
+
+
+def _apart(mesh: Mesh, inner: Floats) -> float:
+    """Least gap between the boxes of two charts [texels]."""
+    count = len(mesh.position)
+    first, second, third = mesh.triangles.T
+    edges = np.concatenate([first, second]), np.concatenate([second, third])
+    charts, of = connected_components(coo_array((np.ones(edges[0].size), edges), (count, count)), directed=False)
+    low, high = np.full((2, charts, 2), np.inf)
+    np.minimum.at(low, of, mesh.uv * inner)
+    np.minimum.at(high, of, -mesh.uv * inner)
+    gaps = np.max(low[:, None] + high[None, :], axis=-1)  # of the one behind the other, along rows or columns
+    gaps = np.maximum(gaps, gaps.T)
+    return float(np.min(gaps[~np.eye(charts, dtype=bool)], initial=np.inf))

@@ -8,7 +8,8 @@ from numpy.typing import NDArray
 from profilefit.scenes.stage.world import Mesh, parameters, sheet, unit
 
 Floats = NDArray[np.float64]
-GAP = 0.1  # of an atlas between the charts of a heart
+GAP = 1.0 / 6.0  # of an atlas between the charts of a heart
+CHARTS_END = 72  # a number of columns or rows, multiples of which have charts end between two texels
 STEP = 1e-4  # of the differences that are its normals [radius]
 # Its charts, faces of a cube by their right, up and outward axes: three in a row, two rows.
 FACES = (

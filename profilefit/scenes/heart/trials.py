@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.scenes.heart import meshes
-from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.fit import SplitLight
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
-from profilefit.scenes.heart.truth import surface_blur
+from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.buffers import INSIDE, pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
@@ -31,8 +31,7 @@ TEXELS, PIXELS, STRIPES = (0.1, 1.0), (0.08, 0.4), (2.0, 8.0)
 VIEWS, LAMPS = (0.0, 65.0), (20.0, 70.0)  # degrees, of the eye from z, and of the lamp from the eye
 PERIODS = 3.0  # of a sheet of bumps
 LARGEST = 200  # pixels of a side, and texels of half of one
-FINE = 700  # texels of the truth, of a side at most
-COARSE = 0.6  # sigma, in its texels, below which a Gaussian is none for the truth: light does not leave the pixel
+FINE = 10 * meshes.CHARTS_END  # texels of the truth, of a side at most
 SAMPLES, CHOSEN = 64, 400
 EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SHADOWS = 1024
@@ -128,7 +127,7 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
     part = Part(mesh, np.ones((1, 1, 3), np.float32))
     scene = Scene((part,), Light(trial.lamp, (LIGHT,) * 3), (AMBIENT,) * 3, camera)
     size, margin = atlas_size(mesh, trial.texel, LARGEST)
-    finest, _ = atlas_size(mesh, 0.0, FINE)
+    finest, _ = atlas_size(mesh, 0.0, FINE, meshes.CHARTS_END)
     with (
         Stage(context, (side, side), SHADOWS) as stage,
         Atlas(context, size, margin) as atlas,
@@ -145,12 +144,13 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
         stage.upload(replace(buffers, irradiance=light))
         chosen = _chosen(trial, buffers.mask > INSIDE, world)
         at = tuple(chosen.T)
-        truth = _truth(fine, trial.kernel, world[at], light[at].astype(float))
+        own = light[at].astype(float)
+        truth = summed(fine.elements(), trial.kernel.variances, trial.kernel.weights, world[at], own)
         near, far, seen, share = _splits(stage, atlas, trial.kernel, at)
         facing = np.abs(buffers.normal[at][:, 2]).astype(float)
         return SplitLight(
             truth,
-            light[at].astype(float),
+            own,
             near,
             far,
             seen,
@@ -160,22 +160,6 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
             camera.height / side,
             np.sqrt(trial.kernel.variances),
         )
-
-
-def atlas_size(mesh: Mesh, texel: float, most: int) -> tuple[tuple[int, int], int]:
-    """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin."""
-    a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
-    p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
-    flat = (q - p)[:, 0] * (r - p)[:, 1] - (q - p)[:, 1] * (r - p)[:, 0]
-    good = np.abs(flat) > 0
-    by_u = ((b - a) * (r - p)[:, 1:] - (c - a) * (q - p)[:, 1:])[good] / flat[good, None]
-    by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
-    area = np.abs(flat[good])
-    extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
-    inner = np.maximum(np.round(extent / max(texel, extent.max() / most)), 8).astype(int)
-    margin = int(np.clip(inner.min() // 12, 2, 24))
-    columns, rows = (inner + 2 * margin).tolist()
-    return (columns, rows), margin
 
 
 def _aside(eye: Floats, angle: float, turn: float) -> Floats:
@@ -199,17 +183,6 @@ def _chosen(trial: RandomScene, inside: NDArray[np.bool_], world: Floats) -> NDA
         inside = inside & np.all(np.abs(world[..., :2]) < half, axis=-1)
     found = np.argwhere(inside)
     return found[np.linspace(0, len(found) - 1, min(CHOSEN, len(found))).astype(int)]
-
-
-def _truth(fine: Atlas, kernel: Kernel, at: Floats, own: Floats) -> Floats:
-    place, stretch, light = (fine.read(name) for name in ("position_map", "stretch_map", "irradiance_map"))
-    inside = place[..., 3] > INSIDE
-    areas = (stretch[..., 0] * stretch[..., 1])[inside].astype(float)
-    wide = np.sqrt(kernel.variances) > COARSE * fine.texel
-    blurred = surface_blur(
-        place[inside][:, :3], areas, light[inside][:, :3], kernel.variances[wide], kernel.weights[wide], at=at
-    )
-    return blurred + kernel.weights[~wide].sum(axis=0) * own
 
 
 def _splits(

@@ -30,8 +30,6 @@ MOST_PIXELS = 2**16
 NEAREST, FARTHEST = 300.0, 1e4  # of the camera [mm]: the head's band is 122 mm from the middle
 LARGEST_VIEW = 1000.0  # [mm]
 MOST_LIGHT = 1000.0
-# What a file's camera looks at, from which distance and in which direction, and how much of it is seen [mm].
-TARGET, DISTANCE, FROM, HEIGHT = (4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0
 EXPOSURE = 1.1  # of the pictures: few of their pixels are clipped by it
 
 
@@ -48,6 +46,21 @@ class ViewRequest:
     size: tuple[int, int]
 
 
+class Viewpoint(NamedTuple):
+    """What a camera looks at, if a file says nothing [mm].
+
+    target  a point;  distance, direction  from there to the eye, of any length;  height  of what is seen there
+    """
+
+    target: Rgb
+    distance: float
+    direction: Rgb
+    height: float
+
+
+HEAD = Viewpoint((4.0, -6.0, 60.0), 650.0, (-109.0, -4.0, 640.0), 130.0)
+
+
 class Shown(NamedTuple):
     """A technique in a picture: what is measured, and what is shown if that is another one.
 
@@ -59,7 +72,7 @@ class Shown(NamedTuple):
     seen: Technique
 
 
-def view(tables: Tables, content: Table) -> dict[str, Any]:
+def view(tables: Tables, content: Table, default: Viewpoint = HEAD) -> dict[str, Any]:
     """The fields of a `ViewRequest`; InputError that names file, table and key, what was got and what is accepted."""
     named, seen, lit = (tables.table(content, name, {}) for name in TABLES)
     light = Light()
@@ -71,7 +84,7 @@ def view(tables: Tables, content: Table) -> dict[str, Any]:
         "file": tables.file,
         "sampling": tables.made("technique", lambda: Sampling(named.get("samples", 16))),
         "chart": _chart(tables, named),
-        "camera": _camera(tables, seen),
+        "camera": _camera(tables, seen, default),
         "light": Light(direction, tables.three("light", "irradiance", lit, light.irradiance, 0.0, MOST_LIGHT)),
         "ambient": tables.three("light", "ambient", lit, Scene(()).ambient, 0.0, MOST_LIGHT),
         "size": size,
@@ -123,13 +136,13 @@ def _direction(tables: Tables, where: str, table: Table, default: Rgb) -> Rgb:
     return direction
 
 
-def _camera(tables: Tables, seen: Table) -> Camera:
-    """Looks from the front, if a file says nothing; without a height its lens stays the same at every distance."""
-    target = tables.three("camera", "target", seen, TARGET, -150.0, 150.0)
-    distance = tables.number("camera", "distance", seen, DISTANCE, FARTHEST)
+def _camera(tables: Tables, seen: Table, default: Viewpoint) -> Camera:
+    """Without a height its lens stays the same at every distance."""
+    target = tables.three("camera", "target", seen, default.target, -150.0, 150.0)
+    distance = tables.number("camera", "distance", seen, default.distance, FARTHEST)
     if distance < NEAREST:
         raise tables.bad("camera", "distance", f"a length in {NEAREST:g} ... {FARTHEST:g} mm", seen["distance"])
-    height = tables.number("camera", "height", seen, HEIGHT * distance / DISTANCE, LARGEST_VIEW)
-    direction = _direction(tables, "camera", seen, FROM)
+    height = tables.number("camera", "height", seen, default.height * distance / default.distance, LARGEST_VIEW)
+    direction = _direction(tables, "camera", seen, default.direction)
     x, y, z = (np.array(target) + distance * unit(direction)).tolist()
     return Camera((x, y, z), target, height)

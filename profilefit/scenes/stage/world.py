@@ -96,6 +96,11 @@ class Light:
     direction: tuple[float, float, float] = (-0.90, 0.26, 0.36)
     irradiance: Rgb = (3.6, 3.4, 3.1)
 
+    def __post_init__(self) -> None:
+        if not (np.all(np.isfinite(self.direction)) and np.linalg.norm(self.direction) > 0):
+            raise InputError(f"light direction must be a direction, not 0, got {self.direction!r}")
+        _require_light("light irradiance", self.irradiance)
+
 
 @dataclass(frozen=True)
 class Scene:
@@ -107,9 +112,17 @@ class Scene:
     camera: Camera = field(default_factory=Camera)
     f0: float = 0.028  # of skin, n = 1.4
 
+    def __post_init__(self) -> None:
+        _require_light("ambient", self.ambient)
+
     def zoomed(self, height: float) -> Self:
         """The same seen by a camera that shows `height` [mm] at its target."""
         return replace(self, camera=replace(self.camera, height=height))
+
+
+def _require_light(name: str, light: Rgb) -> None:
+    if np.shape(light) != (3,) or not np.all(np.isfinite(light)) or min(light) < 0:
+        raise InputError(f"{name} must be three finite numbers >= 0, got {light!r}")
 
 
 def rgb(values: Iterable[float]) -> Rgb:

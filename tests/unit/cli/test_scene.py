@@ -17,7 +17,12 @@ from profilefit.scenes import SCENES
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
-NEEDED = {"skin": (), "layers": ("layers",)}
+NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",)}
+OWN = {
+    "skin": ("label", "material"),
+    "layers": ("kind", "pose", "single", "least", "most"),
+    "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel"),
+}
 SMALL = """\
 scene = "skin"
 [technique]
@@ -45,7 +50,9 @@ def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
     path.write_text(out, encoding="utf-8")
     content = read_toml(path)
     said, taken = home.read("", content), home.read("", {"scene": name, **{key: content[key] for key in NEEDED[name]}})
-    own = {"skin": ("label", "material"), "layers": ("kind", "pose", "single", "least", "most")}[name]
+    own = {"skin": ("label", "material"), "layers": ("kind", "pose", "single", "least", "most"), "heart": OF_HEART}[
+        name
+    ]
     for key in ("sampling", "chart", "camera", "light", "ambient", "size", *own):
         assert getattr(said, key) == getattr(taken, key), key
 
@@ -78,8 +85,8 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"skin"', '"fog"', "scene must be one of skin, layers, got 'fog'"),
-        ('scene = "skin"', "", "scene must be one of skin, layers, got nothing"),
+        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, got 'fog'"),
+        ('scene = "skin"', "", "scene must be one of skin, layers, heart, got nothing"),
         ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
         ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
         ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
@@ -120,7 +127,7 @@ def test_names_and_places(command, small):
     assert command("scene", "fog", "--example") == (
         2,
         "",
-        "profilefit: NAME must be one of skin, layers with --example, got 'fog'\n",
+        "profilefit: NAME must be one of skin, layers, heart with --example, got 'fog'\n",
     )
     assert command("scene", "nowhere.toml")[0] == 2
     Path("file").write_text("")

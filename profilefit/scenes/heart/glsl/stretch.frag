@@ -1,5 +1,5 @@
 // How far a column and a row of the atlas lead on the surface [mm], in margins as where the surface goes on; 1 inside a
-// chart; 1 where there is a surface.
+// chart; the area of a texel [mm^2], which is less than their product where columns and rows are not at right angles.
 
 uniform sampler2D position_map, filled_map; // of a chart, and with its margin
 out vec4 stretch;
@@ -9,15 +9,16 @@ vec4 point_at(ivec2 texel) {
     return texelFetch(filled_map, texel, 0);
 }
 
-float along(ivec2 here, vec3 own, ivec2 step) {
+vec3 along(ivec2 here, vec3 own, ivec2 step) {
     vec4 ahead = point_at(here + step), behind = point_at(here - step);
     vec3 from = behind.w > 0.5 ? behind.xyz : own, to = ahead.w > 0.5 ? ahead.xyz : own;
-    return length(to - from) / max(ahead.w + behind.w, 1.0);
+    return (to - from) / max(ahead.w + behind.w, 1.0);
 }
 
 void main() {
     ivec2 here = ivec2(gl_FragCoord.xy);
     vec4 own = point_at(here);
+    vec3 column = along(here, own.xyz, ivec2(1, 0)), row = along(here, own.xyz, ivec2(0, 1));
     float inside = step(0.5, texelFetch(position_map, here, 0).w);
-    stretch = own.w * vec4(along(here, own.xyz, ivec2(1, 0)), along(here, own.xyz, ivec2(0, 1)), inside, 1.0);
+    stretch = own.w * vec4(length(column), length(row), inside, length(cross(column, row)));
 }

@@ -1,15 +1,18 @@
 """Light in texture space against the oracle of a sphere, and where an atlas fails if it is made carelessly."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from scipy.ndimage import binary_erosion
 from scipy.special import erf
 
 from profilefit.errors import InputError
-from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import Kernel
 from profilefit.scenes.heart.links import links
-from profilefit.scenes.heart.meshes import ball, bumps
-from profilefit.scenes.heart.truth import sphere_blur
+from profilefit.scenes.heart.meshes import CHARTS_END, ball, bumps, heart
+from profilefit.scenes.heart.truth import sphere_blur, summed
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
@@ -145,3 +148,69 @@ def test_bad_input(stage):
         atlas.draw(stage, other)
     with pytest.raises(InputError, match="margin must be texels from 1 to less than half of 48, got 24"):
         Atlas(stage.context, (64, 48), 24)
+
+
+def area_of(mesh) -> float:
+    a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
+    return 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+
+
+def test_elements_are_the_surface(stage):
+    """Texels of skewed charts are smaller than their sides make them; of a ball, where they are not, as large."""
+    for mesh, skewed in ((heart(RADIUS, 32), True), (ball(RADIUS), False)):
+        part = Part(mesh, WHITE)
+        stage.draw(Scene((part,)))
+        size, margin = atlas_size(mesh, 0.0, 2 * CHARTS_END, CHARTS_END)
+        with Atlas(stage.context, size, margin) as atlas:
+            atlas.draw(stage, part)
+            found, stretch = atlas.elements(), atlas.read("stretch_map")
+        assert found.areas.sum() == pytest.approx(area_of(mesh), rel=0.003)
+        sides = np.prod(stretch[stretch[..., 2] > 0.5][:, :2], axis=1).sum()
+        assert (sides > 1.015 * area_of(mesh)) == skewed
+
+
+def test_a_heart_is_blurred_as_its_sum(stage):
+    """All of it, and next to the seams of six charts; where they lie nearer than margins are wide, that is refused."""
+    part = Part(heart(2.0 * RADIUS), WHITE)
+    stage.draw(Scene((part,)))
+    size, margin = atlas_size(part.mesh, 0.25, 10 * CHARTS_END, CHARTS_END)
+    kernel = Kernel(np.array([0.1, 0.4]), np.array([0.6, 0.4]))
+    with Atlas(stage.context, size, margin) as atlas, Atlas(stage.context, size, 3 * margin) as wide:
+        atlas.draw(stage, part)
+        inside = atlas.read("position_map")[..., 3] > 0.5
+        light = 1.0 + cosine(atlas)
+        found = blurred(atlas, light, kernel)[inside]
+        elements = atlas.elements()
+        expected = summed(elements, kernel.variances, kernel.weights, elements.points, elements.irradiance)[:, 0]
+        at_seams = np.where((inside & ~binary_erosion(inside, np.ones((3, 3))))[inside], elements.areas, 0.0)
+        assert rms(found - expected, elements.areas) < 0.006
+        assert rms(found - expected, at_seams) < 0.01
+        assert rms(light[inside] - expected, elements.areas) > 0.015
+        with pytest.raises(InputError, match=f"charts must lie {6 * margin} texels apart, .* got some of 6 that"):
+            wide.draw(stage, part)
+
+
+def flawed(**changes) -> Part:
+    return Part(replace(bumps(10.0, 0.0, 20.0, 8), **changes), WHITE)
+
+
+SHEET = bumps(10.0, 0.0, 20.0, 8)
+COLLAPSED = np.where(SHEET.uv == SHEET.uv.max(), SHEET.uv[-2, 0], SHEET.uv)
+
+
+@pytest.mark.parametrize(
+    ("part", "message"),
+    [
+        (flawed(uv=np.zeros((81, 0))), r"mesh must have a finite uv at each of 81 vertices, got an array of \(81, 0\)"),
+        (flawed(uv=SHEET.uv * np.nan), "mesh must have a finite uv at each of 81 vertices"),
+        (flawed(uv=2.0 * SHEET.uv), r"uv must be in \[0, 1\], got "),
+        (flawed(uv=0.0 * SHEET.uv), "triangles must have an area in the atlas, got 0 of triangle 0 of 128"),
+        (flawed(uv=COLLAPSED), "triangles must have an area in the atlas, got 0 of triangle 7 of 128"),
+        (flawed(uv=np.abs(SHEET.uv - 0.5)), "charts must not overlap, nor triangles turn over: they cover 6400 texels"),
+    ],
+)
+def test_a_mesh_that_cannot_be_laid_out(stage, part, message):
+    """Refused in one line, before links are made."""
+    stage.draw(Scene((part,)))
+    with Atlas(stage.context, (100, 100), 10) as atlas, pytest.raises(InputError, match=message):
+        atlas.draw(stage, part)

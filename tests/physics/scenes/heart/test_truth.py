@@ -6,7 +6,7 @@ import pytest
 from profilefit.errors import InputError
 from profilefit.scenes.heart import screen_share, split, surface_blur
 from profilefit.scenes.heart.law import Kernel, balance
-from profilefit.scenes.heart.truth import sphere_blur
+from profilefit.scenes.heart.truth import Elements, sphere_blur, summed
 
 VARIANCES, WEIGHTS = np.array([0.3, 2.0, 9.0]), np.array([0.2, 0.5, 0.3])
 RADIUS, COUNT = 3.0, 20_000
@@ -31,6 +31,25 @@ def test_a_sphere_is_its_oracle():
     # Negative control: distances along the surface, or light that is renormalised, are something else.
     wider = sphere_blur(RADIUS, at[:, 2] / RADIUS, 1.02 * VARIANCES, WEIGHTS)
     assert np.max(np.abs(found - wider)) > 1e-3
+
+
+def test_many_gaussians_are_summed_apart():
+    """As all at once, though each takes the points together as wide as it can; those narrower than points stay."""
+    points, areas = sphere()
+    at = points[:: COUNT // 40]
+    light = 1.0 + (points[:, :2] > 0)
+    own = 1.0 + (at[:, :2] > 0)
+    spacing = float(np.sqrt(areas[0]))
+    variances, weights = np.append(1e-6, VARIANCES), np.array([[0.1, 0.2], [0.3, 0.1], [0.2, 0.3], [0.4, 0.4]])
+    found = summed(Elements(points, areas, light, spacing), variances, weights, at, own)
+    expected = weights[0] * own + surface_blur(points, areas, light, VARIANCES, weights[1:], at=at)
+    np.testing.assert_allclose(found, expected, atol=4e-3)
+    assert rms(found - expected) < 2e-3
+    assert rms(own - expected) > 0.1
+
+
+def rms(off: np.ndarray) -> float:
+    return float(np.sqrt(np.mean(off**2)))
 
 
 def test_the_oracle_of_little_and_of_great_curvature():

@@ -1,0 +1,227 @@
+"""A heart of layers under one lamp: HEART.toml, drawn in texture space, on the screen, or by a split of both."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Medium
+from profilefit.laws.gaussians import MOST
+from profilefit.recipes.folder import LOCAL, STACKS, fits_folder
+from profilefit.recipes.stack import fit, sum_record
+from profilefit.recipes.stack.gaussians import SumLight, dense, joint, lights_of
+from profilefit.recipes.stack.record import StackRequest, matching, requested
+from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.scenes.heart import meshes
+from profilefit.scenes.heart.atlas import Atlas, atlas_size
+from profilefit.scenes.heart.law import CROSSOVER, Kernel, crossover_of
+from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
+from profilefit.scenes.heart.truth import summed
+from profilefit.scenes.stage import request
+from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.judge import Judge
+from profilefit.scenes.stage.picture import Drawn, TruthError
+from profilefit.scenes.stage.request import Shown, Viewpoint, ViewRequest
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.technique import Lambert, Technique
+from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
+
+Floats = NDArray[np.float64]
+TABLES = {
+    **request.TABLES,
+    "": ("title", "scene", "unit", "illumination", "layers", "surface", *request.TABLES),
+    "surface": ("kind", "size", "steepness", "roughness"),
+    "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel"),
+}
+SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
+SURFACES = ("heart", "ball", "bumps")
+PERIODS = 3.0  # of a sheet of bumps
+SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
+GAUSSIANS, TEXEL = 6, 0.4
+LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
+MOST_TEXELS = 2048  # of a side, margins left out
+FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
+SEEN = 3.0  # height of a view, in the size of what is seen
+
+
+@dataclass(frozen=True)
+class HeartRequest(ViewRequest):
+    """What a file requests.
+
+    surface    its kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period
+    roughness  of the one lobe that is mirrored, GGX [-]
+    kind       of the technique;  gaussians  of its kernel;  texel  mean side of the atlas's [mm]
+    """
+
+    stack: StackRequest
+    surface: str
+    size_mm: float
+    steepness: float
+    roughness: float
+    kind: str
+    gaussians: int
+    texel: float
+
+    @property
+    def media(self) -> tuple[Medium, Medium, Medium]:
+        """Of red, green, blue."""
+        return self.stack.stack.media
+
+    @cached_property
+    def mesh(self) -> Mesh:
+        if self.surface == "bumps":
+            return meshes.bumps(self.size_mm, self.steepness * self.size_mm, PERIODS * self.size_mm)
+        return getattr(meshes, self.surface)(self.size_mm)
+
+    @property
+    def pixel(self) -> float:
+        """Its side at the target [mm]."""
+        return self.camera.height / self.size[1]
+
+
+class Scattering(NamedTuple):
+    """Of a stack, red, green and blue: what is drawn with, and what it is held against.
+
+    kernel  of as many Gaussians as a technique has;  exact  of so many that they are the exact light [mm^2]
+    colour  A [-]
+    """
+
+    kernel: Kernel
+    exact: Kernel
+    colour: Rgb
+
+    @property
+    def mfp(self) -> Rgb:
+        """What the stage is told: a length that no Gaussian's light falls below for being too short to see [mm]."""
+        return (float(np.sqrt(self.kernel.variances[-1])),) * 3
+
+
+def read(file: str, content: Table) -> HeartRequest:
+    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    tables = Tables(file, TABLES)
+    tables.known("", content)
+    stack = requested(file, content)
+    for medium in stack.stack.media:
+        tables.made("layers", lambda medium=medium: fit.require(medium))  # type: ignore[misc]
+        if any(layer.g > 0 for layer in medium.layers):
+            raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
+    if stack.stack.unit != "mm":
+        raise tables.bad("", "unit", "mm, which the surface is in", stack.stack.unit)
+    if stack.stack.map is not None:
+        raise tables.bad("layers", "thickness", "one number: light is blurred alike all over", "an image")
+    surface, named = (tables.table(content, name, {}) for name in ("surface", "technique"))
+    kind = tables.text("surface", "kind", surface, SURFACES[0], SURFACES)
+    if kind != "bumps" and "steepness" in surface:
+        raise tables.bad("surface", "steepness", "left out where kind is not bumps", surface["steepness"])
+    size = tables.number("surface", "size", surface, SIZE, LARGEST)
+    count = named.get("gaussians", GAUSSIANS)
+    if type(count) is not int or not 1 <= count <= MOST:
+        raise tables.bad("technique", "gaussians", f"a whole number in 1 ... {MOST}", count)
+    view = request.view(tables, content, Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), SEEN * size))
+    found = HeartRequest(
+        **view,
+        stack=stack,
+        surface=kind,
+        size_mm=size,
+        steepness=tables.number("surface", "steepness", surface, STEEPNESS, 1.0),
+        roughness=tables.number("surface", "roughness", surface, WET, 1.0),
+        kind=tables.text("technique", "kind", named, SPLIT, KINDS),
+        gaussians=count,
+        texel=tables.number("technique", "texel", named, TEXEL, LARGEST),
+    )
+    (columns, rows), margin = atlas_size(found.mesh, found.texel, 10 * MOST_TEXELS)
+    if max(columns, rows) - 2 * margin > MOST_TEXELS:
+        accepted = f"a length [mm] of which {MOST_TEXELS} at most make a side of the atlas"
+        raise tables.bad("technique", "texel", accepted, found.texel)
+    return found
+
+
+def draw(context: moderngl.Context, of: HeartRequest) -> Drawn:
+    """The picture, its truth, error and cost: a minute, half of it for exact light if no record has these layers."""
+    with bench(context, of, light_of(of.stack, of.gaussians)) as found:
+        way = found.way(of.kind)
+        return request.drawn(found.judge, of, Shown(of.kind, way, way), found.truth_error)
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A scene that is drawn, with its atlas and its truth."""
+
+    judge: Judge
+    truth_error: TruthError
+    atlas: Atlas
+    part: Part
+    light: Scattering
+    pixel: float
+
+    def way(self, kind: str, constant: float = CROSSOVER) -> Technique:
+        """By one of `KINDS`; constant  of `crossover_of`, where the kernel is split."""
+        if kind == NONE:
+            return Lambert()
+        at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel, constant))
+        return Balanced.of(self.atlas, self.part, self.light.kernel, at, ATLAS, self.light.mfp)
+
+
+@contextmanager
+def bench(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[Bench]:
+    """All that ways to draw a request are measured with."""
+    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
+    n = of.media[0].layers[0].n
+    scene = Scene((part,), of.light, of.ambient, of.camera, ((n - 1.0) / (n + 1.0)) ** 2)
+    size, margin = atlas_size(of.mesh, of.texel, MOST_TEXELS)
+    with Stage(context, of.size) as stage, Atlas(context, size, margin) as atlas:
+        stage.draw(scene)
+        request.require_lit(of.file, stage.buffers())
+        atlas.draw(stage, part)
+        truth, error = truth_of(stage, part, scene, light)
+        inside = stage.buffers().mask > INSIDE
+        yield Bench(Judge(stage, light.mfp, truth, inside), error, atlas, part, light, of.pixel)
+
+
+def truth_of(stage: Stage, part: Part, scene: Scene, light: Scattering) -> tuple[Floats, TruthError]:
+    """(h, w, 3) radiant exitance of what the stage drew, from the whole surface; and what a coarser one changes."""
+    buffers = stage.buffers()
+    inside = buffers.mask > INSIDE
+    own = buffers.irradiance[inside].astype(float)
+    view = scene.camera.view()
+    at = (buffers.position[inside].astype(float) - view[:3, 3]) @ view[:3, :3]
+    exact = light.exact
+    found: list[Floats] = []
+    for most in (FINE, FINE // 2):
+        size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
+        with Atlas(stage.context, size, margin) as fine:
+            fine.draw(stage, part)
+            found.append(np.multiply(light.colour, summed(fine.elements(), exact.variances, exact.weights, at, own)))
+    truth = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
+    truth[inside] = found[0]
+    share = np.abs(found[1] - found[0]) / np.mean(found[0])
+    half, most_of = np.quantile(share, (0.5, 0.9)).tolist()
+    return truth, TruthError(half, most_of, float(np.sqrt(np.mean(share**2))))
+
+
+def light_of(stack: StackRequest, count: int) -> Scattering:
+    """Of a record of these very layers, in ./fits or that is shipped; solved and fitted now where there is none."""
+    media = stack.stack.media
+    for folder in (LOCAL, fits_folder()):
+        found = matching(stack, folder)
+        path = None if found is None else sum_record.beside(folder / STACKS / f"{found.name}.json")
+        if path is not None:
+            record = sum_record.load(path)
+            units = [medium.layers[0].similar.mfp for medium in media]
+            kernel = kernel_of(record.laws(stack.illumination, count), units)
+            return _light(kernel, record.lights(stack.illumination))
+    lights = lights_of(media, stack.illumination)
+    best = joint(lights, count)
+    return _light(Kernel(best.variances, best.weights.T), lights)
+
+
+def _light(kernel: Kernel, lights: tuple[SumLight, ...]) -> Scattering:
+    variances, weights = dense(lights)
+    return Scattering(kernel, Kernel(variances, weights.T), rgb(light.whole for light in lights))

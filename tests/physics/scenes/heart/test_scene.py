@@ -1,0 +1,97 @@
+"""A heart of layers: what a file may say, and how wrong each way draws it."""
+
+from copy import deepcopy
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from mcml_sim.files.text_file import read_toml
+from profilefit.errors import InputError
+from profilefit.recipes.folder import shipped
+from profilefit.scenes.heart import scene
+
+EXAMPLE = read_toml(shipped("examples") / "heart.toml")
+SMALL = {"camera": {"resolution": [64, 48]}, "technique": {"samples": 64, "texel": 0.5}}
+
+
+def content(place="", value=None):
+    """The example, with another value at a dotted place."""
+    found = deepcopy(EXAMPLE)
+    if place:
+        *above, last = place.split(".")
+        part = found
+        for name in above:
+            part = part[int(name) - 1 if isinstance(part, list) else name]
+        part[last] = value
+    return found
+
+
+KEYS = "keys must be of "
+REFUSED = [
+    ("colour", 1, f"{KEYS}title, .*, got 'colour'"),
+    ("surface.colour", 1, rf"\[surface\] {KEYS}kind, size, steepness, roughness, got 'colour'"),
+    ("technique.crossover", 1, rf"\[technique\] {KEYS}kind, samples, chart, gaussians, texel, got 'crossover'"),
+    ("surface.kind", "cow", r"\[surface\] kind must be one of heart, ball, bumps, got 'cow'"),
+    ("surface.size", 0.0, r"\[surface\] size must be a number > 0 and <= 150, got 0.0"),
+    ("surface.steepness", 0.1, r"\[surface\] steepness must be left out where kind is not bumps, got 0.1"),
+    ("surface.roughness", 2.0, r"\[surface\] roughness must be a number > 0 and <= 1, got 2.0"),
+    ("technique.kind", "fog", r"\[technique\] kind must be one of split, texture, screen, none, got 'fog'"),
+    ("technique.gaussians", 9, r"\[technique\] gaussians must be a whole number in 1 ... 8, got 9"),
+    ("technique.gaussians", True, r"\[technique\] gaussians must be a whole number in 1 ... 8, got True"),
+    ("technique.texel", 0.01, r"\[technique\] texel must be a length \[mm\] of which 2048 at most make a side of"),
+    ("technique.texel", float("nan"), r"\[technique\] texel must be a number > 0"),
+    ("light.irradiance", [float("nan"), 1.0, 1.0], r"\[light\] irradiance must be three numbers in 0 ... 1000, got"),
+    ("layers.2.g", 0.9, r"\[layers\] g must be 0, and mu_s reduced"),
+    ("unit", "cm", "unit must be mm, which the surface is in, got 'cm'"),
+]
+
+
+@pytest.mark.parametrize(("place", "value", "message"), REFUSED)
+def test_a_mistake_is_one_line(place, value, message):
+    with pytest.raises(InputError, match=message) as caught:
+        scene.read("heart.toml", content(place, value))
+    text = str(caught.value)
+    assert text.startswith("heart.toml: ")
+    assert text.isprintable()
+
+
+def test_what_is_left_out_is_as_the_example_has_it():
+    found = scene.read("heart.toml", content())
+    least = scene.read("heart.toml", {"scene": "heart", "layers": EXAMPLE["layers"]})
+    for one in (least, replace(least, stack=found.stack)):
+        assert one.stack.stack == found.stack.stack
+        assert one.camera == found.camera
+    assert replace(least, stack=found.stack) == found
+    wide = scene.read("heart.toml", content("surface", {"kind": "ball", "size": 30.0}) | {"camera": {}})
+    assert wide.camera.height == 90.0
+
+
+def test_the_split_is_nearest_to_the_truth(context):
+    """Of a small heart; its layers are those of a record. Next to no light is lost on it."""
+    of = scene.read("heart.toml", {**content(), **SMALL})
+    light = scene.light_of(of.stack, of.gaussians)
+    np.testing.assert_allclose((light.kernel.energy, light.exact.energy), 1.0, atol=1e-9)
+    with scene.bench(context, of, light) as bench:
+        judge, own = bench.judge, bench.truth_error
+        errors = {
+            kind: judge.rmse(judge.stage.scatter(bench.way(kind), judge.mfp, of.sampling)) for kind in scene.KINDS
+        }
+        inside = judge.mask
+        lit = judge.stage.buffers().irradiance[inside].mean(axis=0)
+    assert own.rms < 0.003
+    assert errors["split"] < 0.02
+    assert errors["split"] < min(errors["texture"], errors["screen"])
+    assert errors["none"] > 4.0 * errors["split"]
+    np.testing.assert_allclose(judge.truth[inside].mean(axis=0), light.colour * lit, rtol=0.05)
+
+
+def test_a_picture_beside_its_truth(context):
+    """By the texture alone, of a ball, with one Gaussian."""
+    told = {**content("surface", {"kind": "ball", "size": 15.0}), **SMALL}
+    told["technique"] = {"kind": "texture", "gaussians": 1, "samples": 4}
+    told["camera"] = {"resolution": [32, 24]}
+    found = scene.draw(context, scene.read("ball.toml", told))
+    assert found.picture.shape == found.truth.shape == (24, 32, 3)
+    assert found.point.label == "texture"
+    assert 0.003 < found.point.rmse < 0.03
