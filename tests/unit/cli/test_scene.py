@@ -50,10 +50,7 @@ def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
     path.write_text(out, encoding="utf-8")
     content = read_toml(path)
     said, taken = home.read("", content), home.read("", {"scene": name, **{key: content[key] for key in NEEDED[name]}})
-    own = {"skin": ("label", "material"), "layers": ("kind", "pose", "single", "least", "most"), "heart": OF_HEART}[
-        name
-    ]
-    for key in ("sampling", "chart", "camera", "light", "ambient", "size", *own):
+    for key in ("sampling", "chart", "camera", "light", "ambient", "size", *OWN[name]):
         assert getattr(said, key) == getattr(taken, key), key
 
 
