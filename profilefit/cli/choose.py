@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from profilefit.studies.choose.requirements import Requirements
 
 UNSERVED = 1  # exit status
+HEART = "heart"  # what a scene's file says
 
 
 def choose(
@@ -37,12 +38,15 @@ def choose(
     or traced, in its worst colour, and whether light scattered once needs a pass. Half a minute. --json prints every
     option and its constants. Exit status 1 if no option is within the limits.
 
+    Of a file that `profilefit scene` draws as a heart: whether it needs an atlas, or the screen by itself is enough.
+
     \b
     Example, on a file of profilefit examples:
       profilefit choose examples/skin.toml
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.files.text_file import read_toml
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables.choose_table import choose_table, content
         from profilefit.studies.choose import cost
@@ -50,6 +54,9 @@ def choose(
         from profilefit.studies.choose.layers import of_each_colour
         from profilefit.studies.choose.requirements import read
 
+    if read_toml(scene).get("scene") == HEART:
+        _of_heart(scene, as_json, quiet)
+        return
     requirements = read(scene)
     ratios = _measured(requirements, quiet) if measure else cost.shipped()
     choice = chosen(requirements, ratios, lambda options: tracked(options, "predicting", "options", quiet=quiet))
@@ -61,6 +68,25 @@ def choose(
         screen().print(choose_table(choice, ratios, layers))
     if choice.chosen is None:
         raise typer.Exit(UNSERVED)
+
+
+def _of_heart(file: Path, as_json: bool, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.files.text_file import read_toml
+        from mcml_sim.runs.progress import working
+        from profilefit.report.tables.choose_table import atlas_content, atlas_line
+        from profilefit.scenes.heart.scene import read as read_heart
+        from profilefit.shader import opened
+        from profilefit.studies.choose.atlas import atlas_need
+
+    request = read_heart(str(file), read_toml(file))
+    with working("summing what the screen does not see", quiet), opened() as context:
+        need = atlas_need(context, request)
+    if as_json:
+        print_json(atlas_content(need))
+    else:
+        screen().print(atlas_line(need), markup=False)
 
 
 def _measured(requirements: Requirements, quiet: bool) -> Ratios:

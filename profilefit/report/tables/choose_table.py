@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from rich.console import Group, RenderableType
 from rich.text import Text
@@ -17,6 +17,9 @@ from profilefit.studies.choose.error import CHANNELS, Error
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.predicted import passes
 from profilefit.studies.choose.response import reference_light
+
+if TYPE_CHECKING:  # it draws, which nothing else here does
+    from profilefit.studies.choose.atlas import AtlasNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {
@@ -65,6 +68,17 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
     if layers:
         parts += [Text(), Text(_layer(layers, choice), style="bold")]
     return Group(*parts)
+
+
+def atlas_line(need: AtlasNeed) -> str:
+    """Whether a heart's scene needs an atlas."""
+    misses = f"the screen is wrong by {significant(100 * need.error)} % of the light for what it does not see"
+    return f"{need.verdict}: {misses} (requested: {_percent(need.tolerance)} %)"
+
+
+def atlas_content(need: AtlasNeed) -> dict[str, Any]:
+    """The same as data."""
+    return {"verdict": need.verdict, "error": need.error, "tolerance": need.tolerance}
 
 
 def headline(choice: Choice) -> str:

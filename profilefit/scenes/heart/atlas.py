@@ -29,6 +29,7 @@ from profilefit.shader.emit import text_beside
 
 Floats = NDArray[np.float64]
 EIGHT = np.ones((3, 3))  # a texel and its neighbours
+LEAST = 2  # texels of a margin: linear reads next to an edge
 REACH = 3.3  # of a blur's taps, in its sigma
 SHORTEST = 0.2  # of texels are shorter than those whose margins blurs are made for
 LIGHT, FILLED, STRETCH = "light_map", "filled_map", "stretch_map"
@@ -173,6 +174,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin.
 
     step  of which columns and rows within the margin are multiples, as `most` is
+    As fine as it takes for charts to lie two such margins apart.
     """
     a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
     p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
@@ -182,8 +184,10 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     by_v = ((c - a) * (q - p)[:, :1] - (b - a) * (r - p)[:, :1])[good] / flat[good, None]
     area = np.abs(flat[good])
     extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
-    inner = step * np.maximum(np.round(extent / max(texel, extent.max() / most) / step), np.ceil(8 / step)).astype(int)
-    margin = int(np.clip(min(inner.min() // 12, _apart(mesh, inner) // 2), 2, 24))
+    wanted = extent / max(texel, extent.max() / most)
+    wanted = np.maximum(wanted * max(1.0, 2 * LEAST / _apart(mesh, wanted)), 8)
+    inner = step * np.ceil(np.round(wanted) / step).astype(int)
+    margin = int(np.clip(min(inner.min() // 12, _apart(mesh, inner) // 2), LEAST, 24))
     columns, rows = (inner + 2 * margin).tolist()
     return (columns, rows), margin
 

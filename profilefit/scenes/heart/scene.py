@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -25,29 +25,30 @@ from profilefit.scenes.heart.law import CROSSOVER, Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.buffers import INSIDE
+from profilefit.scenes.stage.buffers import INSIDE, Buffers
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.picture import Drawn, TruthError
 from profilefit.scenes.stage.request import Shown, Viewpoint, ViewRequest
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.technique import Lambert, Technique
-from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
+from profilefit.scenes.stage.world import Camera, Mesh, Part, Rgb, Scene, rgb
 
 Floats = NDArray[np.float64]
 TABLES = {
     **request.TABLES,
     "": ("title", "scene", "unit", "illumination", "layers", "surface", *request.TABLES),
     "surface": ("kind", "size", "steepness", "roughness"),
-    "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel"),
+    "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel", "tolerance"),
 }
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
 SURFACES = ("heart", "ball", "bumps")
 PERIODS = 3.0  # of a sheet of bumps
 SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
-GAUSSIANS, TEXEL = 6, 0.4
+GAUSSIANS, TEXEL, TOLERANCE = 6, 0.4, 0.02
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
 FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
+EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
@@ -58,6 +59,7 @@ class HeartRequest(ViewRequest):
     surface    its kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period
     roughness  of the one lobe that is mirrored, GGX [-]
     kind       of the technique;  gaussians  of its kernel;  texel  mean side of the atlas's [mm]
+    tolerance  of what the screen may miss, over the mean of the light [-]
     """
 
     stack: StackRequest
@@ -68,6 +70,7 @@ class HeartRequest(ViewRequest):
     kind: str
     gaussians: int
     texel: float
+    tolerance: float
 
     @property
     def media(self) -> tuple[Medium, Medium, Medium]:
@@ -135,6 +138,7 @@ def read(file: str, content: Table) -> HeartRequest:
         kind=tables.text("technique", "kind", named, SPLIT, KINDS),
         gaussians=count,
         texel=tables.number("technique", "texel", named, TEXEL, LARGEST),
+        tolerance=tables.number("technique", "tolerance", named, TOLERANCE, 1.0),
     )
     (columns, rows), margin = atlas_size(found.mesh, found.texel, 10 * MOST_TEXELS)
     if max(columns, rows) - 2 * margin > MOST_TEXELS:
@@ -152,7 +156,7 @@ def draw(context: moderngl.Context, of: HeartRequest) -> Drawn:
 
 @dataclass(frozen=True)
 class Bench:
-    """A scene that is drawn, with its atlas and its truth."""
+    """A scene that is drawn, with its atlas and its truth. pixel  its side where the camera looks at [mm]"""
 
     judge: Judge
     truth_error: TruthError
@@ -168,37 +172,63 @@ class Bench:
         at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel, constant))
         return Balanced.of(self.atlas, self.part, self.light.kernel, at, ATLAS, self.light.mfp)
 
+    @contextmanager
+    def with_texels(self, texel: float) -> Iterator[Bench]:
+        """The same, its atlas of another mean side of texels [mm]."""
+        size, margin = atlas_size(self.part.mesh, texel, MOST_TEXELS)
+        with Atlas(self.atlas.context, size, margin) as atlas:
+            atlas.draw(self.judge.stage, self.part)
+            yield replace(self, atlas=atlas)
+
+
+@contextmanager
+def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
+    """A stage that has drawn what is requested, and its one part."""
+    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
+    n = of.media[0].layers[0].n
+    with Stage(context, of.size) as stage:
+        stage.draw(Scene((part,), of.light, of.ambient, of.camera, ((n - 1.0) / (n + 1.0)) ** 2))
+        request.require_lit(of.file, stage.buffers())
+        yield stage, part
+
 
 @contextmanager
 def bench(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[Bench]:
     """All that ways to draw a request are measured with."""
-    part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
-    n = of.media[0].layers[0].n
-    scene = Scene((part,), of.light, of.ambient, of.camera, ((n - 1.0) / (n + 1.0)) ** 2)
     size, margin = atlas_size(of.mesh, of.texel, MOST_TEXELS)
-    with Stage(context, of.size) as stage, Atlas(context, size, margin) as atlas:
-        stage.draw(scene)
-        request.require_lit(of.file, stage.buffers())
+    with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
+        buffers = stage.buffers()
         atlas.draw(stage, part)
-        truth, error = truth_of(stage, part, scene, light)
-        inside = stage.buffers().mask > INSIDE
-        yield Bench(Judge(stage, light.mfp, truth, inside), error, atlas, part, light, of.pixel)
+        places = world(buffers, of.camera)
+        truth, error = truth_of(stage, part, places, light)
+        judged = buffers.mask > INSIDE
+        if of.surface == "bumps":  # which end, where no way knows what comes from beyond
+            half = 0.5 * PERIODS * of.size_mm - EDGE * light.mfp[0]
+            judged &= np.all(np.abs(places[..., :2]) < half, axis=-1)
+        yield Bench(Judge(stage, light.mfp, truth, judged), error, atlas, part, light, of.pixel)
 
 
-def truth_of(stage: Stage, part: Part, scene: Scene, light: Scattering) -> tuple[Floats, TruthError]:
-    """(h, w, 3) radiant exitance of what the stage drew, from the whole surface; and what a coarser one changes."""
+def world(buffers: Buffers, camera: Camera) -> Floats:
+    """Places (h, w, 3) of the world that a camera sees [mm]."""
+    view = camera.view()
+    return (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
+
+
+def truth_of(stage: Stage, part: Part, places: Floats, light: Scattering) -> tuple[Floats, TruthError]:
+    """(h, w, 3) radiant exitance of what the stage drew, from the whole surface; and what a coarser one changes.
+
+    places  (h, w, 3) of the pixels in the world [mm]
+    """
     buffers = stage.buffers()
     inside = buffers.mask > INSIDE
-    own = buffers.irradiance[inside].astype(float)
-    view = scene.camera.view()
-    at = (buffers.position[inside].astype(float) - view[:3, 3]) @ view[:3, :3]
-    exact = light.exact
+    own, exact = buffers.irradiance[inside].astype(float), light.exact
     found: list[Floats] = []
     for most in (FINE, FINE // 2):
         size, margin = atlas_size(part.mesh, 0.0, most, meshes.CHARTS_END)
         with Atlas(stage.context, size, margin) as fine:
             fine.draw(stage, part)
-            found.append(np.multiply(light.colour, summed(fine.elements(), exact.variances, exact.weights, at, own)))
+            gathered = summed(fine.elements(), exact.variances, exact.weights, places[inside], own)
+            found.append(np.multiply(light.colour, gathered))
     truth = np.multiply(buffers.irradiance, buffers.reflectance, dtype=float)
     truth[inside] = found[0]
     share = np.abs(found[1] - found[0]) / np.mean(found[0])

@@ -9,16 +9,18 @@ from functools import cached_property
 import moderngl
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import cKDTree
 
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.fit import SplitLight
-from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart.law import Kernel, missed
 from profilefit.scenes.heart.passes import ATLAS, Balanced, gather_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.buffers import INSIDE, pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface import sees
 from profilefit.scenes.stage.technique import EXITANCE
 from profilefit.scenes.stage.world import Camera, Light, Mesh, Part, Scene, unit
 
@@ -36,6 +38,7 @@ SAMPLES, CHOSEN = 64, 400
 EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SHADOWS = 1024
 LIGHT, AMBIENT = 0.9, 0.1  # irradiance of the lamp, and from everywhere: white is 1
+LIT = 1.5  # irradiance of what the lamp reaches, at least, over that of what it does not
 
 
 @dataclass(frozen=True)
@@ -120,13 +123,16 @@ def mean_sigma(kernel: Kernel) -> float:
     return float(weight @ np.sqrt(kernel.variances) / weight.sum())
 
 
-def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
-    """Draw a trial in every way, and sum its truth at some hundred pixels: some seconds."""
+def measured(context: moderngl.Context, trial: RandomScene, most: int = LARGEST) -> SplitLight:
+    """Draw a trial in every way, and sum its truth at some hundred pixels: some seconds.
+
+    most  pixels of a side, and texels, where they are finer
+    """
     mesh, camera = trial.mesh, trial.camera
-    side = int(min(np.ceil(camera.height / trial.pixel), LARGEST))
+    side = int(min(np.ceil(camera.height / trial.pixel), most))
     part = Part(mesh, np.ones((1, 1, 3), np.float32))
     scene = Scene((part,), Light(trial.lamp, (LIGHT,) * 3), (AMBIENT,) * 3, camera)
-    size, margin = atlas_size(mesh, trial.texel, LARGEST)
+    size, margin = atlas_size(mesh, trial.texel, most)
     finest, _ = atlas_size(mesh, 0.0, FINE, meshes.CHARTS_END)
     with (
         Stage(context, (side, side), SHADOWS) as stage,
@@ -144,8 +150,11 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
         stage.upload(replace(buffers, irradiance=light))
         chosen = _chosen(trial, buffers.mask > INSIDE, world)
         at = tuple(chosen.T)
-        own = light[at].astype(float)
-        truth = summed(fine.elements(), trial.kernel.variances, trial.kernel.weights, world[at], own)
+        own, elements = light[at].astype(float), fine.elements()
+        truth = summed(elements, trial.kernel.variances, trial.kernel.weights, world[at], own)
+        unseen = ~sees(buffers, camera, elements.points)
+        lit = unseen & (elements.irradiance.max(axis=1) > LIT * AMBIENT)
+        away, _ = cKDTree(elements.points[lit]).query(world[at]) if lit.any() else (np.full(1, np.inf), None)
         near, far, seen, share = _splits(stage, atlas, trial.kernel, at)
         facing = np.abs(buffers.normal[at][:, 2]).astype(float)
         return SplitLight(
@@ -159,6 +168,8 @@ def measured(context: moderngl.Context, trial: RandomScene) -> SplitLight:
             atlas.texel,
             camera.height / side,
             np.sqrt(trial.kernel.variances),
+            missed(elements, ~unseen, trial.kernel, world[at], own),
+            float(away.min()),
         )
 
 

@@ -9,10 +9,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from profilefit.errors import InputError
 from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.world import Camera
 
 Floats = NDArray[np.float64]
 # Of normal and ray, at the least: a pixel on an outline has no tangent plane, and shows no more than this makes it.
 LEAST_COSINE = 0.05
+# A point may lie so many pixels off the one that shows it, over the cosine of normal and ray, that at least.
+NEAR, LEAST_SHOWN = 1.5, 0.25
 
 
 @dataclass(frozen=True)
@@ -121,3 +124,20 @@ def seen(buffers: Buffers) -> tuple[Surface, View]:
     right, up, forward = np.diag([1.0, 1.0, -1.0])
     view = View(right, up, forward, buffers.pixel, np.zeros(3) if buffers.is_perspective else None)
     return Surface(position, normal, irradiance, reflectance, buffers.mask > INSIDE), view
+
+
+def sees(buffers: Buffers, camera: Camera, points: ArrayLike) -> NDArray[np.bool_]:
+    """(n,) whether a view sees points (n, 3) of the world: in front of none of them lies another surface [mm]."""
+    view = camera.view()
+    place = np.asarray(points, float) @ view[:3, :3].T + view[:3, 3]
+    rows, columns = buffers.mask.shape
+    depth = -place[:, 2] if camera.is_perspective else np.ones(len(place))
+    side = camera.pixel(rows) * np.maximum(depth, np.finfo(float).tiny)
+    column, row = (np.floor(place[:, axis] / side + 0.5 * of).astype(int) for axis, of in ((0, columns), (1, rows)))
+    within = (depth > 0) & (row >= 0) & (row < rows) & (column >= 0) & (column < columns)
+    at = np.where(within, row, 0), np.where(within, column, 0)
+    there = buffers.position[at].astype(float)
+    ray = there if camera.is_perspective else np.array([[0.0, 0.0, -1.0]])
+    facing = np.abs(np.sum(buffers.normal[at] * ray, axis=1)) / np.linalg.norm(ray, axis=1).clip(np.finfo(float).tiny)
+    near = NEAR * side / np.maximum(facing, LEAST_SHOWN)
+    return within & (buffers.mask[at] > INSIDE) & (np.linalg.norm(place - there, axis=1) < near)

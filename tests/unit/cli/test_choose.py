@@ -9,7 +9,8 @@ from typer.testing import CliRunner
 from profilefit.cli import app
 from profilefit.errors import InputError
 
-SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
+SKIN, HEART = EXAMPLES / "skin.toml", EXAMPLES / "heart.toml"
 
 
 def run(*arguments):
@@ -48,3 +49,12 @@ def test_nothing_serves(tmp_path):
     assert found.exit_code == 1
     assert found.stdout.startswith("No option meets 0.20 % within 5 ms: the most accurate in the budget is ")
     assert "light: diffuse, n = 1.4." in found.stdout
+
+
+def test_whether_a_heart_needs_an_atlas(opengl):
+    found = run(HEART, "--json")
+    told = json.loads(found.stdout)
+    assert told["verdict"] == "no atlas"
+    assert 0 < told["error"] < told["tolerance"] == 0.02
+    line = run(HEART).stdout
+    assert line.startswith(f"no atlas: the screen is wrong by {100 * told['error']:.2g} % of the light for what it")

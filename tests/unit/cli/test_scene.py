@@ -21,7 +21,7 @@ NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",)}
 OWN = {
     "skin": ("label", "material"),
     "layers": ("kind", "pose", "single", "least", "most"),
-    "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel"),
+    "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel", "tolerance"),
 }
 SMALL = """\
 scene = "skin"
