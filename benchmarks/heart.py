@@ -1,29 +1,50 @@
-"""The balance of texture and screen: fitted to sixty random scenes, judged on sixty others.
+"""The balance of texture and screen, fitted to sixty random scenes and judged on sixty others; and the heart's scene.
 
-    python -m benchmarks.heart            # twenty minutes on two cores
+    python -m benchmarks.heart            # half an hour on two cores
     python -m benchmarks.heart --count 6  # fewer scenes
+    python -m benchmarks.heart --scene    # error and cost of the heart, way by way: ten minutes
+    python -m benchmarks.heart --pictures fits/evidence   # the same as figures, with the heart beside its truth
 
-Kernels are six Gaussians of heart and of skin. Errors are root mean squares of light against the sum over the whole
-surface with the same kernel, white 1; ratios are scene by scene, their means geometric.
+Kernels are six Gaussians of heart and of skin. Errors of random scenes are root mean squares of light against the sum
+over the whole surface with the same kernel, white 1; ratios are scene by scene, their means geometric. Those of the
+heart are over the mean light, against exact light; times are of this machine's OpenGL, the least of five turns.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+import profilefit
+from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
 from benchmarks.table import show
+from mcml_sim.files.text_file import read_toml
+from profilefit.recipes.folder import shipped
 from profilefit.recipes.stack.gaussians import alike
 from profilefit.recipes.stack.record import request_of
-from profilefit.scenes.heart import trials
-from profilefit.scenes.heart.fit import GRID, Errors, errors, fitted
-from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart import chart, scene, trials
+from profilefit.scenes.heart.fit import GRID, Errors, SplitLight, errors, fitted
+from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
-from profilefit.shader import opened
+from profilefit.scenes.stage.picture import ChartPoint
+from profilefit.scenes.stage.world import unit
+from profilefit.shader import opened, renderer
 
+FILE = "heart.toml"
 STACKS, COUNT = ("heart", "skin"), 6
 SEEDS = (11, 12)  # of the scenes that are fitted, and of those that judge
+TOLERANCE, NEAR = 0.03, 4.0  # of what the screen may be wrong by [white]; mean sigmas within which light is hidden
+SIZES = ((512, 512), (768, 768), (1024, 1024), (1280, 1280))
+WAYS = {"split": (4, 16, 64), "texture": (1,), "screen": (4, 16, 64), "none": (1,)}
+JUDGED = 2000  # pixels
+TEXELS, VIEWS = (0.2, 0.4, 0.8, 1.6), (0.0, 30.0, 60.0, 90.0, 120.0)  # [mm], degrees from the front
+FINER = (1.6, 0.8, 0.4, 0.2)
+# A sheet that hides light: period 10, amplitude 2, eye at 50 degrees, lamp at 40, in mean free paths of alpha = 0.9.
+SHEET, ALPHA, EYE, LAMP, STRIPES = (10.0, 0.2), 0.9, 50.0, 40.0, 4.0
+PIXEL, OF_SHEET, MOST = 0.1, (0.5, 1.0), 800
 
 
 def kernels() -> list[Kernel]:
@@ -59,17 +80,114 @@ def rows(own: Errors, judged: Errors) -> list[tuple[str, ...]]:
     ]
 
 
-def main() -> None:
+def choices(lights: list[SplitLight], units: list[float]) -> list[tuple[str, ...]]:
+    """How often what the screen misses says rightly whether an atlas is needed: numbers of scenes."""
+    said = np.array([light.rms(light.truth + light.missed) > TOLERANCE for light in lights])
+    clear = np.array([light.hidden > NEAR * one for light, one in zip(lights, units, strict=True)])
+    broken = np.array([light.rms(light.screen) > TOLERANCE for light in lights])
+    return [
+        ("nothing lit is hidden nearby", str(clear.sum()), f"no atlas: {np.count_nonzero(clear & ~said)}"),
+        ("the screen breaks the tolerance", str(broken.sum()), f"atlas: {np.count_nonzero(broken & said)}"),
+        ("all", str(len(lights)), f"atlas: {said.sum()}"),
+    ]
+
+
+def sheets() -> list[tuple[str, ...]]:
+    """Errors on a sheet that hides light, of white, by texels [mean free paths]."""
+    law = profilefit.load("gaussians")
+    weights = np.exp(np.asarray(law.log_weights(ALPHA)))
+    kernel = Kernel(np.asarray(law.variances(ALPHA)), np.repeat(weights[:, None], 3, axis=1))
+    eye, lamp = (unit((np.sin(one), 0.0, np.cos(one))) for one in np.radians((EYE, LAMP)))
+    found = []
+    with opened() as context:
+        for texel in OF_SHEET:
+            trial = trials.RandomScene(
+                "bumps", *SHEET, tuple(eye.tolist()), tuple(lamp.tolist()), STRIPES, texel, PIXEL, kernel
+            )
+            light = trials.measured(context, trial, MOST)
+            split = light.rms(light.light(crossover_of(light.texel, light.pixel), np.inf))
+            of = light.ways()
+            blend = of["constant blend, best in hindsight"]
+            cells = (of["no blur"], of["texture alone"], of["screen alone"], blend, split, blend / split)
+            found.append((f"{texel:g}", *(f"{cell:.3g}" for cell in cells)))
+    return found
+
+
+def request(size: tuple[int, int] = (160, 120)) -> scene.HeartRequest:
+    """The example, at that many pixels."""
+    path = shipped("examples") / FILE
+    return replace(scene.read(str(path), read_toml(Path(path))), size=size)
+
+
+def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tuple[str, ...]], str]:
+    """Error and cost of each way at each size; rows of them and of frames; the device."""
+    light, found, told = scene.light_of(request().stack, COUNT), {}, []
+    with opened() as context:
+        for size in SIZES:
+            with scene.bench(context, request(size), light, JUDGED) as own:
+                found[size] = chart.ways(own, request(size), WAYS)
+                frames = chart.frames(own, ("split", "texture"), sampling=request().sampling)
+            name = f"{size[0]} x {size[1]}"
+            for kind, points in found[size].items():
+                cells = ((str(one.samples), f"{one.rmse:.3g}", f"{min(one.milliseconds):.3g}") for one in points)
+                told += [(name, kind, *cell) for cell in cells]
+            more = frames["split"] / frames["texture"] - 1.0
+            told.append((name, "frame, split over texture", "16", "", f"{100 * more:+.0f} %"))
+        device = renderer(context)
+    return found, told, device
+
+
+def finer() -> list[tuple[str, ...]]:
+    """Errors as the atlas is refined."""
+    found = []
+    light = scene.light_of(request().stack, COUNT)
+    with opened() as context, scene.bench(context, request(), light, JUDGED) as own:
+        for texel in FINER:
+            with own.with_texels(texel) as of:
+                cells = (f"{chart.error(of, kind):.3g}" for kind in ("texture", "split"))
+                found.append((f"{of.atlas.texel:.2g}", *cells))
+    return found
+
+
+def mapped() -> dict[str, np.ndarray]:
+    """Errors by texel and view."""
+    with opened() as context:
+        return chart.over_texel_and_view(context, request(), scene.light_of(request().stack, COUNT), TEXELS, VIEWS)
+
+
+def main(arguments: list[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=60)
-    count = parser.parse_args().count
-    known = kernels()
+    parser.add_argument("--scene", action="store_true", help="error and cost of the heart, only")
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the heart, only")
+    given = parser.parse_args(arguments)
+    if given.scene or given.pictures is not None:
+        of_size, told, device = costs()
+        show(f"The heart on {device}", ("pixels", "way", "samples", "error", "ms"), told)
+        show("As the atlas is refined", ("texel [mm]", "texture", "split"), finer())
+        by_view = mapped()
+        for kind, found in by_view.items():
+            cells = [(f"{texel:g}", *(f"{one:.3g}" for one in row)) for texel, row in zip(TEXELS, found, strict=True)]
+            show(f"Error by {kind}, over texel and view", ("mm", *(f"{one:g} degrees" for one in VIEWS)), cells)
+        if given.pictures is not None:
+            cost_figure(of_size, device, given.pictures / "heart-cost.png")
+            map_figure(by_view, TEXELS, VIEWS, given.pictures / "heart-map.png")
+            heart_picture(request((320, 300)), given.pictures / "render-heart.png")
+        return
+    if given.count < 1:
+        parser.error(f"--count must be a number of scenes > 0, got {given.count}")
+    known, count = kernels(), given.count
     with opened() as context:
-        own, judged = (
-            errors([trials.measured(context, one) for one in trials.drawn(known, count, seed)]) for seed in SEEDS
-        )
+        drawn = {seed: trials.drawn(known, count, seed) for seed in SEEDS}
+        lights = {seed: [trials.measured(context, one) for one in some] for seed, some in drawn.items()}
+    own, judged = (errors(lights[seed]) for seed in SEEDS)
     columns = ("", "value", "1 sigma")
     show(f"{count} scenes are fitted, {count} others judge", columns, rows(own, judged))
+    units = [trials.mean_sigma(one.kernel) for some in drawn.values() for one in some]
+    every = [light for some in lights.values() for light in some]
+    show(f"Is an atlas needed? Tolerance {TOLERANCE:g}", ("scenes", "number", "said"), choices(every, units))
+    columns = ("texel", "no blur", "texture", "screen", "best constant blend", "split", "blend / split")
+    show("A sheet that hides light, eye at 50 degrees", columns, sheets())
 
 
 if __name__ == "__main__":

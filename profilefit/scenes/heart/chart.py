@@ -18,6 +18,7 @@ from profilefit.scenes.stage.world import unit
 
 Floats = NDArray[np.float64]
 SURE = Sampling(64)  # where a map shows what a way is wrong by, not its noise
+CHOSEN = 2000  # pixels of a map's errors
 MAPPED = (SPLIT, TEXTURE, SCREEN)
 
 
@@ -64,11 +65,11 @@ def over_texel_and_view(
     """Errors (texels, views) of texture, screen and their split: texels [mm], and views turned about the upright."""
     found = {kind: np.empty((len(texels), len(degrees))) for kind in MAPPED}
     for column, one in enumerate(degrees):
-        with bench(context, turned(request, one), light) as seen:
+        with bench(context, turned(request, one), light, CHOSEN) as seen:
             for row, texel in enumerate(texels):
                 with seen.with_texels(texel) as own:
                     for kind in MAPPED:
-                        found[kind][row, column] = _error(own, kind)
+                        found[kind][row, column] = error(own, kind)
     return found
 
 
@@ -81,7 +82,7 @@ def blended(found: Bench) -> Blended:
     apart, off = (screen - texture)[judge.mask], (judge.truth - texture)[judge.mask]
     weight = float(np.sum(apart * off) / np.sum(apart**2))
     mixed = texture + weight * (screen - texture)
-    return Blended(_error(found, SPLIT), judge.rmse(texture), judge.rmse(screen), judge.rmse(mixed), weight)
+    return Blended(error(found, SPLIT), judge.rmse(texture), judge.rmse(screen), judge.rmse(mixed), weight)
 
 
 def turned(request: HeartRequest, degrees: float) -> HeartRequest:
@@ -92,6 +93,7 @@ def turned(request: HeartRequest, degrees: float) -> HeartRequest:
     return replace(request, camera=replace(camera, eye=(x, y, z)))
 
 
-def _error(found: Bench, kind: str) -> float:
+def error(found: Bench, kind: str) -> float:
+    """Root mean square error of a way with many samples, over the mean of the truth [-]."""
     judge = found.judge
     return judge.rmse(judge.stage.scatter(found.way(kind), judge.mfp, SURE))

@@ -193,18 +193,24 @@ def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> It
 
 
 @contextmanager
-def bench(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[Bench]:
-    """All that ways to draw a request are measured with."""
+def bench(
+    context: moderngl.Context, of: HeartRequest, light: Scattering, most: int = request.MOST_PIXELS
+) -> Iterator[Bench]:
+    """All that ways to draw a request are measured with, at so many pixels at most."""
     size, margin = atlas_size(of.mesh, of.texel, MOST_TEXELS)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as atlas:
         buffers = stage.buffers()
         atlas.draw(stage, part)
-        places = world(buffers, of.camera)
-        truth, error = truth_of(stage, part, places, light)
-        judged = buffers.mask > INSIDE
+        places, inside = world(buffers, of.camera), buffers.mask > INSIDE
+        judged = inside.copy()
         if of.surface == "bumps":  # which end, where no way knows what comes from beyond
             half = 0.5 * PERIODS * of.size_mm - EDGE * light.mfp[0]
             judged &= np.all(np.abs(places[..., :2]) < half, axis=-1)
+        some = np.flatnonzero(judged)
+        if some.size > most:
+            judged = np.isin(np.arange(judged.size), some[np.linspace(0, some.size - 1, most).astype(int)])
+            inside = judged = judged.reshape(inside.shape)
+        truth, error = truth_of(stage, part, places, inside, light)
         yield Bench(Judge(stage, light.mfp, truth, judged), error, atlas, part, light, of.pixel)
 
 
@@ -214,13 +220,14 @@ def world(buffers: Buffers, camera: Camera) -> Floats:
     return (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
 
 
-def truth_of(stage: Stage, part: Part, places: Floats, light: Scattering) -> tuple[Floats, TruthError]:
+def truth_of(
+    stage: Stage, part: Part, places: Floats, inside: NDArray[np.bool_], light: Scattering
+) -> tuple[Floats, TruthError]:
     """(h, w, 3) radiant exitance of what the stage drew, from the whole surface; and what a coarser one changes.
 
-    places  (h, w, 3) of the pixels in the world [mm]
+    places  (h, w, 3) of the pixels in the world [mm];  inside  (h, w), where it is summed: elsewhere it is Lambert's
     """
     buffers = stage.buffers()
-    inside = buffers.mask > INSIDE
     own, exact = buffers.irradiance[inside].astype(float), light.exact
     found: list[Floats] = []
     for most in (FINE, FINE // 2):
