@@ -39,9 +39,8 @@ def test_ways_and_blends(context, request_small):
 
 def test_a_finer_atlas_is_nearer(context, request_small):
     """The screen by itself has none."""
-    monotone = chart.over_texel_and_view(
-        context, request_small, scene.light_of(request_small.stack, 6), (0.4, 1.6), (0.0,)
-    )
+    light = scene.light_of(request_small.stack, 6)
+    found = chart.over_texel_and_view(context, request_small, light, (0.4, 1.6), (0.0,))
     assert found["texture"][0, 0] < 0.7 * found["texture"][1, 0]
     assert found["split"][0, 0] < found["split"][1, 0]
     assert found["screen"][0, 0] == found["screen"][1, 0]
