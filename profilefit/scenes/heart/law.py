@@ -34,8 +34,8 @@ class Kernel:
         return np.sum(self.weights, axis=0)
 
 
-# Of sixty random scenes; 0.43 to 0.54 as scenes are drawn again (`python -m benchmarks.heart`).
-CROSSOVER = 0.54
+# Of sixty random scenes; 0.54 to 0.66 as scenes are drawn again (`python -m benchmarks.heart`).
+CROSSOVER = 0.6
 
 
 class NearFar(NamedTuple):
@@ -55,13 +55,13 @@ def split(kernel: Kernel, crossover: float) -> NearFar:
 
 
 def crossover_of(texel: float, pixel: float, constant: float = CROSSOVER) -> float:
-    """Where to split: constant * texel^2 / pixel, the mean sides of what both spaces have [length].
+    """Where to split: constant * texel * sqrt(texel / pixel), the mean sides of what both spaces have [length].
 
     The coarser the atlas, the more is left to the screen; less, the coarser the screen is itself.
     """
     if not (texel > 0 and pixel > 0):
         raise InputError(f"texel and pixel must be lengths > 0, got {texel!r} and {pixel!r}")
-    return constant * texel**2 / pixel
+    return constant * texel * float(np.sqrt(texel / pixel))
 
 
 def screen_share(points: ArrayLike, areas: ArrayLike, seen: ArrayLike, kernel: Kernel, at: ArrayLike) -> Floats:

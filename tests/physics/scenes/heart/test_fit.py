@@ -19,7 +19,20 @@ def test_a_balance_is_found_again():
         off = 0.01 * (1.0 + np.abs(np.arange(25) - right))[:, None, None] * np.ones((25, 6, 3))
         ones, none = np.ones((6, 3)), np.zeros((25, 6, 3))
         scenes.append(
-            SplitLight(ones, ones, none, 2.0 + off, 1.0 + off, np.ones((25, 6)), ones[:, 0], texel, pixel, sigma)
+            SplitLight(
+                ones,
+                ones,
+                none,
+                2.0 + off,
+                1.0 + off,
+                np.ones((25, 6)),
+                ones[:, 0],
+                texel,
+                pixel,
+                sigma,
+                0 * ones,
+                np.inf,
+            )
         )
     best, refits = fitted(errors(scenes))
     assert best.constant == pytest.approx(0.8, rel=0.1)
@@ -34,12 +47,12 @@ def test_a_blend_in_hindsight():
     facing, ones = random.random(50), np.ones((50, 3))
     truth = texture + (0.2 + 0.5 * facing)[:, None] * (screen - texture)
     far, atlas = np.stack([screen] * 5), np.stack([texture] * 5)
-    one = SplitLight(truth, ones, 0 * far, far, atlas, np.ones((5, 50)), facing, 0.1, 0.1, np.ones(4))
+    one = SplitLight(truth, ones, 0 * far, far, atlas, np.ones((5, 50)), facing, 0.1, 0.1, np.ones(4), 0 * ones, np.inf)
     assert one.rms(one.blended(np.ones(50), facing)) < 1e-12
     assert 0.01 < one.rms(one.blended(np.ones(50))) < one.rms(texture)
 
 
 def test_the_crossover():
-    assert crossover_of(0.4, 0.2, 0.5) == pytest.approx(0.4)
+    assert crossover_of(0.4, 0.1, 0.5) == pytest.approx(0.4)
     with pytest.raises(InputError, match=r"texel and pixel must be lengths > 0, got 0\.4 and nan"):
         crossover_of(0.4, np.nan)
