@@ -17,6 +17,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
 
 import profilefit
 from benchmarks.heart_figure import cost_figure, heart_picture, map_figure
@@ -29,6 +30,7 @@ from profilefit.scenes.heart import chart, scene, trials
 from profilefit.scenes.heart.fit import GRID, Errors, SplitLight, errors, fitted
 from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import kernel_of
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.world import unit
 from profilefit.shader import opened, renderer
@@ -41,6 +43,7 @@ SIZES = ((512, 512), (768, 768), (1024, 1024), (1280, 1280))
 WAYS = {"split": (4, 16, 64), "texture": (1,), "screen": (4, 16, 64), "none": (1,)}
 JUDGED = 2000  # pixels
 TEXELS, VIEWS = (0.2, 0.4, 0.8, 1.6), (0.0, 30.0, 60.0, 90.0, 120.0)  # [mm], degrees from the front
+SUPER, JITTERS = 8, (0.3, 0.5, 1.0)  # samples of a side; sigma [pixels]
 FINER = (1.6, 0.8, 0.4, 0.2)
 # A sheet that hides light: period 10, amplitude 2, eye at 50 degrees, lamp at 40, in mean free paths of alpha = 0.9.
 SHEET, ALPHA, EYE, LAMP, STRIPES = (10.0, 0.2), 0.9, 50.0, 40.0, 4.0
@@ -149,6 +152,39 @@ def finer() -> list[tuple[str, ...]]:
     return found
 
 
+def edges() -> list[tuple[str, ...]]:
+    """Errors of radiance next to outlines, over the mean of what is seen, against 8 x 8 samples a pixel.
+
+    Jitter is the mean over many frames of a pixel's place moved by a Gaussian: a blur, by its variance.
+    """
+    light, columns, rows = scene.light_of(request().stack, COUNT), *request().size
+    size = (SUPER * columns, SUPER * rows)
+    with opened() as context, scene.bench(context, request(size), light, 1) as own:
+        stage, mfp = own.judge.stage, own.judge.mfp
+        fine = stage.render(own.way("split"), mfp, request().sampling).astype(float)
+        inside = stage.buffers().mask > INSIDE
+    covered = inside.reshape(rows, SUPER, columns, SUPER).mean(axis=(1, 3))
+    outline = (covered > 0) & (covered < 1)
+    mean = fine.reshape(rows, SUPER, columns, SUPER, 3).mean(axis=(1, 3))
+    middle, found = slice(SUPER // 2, None, SUPER), []
+    ways = {"one sample": fine[middle, middle]}
+    for number in (2, 4):
+        places = (np.arange(number) + 0.5) / number * SUPER
+        at = (np.arange(0, size[1], SUPER)[:, None] + places).astype(int).ravel()
+        across = (np.arange(0, size[0], SUPER)[:, None] + places).astype(int).ravel()
+        picked = fine[at][:, across].reshape(rows, number, columns, number, 3)
+        ways[f"{number} x {number} samples"] = picked.mean(axis=(1, 3))
+    for sigma in JITTERS:
+        blurred = gaussian_filter(fine, (sigma * SUPER, sigma * SUPER, 0.0))
+        ways[f"jitter of {sigma:g} pixels"] = blurred[middle, middle]
+    for name, picture in ways.items():
+        off = [
+            np.sqrt(np.mean((picture - mean)[one] ** 2)) / mean[covered == 1].mean() for one in (outline, covered == 1)
+        ]
+        found.append((name, *(f"{one:.3g}" for one in off)))
+    return found
+
+
 def mapped() -> dict[str, np.ndarray]:
     """Errors by texel and view."""
     with opened() as context:
@@ -165,6 +201,8 @@ def main(arguments: list[str] | None = None) -> None:
         of_size, told, device = costs()
         show(f"The heart on {device}", ("pixels", "way", "samples", "error", "ms"), told)
         show("As the atlas is refined", ("texel [mm]", "texture", "split"), finer())
+        columns = ("frames", "at the outline", "inside")
+        show(f"Edges, against {SUPER} x {SUPER} samples a pixel", columns, edges())
         by_view = mapped()
         for kind, found in by_view.items():
             cells = [(f"{texel:g}", *(f"{one:.3g}" for one in row)) for texel, row in zip(TEXELS, found, strict=True)]
