@@ -18,7 +18,7 @@ from profilefit.shader.context import opened
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SECONDS = 120  # of a cell, which takes a tenth of that: what hangs is ended
-NEEDS_OPENGL = ("04-check-the-shader",)
+NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen")
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
@@ -85,8 +85,8 @@ def definitions(source: str) -> Iterator[list[str]]:
         yield block.rstrip().splitlines()
 
 
-def test_there_are_seven_and_a_table_of_them():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07"]
+def test_there_are_eight_and_a_table_of_them():
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08"]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
 
 
@@ -228,6 +228,15 @@ def test_layers_matter_where_mean_free_paths_differ():
 
 
 @pytest.mark.slow
+def test_a_split_is_nearest_on_atlases_of_any_texel():
+    text = printed("08-texture-or-screen")
+    split, texture, screen = (numbers(rf"(?m)texel \S+ mm: (\S+)", line) for line in text.splitlines()[-3:])
+    assert all(a < min(b, c) for a, b, c in zip(split, texture, screen, strict=True))
+    assert max(split) < 1.5 * min(split)
+    assert max(texture) > 2 * min(texture)
+
+
+@pytest.mark.slow
 def test_slider_redraws_after_all_cells_have_run():
     after = "print(len(before), interactive.out.outputs != before)"
     notebook = run(EXPLORE, "before = interactive.out.outputs", "sliders['alpha'].value = 0.2", after)
@@ -244,7 +253,7 @@ def test_without_ipywidgets_one_line_stands_in_for_the_sliders(tmp_path, monkeyp
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("stem", ["03-what-errors-mean-on-screen", "04-check-the-shader"])
+@pytest.mark.parametrize("stem", ["03-what-errors-mean-on-screen", "04-check-the-shader", "08-texture-or-screen"])
 def test_without_opengl_one_line_says_so(stem, monkeypatch):
     monkeypatch.setenv("GLCONTEXT_LINUX_LIBEGL", "libEGL-none.so")
     notebook = run(FOLDER / f"{stem}.ipynb")
