@@ -230,7 +230,7 @@ def test_layers_matter_where_mean_free_paths_differ():
 @pytest.mark.slow
 def test_a_split_is_nearest_on_atlases_of_any_texel():
     text = printed("08-texture-or-screen")
-    split, texture, screen = (numbers(rf"(?m)texel \S+ mm: (\S+)", line) for line in text.splitlines()[-3:])
+    split, texture, screen = (numbers(r"texel \S+ mm: (\S+)", line) for line in text.splitlines()[-3:])
     assert all(a < min(b, c) for a, b, c in zip(split, texture, screen, strict=True))
     assert max(split) < 1.5 * min(split)
     assert max(texture) > 2 * min(texture)
