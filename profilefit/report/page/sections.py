@@ -26,11 +26,15 @@ RENDERS = {
     "render-choices.png": "The same head by each way to sample.",
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
 }
-# `python -m benchmarks.layers --pictures` makes them.
+# `python -m benchmarks.layers --pictures` and `python -m benchmarks.heart --pictures` make them.
 OF_LAYERS = {
     "render-layers.png": "A head of layered skin: its truth, the law of the stack, the first layer's dipole (Zhao et "
     "al.), the nearest half space.",
     "render-ear.png": "An ear lit from behind, by the same three ways.",
+    "render-heart.png": "A heart: its truth, Gaussians split between screen and atlas, texture space alone, the screen "
+    "alone, no light scattering sideways.",
+    "heart-cost.png": "The heart's error over the time of its passes, by each way at four sizes.",
+    "heart-map.png": "The heart's error by texel and view; the least of the three in bold.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),

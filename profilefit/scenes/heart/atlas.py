@@ -139,10 +139,10 @@ class Atlas:
         owner = charts[tuple(nearest)]
         for axis in (0, 1):
             (one, other), (there, here) = ((np.delete(of, -1, axis), np.delete(of, 0, axis)) for of in (owner, away))
-            if np.any((one != other) & (there + here < 2 * self.margin)):
+            if np.any((one != other) & (there + here <= 2 * self.margin)):
                 raise InputError(
-                    f"charts must lie {2 * self.margin} texels apart, twice the margin of this atlas, got some of "
-                    f"{count} that are nearer"
+                    f"charts must lie {2 * self.margin + 1} texels apart, twice the margin of this atlas and one, got "
+                    f"some of {count} that are nearer"
                 )
 
     def _gaussian(self, done: float, variance: float) -> Iterator[Pass]:
@@ -174,7 +174,7 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     """Columns and rows of an atlas whose texels have about a side [mm], no side above so many; and its margin.
 
     step  of which columns and rows within the margin are multiples, as `most` is
-    As fine as it takes for charts to lie two such margins apart.
+    As fine as it takes for charts to lie two such margins and a texel apart.
     """
     a, b, c = (mesh.position[mesh.triangles[:, one]] for one in range(3))
     p, q, r = (mesh.uv[mesh.triangles[:, one]] for one in range(3))
@@ -185,9 +185,9 @@ def atlas_size(mesh: Mesh, texel: float, most: int, step: int = 1) -> tuple[tupl
     area = np.abs(flat[good])
     extent = np.array([np.sqrt(np.average(np.sum(one**2, axis=1), weights=area)) for one in (by_u, by_v)])
     wanted = extent / max(texel, extent.max() / most)
-    wanted = np.maximum(wanted * max(1.0, 2 * LEAST / _apart(mesh, wanted)), 8)
+    wanted = np.maximum(wanted * max(1.0, (2 * LEAST + 1) / _apart(mesh, wanted)), 8)
     inner = step * np.ceil(np.round(wanted) / step).astype(int)
-    margin = int(np.clip(min(inner.min() // 12, _apart(mesh, inner) // 2), LEAST, 24))
+    margin = int(np.clip(min(inner.min() // 12, (_apart(mesh, inner) - 1) // 2), LEAST, 24))
     columns, rows = (inner + 2 * margin).tolist()
     return (columns, rows), margin
 

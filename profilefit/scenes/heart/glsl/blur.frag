@@ -11,6 +11,7 @@ uniform float reach; // of the taps [sigma]
 uniform float widest; // sigma at most, where a texel is next to nothing [texels]
 out vec4 blurred;
 
+const float NARROW = 0.6; // [texels]
 const float SMOOTH = 0.7; // taps that far apart, in sigma of what was blurred, miss nothing of it
 
 float counts(ivec2 texel) {
@@ -27,9 +28,13 @@ void main() {
     int taps = int(ceil(reach * width / float(apart)));
     vec4 sum = counts(here) * texelFetch(filled_map, here, 0);
     float rate = 0.5 * float(apart * apart) / max(width * width, 1e-12);
+    // Samples of a Gaussian that narrow have less than its variance, and of many such blurs next to nothing is left: one
+    // tap to either side has all of it.
+    bool narrow = width < NARROW;
+    if (narrow) taps = 1;
     ivec2 last = textureSize(filled_map, 0) - 1;
     for (int i = 1; i <= taps; ++i) {
-        float weight = exp(-rate * float(i * i));
+        float weight = narrow ? 0.5 * width * width / (1.0 - width * width) : exp(-rate * float(i * i));
         ivec2 step = ivec2(along) * i * apart;
         for (int side = -1; side <= 1; side += 2) {
             ivec2 there = here + side * step;

@@ -24,12 +24,12 @@ def test_ways_and_blends(context, request_small):
     light = scene.light_of(request_small.stack, 6)
     with scene.bench(context, request_small, light, KEPT) as found:
         assert np.count_nonzero(found.judge.mask) == KEPT
-        ways = chart.ways(found, request_small, {"split": (4, 64), "none": (1,)}, turns=2)
-        few, many = ways["split"]
+        ways = chart.ways(found, request_small, {"screen": (4, 64), "none": (1,)}, turns=2)
+        few, many = ways["screen"]
         assert (few.samples, many.samples) == (4, 64)
         assert many.rmse < few.rmse < ways["none"][0].rmse
         assert len(many.milliseconds) == 2
-        assert many.rmse == pytest.approx(chart.error(found, "split"))
+        assert many.rmse == pytest.approx(chart.error(found, "screen"))
         mixed = chart.blended(found)
         assert mixed.blend <= min(mixed.texture, mixed.screen) + 1e-12
         frames = chart.frames(found, ("split", "texture"), turns=1)

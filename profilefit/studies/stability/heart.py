@@ -1,0 +1,146 @@
+"""Where blurs of a heart may fail: poles, seams and stretch of an atlas, and a screen seen aslant. It needs OpenGL.
+
+Light is blurred by one Gaussian at a time, and held against what is known: a ball lit from one side, and an edge of
+light on a plane. Errors are of white.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import erf
+
+from profilefit.scenes.heart.atlas import Atlas
+from profilefit.scenes.heart.law import Kernel
+from profilefit.scenes.heart.meshes import ball, bumps
+from profilefit.scenes.heart.passes import gather_of
+from profilefit.scenes.heart.truth import sphere_blur
+from profilefit.scenes.stage.buffers import pixels
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.world import Camera, Part, Scene, unit
+from profilefit.shader import opened
+from profilefit.studies.stability.causes_of_heart import ANGLE, ATLAS_OF_BALL, LATITUDE, LIGHT, SEEN_ASLANT
+from profilefit.studies.stability.cells import Cells, absolute, judged
+from profilefit.studies.stability.layout import TEXT32, ArgumentAxis
+
+Floats = NDArray[np.float64]
+BOUND = 0.02  # of white: what shows
+RADIUS, TEXELS, MARGIN = 8.0, (192, 96), 24  # of the ball [mm], its atlas, columns and rows
+SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.4)  # [radius]; a texel of the equator is 0.033
+LATITUDES = (0.0, 30.0, 60.0, 75.0, 83.0, 89.0)
+FROM_SEAM = (0, 2, 10, 60)  # columns
+LAMP = (0.6, 0.64, 0.48)
+ROWS, RATIOS = 128, (1, 2, 4, 8, 16)  # of a plane's atlas, and rows over columns
+WIDTHS = (2.0, 6.0, 18.0)  # sigma of a plane's light, in rows
+ANGLES = (0.0, 30.0, 60.0, 75.0, 80.0, 85.0, 87.0, 88.0, 89.0)  # of the eye from the normal
+PLACES = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)  # from the edge [sigma]
+VIEW, SIGMA, SAMPLES = (192, 64), 6.0, 256  # pixels; sigma [pixels, of a plane that faces the eye]
+PROMISED = 85.0  # degrees up to which a screen is held to the bound
+
+
+def cells_of() -> Iterator[Cells]:
+    """A ball's atlas over sigma, latitude and distance from its seam; a plane's over stretch; a screen over angles."""
+    with opened() as context:
+        yield of_ball(context)
+        yield of_stretch(context)
+        yield of_view(context)
+
+
+def of_ball(context: moderngl.Context) -> Cells:
+    """Its atlas under a lamp."""
+    part = _part(ball(RADIUS))
+    size = (TEXELS[0] + 2 * MARGIN, TEXELS[1] + 2 * MARGIN)
+    rows = [MARGIN + int((0.5 + one / 180.0) * TEXELS[1]) for one in LATITUDES]
+    columns = [MARGIN + one for one in FROM_SEAM]
+    found = []
+    with Stage(context, (16, 16), 16) as stage, Atlas(context, size, MARGIN) as atlas:
+        stage.draw(Scene((part,)))
+        atlas.draw(stage, part)
+        towards = atlas.read("normal_map")[..., :3].astype(float) @ np.array(LAMP)
+        for sigma in SIGMAS:
+            light = _blurred(atlas, 1.0 + towards, sigma * RADIUS)
+            right = sphere_blur(RADIUS, towards, [(sigma * RADIUS) ** 2], [1.0])
+            found.append([one[np.ix_(rows, columns)] for one in (light, right)])
+    value, reference = np.stack(found, axis=1)
+    axes = (
+        ArgumentAxis("σ/R", "-", np.array(SIGMAS)),
+        ArgumentAxis(LATITUDE, "degrees", np.array(LATITUDES)),
+        ArgumentAxis("from the seam", "texels", np.array(FROM_SEAM, float)),
+    )
+    return _cells(ATLAS_OF_BALL, axes, value, reference, np.ones(value.shape, bool))
+
+
+def of_stretch(context: moderngl.Context) -> Cells:
+    """An edge of light on a plane, whose columns are wider than its rows: the texel of each that is worst."""
+    value, reference = np.empty((2, len(RATIOS), len(WIDTHS), 2))
+    part = _part(bumps(ROWS / 3.0, 0.0, float(ROWS), 8))
+    with Stage(context, (16, 16), 16) as stage:
+        stage.draw(Scene((part,)))
+        for i, ratio in enumerate(RATIOS):
+            inner, margin = ROWS // ratio, min(24, max(2, ROWS // ratio // 4))
+            with Atlas(context, (inner + 2 * margin, ROWS + 2 * margin), margin) as atlas:
+                atlas.draw(stage, part)
+                place = atlas.read("position_map")
+                for j, sigma in enumerate(WIDTHS):
+                    for axis in (0, 1):
+                        along = place[..., axis].astype(float)
+                        light = _blurred(atlas, (along > 0).astype(float), sigma)
+                        # What the texels of such an atlas hold is an edge as wide as they are.
+                        right = 0.5 + 0.5 * erf(along / (np.sqrt(2.0) * sigma))
+                        here = np.argwhere((place[..., 3] > 0.5) & (np.abs(along) < 0.25 * ROWS))
+                        off = np.abs(light - right)[tuple(here.T)]
+                        at = tuple(here[int(np.argmax(off))])
+                        value[i, j, axis], reference[i, j, axis] = light[at], right[at]
+    axes = (
+        ArgumentAxis("column / row", "-", np.array(RATIOS, float)),
+        ArgumentAxis("σ", "rows", np.array(WIDTHS)),
+        ArgumentAxis("edge", "-", np.arange(2.0), ("across columns", "across rows")),
+    )
+    coarse = np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0]) > np.array(WIDTHS)[:, None]
+    return _cells("atlas that is stretched", axes, value, reference, ~coarse)
+
+
+def of_view(context: moderngl.Context) -> Cells:
+    """An edge of light on a plane seen aslant, blurred on the screen."""
+    value, reference = np.empty((2, len(ANGLES), len(PLACES)))
+    kernel = Kernel(np.array([SIGMA**2]), np.ones((1, 3)))
+    part = _part(bumps(1e4, 0.0, 3e4, 8))
+    with Stage(context, VIEW, 16) as stage:
+        for i, angle in enumerate(np.radians(ANGLES).tolist()):
+            eye = 1e5 * unit((np.sin(angle), 0.0, np.cos(angle)))
+            camera = Camera((float(eye[0]), 0.0, float(eye[2])), height=float(VIEW[1]), kind="orthographic")
+            stage.draw(Scene((part,), camera=camera))
+            buffers = stage.buffers()
+            across = (np.arange(VIEW[0]) + 0.5 - 0.5 * VIEW[0]) / np.cos(angle)
+            buffers.irradiance[:] = (across > 0)[None, :, None]
+            stage.upload(buffers)
+            mean = stage.scatter(gather_of(kernel, (1.0,) * 3), 1.0, Sampling(SAMPLES))[..., 0].mean(axis=0)
+            for j, place in enumerate(PLACES):
+                at = int(np.argmin(np.abs(across - place * SIGMA)))
+                value[i, j], reference[i, j] = mean[at], 0.5 + 0.5 * erf(across[at] / (np.sqrt(2.0) * SIGMA))
+    axes = ArgumentAxis(ANGLE, "degrees", np.array(ANGLES)), ArgumentAxis("from the edge", "σ", np.array(PLACES))
+    inside = np.broadcast_to(np.array(ANGLES)[:, None] <= PROMISED, value.shape)
+    return _cells(SEEN_ASLANT, axes, value, reference, inside)
+
+
+def _part(mesh) -> Part:  # type: ignore[no-untyped-def]
+    return Part(mesh, np.ones((1, 1, 3), np.float32))
+
+
+def _blurred(atlas: Atlas, light: Floats, sigma: float) -> Floats:
+    """(rows, columns) of an irradiance by one Gaussian [mm]."""
+    texels = np.repeat(light[..., None], 4, axis=-1).astype(np.float32)
+    atlas.targets.map("irradiance_map").write(np.ascontiguousarray(texels).tobytes())
+    return pixels(atlas.blur(Kernel(np.array([sigma**2]), np.ones(1))))[..., 0].astype(float)
+
+
+def _cells(
+    subject: str, axes: tuple[ArgumentAxis, ...], value: Floats, reference: Floats, inside: NDArray[np.bool_]
+) -> Cells:
+    error = absolute(value, reference)
+    codes = judged(value, reference, error, BOUND, np.ones(value.shape, bool), np.float32)
+    return Cells(subject, True, LIGHT, TEXT32, axes, value, reference, error, BOUND, inside, codes, dtype=np.float32)
