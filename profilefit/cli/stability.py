@@ -23,7 +23,7 @@ def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Laws, maps, records, or exact, convert, solver, stacks; all there is if none is named.",
+            help="Laws, maps, records, or exact, convert, solver, stacks, heart; none: all but heart (OpenGL).",
             autocompletion=options.tested,
         ),
     ] = None,

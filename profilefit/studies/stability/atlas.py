@@ -18,6 +18,7 @@ from profilefit.studies.stability import (
     fit_cases,
     gradients,
     halfspace,
+    heart,
     law_cells,
     map_cells,
     misuse,
@@ -30,8 +31,9 @@ from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.regions import Region, regions_of
 
-EXACT, CONVERT, SOLVER, STACKS = "exact", "convert", "solver", "stacks"
-FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS)
+EXACT, CONVERT, SOLVER, STACKS, HEART = "exact", "convert", "solver", "stacks", "heart"
+FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS, HEART)
+IF_NAMED = (HEART,)  # it needs OpenGL
 SETTINGS = (Setting(), Setting("diffuse"))
 WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
 # Whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
@@ -84,7 +86,7 @@ def jobs(names: Iterable[str], folder: Folder, quick: bool) -> list[Job]:
         if _is_requested(one, _map_label(one), requested, quick):
             found.append((_map_label(one), _of_map(one, records, quick)))
     for name, job in _functions(records, quick).items():
-        if name in requested or not (requested or quick):
+        if name in requested or not (requested or quick or name in IF_NAMED):
             found.append((name, job))
     _require_known(requested, [name for name, _ in found], profiles, albedos)
     return found
@@ -170,6 +172,7 @@ def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]
         CONVERT: lambda: _part(CONVERT, [*map_cells.conversion_cells(), *misuse.of_convert()]),
         SOLVER: of_solver,
         STACKS: lambda: _part(STACKS, list(stacks.cells_of(folder.folder))),
+        HEART: lambda: _part(HEART, list(heart.cells_of())),
     }
 
 

@@ -1,47 +1,49 @@
-"""What fails in blurs over an atlas and on the screen."""
+"""What fails in blurs over an atlas."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from profilefit.studies.stability.cause import Cause
-from profilefit.studies.stability.cells import Cells, Mask
+from profilefit.studies.stability.cells import Cells, Mask, Verdict
 
-ATLAS_OF_BALL, SEEN_ASLANT, LIGHT = "atlas of a ball", "screen seen aslant", "light"
-LATITUDE, ANGLE = "latitude", "angle"
-POLAR, GRAZING = 80.0, 85.0  # degrees
+LIGHT = "light, blurred"
+WIDTH, LATITUDE, RATIO, IN_ROWS = "σ/R", "latitude", "column / row", "σ"
+WITHIN = 2.0  # sigma from a pole
+FINE = 1.5  # texels of a sigma
+
+
+def near_a_pole(width: np.ndarray, latitude: np.ndarray) -> Mask:
+    """Of Gaussians [radius], at latitudes [degrees]."""
+    return np.asarray(np.radians(90.0 - latitude) < WITHIN * width)
+
+
+def is_coarse(ratio: np.ndarray, sigma: np.ndarray) -> Mask:
+    """Of columns so many rows wide, and Gaussians [rows]."""
+    return np.asarray(sigma < FINE * ratio)
 
 
 def _at_a_pole(cells: Cells) -> Mask:
-    return np.asarray((cells.spread(LATITUDE, 0.0) > POLAR) & (cells.subject == ATLAS_OF_BALL))
-
-
-def _grazing(cells: Cells) -> Mask:
-    return np.asarray((cells.spread(ANGLE, 0.0) > GRAZING) & (cells.subject == SEEN_ASLANT))
+    return near_a_pole(cells.spread(WIDTH, 0.0), cells.spread(LATITUDE, 0.0)) & (cells.quantity == LIGHT)
 
 
 def _coarse(cells: Cells) -> Mask:
-    ratio, sigma = cells.spread("column / row", 0.0), cells.spread("σ", np.inf)
-    return np.asarray((ratio > sigma) & (cells.quantity == LIGHT))
+    return is_coarse(cells.spread(RATIO, 0.0), cells.spread(IN_ROWS, np.inf)) & (cells.quantity == LIGHT)
 
 
 HEART = (
     Cause(
-        "pole",
-        "where the lines of an atlas draw together, texels shorter than a fifth of all are blurred by its margin at most",
-        "a chart over the pole, as a cube has",
+        "wide blur at a pole",
+        "its reach is where an atlas's lines turn: rows and then columns are right to first order in the variance",
+        "charts without poles, as the faces of a cube; or the screen",
         _at_a_pole,
-    ),
-    Cause(
-        "grazing view",
-        "a pixel counts for no more than twenty times its own area, and stands for a strip wider than the kernel",
-        "texture space, which does not know the view, or the split",
-        _grazing,
+        frozenset({Verdict.INACCURATE}),
     ),
     Cause(
         "coarse texels",
-        "sigma is less than a texel: the edge that is blurred is as wide as the texel is",
-        "a finer atlas, or that Gaussian on the screen",
+        "sigma is less than a texel and a half: the edge that is blurred is as wide as a texel",
+        "a finer atlas, or that Gaussian on the screen, as a split has it",
         _coarse,
+        frozenset({Verdict.INACCURATE}),
     ),
 )

@@ -21,9 +21,17 @@ from profilefit.scenes.heart.truth import sphere_blur
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.world import Camera, Part, Scene, unit
+from profilefit.scenes.stage.world import Camera, Mesh, Part, Scene, unit
 from profilefit.shader import opened
-from profilefit.studies.stability.causes_of_heart import ANGLE, ATLAS_OF_BALL, LATITUDE, LIGHT, SEEN_ASLANT
+from profilefit.studies.stability.causes_of_heart import (
+    IN_ROWS,
+    LATITUDE,
+    LIGHT,
+    RATIO,
+    WIDTH,
+    is_coarse,
+    near_a_pole,
+)
 from profilefit.studies.stability.cells import Cells, absolute, judged
 from profilefit.studies.stability.layout import TEXT32, ArgumentAxis
 
@@ -39,7 +47,6 @@ WIDTHS = (2.0, 6.0, 18.0)  # sigma of a plane's light, in rows
 ANGLES = (0.0, 30.0, 60.0, 75.0, 80.0, 85.0, 87.0, 88.0, 89.0)  # of the eye from the normal
 PLACES = (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)  # from the edge [sigma]
 VIEW, SIGMA, SAMPLES = (192, 64), 6.0, 256  # pixels; sigma [pixels, of a plane that faces the eye]
-PROMISED = 85.0  # degrees up to which a screen is held to the bound
 
 
 def cells_of() -> Iterator[Cells]:
@@ -67,11 +74,12 @@ def of_ball(context: moderngl.Context) -> Cells:
             found.append([one[np.ix_(rows, columns)] for one in (light, right)])
     value, reference = np.stack(found, axis=1)
     axes = (
-        ArgumentAxis("σ/R", "-", np.array(SIGMAS)),
+        ArgumentAxis(WIDTH, "-", np.array(SIGMAS)),
         ArgumentAxis(LATITUDE, "degrees", np.array(LATITUDES)),
         ArgumentAxis("from the seam", "texels", np.array(FROM_SEAM, float)),
     )
-    return _cells(ATLAS_OF_BALL, axes, value, reference, np.ones(value.shape, bool))
+    away = ~near_a_pole(np.array(SIGMAS)[:, None, None], np.array(LATITUDES)[:, None])
+    return _cells("atlas of a ball", axes, value, reference, away)
 
 
 def of_stretch(context: moderngl.Context) -> Cells:
@@ -89,18 +97,17 @@ def of_stretch(context: moderngl.Context) -> Cells:
                     for axis in (0, 1):
                         along = place[..., axis].astype(float)
                         light = _blurred(atlas, (along > 0).astype(float), sigma)
-                        # What the texels of such an atlas hold is an edge as wide as they are.
                         right = 0.5 + 0.5 * erf(along / (np.sqrt(2.0) * sigma))
                         here = np.argwhere((place[..., 3] > 0.5) & (np.abs(along) < 0.25 * ROWS))
                         off = np.abs(light - right)[tuple(here.T)]
                         at = tuple(here[int(np.argmax(off))])
                         value[i, j, axis], reference[i, j, axis] = light[at], right[at]
     axes = (
-        ArgumentAxis("column / row", "-", np.array(RATIOS, float)),
-        ArgumentAxis("σ", "rows", np.array(WIDTHS)),
+        ArgumentAxis(RATIO, "-", np.array(RATIOS, float)),
+        ArgumentAxis(IN_ROWS, "rows", np.array(WIDTHS)),
         ArgumentAxis("edge", "-", np.arange(2.0), ("across columns", "across rows")),
     )
-    coarse = np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0]) > np.array(WIDTHS)[:, None]
+    coarse = is_coarse(np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0]), np.array(WIDTHS)[:, None])
     return _cells("atlas that is stretched", axes, value, reference, ~coarse)
 
 
@@ -122,12 +129,11 @@ def of_view(context: moderngl.Context) -> Cells:
             for j, place in enumerate(PLACES):
                 at = int(np.argmin(np.abs(across - place * SIGMA)))
                 value[i, j], reference[i, j] = mean[at], 0.5 + 0.5 * erf(across[at] / (np.sqrt(2.0) * SIGMA))
-    axes = ArgumentAxis(ANGLE, "degrees", np.array(ANGLES)), ArgumentAxis("from the edge", "σ", np.array(PLACES))
-    inside = np.broadcast_to(np.array(ANGLES)[:, None] <= PROMISED, value.shape)
-    return _cells(SEEN_ASLANT, axes, value, reference, inside)
+    axes = ArgumentAxis("angle", "degrees", np.array(ANGLES)), ArgumentAxis("from the edge", "σ", np.array(PLACES))
+    return _cells("screen seen aslant", axes, value, reference, np.ones(value.shape, bool))
 
 
-def _part(mesh) -> Part:  # type: ignore[no-untyped-def]
+def _part(mesh: Mesh) -> Part:
     return Part(mesh, np.ones((1, 1, 3), np.float32))
 
 
@@ -141,6 +147,6 @@ def _blurred(atlas: Atlas, light: Floats, sigma: float) -> Floats:
 def _cells(
     subject: str, axes: tuple[ArgumentAxis, ...], value: Floats, reference: Floats, inside: NDArray[np.bool_]
 ) -> Cells:
-    error = absolute(value, reference)
+    error, inside = absolute(value, reference), np.broadcast_to(inside, value.shape)
     codes = judged(value, reference, error, BOUND, np.ones(value.shape, bool), np.float32)
     return Cells(subject, True, LIGHT, TEXT32, axes, value, reference, error, BOUND, inside, codes, dtype=np.float32)
