@@ -2,12 +2,12 @@
 
     python -m benchmarks.heart            # half an hour on two cores
     python -m benchmarks.heart --count 6  # fewer scenes
-    python -m benchmarks.heart --scene    # error and cost of the heart, way by way: ten minutes
+    python -m benchmarks.heart --scene    # error and cost of the heart, way by way: twelve minutes
     python -m benchmarks.heart --pictures fits/evidence   # the same as figures, with the heart beside its truth
 
 Kernels are six Gaussians of heart and of skin. Errors of random scenes are root mean squares of light against the sum
 over the whole surface with the same kernel, white 1; ratios are scene by scene, their means geometric. Those of the
-heart are over the mean light, against exact light; times are of this machine's OpenGL, the least of five turns.
+heart are over the mean light, against exact light; times are of this machine's OpenGL, the least of three turns.
 """
 
 from __future__ import annotations
@@ -41,10 +41,10 @@ SEEDS = (11, 12)  # of the scenes that are fitted, and of those that judge
 TOLERANCE, NEAR = 0.03, 4.0  # of what the screen may be wrong by [white]; mean sigmas within which light is hidden
 SIZES = ((512, 512), (768, 768), (1024, 1024), (1280, 1280))
 WAYS = {"split": (4, 16, 64), "texture": (1,), "screen": (4, 16, 64), "none": (1,)}
-JUDGED = 2000  # pixels
-TEXELS, VIEWS = (0.2, 0.4, 0.8, 1.6), (0.0, 30.0, 60.0, 90.0, 120.0)  # [mm], degrees from the front
+JUDGED, TURNS = 2000, 3  # pixels; of times
+TEXELS, VIEWS = (0.1, 0.2, 0.4, 0.7), (0.0, 60.0, 120.0)  # [mm], degrees from the front
 SUPER, JITTERS = 8, (0.3, 0.5, 1.0)  # samples of a side; sigma [pixels]
-FINER = (1.6, 0.8, 0.4, 0.2)
+FINER = (0.7, 0.4, 0.2, 0.1)
 # A sheet that hides light: period 10, amplitude 2, eye at 50 degrees, lamp at 40, in mean free paths of alpha = 0.9.
 SHEET, ALPHA, EYE, LAMP, STRIPES = (10.0, 0.2), 0.9, 50.0, 40.0, 4.0
 PIXEL, OF_SHEET, MOST = 0.1, (0.5, 1.0), 800
@@ -128,8 +128,8 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
     with opened() as context:
         for size in SIZES:
             with scene.bench(context, request(size), light, JUDGED) as own:
-                found[size] = chart.ways(own, request(size), WAYS)
-                frames = chart.frames(own, ("split", "texture"), sampling=request().sampling)
+                found[size] = chart.ways(own, request(size), WAYS, TURNS)
+                frames = chart.frames(own, ("split", "texture"), TURNS, request().sampling)
             name = f"{size[0]} x {size[1]}"
             for kind, points in found[size].items():
                 cells = ((str(one.samples), f"{one.rmse:.3g}", f"{min(one.milliseconds):.3g}") for one in points)
@@ -210,7 +210,7 @@ def main(arguments: list[str] | None = None) -> None:
         if given.pictures is not None:
             cost_figure(of_size, device, given.pictures / "heart-cost.png")
             map_figure(by_view, TEXELS, VIEWS, given.pictures / "heart-map.png")
-            heart_picture(request((320, 300)), given.pictures / "render-heart.png")
+            heart_picture(request((200, 190)), given.pictures / "render-heart.png")
         return
     if given.count < 1:
         parser.error(f"--count must be a number of scenes > 0, got {given.count}")
