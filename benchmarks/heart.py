@@ -208,8 +208,8 @@ def main(arguments: list[str] | None = None) -> None:
             cells = [(f"{texel:g}", *(f"{one:.3g}" for one in row)) for texel, row in zip(TEXELS, found, strict=True)]
             show(f"Error by {kind}, over texel and view", ("mm", *(f"{one:g} degrees" for one in VIEWS)), cells)
         if given.pictures is not None:
-            cost_figure(of_size, device, given.pictures / "heart-cost.png")
-            map_figure(by_view, TEXELS, VIEWS, given.pictures / "heart-map.png")
+            cost_figure(of_size, device, given.pictures / "render-heart-cost.png")
+            map_figure(by_view, TEXELS, VIEWS, given.pictures / "render-heart-map.png")
             heart_picture(request((200, 190)), given.pictures / "render-heart.png")
         return
     if given.count < 1:

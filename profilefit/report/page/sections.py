@@ -33,8 +33,8 @@ OF_LAYERS = {
     "render-ear.png": "An ear lit from behind, by the same three ways.",
     "render-heart.png": "A heart: its truth, Gaussians split between screen and atlas, texture space alone, the screen "
     "alone, no light scattering sideways.",
-    "heart-cost.png": "The heart's error over the time of its passes, by each way at four sizes.",
-    "heart-map.png": "The heart's error by texel and view; the least of the three in bold.",
+    "render-heart-cost.png": "The heart's error over the time of its passes, by each way at four sizes.",
+    "render-heart-map.png": "The heart's error by texel and view; the least of the three in bold.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),
