@@ -24,7 +24,7 @@ from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, sty
 from profilefit.scenes.skin.law import albedo_of
 from profilefit.scenes.skin.scene import head_scene
 from profilefit.scenes.stage.pattern import MOST_SAMPLES, Sampling
-from profilefit.scenes.stage.request import FROM
+from profilefit.scenes.stage.request import HEAD
 from profilefit.scenes.stage.world import Camera, unit
 
 Floats = NDArray[np.float64]
@@ -58,7 +58,7 @@ class Shot:
 
 def judged_head(context: moderngl.Context, size: tuple[int, int], kept: Path | None) -> AbstractContextManager[Judged]:
     """The head under a surface of n = 1.4 in the colour that this gives the material, with its exact answer."""
-    x, y, z = (np.array(TARGET) + DISTANCE * unit(FROM)).tolist()
+    x, y, z = (np.array(TARGET) + DISTANCE * unit(HEAD.direction)).tolist()
     scene = head_scene(MATERIAL, Camera((x, y, z), TARGET, HEIGHT), setting=SKIN)
     return judged(context, size, kept, True, scene, SCALE, SKIN)
 
