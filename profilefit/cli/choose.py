@@ -11,6 +11,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.options import AsJson, Quiet
 
 if TYPE_CHECKING:
+    from profilefit.recipes.toml_tables import Table
     from profilefit.studies.choose.cost import Ratios
     from profilefit.studies.choose.requirements import Requirements
 
@@ -48,14 +49,18 @@ def choose(
         from mcml_sim.cli.screen import print_json, screen
         from mcml_sim.files.text_file import read_toml
         from mcml_sim.runs.progress import tracked
+        from profilefit.errors import InputError
         from profilefit.report.tables.choose_table import choose_table, content
         from profilefit.studies.choose import cost
         from profilefit.studies.choose.choice import choose as chosen
         from profilefit.studies.choose.layers import of_each_colour
         from profilefit.studies.choose.requirements import read
 
-    if read_toml(scene).get("scene") == HEART:
-        _of_heart(scene, as_json, quiet)
+    told = read_toml(scene)
+    if told.get("scene") == HEART:
+        if measure:
+            raise InputError(f"{scene}: --measure must be left out of a heart's file, of which no cost is asked")
+        _of_heart(scene, told, as_json, quiet)
         return
     requirements = read(scene)
     ratios = _measured(requirements, quiet) if measure else cost.shipped()
@@ -70,17 +75,16 @@ def choose(
         raise typer.Exit(UNSERVED)
 
 
-def _of_heart(file: Path, as_json: bool, quiet: bool) -> None:
+def _of_heart(file: Path, told: Table, as_json: bool, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen
-        from mcml_sim.files.text_file import read_toml
         from mcml_sim.runs.progress import working
         from profilefit.report.tables.choose_table import atlas_content, atlas_line
         from profilefit.scenes.heart.scene import read as read_heart
         from profilefit.shader import opened
         from profilefit.studies.choose.atlas import atlas_need
 
-    request = read_heart(str(file), read_toml(file))
+    request = read_heart(str(file), told)
     with working("summing what the screen does not see", quiet), opened() as context:
         need = atlas_need(context, request)
     if as_json:

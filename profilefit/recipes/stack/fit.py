@@ -27,7 +27,9 @@ from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.recipes import catalogue
 from profilefit.recipes.stack import photons
+from profilefit.recipes.stack.file import LayerStack
 from profilefit.recipes.stack.photons import TracedRings
+from profilefit.recipes.toml_tables import Tables
 
 Floats = NDArray[np.float64]
 THIN, THICK, LONGEST = 0.1, 3.0, 12.0  # thicknesses that are fitted: mean free paths; decay lengths; mean free paths
@@ -200,6 +202,19 @@ def radii(medium: Medium) -> Floats:
 
 def _vector(law: StackLaw):
     return jnp.stack([jnp.asarray(getattr(law, name)) for name in StackLaw.constant_names()])
+
+
+def require_exact(tables: Tables, stack: LayerStack, what: str) -> None:
+    """InputError, in the words of a scene's file, on a stack of which no exact light is known, or not in millimetres.
+
+    what  is in that unit, too
+    """
+    for medium in stack.media:
+        tables.made("layers", lambda medium=medium: require(medium))  # type: ignore[misc]
+        if any(layer.g > 0 for layer in medium.layers):
+            raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
+    if stack.unit != "mm":
+        raise tables.bad("", "unit", f"mm, which {what} is in", stack.unit)
 
 
 def require(medium: Medium) -> None:

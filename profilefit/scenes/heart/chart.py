@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -20,19 +19,6 @@ Floats = NDArray[np.float64]
 SURE = Sampling(64)  # where a map shows what a way is wrong by, not its noise
 CHOSEN = 2000  # pixels of a map's errors
 MAPPED = (SPLIT, TEXTURE, SCREEN)
-
-
-class Blended(NamedTuple):
-    """Errors over the mean of the truth [-]: of both spaces, of their split, and of the best constant blend.
-
-    weight  the screen's of that blend, fitted to the truth itself [-]
-    """
-
-    split: float
-    texture: float
-    screen: float
-    blend: float
-    weight: float
 
 
 def ways(
@@ -71,18 +57,6 @@ def over_texel_and_view(
                     for kind in MAPPED:
                         found[kind][row, column] = error(own, kind)
     return found
-
-
-def blended(found: Bench) -> Blended:
-    """Both spaces and their split, against the constant blend that is nearest to the truth in hindsight."""
-    judge = found.judge
-    texture, screen = (
-        judge.stage.scatter(found.way(kind), judge.mfp, SURE).astype(float) for kind in (TEXTURE, SCREEN)
-    )
-    apart, off = (screen - texture)[judge.mask], (judge.truth - texture)[judge.mask]
-    weight = float(np.sum(apart * off) / np.sum(apart**2))
-    mixed = texture + weight * (screen - texture)
-    return Blended(error(found, SPLIT), judge.rmse(texture), judge.rmse(screen), judge.rmse(mixed), weight)
 
 
 def turned(request: HeartRequest, degrees: float) -> HeartRequest:

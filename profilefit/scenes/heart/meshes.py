@@ -8,6 +8,9 @@ from numpy.typing import NDArray
 from profilefit.scenes.stage.world import Mesh, parameters, sheet, unit
 
 Floats = NDArray[np.float64]
+KINDS = ("heart", "ball", "bumps")
+PERIODS = 3.0  # of a sheet of bumps
+EDGE, MOST_EDGE = 3.0, 0.3  # of a sheet, where nothing is judged: in sigma of the widest Gaussian, in its side at most
 GAP = 1.0 / 6.0  # of an atlas between the charts of a heart
 CHARTS_END = 72  # a number of columns or rows, multiples of which have charts end between two texels
 STEP = 1e-4  # of the differences that are its normals [radius]
@@ -29,6 +32,21 @@ VESSELS = (
 )
 VESSEL = 0.055  # their half width [radius]
 WINDING = 0.05, 9.0  # how far they wind [radius], and how often [1/radius]
+
+
+def surface(kind: str, size: float, steepness: float) -> Mesh:
+    """By one of `KINDS`. size  radius, or period of bumps [length];  steepness  amplitude of those, in their period"""
+    if kind == "bumps":
+        return bumps(size, steepness * size, PERIODS * size)
+    return {"heart": heart, "ball": ball}[kind](size)
+
+
+def off_edges(kind: str, size: float, points: Floats, sigma: float) -> NDArray[np.bool_]:
+    """(...) of points (..., 3): all but those so near to a sheet's edge that no blur knows what comes from beyond."""
+    if kind != "bumps":
+        return np.ones(points.shape[:-1], bool)
+    side = PERIODS * size
+    return np.all(np.abs(points[..., :2]) < 0.5 * side - min(EDGE * sigma, MOST_EDGE * side), axis=-1)
 
 
 def ball(radius: float, rows: int = 96, columns: int = 192) -> Mesh:

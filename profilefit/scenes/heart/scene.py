@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Medium
+from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
 from profilefit.recipes.folder import LOCAL, STACKS, fits_folder
 from profilefit.recipes.stack import fit, sum_record
@@ -21,17 +22,18 @@ from profilefit.recipes.stack.record import StackRequest, matching, requested
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.scenes.heart import meshes
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
-from profilefit.scenes.heart.law import CROSSOVER, Kernel, crossover_of
+from profilefit.scenes.heart.law import Kernel, crossover_of
 from profilefit.scenes.heart.passes import ATLAS, Balanced, kernel_of
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage import request
-from profilefit.scenes.stage.buffers import INSIDE, Buffers
+from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.judge import Judge
 from profilefit.scenes.stage.picture import Drawn, TruthError
 from profilefit.scenes.stage.request import Shown, Viewpoint, ViewRequest
 from profilefit.scenes.stage.stage import Stage
+from profilefit.scenes.stage.surface import evenly, world
 from profilefit.scenes.stage.technique import Lambert, Technique
-from profilefit.scenes.stage.world import Camera, Mesh, Part, Rgb, Scene, rgb
+from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 
 Floats = NDArray[np.float64]
 TABLES = {
@@ -41,14 +43,11 @@ TABLES = {
     "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel", "tolerance"),
 }
 SPLIT, TEXTURE, SCREEN, NONE = KINDS = ("split", "texture", "screen", "none")
-SURFACES = ("heart", "ball", "bumps")
-PERIODS = 3.0  # of a sheet of bumps
 SIZE, STEEPNESS, WET = 15.0, 0.15, 0.2
 GAUSSIANS, TEXEL, TOLERANCE = 6, 0.4, 0.02
 LARGEST = 150.0  # of a surface [mm], as far as cameras look from it
 MOST_TEXELS = 2048  # of a side, margins left out
 FINE = 16 * meshes.CHARTS_END  # texels of the truth's, of a side
-EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SEEN = 3.0  # height of a view, in the size of what is seen
 
 
@@ -79,9 +78,7 @@ class HeartRequest(ViewRequest):
 
     @cached_property
     def mesh(self) -> Mesh:
-        if self.surface == "bumps":
-            return meshes.bumps(self.size_mm, self.steepness * self.size_mm, PERIODS * self.size_mm)
-        return getattr(meshes, self.surface)(self.size_mm)
+        return meshes.surface(self.surface, self.size_mm, self.steepness)
 
     @property
     def pixel(self) -> float:
@@ -111,16 +108,11 @@ def read(file: str, content: Table) -> HeartRequest:
     tables = Tables(file, TABLES)
     tables.known("", content)
     stack = requested(file, content)
-    for medium in stack.stack.media:
-        tables.made("layers", lambda medium=medium: fit.require(medium))  # type: ignore[misc]
-        if any(layer.g > 0 for layer in medium.layers):
-            raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
-    if stack.stack.unit != "mm":
-        raise tables.bad("", "unit", "mm, which the surface is in", stack.stack.unit)
+    fit.require_exact(tables, stack.stack, "the surface")
     if stack.stack.map is not None:
         raise tables.bad("layers", "thickness", "one number: light is blurred alike all over", "an image")
     surface, named = (tables.table(content, name, {}) for name in ("surface", "technique"))
-    kind = tables.text("surface", "kind", surface, SURFACES[0], SURFACES)
+    kind = tables.text("surface", "kind", surface, meshes.KINDS[0], meshes.KINDS)
     if kind != "bumps" and "steepness" in surface:
         raise tables.bad("surface", "steepness", "left out where kind is not bumps", surface["steepness"])
     size = tables.number("surface", "size", surface, SIZE, LARGEST)
@@ -165,11 +157,11 @@ class Bench:
     light: Scattering
     pixel: float
 
-    def way(self, kind: str, constant: float = CROSSOVER) -> Technique:
-        """By one of `KINDS`; constant  of `crossover_of`, where the kernel is split."""
+    def way(self, kind: str) -> Technique:
+        """By one of `KINDS`."""
         if kind == NONE:
             return Lambert()
-        at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel, constant))
+        at = {TEXTURE: 0.0, SCREEN: np.inf}.get(kind, crossover_of(self.atlas.texel, self.pixel))
         return Balanced.of(self.atlas, self.part, self.light.kernel, at, ATLAS, self.light.mfp)
 
     @contextmanager
@@ -202,22 +194,16 @@ def bench(
         buffers = stage.buffers()
         atlas.draw(stage, part)
         places, inside = world(buffers, of.camera), buffers.mask > INSIDE
-        judged = inside.copy()
-        if of.surface == "bumps":  # which end, where no way knows what comes from beyond
-            half = 0.5 * PERIODS * of.size_mm - EDGE * light.mfp[0]
-            judged &= np.all(np.abs(places[..., :2]) < half, axis=-1)
-        some = np.flatnonzero(judged)
-        if some.size > most:
-            judged = np.isin(np.arange(judged.size), some[np.linspace(0, some.size - 1, most).astype(int)])
-            inside = judged = judged.reshape(inside.shape)
+        judged = inside & meshes.off_edges(of.surface, of.size_mm, places, light.mfp[0])
+        if not judged.any():
+            raise InputError(f"{of.file}: the view must show some of the sheet that is not next to its edge")
+        if np.count_nonzero(judged) > most:
+            chosen = evenly(judged, most)
+            judged = np.zeros_like(judged)
+            judged[chosen] = True
+            inside = judged
         truth, error = truth_of(stage, part, places, inside, light)
         yield Bench(Judge(stage, light.mfp, truth, judged), error, atlas, part, light, of.pixel)
-
-
-def world(buffers: Buffers, camera: Camera) -> Floats:
-    """Places (h, w, 3) of the world that a camera sees [mm]."""
-    view = camera.view()
-    return (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
 
 
 def truth_of(

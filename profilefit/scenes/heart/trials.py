@@ -20,7 +20,7 @@ from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.buffers import INSIDE, pixels
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
-from profilefit.scenes.stage.surface import sees
+from profilefit.scenes.stage.surface import evenly, sees, world
 from profilefit.scenes.stage.technique import EXITANCE
 from profilefit.scenes.stage.world import Camera, Light, Mesh, Part, Scene, unit
 
@@ -31,11 +31,9 @@ RADII = {"ball": (3.0, 20.0), "bumps": (5.0, 20.0), "heart": (6.0, 25.0)}  # of 
 STEEPNESS = 0.05, 0.3  # amplitude of bumps, in their period
 TEXELS, PIXELS, STRIPES = (0.1, 1.0), (0.08, 0.4), (2.0, 8.0)
 VIEWS, LAMPS = (0.0, 65.0), (20.0, 70.0)  # degrees, of the eye from z, and of the lamp from the eye
-PERIODS = 3.0  # of a sheet of bumps
 LARGEST = 200  # pixels of a side, and texels of half of one
 FINE = 10 * meshes.CHARTS_END  # texels of the truth, of a side at most
 SAMPLES, CHOSEN = 64, 400
-EDGE = 3.0  # of the widest sigma: so near to where a sheet ends nothing is judged
 SHADOWS = 1024
 LIGHT, AMBIENT = 0.9, 0.1  # irradiance of the lamp, and from everywhere: white is 1
 LIT = 1.5  # irradiance of what the lamp reaches, at least, over that of what it does not
@@ -62,9 +60,7 @@ class RandomScene:
 
     @cached_property
     def mesh(self) -> Mesh:
-        if self.kind == "bumps":
-            return meshes.bumps(self.size, self.steepness * self.size, PERIODS * self.size)
-        return getattr(meshes, self.kind)(self.size)
+        return meshes.surface(self.kind, self.size, self.steepness)
 
     @cached_property
     def camera(self) -> Camera:
@@ -144,17 +140,15 @@ def measured(context: moderngl.Context, trial: RandomScene, most: int = LARGEST)
             one.draw(stage, part)
             _lit(one, trial)
         buffers = stage.buffers()
-        view = camera.view()
-        world = (buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3]
-        light = trial.striped(buffers.irradiance, world).astype(np.float32)
+        places = world(buffers, camera)
+        light = trial.striped(buffers.irradiance, places).astype(np.float32)
         stage.upload(replace(buffers, irradiance=light))
-        chosen = _chosen(trial, buffers.mask > INSIDE, world)
-        at = tuple(chosen.T)
+        at = _chosen(trial, buffers.mask > INSIDE, places)
         own, elements = light[at].astype(float), fine.elements()
-        truth = summed(elements, trial.kernel.variances, trial.kernel.weights, world[at], own)
+        truth = summed(elements, trial.kernel.variances, trial.kernel.weights, places[at], own)
         unseen = ~sees(buffers, camera, elements.points)
         lit = unseen & (elements.irradiance.max(axis=1) > LIT * AMBIENT)
-        away, _ = cKDTree(elements.points[lit]).query(world[at]) if lit.any() else (np.full(1, np.inf), None)
+        away, _ = cKDTree(elements.points[lit]).query(places[at]) if lit.any() else (np.full(1, np.inf), None)
         near, far, seen, share = _splits(stage, atlas, trial.kernel, at)
         facing = np.abs(buffers.normal[at][:, 2]).astype(float)
         return SplitLight(
@@ -168,7 +162,7 @@ def measured(context: moderngl.Context, trial: RandomScene, most: int = LARGEST)
             atlas.texel,
             camera.height / side,
             np.sqrt(trial.kernel.variances),
-            missed(elements, ~unseen, trial.kernel, world[at], own),
+            missed(elements, ~unseen, trial.kernel, places[at], own),
             float(away.min()),
         )
 
@@ -187,13 +181,10 @@ def _lit(atlas: Atlas, trial: RandomScene) -> None:
     atlas.targets.map("irradiance_map").write(np.ascontiguousarray(light).tobytes())
 
 
-def _chosen(trial: RandomScene, inside: NDArray[np.bool_], world: Floats) -> NDArray[np.int64]:
-    """Some of the pixels (n, 2) that see the surface, away from where it ends."""
-    if trial.kind == "bumps":
-        half = 0.5 * PERIODS * trial.size - min(EDGE * np.sqrt(trial.kernel.variances[-1]), 0.3 * PERIODS * trial.size)
-        inside = inside & np.all(np.abs(world[..., :2]) < half, axis=-1)
-    found = np.argwhere(inside)
-    return found[np.linspace(0, len(found) - 1, min(CHOSEN, len(found))).astype(int)]
+def _chosen(trial: RandomScene, inside: NDArray[np.bool_], places: Floats) -> tuple[NDArray[np.intp], ...]:
+    """Some of the pixels that see the surface, away from where it ends."""
+    sigma = float(np.sqrt(trial.kernel.variances[-1]))
+    return evenly(inside & meshes.off_edges(trial.kind, trial.size, places, sigma), CHOSEN)
 
 
 def _splits(

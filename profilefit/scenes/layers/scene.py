@@ -77,12 +77,7 @@ def read(file: str, content: Table) -> LayersRequest:
     tables = Tables(file, TABLES)
     tables.known("", content)
     stack = requested(file, content)
-    for medium in stack.stack.media:
-        tables.made("layers", lambda medium=medium: fit.require(medium))  # type: ignore[misc]
-        if any(layer.g > 0 for layer in medium.layers):
-            raise tables.bad("layers", "g", "0, and mu_s reduced: the exact truth is of isotropic scattering", "more")
-    if stack.stack.unit != "mm":
-        raise tables.bad("", "unit", "mm, which the head is in", stack.stack.unit)
+    fit.require_exact(tables, stack.stack, "the head")
     named = tables.table(content, "technique", {})
     least, most, values = _thickness(tables, content, stack)
     return LayersRequest(

@@ -126,6 +126,18 @@ def seen(buffers: Buffers) -> tuple[Surface, View]:
     return Surface(position, normal, irradiance, reflectance, buffers.mask > INSIDE), view
 
 
+def world(buffers: Buffers, camera: Camera) -> Floats:
+    """Places (h, w, 3) of the world that a camera sees [mm]."""
+    view = camera.view()
+    return np.asarray((buffers.position.astype(float) - view[:3, 3]) @ view[:3, :3], float)
+
+
+def evenly(mask: NDArray[np.bool_], most: int) -> tuple[NDArray[np.intp], ...]:
+    """Rows and columns of at most so many pixels of a mask, spread over all of it."""
+    found = np.argwhere(mask)
+    return tuple(found[np.linspace(0, len(found) - 1, min(most, len(found))).astype(int)].T)
+
+
 def sees(buffers: Buffers, camera: Camera, points: ArrayLike) -> NDArray[np.bool_]:
     """(n,) whether a view sees points (n, 3) of the world: in front of none of them lies another surface [mm]."""
     view = camera.view()

@@ -10,10 +10,10 @@ import numpy as np
 from profilefit.scenes.heart.atlas import Atlas, atlas_size
 from profilefit.scenes.heart.law import missed
 from profilefit.scenes.heart.meshes import CHARTS_END
-from profilefit.scenes.heart.scene import HeartRequest, light_of, staged, world
+from profilefit.scenes.heart.scene import HeartRequest, light_of, staged
 from profilefit.scenes.heart.truth import summed
 from profilefit.scenes.stage.buffers import INSIDE
-from profilefit.scenes.stage.surface import sees
+from profilefit.scenes.stage.surface import evenly, sees, world
 
 CHOSEN = 400  # pixels
 FINE = 6 * CHARTS_END  # texels of a side, of what light goes in
@@ -38,8 +38,7 @@ def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as fine:
         fine.draw(stage, part)
         elements, buffers = fine.elements(), stage.buffers()
-    inside = np.argwhere(buffers.mask > INSIDE)
-    at = tuple(inside[np.linspace(0, len(inside) - 1, min(CHOSEN, len(inside))).astype(int)].T)
+    at = evenly(buffers.mask > INSIDE, CHOSEN)
     places, own = world(buffers, of.camera)[at], buffers.irradiance[at].astype(float)
     off = missed(elements, sees(buffers, of.camera, elements.points), light.kernel, places, own)
     whole = summed(elements, light.kernel.variances, light.kernel.weights, places, own)

@@ -58,3 +58,5 @@ def test_whether_a_heart_needs_an_atlas(opengl):
     assert 0 < told["error"] < told["tolerance"] == 0.02
     line = run(HEART).stdout
     assert line.startswith(f"no atlas: the screen is wrong by {100 * told['error']:.2g} % of the light for what it")
+    refused = run(HEART, "--measure").exception
+    assert str(refused) == f"{HEART}: --measure must be left out of a heart's file, of which no cost is asked"

@@ -1,6 +1,5 @@
 """A heart of layers: what a file may say, and how wrong each way draws it."""
 
-from copy import deepcopy
 from dataclasses import replace
 
 import numpy as np
@@ -10,21 +9,14 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.recipes.folder import shipped
 from profilefit.scenes.heart import scene
+from tests.physics.scenes.examples import changed
 
 EXAMPLE = read_toml(shipped("examples") / "heart.toml")
 SMALL = {"camera": {"resolution": [64, 48]}, "technique": {"samples": 64, "texel": 0.5}}
 
 
 def content(place="", value=None):
-    """The example, with another value at a dotted place."""
-    found = deepcopy(EXAMPLE)
-    if place:
-        *above, last = place.split(".")
-        part = found
-        for name in above:
-            part = part[int(name) - 1 if isinstance(part, list) else name]
-        part[last] = value
-    return found
+    return changed(EXAMPLE, place, value)
 
 
 KEYS = "keys must be of "
@@ -99,3 +91,15 @@ def test_a_picture_beside_its_truth(context):
     assert found.picture.shape == found.truth.shape == (24, 32, 3)
     assert found.point.label == "texture"
     assert 0.003 < found.point.rmse < 0.03
+
+
+def test_a_view_of_nothing_that_is_judged_is_one_line(context):
+    """A sheet's corner, next to its edges."""
+    told = {**content("surface", {"kind": "bumps", "size": 20.0}), **SMALL}
+    told["camera"] = {"resolution": [8, 6], "target": [28.0, 28.0, 0.0], "height": 2.0}
+    of = scene.read("sheet.toml", told)
+    with (
+        pytest.raises(InputError, match="sheet.toml: the view must show some of the sheet that"),
+        scene.bench(context, of, scene.light_of(of.stack, of.gaussians)),
+    ):
+        pass

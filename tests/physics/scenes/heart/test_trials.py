@@ -33,7 +33,7 @@ def test_a_trial_is_what_the_passes_draw(context):
         inside = stage.buffers().mask > 0.5
     assert trial.stripes == 0
     chosen = trials._chosen(trial, inside, np.zeros((*inside.shape, 3)))
-    np.testing.assert_allclose(found.light(0.5, 0.9), picture[tuple(chosen.T)], atol=2e-5)
+    np.testing.assert_allclose(found.light(0.5, 0.9), picture[chosen], atol=2e-5)
     assert found.rms(found.light(0.5, 0.9)) < found.rms(found.lambert)
 
 

@@ -1,6 +1,5 @@
 """A head of layers: what a file may say, how it is posed, and how wrong it is drawn."""
 
-from copy import deepcopy
 from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
@@ -18,6 +17,7 @@ from profilefit.scenes.stage import head
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Light
+from tests.physics.scenes.examples import changed
 
 EXAMPLE = read_toml(shipped("examples") / "layers-head.toml")
 FOOT, WHOLE = -170.0, -40.0  # y below which nothing moves, and above which the head does as one [mm]
@@ -26,18 +26,7 @@ MOVED = [pose for pose in scene.POSES if pose != "rest"]
 
 
 def content(place="", value=None):
-    """The example, with another value at a dotted place; None takes what is there away."""
-    found = deepcopy(EXAMPLE)
-    if place:
-        *above, last = place.split(".")
-        part = found
-        for name in above:
-            part = part[int(name) - 1 if isinstance(part, list) else name]
-        if value is None:
-            del part[last]
-        else:
-            part[last] = value
-    return found
+    return changed(EXAMPLE, place, value)
 
 
 @pytest.fixture
