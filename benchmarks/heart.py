@@ -34,6 +34,7 @@ from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.scenes.stage.world import unit
 from profilefit.shader import opened, renderer
+from profilefit.studies.choose.atlas import AtlasNeed
 
 FILE = "heart.toml"
 STACKS, COUNT = ("heart", "skin"), 6
@@ -85,12 +86,14 @@ def rows(own: Errors, judged: Errors) -> list[tuple[str, ...]]:
 
 def choices(lights: list[SplitLight], units: list[float]) -> list[tuple[str, ...]]:
     """How often what the screen misses says rightly whether an atlas is needed: numbers of scenes."""
-    said = np.array([light.rms(light.truth + light.missed) > TOLERANCE for light in lights])
+    needs = [AtlasNeed(light.rms(light.screen), light.rms(light.truth + light.missed), TOLERANCE) for light in lights]
+    said, broken = np.array([(one.verdict == "atlas", one.is_broken) for one in needs]).T
     clear = np.array([light.hidden > NEAR * one for light, one in zip(lights, units, strict=True)])
-    broken = np.array([light.rms(light.screen) > TOLERANCE for light in lights])
+    hidden = broken & ~clear
     return [
         ("nothing lit is hidden nearby", str(clear.sum()), f"no atlas: {np.count_nonzero(clear & ~said)}"),
         ("the screen breaks the tolerance", str(broken.sum()), f"atlas: {np.count_nonzero(broken & said)}"),
+        ("and something lit is hidden nearby", str(hidden.sum()), f"atlas: {np.count_nonzero(hidden & said)}"),
         ("all", str(len(lights)), f"atlas: {said.sum()}"),
     ]
 

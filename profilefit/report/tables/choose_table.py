@@ -72,13 +72,16 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
 
 def atlas_line(need: AtlasNeed) -> str:
     """Whether a heart's scene needs an atlas."""
-    misses = f"the screen is wrong by {significant(100 * need.error)} % of the light for what it does not see"
-    return f"{need.verdict}: {misses} (requested: {_percent(need.tolerance)} %)"
+    error, hidden = (significant(100 * one) for one in (need.error, need.hidden))
+    misses = f"the screen by itself is wrong by {error} % of the light, by {hidden} % for what it does not see"
+    is_coarse = need.is_broken and need.verdict == "no atlas"
+    advice = "; finer pixels would mend it" if is_coarse else ""
+    return f"{need.verdict}: {misses} (requested: {_percent(need.tolerance)} %){advice}"
 
 
 def atlas_content(need: AtlasNeed) -> dict[str, Any]:
     """The same as data."""
-    return {"verdict": need.verdict, "error": need.error, "tolerance": need.tolerance}
+    return {"verdict": need.verdict, "error": need.error, "hidden": need.hidden, "tolerance": need.tolerance}
 
 
 def headline(choice: Choice) -> str:

@@ -34,7 +34,7 @@ class Kernel:
         return np.sum(self.weights, axis=0)
 
 
-# Of sixty random scenes; 0.54 to 0.66 as scenes are drawn again (`python -m benchmarks.heart`).
+# Of sixty random scenes; 0.48 to 0.60 as scenes are drawn again (`python -m benchmarks.heart`).
 CROSSOVER = 0.6
 
 

@@ -58,7 +58,7 @@ class HeartRequest(ViewRequest):
     surface    its kind;  size  radius, or period of bumps [mm];  steepness  amplitude of those, in their period
     roughness  of the one lobe that is mirrored, GGX [-]
     kind       of the technique;  gaussians  of its kernel;  texel  mean side of the atlas's [mm]
-    tolerance  of what the screen may miss, over the mean of the light [-]
+    tolerance  of what the screen by itself may be wrong by, over the mean of the light [-]
     """
 
     stack: StackRequest
