@@ -147,7 +147,7 @@ def _setting(illumination: str, n: Any, known: Any) -> Setting:
 
 
 def _require_solved(setting: Setting) -> None:
-    if not (isinstance(setting, Setting) and setting.g == 0 and (is_traced(setting.n) or setting.n >= 1)):
+    if not (isinstance(setting, Setting) and setting.is_isotropic and (is_traced(setting.n) or setting.n >= 1)):
         raise SettingError(f"the exact half space has n >= 1 and g = 0, got {setting}: simulate it instead")
 
 

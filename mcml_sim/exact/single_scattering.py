@@ -31,7 +31,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media import fresnel
 from mcml_sim.media.grid import Grid
-from mcml_sim.media.phase import HenyeyGreenstein, Phase
+from mcml_sim.media.phase import Phase
 from mcml_sim.media.setting import Setting
 
 Floats = NDArray[np.float64]
@@ -98,7 +98,7 @@ def critical_rate(setting: Setting = SEARCHLIGHT) -> float:
 @lru_cache(maxsize=64)
 def transform_density(setting: Setting) -> tuple[Floats, Floats]:
     """Nodes k, and f(k) dk on them."""
-    n, phase = setting.n, HenyeyGreenstein(setting.g)
+    n, phase = setting.n, setting.scattering
     critical = critical_rate(setting)
     if setting.illumination == "searchlight":
         f = _searchlight(critical, n, phase)

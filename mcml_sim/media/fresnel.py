@@ -5,13 +5,9 @@ Every function takes numbers, numpy arrays or jax arrays, which broadcast, and k
 
 from __future__ import annotations
 
-from types import ModuleType
 from typing import Any
 
-import jax
-import jax.numpy as jnp
-import numpy as np
-
+from mcml_sim.media.arrays import namespace
 from mcml_sim.media.medium import Medium
 
 
@@ -58,8 +54,3 @@ def specular_reflectance(medium: Medium) -> float:
 def normal_reflectance(n1: float, n2: float) -> float:
     """Fresnel reflectance at normal incidence, ((n1 - n2) / (n1 + n2))^2 [-]."""
     return ((n1 - n2) / (n1 + n2)) ** 2
-
-
-def namespace(*values: Any) -> ModuleType:
-    """jax.numpy if any of the values is a jax array, else numpy."""
-    return jnp if any(isinstance(value, jax.Array) for value in values) else np

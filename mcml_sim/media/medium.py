@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
+from mcml_sim.media import phase as phases
 from mcml_sim.media.checks import is_number, shown
 
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
@@ -23,6 +24,7 @@ class Layer:
     mu_s       scattering coefficient [1/length], >= 0; 0 is clear glass
     g          mean cosine of the scattering angle [-], -1 < g < 1 (also 1 where nothing scatters)
     thickness  [length], > 0; infinite only for the last layer of a medium
+    phase      a phase function of `mcml_sim.phase`, whose mean cosine g is then; None for Henyey and Greenstein's of g
     """
 
     n: float
@@ -30,8 +32,12 @@ class Layer:
     mu_s: float
     g: float
     thickness: float = math.inf
+    phase: phases.Phase | None = None
 
     def __post_init__(self) -> None:
+        if self.phase is not None:
+            for name, value in zip(("g", "phase"), phases.own(self.phase), strict=True):
+                object.__setattr__(self, name, value)
         _require_index("n", self.n)
         for name in ("mu_a", "mu_s"):
             value = getattr(self, name)
@@ -60,12 +66,17 @@ class Layer:
         return 1 / self.mu_t if self.mu_t else math.inf
 
     @property
+    def is_isotropic(self) -> bool:
+        """True where scattering has no preferred direction."""
+        return self.g == 0 and self.phase is None
+
+    @property
     def similar(self) -> Layer:
         """The isotropic layer of equal reduced scattering mu_s' = mu_s (1 - g), which looks the same from afar.
 
         Similarity is an approximation: it fails within a few mean free paths of the source.
         """
-        return replace(self, mu_s=self.mu_s * (1 - self.g), g=0.0)
+        return replace(self, mu_s=self.mu_s * (1 - self.g), g=0.0, phase=None)
 
 
 @dataclass(frozen=True)
@@ -104,7 +115,7 @@ class Medium:
     def is_matched_isotropic_half_space(self) -> bool:
         """True if the medium is one infinite layer that neither refracts at its surface nor prefers a direction."""
         (first, *others) = self.layers
-        return not others and self.is_half_space and first.g == 0 and first.n == self.n_above and first.mu_t > 0
+        return not others and self.is_half_space and first.is_isotropic and first.n == self.n_above and first.mu_t > 0
 
     def with_first(self, thickness: float) -> Medium:
         """The same layers under a first one of another thickness [length]."""

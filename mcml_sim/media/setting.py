@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import math
 import sys
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 from mcml_sim.errors import InputError
+from mcml_sim.media import phase as phases
 from mcml_sim.media.checks import is_number, shown
 
 ILLUMINATIONS = ("searchlight", "diffuse")
@@ -20,6 +23,8 @@ class Setting:
     n             refractive index of the half space over that outside [-], > 0; a jax array () where an exact solution
                   is to be differentiated by it, and nowhere else
     g             mean cosine of the scattering angle [-], -1 < g < 1
+    phase         a phase function of `mcml_sim.phase` in place of g, which is its mean cosine then; None for Henyey and
+                  Greenstein's of g
 
     Profiles, laws and records of different settings never mix.
     """
@@ -27,8 +32,12 @@ class Setting:
     illumination: str = "searchlight"
     n: float = 1.0
     g: float = 0.0
+    phase: phases.Phase | None = None
 
     def __post_init__(self) -> None:
+        if self.phase is not None:
+            for name, value in zip(("g", "phase"), phases.own(self.phase), strict=True):
+                object.__setattr__(self, name, value)
         require_illumination(self.illumination)
         if not (is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)):
             raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")
@@ -38,16 +47,39 @@ class Setting:
     @property
     def is_matched_isotropic(self) -> bool:
         """True where the surface does not refract and scattering has no preferred direction."""
-        return self.n == 1.0 and self.g == 0.0
+        return self.n == 1.0 and self.is_isotropic
+
+    @property
+    def is_isotropic(self) -> bool:
+        """True where scattering has no preferred direction."""
+        return self.g == 0.0 and self.phase is None
+
+    @property
+    def scattering(self) -> phases.Phase:
+        """The phase function."""
+        return phases.HenyeyGreenstein(self.g) if self.phase is None else self.phase
 
     @property
     def is_solved(self) -> bool:
         """True where `mcml_sim.exact` has the half space."""
-        return self.n >= 1.0 and self.g == 0.0
+        return self.n >= 1.0 and self.is_isotropic
+
+    def content(self) -> dict[str, Any]:
+        """What files say of it; `phase` where it is not Henyey and Greenstein's."""
+        told = {"illumination": self.illumination, "n": self.n, "g": self.g}
+        return told if self.phase is None else {**told, "phase": phases.as_table(self.phase)}
+
+    @classmethod
+    def of(cls, content: Mapping[str, Any]) -> Setting:
+        """What `content` gave; InputError or TypeError on anything else."""
+        if "phase" not in content:
+            return cls(**content)
+        return cls(**{**content, "phase": phases.from_table(content["phase"])})
 
     def __str__(self) -> str:
         n = str(self.n) if is_traced(self.n) else f"{self.n:g}"
-        return f"{self.illumination}, n = {n}, g = {self.g:g}"
+        of_phase = "" if self.phase is None else f", phase = {self.phase}"
+        return f"{self.illumination}, n = {n}, g = {self.g:g}{of_phase}"
 
 
 def require_illumination(name: object) -> None:

@@ -27,6 +27,7 @@ import os
 import posixpath
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import read_whole
@@ -200,7 +201,7 @@ def _index(lines: Lines, name: str) -> float:
 def _layer(lines: Lines, at: int, number: int) -> Layer:
     of = f"of layer {at} of {number}"
     n, mu_a, mu_s, g, thickness = lines.take(5, f"n, mu_a, mu_s, g and thickness {of}")
-    values = {
+    values: dict[str, Any] = {
         "n": lines.decimal(f"n {of}", n, INDICES),
         "mu_a": lines.coefficient(f"mu_a {of} in 1/cm", mu_a),
         "mu_s": lines.coefficient(f"mu_s {of} in 1/cm", mu_s),

@@ -54,6 +54,9 @@ def mco_text(tally: Tally, name: str) -> str:
     """What `write_mco` writes into a file of that name."""
     if tally.illumination != "searchlight":
         raise InputError(f"an .mco is of a searchlight, got a tally of {tally.illumination} light")
+    for number, layer in enumerate(tally.medium.layers, start=1):
+        if layer.phase is not None:
+            raise InputError(f"an .mco has g alone for a phase function, got {layer.phase!r} in layer {number}")
     return "".join(_sections(tally, name))
 
 

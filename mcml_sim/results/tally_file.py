@@ -27,6 +27,7 @@ from mcml_sim.files.whole_file import checked_path, write_whole
 from mcml_sim.media.checks import MAX_PHOTONS, checked_whole, is_number, shown
 from mcml_sim.media.grid import Grid, require_resolved
 from mcml_sim.media.medium import MAX_LAYERS, Layer, Medium
+from mcml_sim.media.phase import as_table, from_table
 from mcml_sim.media.setting import require_illumination
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.results.tally import Tally, shapes
@@ -36,7 +37,8 @@ ENDS = ("", "_standard_error", "_effective_samples")  # the fields of an Estimat
 EDGES = ("r_edges", "z_edges", "a_edges")
 LIGHT = "illumination"
 HEADER = frozenset({"format", "mcml_sim", "photons", "seed", "cut", "medium"})
-MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) for kind in (Medium, Layer))
+PHASE = "phase"
+MEDIUM, LAYER = (frozenset(field.name for field in fields(kind)) - {PHASE} for kind in (Medium, Layer))
 MAX_BYTES = 2**28  # of a file; the finest tables have 2^27.2 unpacked
 MOST_FIRST = 2**22  # bytes of edges and header: 65537 numbers an axis, and a thousand layers
 MOST_BEFORE = 512  # bytes of an array's own header
@@ -79,7 +81,7 @@ def results_bytes(tally: Tally) -> bytes:
         "photons": tally.photons,
         "seed": tally.seed,
         "cut": tally.cut,
-        "medium": asdict(tally.medium),
+        "medium": {**asdict(tally.medium), "layers": [_told(layer) for layer in tally.medium.layers]},
     }
     if tally.illumination != "searchlight":  # which files said nothing of when there was no other
         header[LIGHT] = tally.illumination
@@ -151,8 +153,19 @@ def _medium(value: object) -> Medium:
     layers = table.pop("layers")
     if not isinstance(layers, list) or len(layers) > MAX_LAYERS:
         raise ValueError(f"layers must be a list of at most {MAX_LAYERS}, got {shown(layers)}")
-    each = [_table(f"layer {at}", layer, LAYER) for at, layer in enumerate(layers, start=1)]
-    return Medium(tuple(Layer(**layer) for layer in each), **table)
+    return Medium(tuple(_layer(f"layer {at}", layer) for at, layer in enumerate(layers, start=1)), **table)
+
+
+def _told(layer: Layer) -> dict[str, Any]:
+    """A layer; of its phase function only where that is not Henyey and Greenstein's, as files always did."""
+    told = {field.name: getattr(layer, field.name) for field in fields(Layer) if field.name != PHASE}
+    return told if layer.phase is None else {**told, PHASE: as_table(layer.phase)}
+
+
+def _layer(name: str, value: object) -> Layer:
+    told = dict(value) if isinstance(value, dict) else value
+    phase = told.pop(PHASE) if isinstance(told, dict) and PHASE in told else None
+    return Layer(**_table(name, told, LAYER), phase=None if phase is None else from_table(phase))
 
 
 def _grid(arrays: Mapping[str, NDArray]) -> Grid:

@@ -19,7 +19,7 @@ from jax import Array, lax
 from numpy.typing import NDArray
 
 from mcml_sim.media import fresnel
-from mcml_sim.media.phase import HenyeyGreenstein, Phase
+from mcml_sim.media.phase import Phase
 from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import rng
 from mcml_sim.tracing.isotropic_event import STOPPED, azimuth_cosine, has_ended, landed, stop, was_stopped
@@ -65,8 +65,7 @@ class HalfSpaceLanes(NamedTuple):
 
 def half_space(setting: Setting) -> HalfSpace:
     """What the kernel needs to know of a setting."""
-    phase = HenyeyGreenstein(jnp.float32(setting.g))
-    return HalfSpace(jnp.float32(setting.n), phase, jnp.asarray(entry_cosines(setting)))
+    return HalfSpace(jnp.float32(setting.n), setting.scattering.for_kernel(), jnp.asarray(entry_cosines(setting)))
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpaceLanes:

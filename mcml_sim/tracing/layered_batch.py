@@ -165,7 +165,7 @@ def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelS
 
     def flight(number: Array, state: tuple[LayeredLanes, Array, Array]) -> tuple[LayeredLanes, Array, Array]:
         lanes, absorbed, by_cell = state
-        after, left = layered_event.scatter(go, key, lanes, lanes.event + number, here)
+        after, left = layered_event.scatter(go, key, lanes, lanes.event + number, here, stack.others)
         if by_cell.size:
             top = layered_event.pick(stack.top, lanes.layer)
             cell, units = layered_event.staged(go, partial(_cell, bins), after.place, after.down, top, group, left)

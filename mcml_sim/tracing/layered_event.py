@@ -68,7 +68,9 @@ class Stack(NamedTuple):
     absorbs: Array
     """1 - alpha = mu_a / mu_t [-]: a number of its own, since 1 - alpha would lose the digits of weak absorption."""
     phase: Phase
-    """Leaves by layer too."""
+    """Henyey and Greenstein's, its g by layer too."""
+    others: tuple[Phase | None, ...]
+    """Phase functions of layers that have another one, a single one each; what is None is no array."""
     n: Array
     """Refractive indices [-], (layers + 2,): those above and below are first and last."""
 
@@ -117,7 +119,8 @@ def stack(medium: Medium, unit: float) -> Stack:
         "n": [medium.n_above, *(layer.n for layer in layers), medium.n_below],
     }
     arrays = {name: jnp.asarray(np.asarray(values, np.float32)) for name, values in columns.items()}
-    return Stack(phase=HenyeyGreenstein(arrays.pop("g")), **arrays)
+    others = tuple(layer.phase.for_kernel() if layer.phase and layer.mu_s else None for layer in layers)
+    return Stack(phase=HenyeyGreenstein(arrays.pop("g")), others=others, **arrays)
 
 
 def enter(key: Array, photon: Array, first: Array, entry: Array, followed: int) -> LayeredLanes:
@@ -181,13 +184,15 @@ def optics(stack: Stack, layer: Array) -> LayerOptics:
     return jax.tree.map(lambda values: pick(values, layer), everywhere)
 
 
-def scatter(go: Array, key: Array, lanes: LayeredLanes, event: Array, here: LayerOptics) -> tuple[LayeredLanes, Array]:
+def scatter(
+    go: Array, key: Array, lanes: LayeredLanes, event: Array, here: LayerOptics, others: tuple[Phase | None, ...]
+) -> tuple[LayeredLanes, Array]:
     """Fly each photon to its next interaction, absorb a share of it and scatter the rest; or let it wait.
 
-    Also returns what is absorbed. `go` as in `staged`.
+    Also returns what is absorbed. `go` as in `staged`, `others` as in `Stack`.
     """
     paths = staged(go, _paths, key, lanes.down, lanes.weight, lanes.photon, event, here.thickness, here.mfp)
-    turns = staged(go, _turns, key, lanes.photon, event, here.phase)
+    turns = staged(go, _turns, key, lanes.photon, event, here.phase, lanes.layer, others)
     aside = staged(go, _aside, turns)
     moves, cosine, uz = paths > 0, 1 - turns.real, lanes.down.imag
     upright = jnp.abs(uz)
@@ -255,10 +260,16 @@ def _paths(key: Array, down: Array, weight: Array, photon: Array, event: Array, 
     return jnp.where((weight > 0) & (z >= 0) & (z <= thickness), path, 0)
 
 
-def _turns(key: Array, photon: Array, event: Array, phase: Phase) -> Array:
+def _turns(
+    key: Array, photon: Array, event: Array, phase: Phase, layer: Array, others: tuple[Phase | None, ...]
+) -> Array:
     """1 - cosine of the scattering angle, and i times the azimuth / pi."""
     _, cosine_word, azimuth_word = rng.draw_three(key, photon, event)
-    below_one, _ = phase.deflection(rng.symmetric(cosine_word))
+    v = rng.symmetric(cosine_word)
+    below_one, _ = phase.deflection(v)
+    for number, other in enumerate(others, start=1):
+        if other is not None:
+            below_one = jnp.where(layer == number, other.deflection(v)[0], below_one)
     return lax.complex(below_one, rng.symmetric(azimuth_word))
 
 

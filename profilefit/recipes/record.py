@@ -115,7 +115,7 @@ def _outside(content: Mapping[str, Any]) -> str | None:
 def record_setting(content: Mapping[str, Any]) -> Setting:
     """The setting that a record belongs to."""
     try:
-        return Setting(**content["setting"])
+        return Setting.of(content["setting"])
     except (KeyError, TypeError, InputError):
         raise RecordError(f"record {content.get('name')!r} is damaged: it has no valid setting") from None
 

@@ -149,7 +149,7 @@ def _require_solved(medium: Medium, illumination: str) -> None:
     if len(layers) > MAX_LAYERS:
         raise InputError(f"a stack solved exactly must have at most {MAX_LAYERS} layers, got {len(layers)}")
     for number, layer in enumerate(layers, start=1):
-        if layer.mu_s > 0 and layer.g != 0:
+        if layer.mu_s > 0 and not layer.is_isotropic:
             raise InputError(f"a stack solved exactly must scatter with g = 0, got {layer.g:g} in layer {number}")
         if layer.n != layers[0].n:
             got = f"{layers[0].n:g} in layer 1 and {layer.n:g} in layer {number}"

@@ -1,7 +1,47 @@
-"""Phase functions, a file each: how far scattering turns the light."""
+"""Phase functions, a file each: how far scattering turns the light; imported on first use."""
 
-from mcml_sim.media.phase.base import Phase
-from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
-from mcml_sim.media.phase.isotropic import Isotropic
+from importlib import import_module
 
-__all__ = ["HenyeyGreenstein", "Isotropic", "Phase"]
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
+if TYPE_CHECKING:
+    from mcml_sim.media.phase.base import Phase
+    from mcml_sim.media.phase.fournier_forand import FournierForand
+    from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
+    from mcml_sim.media.phase.isotropic import Isotropic
+    from mcml_sim.media.phase.mixture import Mixture
+    from mcml_sim.media.phase.table import as_table, from_table, own
+    from mcml_sim.media.phase.tabulated import Tabulated
+
+HOMES = {
+    "FournierForand": "fournier_forand",
+    "HenyeyGreenstein": "henyey_greenstein",
+    "Isotropic": "isotropic",
+    "Mixture": "mixture",
+    "Phase": "base",
+    "Tabulated": "tabulated",
+    **dict.fromkeys(("as_table", "from_table", "own"), "table"),
+}
+
+__all__ = [
+    "FournierForand",
+    "HenyeyGreenstein",
+    "Isotropic",
+    "Mixture",
+    "Phase",
+    "Tabulated",
+    "as_table",
+    "from_table",
+    "own",
+]
+
+
+def __getattr__(name: str) -> object:
+    """JAX takes half a second to import, which who only names a layer or a setting has no use for."""
+    if name not in HOMES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{HOMES[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that were not used yet, too."""
+    return [*globals(), *__all__]

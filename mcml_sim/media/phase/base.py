@@ -9,6 +9,7 @@ from functools import partial
 from typing import Any, TypeVar
 
 import jax
+import jax.numpy as jnp
 
 P = TypeVar("P", bound="Phase")
 
@@ -26,6 +27,11 @@ class Phase(ABC):
         super().__init_subclass__()
         jax.tree_util.register_pytree_node(cls, _leaves, partial(_from_leaves, cls))
 
+    @classmethod
+    def of(cls: type[P], **leaves: Any) -> P:
+        """With these fields, without the checks of the constructor: arrays that a kernel needs in place of numbers."""
+        return _from_leaves(cls, None, [leaves[field.name] for field in fields(cls)])  # type: ignore[arg-type]
+
     @abstractmethod
     def pdf(self, cosine: Any) -> Any:
         """Density p(c) of the direction [1/sr]: over all directions its integral, 2 pi int p dc, is 1."""
@@ -41,6 +47,15 @@ class Phase(ABC):
     @abstractmethod
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
         """Legendre moment [-] of the order l >= 0: 2 pi int p(c) P_l(c) dc. That of order 0 is 1."""
+
+    @property
+    def simplest(self) -> Phase:
+        """The same without what it does not need: of a sum without empty terms."""
+        return self
+
+    def for_kernel(self) -> Phase:
+        """The phase function as a kernel draws from it: float32."""
+        return jax.tree.map(jnp.float32, self)
 
     def sample(self, xi: Any) -> Any:
         """Cosine [-] below which lies the share `xi` in [0, 1] of all scatterings."""

@@ -9,8 +9,8 @@ import jax
 import numpy as np
 
 from mcml_sim.errors import InputError
+from mcml_sim.media.arrays import namespace
 from mcml_sim.media.checks import is_number, shown
-from mcml_sim.media.fresnel import namespace
 from mcml_sim.media.phase.base import Phase
 
 

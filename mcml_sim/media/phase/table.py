@@ -1,0 +1,71 @@
+"""A phase function as tables of files have it, and back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from typing import Any
+
+from mcml_sim.errors import InputError
+from mcml_sim.media.checks import shown
+from mcml_sim.media.phase.base import Phase
+from mcml_sim.media.phase.fournier_forand import FournierForand
+from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
+from mcml_sim.media.phase.isotropic import Isotropic
+from mcml_sim.media.phase.mixture import Mixture
+from mcml_sim.media.phase.tabulated import Tabulated
+
+KINDS: dict[str, type[Phase]] = {
+    "isotropic": Isotropic,
+    "henyey-greenstein": HenyeyGreenstein,
+    "fournier-forand": FournierForand,
+    "mixture": Mixture,
+    "tabulated": Tabulated,
+}
+DEEPEST = 4  # mixtures within one another
+
+
+def own(phase: object) -> tuple[float, Phase | None]:
+    """Mean cosine and phase function of a layer or a setting: None for Henyey and Greenstein's, which g alone says.
+
+    InputError on what is no phase function.
+    """
+    if not isinstance(phase, Phase):
+        raise InputError(f"phase must be a phase function of mcml_sim.phase, got {shown(phase)}")
+    found = phase.simplest
+    return float(found.mean_cosine), None if isinstance(found, HenyeyGreenstein | Isotropic) else found
+
+
+def as_table(phase: Phase) -> dict[str, Any]:
+    """Its kind, and what its constructor takes: numbers, lists, and tables of the same form."""
+    kind = next(name for name, one in KINDS.items() if type(phase) is one)
+    return {"kind": kind, **{name: _plain(getattr(phase, name)) for name in _arguments(type(phase))}}
+
+
+def from_table(table: object, deepest: int = DEEPEST) -> Phase:
+    """What `as_table` gave; InputError on anything else."""
+    if not isinstance(table, Mapping):
+        raise InputError(f"a phase function must be a table, got {shown(table)}")
+    kind = table.get("kind")
+    if not isinstance(kind, str) or kind not in KINDS:
+        raise InputError(f"kind of a phase function must be one of {', '.join(KINDS)}, got {shown(kind)}")
+    if kind == "mixture" and deepest == 0:
+        raise InputError(f"a mixture must hold mixtures of at most {DEEPEST} levels, got more")
+    wanted = _arguments(KINDS[kind])
+    if set(table) != {"kind", *wanted}:
+        got = ", ".join(map(str, sorted(set(table) - {"kind"}))) or "nothing"
+        raise InputError(f"a phase function of kind {kind} must have {', '.join(wanted) or 'nothing else'}, got {got}")
+    given = {name: table[name] for name in wanted}
+    if kind == "mixture" and isinstance(given["phases"], list | tuple):
+        given["phases"] = [from_table(one, deepest - 1) for one in given["phases"]]
+    return KINDS[kind](**given)
+
+
+def _arguments(kind: type[Phase]) -> list[str]:
+    return [field.name for field in fields(kind) if field.init]  # type: ignore[arg-type]
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Phase):
+        return as_table(value)
+    return [_plain(one) for one in value] if isinstance(value, tuple) else float(value)

@@ -1,0 +1,98 @@
+"""Photons that scatter by sums of terms and by tables."""
+
+import numpy as np
+import pytest
+
+from mcml_sim import (
+    Grid,
+    InputError,
+    Layer,
+    Medium,
+    Setting,
+    StoreError,
+    read_results,
+    simulate,
+    simulate_orders,
+    write_mco,
+    write_results,
+)
+from mcml_sim.media.phase import FournierForand, HenyeyGreenstein, Mixture, Tabulated
+
+ONE = HenyeyGreenstein(0.9)
+GRID = Grid.from_edges(r=np.append(0.0, np.geomspace(0.1, 20, 12)))
+SEA = Mixture((0.317, 0.6813, 0.0017), (HenyeyGreenstein(0.9933), HenyeyGreenstein(0.8957), HenyeyGreenstein(-0.635)))
+ANGLES = np.radians(np.append(np.geomspace(0.05, 10, 60), np.linspace(12, 180, 80)))
+TABLE = Tabulated(ANGLES, SEA.pdf(np.cos(ANGLES)))  # the same light, but for what goes on within 0.05 degrees
+BY_PHASE = pytest.mark.parametrize("phase", [SEA, TABLE, FournierForand(1.1, 3.6)], ids=["mixture", "table", "Forand"])
+
+
+def tally(phase, g=0.0, seed=1, photons=50_000, **given):
+    layers = (Layer(1.2, 0.1, 1.0, 0.3, 2.0), Layer(1.2, 0.3, 1.0, g, phase=phase))
+    return simulate(Medium(layers), GRID, photons, seed, **given)
+
+
+def test_an_empty_term_changes_no_bit():
+    mixed = Mixture((1, 0), (ONE, HenyeyGreenstein(0.1)))
+    plain, same = tally(None, 0.9), tally(mixed)
+    np.testing.assert_array_equal(plain.deposits.reflected, same.deposits.reflected)
+    np.testing.assert_array_equal(plain.deposits.absorbed, same.deposits.absorbed)
+    orders = [simulate_orders(GRID, 2**17, 3, Setting(n=1.2, phase=one)) for one in (ONE, mixed)]
+    np.testing.assert_array_equal(orders[0].counts.exits, orders[1].counts.exits)
+
+
+def test_equal_terms_are_one():
+    mixed = Mixture((0.3, 0.7), (ONE, ONE))
+    one, other = tally(None, 0.9, 1).diffuse_reflectance, tally(mixed, seed=2).diffuse_reflectance
+    assert abs(one.value - other.value) < 3 * np.hypot(one.standard_error, other.standard_error)
+    blunt = tally(Mixture((0.3, 0.7), (HenyeyGreenstein(0.8), ONE)), seed=2).diffuse_reflectance
+    assert abs(one.value - blunt.value) > 5 * np.hypot(one.standard_error, blunt.standard_error)
+
+
+@BY_PHASE
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_light_scattered_once(phase, illumination):
+    """Photons of the first order against the closed single scattering of that phase function."""
+    found = simulate_orders(GRID, 2**17, 4, Setting(illumination, n=1.2, phase=phase))
+    seen = found.entered * found.counts.exits[:, 0] / found.photons
+    error = found.entered * np.sqrt(found.counts.exits[:, 0] + 1) / found.photons
+    assert np.all(np.abs(seen - found.once(1.0)) < 4.5 * error)
+    total = found.once(1.0).sum()
+    assert abs(seen.sum() - total) < 4 * np.sqrt(total * found.entered / found.photons)
+
+
+@BY_PHASE
+def test_layers_and_orders_agree(phase):
+    """Two kernels that share nothing but the phase function: A and rings of one half space."""
+    orders = simulate_orders(GRID, 2**17, 5, Setting(n=1.2, phase=phase))
+    layered = simulate(Medium((Layer(1.2, 0.2, 0.8, 0.0, phase=phase),)), GRID, 2**17, 6)
+    for one, other in (
+        (orders.reflectance(0.8), layered.diffuse_reflectance),
+        (orders.profile(0.8), layered.reflectance_r),
+    ):
+        error = np.hypot(one.standard_error, np.asarray(other.standard_error))
+        assert np.all(np.abs(np.asarray(one.value) - other.value) < 4.5 * error)
+
+
+def test_a_table_and_the_terms_that_made_it():
+    one, other = tally(SEA, seed=1), tally(TABLE, seed=2)
+    a, b = one.diffuse_reflectance, other.diffuse_reflectance
+    assert abs(a.value - b.value) < 4 * np.hypot(a.standard_error, b.standard_error)
+
+
+def test_results_keep_the_phase_function(tmp_path):
+    found = tally(SEA, photons=1000)
+    write_results(found, tmp_path / "sea.npz")
+    assert read_results(tmp_path / "sea.npz").medium == found.medium
+    with pytest.raises(InputError, match=r"an .mco has g alone for a phase function, got Mixture.* in layer 2"):
+        write_mco(found, tmp_path / "sea.mco")
+    assert not (tmp_path / "sea.mco").exists()
+
+
+def test_stores_of_different_phase_functions_do_not_mix(tmp_path):
+    other = Tabulated(ANGLES, TABLE.pdf(np.cos(ANGLES)) * np.where(ANGLES > 1, 1.01, 1.0))
+    tally(TABLE, photons=1000, store=tmp_path / "layers")
+    with pytest.raises(StoreError, match="medium is"):
+        tally(other, photons=1000, store=tmp_path / "layers")
+    simulate_orders(GRID, 1000, 1, Setting(n=1.2, phase=TABLE), store=tmp_path / "orders")
+    with pytest.raises(StoreError, match="setting is"):
+        simulate_orders(GRID, 1000, 1, Setting(n=1.2, phase=other), store=tmp_path / "orders")
