@@ -10,7 +10,7 @@ PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
 PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 ARGS ?=
 # Pages with tables of what was fitted, between marks.
-TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/guide/layered.md docs/howto/shader.md
+TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/guide/layered.md docs/guide/phases.md docs/howto/shader.md
 
 .DEFAULT_GOAL := help
 .PHONY: help fits evidence claims readme docs test test-all benchmark programs lint format wheel clean

@@ -10,7 +10,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.folders import records_folder
+from profilefit.cli.folders import known_phases, records_folder
 from profilefit.cli.options import Fits
 from profilefit.errors import InputError
 
@@ -20,7 +20,7 @@ def export(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A record (hazard-diffuse), a law (burley), a map (chiang) or the record of a stack (skin).",
+            help="A record (hazard-diffuse), a law (burley), a map (chiang), a stack (skin) or a phase (petzold).",
             autocompletion=options.subjects,
         ),
     ],
@@ -49,7 +49,7 @@ def export(
 
     Its functions, every constant with its errors, units, illumination, range and digests. Without --constants a law or
     map that was not regenerated has its printed ones. Of a stack: the law of its three colours with the first layer's
-    thickness as an argument, and light scattered once.
+    thickness as an argument, and light scattered once. Of a phase function: its best sum of terms, with its sampler.
 
     \b
     Examples:
@@ -60,8 +60,10 @@ def export(
         from mcml_sim.files.whole_file import write_whole
         from profilefit.recipes.folder import LOCAL, fits_folder
         from profilefit.recipes.inventory import find
+        from profilefit.recipes.phases.record import load
         from profilefit.recipes.stack import record as stack_record
         from profilefit.shader import export as exported
+        from profilefit.shader.phase_text import export_phase
         from profilefit.shader.stack_file import export_stack
 
     folder = records_folder(fits)
@@ -72,6 +74,10 @@ def export(
         if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
             raise InputError(f"{given[0]} must be left out where NAME is a stack, got {what!r}")
         text = export_stack(stack_record.load(path), lang, name)
+    elif what in (phases := known_phases(fits)):
+        if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
+            raise InputError(f"{given[0]} must be left out where NAME is a phase function, got {what!r}")
+        text = export_phase(load(phases[what]), lang, name)
     else:
         text = exported(find(what, folder, constants, n), folder, lang, name)
     if out is None:

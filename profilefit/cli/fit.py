@@ -25,10 +25,14 @@ FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
 WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
+PROFILE, PHASE = KINDS = ("profile", "phase")
+PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 
 def fit(
+    context: typer.Context,
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
+    kind: Annotated[str, typer.Option(help="profile, or phase: a phase function.")] = PROFILE,
     law: Annotated[str, typer.Option(help=f"One of {', '.join(PROFILES)}.", autocompletion=options.laws)] = "hazard",
     constants: Annotated[
         str,
@@ -55,6 +59,9 @@ def fit(
     ] = None,
     r_min: Annotated[str | None, typer.Option(help="Leave out what is nearer to the beam, such as 0.5mm.")] = None,
     r_max: Annotated[str | None, typer.Option(help="Leave out what is farther.")] = None,
+    angles: Annotated[
+        str | None, typer.Option(help="Angles of a phase function that count, such as 1:180 degrees.", metavar="A:B")
+    ] = None,
     out: Annotated[Path | None, typer.Option(help="Folder for fit.json and the figures.")] = None,
     seed: Annotated[int, typer.Option(help="Seed of the posterior's walkers, >= 0.")] = 0,
     fits: Fits = None,
@@ -68,10 +75,14 @@ def fit(
     annuli. Values are reflected light per area and per incident light, unless the scale is free. Exit status 1 if the
     fit fails.
 
+    With --kind phase a table has columns angle (degrees), value and, if known, sigma; one to four terms of Henyey
+    and Greenstein, Haltrin's form, and Fournier and Forand's are fitted to it, moments free or held: a minute.
+
     \b
     Examples, on the files of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
+      profilefit fit fits/phases/petzold.csv --kind phase
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json
@@ -81,6 +92,13 @@ def fit(
         from profilefit.measured import read
         from profilefit.measured.result import content
 
+    if kind not in KINDS:
+        raise InputError(f"--kind must be {PROFILE} or {PHASE}, got {kind!r}")
+    if kind == PHASE:
+        _of_phase(context, data, angles, out, as_json, quiet)
+        return
+    if angles is not None:
+        raise InputError("--angles must be left out where --kind is not phase")
     if seed < 0:
         raise InputError(f"--seed must be a whole number >= 0, got {seed}")
     folder = records_folder(fits, quiet)
@@ -107,6 +125,51 @@ def fit(
         _show(result, f"{one_line(data.name)}: {points}, law {law}, {result.found.question.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
+
+
+def _of_phase(
+    context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
+) -> None:
+    """Every form of a phase function, in a table."""
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, screen, show
+        from mcml_sim.files.text_file import as_json as json_text
+        from mcml_sim.files.whole_file import require_folder, write_whole
+        from mcml_sim.runs.progress import working
+        from profilefit.recipes.phases.data import read_phase
+        from profilefit.recipes.phases.fit import ALL_ANGLES
+        from profilefit.recipes.phases.record import content, fits_of
+        from profilefit.report.tables.phase_table import phase_tables, premise_lines
+
+    taken = {"data", "kind", "angles", "out", "as_json", "quiet"}
+    for name in context.params:
+        source = context.get_parameter_source(name)
+        if name not in taken and source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"--{name.replace('_', '-')} must be left out where --kind is {PHASE}")
+    table = read_phase(data)
+    if out is not None:
+        require_folder(out)
+    with working("fitting", quiet):
+        body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
+    if out is not None:
+        write_whole(out / "fit.json", json_text(body))
+        notes(quiet).print(f"wrote fit.json into {out}", markup=False)
+    if as_json:
+        print_json(body)
+    else:
+        show(phase_tables(body), screen())
+        for line in premise_lines(body):
+            screen().print(line, markup=False)
+    if body["fit"]["result"] != "converged":
+        raise typer.Exit(FAILED)
+
+
+def _range(text: str) -> tuple[float, float]:
+    match = PAIR.fullmatch(text.strip())
+    low, high = (_number("--angles", match[at]) for at in (1, 2)) if match else (1.0, 0.0)
+    if not 0 <= low < high <= 180:
+        raise InputError(f"--angles must be two rising angles in 0 ... 180 degrees, such as 1:180, got {text!r}")
+    return low, high
 
 
 def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.errors import InputError, OtherRecords
-from profilefit.recipes.folder import EVIDENCE, LOCAL, STACKS, fits_folder
+from profilefit.recipes.folder import EVIDENCE, LOCAL, PHASES, STACKS, fits_folder
 
 
 def records_folder(requested: Path | None = None, quiet: bool = False) -> Path:
@@ -35,12 +35,21 @@ def known_folder(requested: Path | None = None) -> Path:
 
 def known_stacks(requested: Path | None = None) -> dict[str, Path]:
     """The records of stacks by name: of the folder requested or, if none was, of ./fits beside those shipped."""
+    return _known(STACKS, requested)
+
+
+def known_phases(requested: Path | None = None) -> dict[str, Path]:
+    """The same of phase functions."""
+    return _known(PHASES, requested)
+
+
+def _known(kind: str, requested: Path | None) -> dict[str, Path]:
     with interruptible(__name__):
         from profilefit.recipes.record import available
 
     found: dict[str, Path] = {}
     for one in (requested,) if requested else (fits_folder(), LOCAL):
-        found |= available(one / STACKS)
+        found |= available(one / kind)
     return dict(sorted(found.items()))
 
 

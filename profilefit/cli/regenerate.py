@@ -13,7 +13,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import Quiet
 from profilefit.errors import InputError
-from profilefit.recipes.folder import LOCAL, STACKS, SUMS, fits_folder
+from profilefit.recipes.folder import LOCAL, PHASES, STACKS, SUMS, fits_folder
 
 PHOTON_STORE = ".photons"
 SEED = 1
@@ -32,7 +32,7 @@ def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of recipes or stacks, or .toml files of either; all recipes if none is named.",
+            help="Names of recipes, stacks, phase functions, or their files (.toml, .csv); all recipes if none.",
             autocompletion=options.recipes,
         ),
     ] = None,
@@ -56,6 +56,7 @@ def regenerate(
 
     A file of layers is a stack: its law is fitted to exact light in two to four minutes, longer where a layer scatters
     forward, and its record goes to OUT/stacks. That of its sums of Gaussians, two minutes more, goes to OUT/gaussians.
+    A table of a phase function is fitted by every form in a minute, and its record goes to OUT/phases.
 
     \b
     Examples, the last on a file of profilefit examples:
@@ -67,6 +68,8 @@ def regenerate(
         from mcml_sim.cli.screen import notes, print_json, put
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import is_watched
+        from profilefit.recipes.phases import record as phase_record
+        from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
         from profilefit.recipes.run import RecipeRun
@@ -80,11 +83,15 @@ def regenerate(
     if photons is not None and photons < 1:
         raise InputError(f"photons must be a whole number >= 1, got {photons}")
     said = notes(quiet)
+    tables = {name: found for name in recipes or () if (found := phase_record.table_of(name)) is not None}
+    phases, recipes = list(dict.fromkeys(tables.values())), [name for name in recipes or () if name not in tables]
+    for table in phases:
+        read_phase(table)
     stacks = [stack_record.request_of(name) for name in recipes or () if stack_record.is_stack(name)]
     others = [name for name in recipes or () if not stack_record.is_stack(name)]
-    those = chosen(others, fits_folder()) if others or not stacks else ()
+    those = chosen(others, fits_folder()) if others or not (stacks or phases) else ()
     stack_record.require_apart(stacks)
-    if stacks:
+    if stacks or phases:
         _require_default(
             {"--preset": preset is not Preset.QUICK, "--seed": seed != SEED, "--photons": photons is not None}
         )
@@ -107,6 +114,10 @@ def regenerate(
             start, name = time.perf_counter(), f"{folder}/{stack.name}"
             written[name] = made(stack, out, cores(), run.say)
             seconds[name] = time.perf_counter() - start
+    for table in phases:
+        start, name = time.perf_counter(), f"{PHASES}/{table.stem}"
+        written[name] = phase_record.regenerate(table, out, run.say)
+        seconds[name] = time.perf_counter() - start
     if len(written) > 1:
         put(spent(seconds, written), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
@@ -115,7 +126,9 @@ def regenerate(
 
 
 def _require_default(given: dict[str, bool]) -> None:
-    """InputError on an option that stacks do not take."""
+    """InputError on an option that stacks and phase functions do not take."""
     for option, is_given in given.items():
         if is_given:
-            raise InputError(f"{option} must be left out where a stack is fitted: its light and starts are fixed")
+            raise InputError(
+                f"{option} must be left out where a stack or a phase function is fitted: its data and starts are fixed"
+            )

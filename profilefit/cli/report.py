@@ -11,7 +11,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
-from profilefit.cli.folders import evidence_folder, known_stacks, records_folder
+from profilefit.cli.folders import evidence_folder, known_phases, known_stacks, records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 from profilefit.errors import InputError, OtherRecords, ShaderError
 
@@ -83,6 +83,12 @@ def report(
     _require_one({"--markdown": markdown, "--html": html, **printed})
     folder = records_folder(fits, quiet)
     ordinary, known = record.available(folder), known_stacks(fits)
+    if phases := [name for name in names or () if name not in ordinary and name in known_phases(fits)]:
+        _require_alone(
+            phases, names or [], {**printed, "--markdown": markdown, "--html": html, "--figures": figures_to}
+        )
+        _show_phases({name: known_phases(fits)[name] for name in phases}, as_json)
+        return
     only_stacks = not names and not any((*printed.values(), markdown, html)) and not ordinary
     if only_stacks and (table := stack_table(folder)) is not None:
         show([table], screen())
@@ -114,6 +120,32 @@ def report(
         _show(_told(contents, stacks, names), _sums(stacks), folder, bool(names))
     if figures_to is not None:
         _draw(folder, figures_to, names, quiet)
+
+
+def _require_alone(phases: list[str], names: list[str], others: dict[str, object]) -> None:
+    """InputError where tables of phase functions are asked for with what they are no part of."""
+    given = [option for option, value in others.items() if value and option != "--json"]
+    strange = [name for name in names if name not in phases]
+    if given or strange:
+        raise InputError(
+            f"{(given or strange)[0]!r} must be left out where NAME is a phase function's record, got {phases[0]!r}"
+        )
+
+
+def _show_phases(paths: Mapping[str, Path], as_json: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen, show
+        from profilefit.recipes.phases.record import load
+        from profilefit.report.tables.phase_table import phase_tables, premise_lines
+
+    found = {name: load(path).content for name, path in paths.items()}
+    if as_json:
+        print_json({"phases": found})
+        return
+    for one in found.values():
+        show(phase_tables(one), screen())
+        for line in premise_lines(one):
+            screen().print(line, markup=False)
 
 
 def _require_one(flags: dict[str, object]) -> None:
@@ -155,6 +187,7 @@ def _show(contents: dict[str, dict[str, Any]], sums: Mapping[str, SumRecord], fo
     with interruptible(__name__):
         from mcml_sim.cli.screen import put, screen
         from profilefit.report import record_tables, summary
+        from profilefit.report.tables.phase_table import phase_table
         from profilefit.report.tables.stack_table import stack_table
         from profilefit.report.tables.sum_table import sum_tables
 
@@ -162,8 +195,8 @@ def _show(contents: dict[str, dict[str, Any]], sums: Mapping[str, SumRecord], fo
     for name in contents if named else ():
         parts += record_tables(contents[name])
         parts += sum_tables(sums[name]) if name in sums else []
-    if not named and (stacks := stack_table(folder)) is not None:
-        parts.append(stacks)
+    if not named:
+        parts += [one for one in (stack_table(folder), phase_table(folder)) if one is not None]
     console = screen()
     for part in parts:
         put(part, console)
@@ -230,6 +263,7 @@ def _fill(
         from mcml_sim.files.whole_file import read_whole, write_whole
         from mcml_sim.runs.progress import working
         from profilefit.report import fill, markdown_sections, sections
+        from profilefit.report.tables.phase_table import phase_sections
         from profilefit.report.tables.stack_table import stack_sections
         from profilefit.report.tables.sum_table import sum_sections
 
@@ -243,7 +277,8 @@ def _fill(
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
     measured = {}
-    for name, make in (markdown_sections(folder) | stack_sections(stacks) | sum_sections(stacks)).items():
+    made = markdown_sections(folder) | stack_sections(stacks) | sum_sections(stacks) | phase_sections(folder)
+    for name, make in made.items():
         if f"<!-- {name} -->" in text:  # what is measured takes a minute, so only where the file has a place for it
             try:
                 with working(f"measuring the table {name}", quiet):

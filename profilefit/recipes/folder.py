@@ -8,6 +8,7 @@ from pathlib import Path
 LOCAL = Path("fits")
 STACKS = "stacks"  # in a folder of records: the folder of those of stacks
 SUMS = "gaussians"  # and that of their sums of Gaussians
+PHASES = "phases"  # and that of phase functions
 EVIDENCE = Path("evidence")  # what was measured with records: shader check, failures, times
 
 

@@ -241,7 +241,7 @@ SEARCHLIGHT = Setting()
 
 
 @dataclass(frozen=True)
-class Tabulated:
+class TabulatedRadii:
     """The exact half space under a searchlight, cubics between knots of ln r: as a law answers, one albedo a call."""
 
     setting: Setting = SEARCHLIGHT
@@ -289,5 +289,5 @@ class TableContender(Contender):
 
 def table_contender(material: float) -> TableContender:
     """The table as a contender; its error is that at every albedo, its time that of one material."""
-    law: Any = Tabulated()
+    law: Any = TabulatedRadii()
     return TableContender(NAME, law, law, (0, 0), None, law, curves=law.curves(material))

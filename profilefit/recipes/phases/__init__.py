@@ -1,0 +1,1 @@
+"""Phase functions fitted to measured or computed ones: tables, fits with errors, records."""

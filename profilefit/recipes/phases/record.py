@@ -1,0 +1,178 @@
+"""All forms of a phase function fitted to one table: their record, FITS/phases/NAME.json, and back to them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mcml_sim import Setting
+from mcml_sim.media.phase import Phase
+from profilefit.errors import InputError, RecordError
+from profilefit.laws.phases import FORMS, regression
+from profilefit.recipes import record
+from profilefit.recipes.folder import LOCAL, PHASES, fits_folder
+from profilefit.recipes.kinds import COUNT, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS
+from profilefit.recipes.phases.data import PhaseData, read_phase
+from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
+from profilefit.recipes.schema import Kinds, mistyped
+
+PIPELINE = "phase"
+TITLE = "Phase functions fitted to a table"
+EQUATIONS = "p(c) = sum_i w_i (1 - g_i^2) / (4 pi (1 + g_i^2 - 2 g_i c)^(3/2)); haltrin; fournier-forand"
+NOTE = (
+    "Least squares of ln p over all rows alike, or by their sigma. Moments that are held are those of the table, which "
+    "is straight in the logarithms of p and 1 - c between its rows and goes on below the first by their power law."
+)
+HELD, FREE = "held", "free"
+DEFAULT = ("4-terms", HELD)
+OF_FIT: Kinds = {
+    "": TABLE,
+    ".held": TEXTS,
+    ".result": TEXT,
+    ".steps": COUNT,
+    ".condition_number": MEASURE,
+    **dict.fromkeys((".rms", ".mean_cosine", ".backscattered", ".second"), NUMBER),
+    ".bands": MEASURES,
+}
+SHOWN: Kinds = {
+    **dict.fromkeys(("title", "equations", "note", "data_digest"), TEXT),
+    **{"data": TABLE, "data.source": TEXT, "data.rows": COUNT, "phases": TABLE},
+    **dict.fromkeys(("data.integral", "data.mean_cosine", "data.backscattered", "data.second"), NUMBER),
+    "data.angles": MEASURES,
+    **{f"phases.{form}": TABLE for form in FORMS},
+    **{f"phases.{form}.{how}{key}": kind for form in FORMS for how in (FREE, HELD) for key, kind in OF_FIT.items()},
+}
+
+
+@dataclass(frozen=True)
+class PhaseRecord:
+    """A record, read. content  all that it says;  path  of its file"""
+
+    content: Mapping[str, Any]
+    path: Path
+
+    def constants(self, form: str, how: str = HELD) -> dict[str, Mapping[str, Any]]:
+        """Of a form with its moments held or free, each with its errors."""
+        return {name: self.content["constants"][f"{form}.{how}.{name}"] for name in FORMS[form].names}
+
+    def phase(self, form: str = DEFAULT[0], how: str = DEFAULT[1]) -> Phase:
+        """A fitted phase function; InputError on another form."""
+        if form not in FORMS:
+            raise InputError(f"form must be one of {', '.join(FORMS)}, got {form!r}")
+        if how not in (HELD, FREE):
+            raise InputError(f"moments must be {HELD} or {FREE}, got {how!r}")
+        own = self.constants(form, how)
+        try:
+            return built(FORMS[form], np.array([own[name]["regenerated"] for name in FORMS[form].names]))
+        except InputError as error:
+            raise RecordError(f"{self.path}: is damaged: {error}; regenerate it") from None
+
+
+def fits_of(
+    data: PhaseData, angles: tuple[float, float] = ALL_ANGLES, say: Callable[[str], None] = lambda _: None
+) -> list[PhaseFit]:
+    """Every form, its moments free and then held, as many as it has numbers for."""
+    found = []
+    for name, form in FORMS.items():
+        for hold in ((), MOMENTS[: form.free]):
+            found.append(fit_phase(data, name, hold, angles))
+        say(f"{name} fitted")
+    return found
+
+
+def regenerate(path: Path, out: Path, say: Callable[[str], None] = lambda _: None) -> Path:
+    """Fit every form to a table, and write the record: a minute. InputError on what is no table."""
+    data = read_phase(path)
+    arrays = {"angles": data.angles, "values": data.values}
+    return record.write(out / PHASES, path.stem, content(data, fits_of(data, say=say)), arrays)
+
+
+def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:
+    """What a record says."""
+    constants: dict[str, Any] = {}
+    phases: dict[str, Any] = {name: {} for name in FORMS}
+    for one in found:
+        how = HELD if one.held else FREE
+        for place, name in enumerate(one.form.names):
+            constants[f"{one.form.name}.{how}.{name}"] = {
+                "published": None,
+                "regenerated": one.constants[place],
+                **{key: None if own is None else own[place] for key, own in one.errors.items()},
+            }
+        phases[one.form.name][how] = {
+            "held": list(one.held),
+            "result": one.result,
+            "steps": one.best.steps,
+            "condition_number": one.best.condition_number,
+            "rms": one.rms,
+            "bands": list(one.bands),
+            "mean_cosine": one.mean_cosine,
+            "backscattered": one.backscattered,
+            "second": float(one.phase.moment(2)),
+        }
+    results = [one.best.result for one in found]
+    return {
+        "title": TITLE,
+        "law": PIPELINE,
+        "pipeline": PIPELINE,
+        "equations": EQUATIONS,
+        "note": NOTE,
+        "setting": Setting(),
+        "constants": constants,
+        "phases": phases,
+        "data": {
+            "source": Path(data.source).name,
+            "rows": data.angles.size,
+            "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
+            "integral": data.integral,
+            "mean_cosine": data.mean_cosine,
+            "backscattered": data.backscattered,
+            "second": float(data.table.moment(2)),
+            "regression": regression(data.backscattered),
+        },
+        "fit": {"result": next((one for one in results if one != "converged"), "converged")},
+        "quality": {"regenerated": {"rms": [one.rms for one in found]}},
+        "truth": {"kind": "table"},
+        "preset": "quick",
+        "seed": SEED,
+        "versions": record.versions(),
+        "data_digest": data.digest,
+    }
+
+
+def table_of(name: str) -> Path | None:
+    """The table that a name of a command means: a .csv, or one that is shipped; None where it means something else."""
+    if name.endswith(".csv"):
+        return Path(name)
+    shipped = fits_folder() / PHASES / f"{name}.csv"
+    return shipped if shipped.exists() else None
+
+
+def load(path: Path) -> PhaseRecord:
+    """A record; RecordError in one line on one that is damaged."""
+    found = record.read(path)
+    if found["pipeline"] != PIPELINE:
+        raise RecordError(f"{path}: must be a record of phase functions, got pipeline {found['pipeline']!r}")
+    if text := mistyped(found, SHOWN) or _missing(found):
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    return PhaseRecord(found, path)
+
+
+def find(name: str) -> PhaseRecord:
+    """The record of a name, in ./fits or that is shipped, or of a path; InputError if there is none."""
+    if name.endswith(".json"):
+        return load(Path(name))
+    known = {path.stem: path for one in (fits_folder(), LOCAL) for path in record.available(one / PHASES).values()}
+    if name not in known:
+        raise InputError(f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {name!r}")
+    return load(known[name])
+
+
+def _missing(found: Mapping[str, Any]) -> str | None:
+    names = (f"{form}.{how}.{one}" for form in FORMS for how in (FREE, HELD) for one in FORMS[form].names)
+    missing = next((name for name in names if name not in found["constants"]), None)
+    return f"constants.{missing} must be a table, got nothing" if missing else None

@@ -1,0 +1,211 @@
+"""Phase functions fitted to tables: Petzold's mean, one that is known, bad tables, and the shipped record."""
+
+import json
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+
+from mcml_sim.media.phase import HenyeyGreenstein, Mixture
+from profilefit.errors import InputError, RecordError
+from profilefit.laws.phases import FORMS, backscattered, haltrin
+from profilefit.recipes.folder import shipped
+from profilefit.recipes.phases import record
+from profilefit.recipes.phases.data import read_phase
+from profilefit.recipes.phases.fit import MOMENTS, fit_phase
+
+FOLDER = shipped("fits") / "phases"
+PETZOLD = read_phase(FOLDER / "petzold.csv")
+SHIPPED = record.load(FOLDER / "petzold.json")
+KNOWN = Mixture((0.7, 0.3), (HenyeyGreenstein(0.95), HenyeyGreenstein(0.3)))
+
+
+def table(path, phase, sigma=0.0, noise=0.0, degrees=None):
+    degrees = np.append(np.geomspace(0.1, 10, 30), np.linspace(15, 180, 34)) if degrees is None else degrees
+    values = phase.pdf(np.cos(np.radians(degrees)))
+    values = values * np.exp(noise * np.random.default_rng(1).standard_normal(values.size))
+    head = "angle [deg], value [1/sr]" + (", sigma" if sigma else "")
+    rows = [f"{a:.6g}, {v:.9g}" + (f", {sigma * v:.6g}" if sigma else "") for a, v in zip(degrees, values, strict=True)]
+    path.write_text("\n".join(["# made", head, *rows]))
+    return path
+
+
+def test_haltrin_as_published():
+    """Both ends, and a value between by hand."""
+    assert haltrin(1.0) == (pytest.approx(1.0), 1.0, pytest.approx(0.7125968))
+    weight, g, h = haltrin(0.9)
+    assert h == pytest.approx(-0.3061446 + 0.9 * 1.000568 - 0.81 * 0.01826332 + 0.729 * 0.03643748)
+    assert weight == pytest.approx(h * (1 + h) / ((g + h) * (1 + h - g)))
+    # The condition that the weight comes from: the mean of P_2 is the mean cosine.
+    both = Mixture((weight, 1 - weight), (HenyeyGreenstein(g), HenyeyGreenstein(-h)))
+    assert both.moment(2) == pytest.approx(both.mean_cosine, abs=1e-12)
+    assert abs(haltrin(0.30665).h) < 1e-4
+
+
+@pytest.mark.parametrize("g", [0.30664, 0.0, -0.5, 1.0001, float("nan"), True, "0.9", None])
+def test_haltrin_elsewhere(g):
+    with pytest.raises(InputError, match=r"g must be in \(0.30664, 1\], got"):
+        haltrin(g)
+
+
+@pytest.mark.parametrize("form", FORMS.values(), ids=list(FORMS))
+def test_every_form_is_a_phase_function(form):
+    """Normalised, its moments those of the form that a fit uses, and differentiable, wherever fits start from."""
+    for start in form.starts(np.random.default_rng(2), 5):
+        with jax.enable_x64(True):
+            constants = form.constants(jnp.asarray(start))
+            assert constants.shape == (len(form.names),)
+            slope = np.asarray(jax.jacfwd(lambda p: form.mean_cosine(form.constants(p)))(jnp.asarray(start)))
+            mean = float(form.mean_cosine(constants))
+        assert np.all(np.isfinite(slope))
+        assert start.shape == (form.free,)
+        x = np.cos(np.linspace(np.pi, 1e-4, 400_001))
+        p = np.asarray(form.phase(np.asarray(constants)).pdf(x))
+        total = 2 * np.pi * np.trapezoid(p, x)
+        left = 1 - float(form.phase(np.asarray(constants)).invert(np.cos(1e-4)))
+        assert total + left == pytest.approx(1, abs=2e-4)
+        assert mean == pytest.approx(2 * np.pi * np.trapezoid(p * x, x) + left, abs=3e-4)
+
+
+def test_a_known_function_comes_back(tmp_path):
+    data = read_phase(table(tmp_path / "known.csv", KNOWN))
+    found = fit_phase(data, "2-terms")
+    np.testing.assert_allclose(found.constants, [0.95, 0.3, 0.7, 0.3], atol=2e-3)
+    assert found.rms < 5e-3  # what the table's own pieces leave of its integral
+    assert fit_phase(data, "1-term").rms > 0.3
+
+
+def test_statistical_errors_are_those_of_the_noise(tmp_path):
+    """z of four constants under a noise of 3 %, as it is given and thought ten times smaller."""
+    found = fit_phase(read_phase(table(tmp_path / "noisy.csv", KNOWN, 0.03, 0.03)), "2-terms")
+    off, errors = np.abs(found.constants - [0.95, 0.3, 0.7, 0.3]), found.errors
+    assert np.all(off < 3.5 * errors["statistical_error"])
+    assert np.any(off > 3.5 * errors["statistical_error"] / 10)
+    assert errors["discretisation_error"] is None
+    for name in ("model_error", "misfit_error", "jackknife_error"):
+        assert np.all((errors[name] < 5 * errors["statistical_error"]) & (errors[name] > 0)), name
+
+
+def test_moments_are_kept():
+    found = fit_phase(PETZOLD, "2-terms", MOMENTS)
+    assert found.mean_cosine == pytest.approx(PETZOLD.mean_cosine, rel=1e-3)
+    assert found.backscattered == pytest.approx(PETZOLD.backscattered, rel=1e-3)
+    assert found.result == "converged"
+    assert fit_phase(PETZOLD, "2-terms").rms < found.rms
+
+
+def test_what_cannot_keep_both_says_so():
+    found = fit_phase(PETZOLD, "fournier-forand", MOMENTS)
+    assert found.result == "backscattered cannot be kept by this form"
+    assert fit_phase(PETZOLD, "1-term", MOMENTS[:1]).result == "converged"
+
+
+def test_angles_that_count():
+    """From 1 degree on one term is nearer: a quarter of all scattering is left out."""
+    every, some = fit_phase(PETZOLD, "1-term"), fit_phase(PETZOLD, "1-term", angles=(1.0, 180.0))
+    assert some.rms < 0.7 * every.rms
+    assert np.isnan(some.bands[0])
+
+
+def test_shipped_record():
+    """What it promises of Petzold's mean, at the moments of the table; `make test-all` fits it again."""
+    data, phases = SHIPPED.content["data"], SHIPPED.content["phases"]
+    assert SHIPPED.content["data_digest"] == PETZOLD.digest
+    assert phases["3-terms"]["held"]["rms"] < 0.171
+    assert phases["4-terms"]["held"]["rms"] < 0.07
+    assert phases["fournier-forand"]["free"]["rms"] < 0.092
+    assert phases["haltrin"]["free"]["rms"] > 1.0
+    for form in ("3-terms", "4-terms"):
+        phase = SHIPPED.phase(form)
+        assert phase.mean_cosine == pytest.approx(data["mean_cosine"], rel=1e-3)
+        assert backscattered(phase) == pytest.approx(data["backscattered"], rel=1e-3)
+        off = np.log(phase.pdf(np.cos(PETZOLD.angles)) / PETZOLD.values)
+        assert np.sqrt(np.mean(off**2)) == pytest.approx(phases[form]["held"]["rms"], rel=1e-6)
+    # Neither premise of Haltrin's form holds.
+    assert data["mean_cosine"] - data["second"] > 0.06
+    assert data["regression"] - data["mean_cosine"] > 0.03
+    assert record.find("petzold").content == SHIPPED.content
+
+
+@pytest.mark.slow
+def test_the_record_comes_out_again(tmp_path):
+    again = record.load(record.regenerate(FOLDER / "petzold.csv", tmp_path))
+    for name, one in SHIPPED.content["constants"].items():
+        error = max(value for key, value in one.items() if key.endswith("error") and value is not None)
+        assert abs(again.content["constants"][name]["regenerated"] - one["regenerated"]) <= 0.01 * error + 1e-9, name
+
+
+HEAD = "angle [deg], value [1/sr]\n"
+ROWS = "".join(f"{a}, {1 / (4 * np.pi):.9f}\n" for a in (1, 10, 30, 60, 90, 120, 150, 180))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "expected a header of angle .*, got an empty file"),
+        ("angle, p\n" + ROWS, ":1: expected a header of angle .*, got 'p'"),
+        ("angle [rad], value\n" + ROWS, r":1: expected angle in deg, got \[rad\]"),
+        ("angle\n" + ROWS, ":1: expected a header of angle .*, got 'angle'"),
+        (HEAD + "1, 2\n", "expected 8 to 5000 rows under the header, got 1"),
+        (HEAD + ROWS + "170, 0.08\n", ":10: expected an angle in .* that rises, got 170"),
+        (HEAD + ROWS.replace("60,", "nan,"), ":5: column angle: expected a finite number, got 'nan'"),
+        (HEAD + ROWS.replace("60, ", "60, -"), ":5: expected a value > 0, got -0.0796"),
+        (HEAD + ROWS.replace("60, ", "60, 3, "), ":5: expected 2 cells, as the header has, got 3"),
+        (HEAD + "".join(f"{0.3 * i}, 0.08\n" for i in range(1, 11)), "angles in degrees up to 180, got 3 at most"),
+        (HEAD + ROWS.replace("0.0", "1.0"), "integral over all directions is 1, got 13.6"),
+        ("angle, value, sigma\n" + ROWS.replace("\n", ", 0\n"), ":2: expected a sigma > 0, got 0"),
+    ],
+)
+def test_bad_tables_in_one_line(tmp_path, text, message):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as error:
+        read_phase(path)
+    assert "\n" not in str(error.value)
+    assert str(path) in str(error.value)
+
+
+def test_bytes_that_are_no_text(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_bytes(b"angle, value\n\xff\n")
+    with pytest.raises(InputError, match=r"table\.csv:2: expected text in UTF-8, got the byte 0xff"):
+        read_phase(path)
+    path.write_bytes(b"#" * (2**20 + 10))
+    with pytest.raises(InputError, match="at most 1048576 bytes"):
+        read_phase(path)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"form": "5-terms"}, "form must be one of 1-term, .*, got '5-terms'"),
+        ({"form": "1-term", "hold": MOMENTS}, "hold must be at most 1 of the moments for 1-term, got 2"),
+        ({"form": "2-terms", "hold": ("norm",)}, "hold must be of mean_cosine, backscattered, got 'norm'"),
+        ({"form": "4-terms", "angles": (100.0, 120.0)}, "angles must hold 14 rows or more for 4-terms, got 5"),
+    ],
+)
+def test_questions_that_have_no_answer(arguments, message):
+    with pytest.raises(InputError, match=message):
+        fit_phase(PETZOLD, **arguments)
+
+
+def test_damaged_records(tmp_path):
+    content = json.loads((FOLDER / "petzold.json").read_text())
+    path = tmp_path / "petzold.json"
+
+    def damaged(message):
+        path.write_text(json.dumps(content))
+        with pytest.raises(RecordError, match=message):
+            record.load(path).phase("4-terms")
+
+    content["constants"]["4-terms.held.w1"]["regenerated"] = 0.9
+    damaged(r"petzold\.json: is damaged: weights must sum to 1")
+    del content["constants"]["4-terms.held.w1"]
+    damaged("constants.4-terms.held.w1 must be a table, got nothing")
+    content["phases"]["haltrin"]["free"]["rms"] = "small"
+    damaged("phases.haltrin.free.rms must be a number")
+    content["pipeline"] = "profile"
+    damaged("must be a record of phase functions, got pipeline 'profile'")
+    with pytest.raises(InputError, match=r"must be one of petzold, or a \.json, got 'baltic'"):
+        record.find("baltic")
