@@ -9,8 +9,8 @@ import mcml_sim
 import profilefit
 
 SIGNATURES = {
-    "Setting": (mcml_sim, "illumination n g"),
-    "Layer": (mcml_sim, "n mu_a mu_s g thickness"),
+    "Setting": (mcml_sim, "illumination n g phase"),
+    "Layer": (mcml_sim, "n mu_a mu_s g thickness phase"),
     "Medium": (mcml_sim, "layers n_above n_below"),
     "half_space": (mcml_sim, "alpha mfp n g"),
     "Grid.from_edges": (mcml_sim, "r z na"),
@@ -31,6 +31,9 @@ SIGNATURES = {
     "exact.Solution.cdf": (mcml_sim, "self r"),
     "phase.HenyeyGreenstein": (mcml_sim, "g"),
     "phase.Isotropic": (mcml_sim, ""),
+    "phase.Mixture": (mcml_sim, "weights phases"),
+    "phase.Tabulated": (mcml_sim, "angles values"),
+    "phase.FournierForand": (mcml_sim, "n mu"),
     "phase.Phase.pdf": (mcml_sim, "self cosine"),
     "phase.Phase.sample": (mcml_sim, "self xi"),
     "phase.Phase.invert": (mcml_sim, "self cosine"),
@@ -45,6 +48,11 @@ SIGNATURES = {
     "posterior": (profilefit, "fit"),
     "scenes.layers.single_scattering": (profilefit, "medium cos_in cos_out azimuth"),
     "scenes.layers.stack_law": (profilefit, "medium illumination"),
+    "scenes.sea.haltrin": (profilefit, "g"),
+    "scenes.sea.beam_share": (profilefit, "omega ct cw lobes"),
+    "scenes.sea.segment_integral": (profilefit, "c s0 t0 m t1"),
+    "scenes.sea.first_hit": (profilefit, "height origin direction lowest highest steps"),
+    "scenes.sea.caustic_irradiance": (profilefit, "surface x depth tilt n"),
 }
 
 

@@ -1,0 +1,26 @@
+"""Under the sea after Li et al.: beams, caustics and shafts of light in scattering water; imported on first use."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
+if TYPE_CHECKING:
+    from profilefit.laws.phases import haltrin
+    from profilefit.scenes.sea.hits import first_hit
+    from profilefit.scenes.sea.law import beam_share, segment_integral
+    from profilefit.scenes.sea.truth import caustic_irradiance
+else:
+    __getattr__ = attributes(
+        __name__,
+        {
+            "first_hit": "hits",
+            **dict.fromkeys(("beam_share", "haltrin", "segment_integral"), "law"),
+            "caustic_irradiance": "truth",
+        },
+    )
+
+__all__ = ["beam_share", "caustic_irradiance", "first_hit", "haltrin", "segment_integral"]
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that were not used yet, too."""
+    return [*globals(), *__all__]

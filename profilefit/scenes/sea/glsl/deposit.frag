@@ -1,0 +1,8 @@
+#version 330
+// The same light for each fragment of a shape.
+flat in float light;
+out float deposit;
+
+void main() {
+    deposit = light;
+}

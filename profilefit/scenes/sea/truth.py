@@ -1,0 +1,260 @@
+"""Sunlight on a floor below waves of one dimension, exactly: by all the rays that come to a place.
+
+Light is refracted once, by Snell and Fresnel; what the water does to it is not part of this. Irradiance is per
+horizontal area, over that of the sun across its rays. A point sun makes it infinite on folds: averages over pixels are
+finite, and those of a sun with a disc are finite everywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.media.checks import checked_numbers, is_number, shown
+from profilefit.errors import InputError
+from profilefit.scenes.sea.waves import STILL, checked_sun, refracted
+
+Floats = NDArray[np.float64]
+Surface = Callable[..., ArrayLike]  # of x [m], to z [m]
+PER_DEPTH = 5000  # samples of a surface in a length as long as the floor is deep
+MOST_SAMPLES = 2**23
+HALVINGS = 60  # of a bracket, until its ends are neighbours in floating point
+SUNS = 32  # directions within the sun's disc, in the plane of the waves
+# Central differences of eighth order (Fornberg, Mathematics of Computation 51, 1988, table 1).
+FIRST = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
+SECOND = np.array([-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560])
+# Gauss's points and weights on [0, 1], of the flux between two samples.
+GAUSS = [(0.5 * (1.0 + point), 0.5 * weight) for point, weight in zip(*np.polynomial.legendre.leggauss(4), strict=True)]
+
+
+def caustic_irradiance(
+    surface: Surface,
+    x: ArrayLike,
+    depth: float,
+    tilt: float,
+    n: float,
+    *,
+    slope: Surface | None = None,
+    curvature: Surface | None = None,
+    spacing: float | None = None,
+) -> Any:
+    """Irradiance on a level floor at z = -depth below waves z = surface(x), of a point sun [-]; the shape of x.
+
+    x      [m];  depth  below z = 0, below the deepest trough [m]
+    tilt   of the sun from the vertical, in [0, pi / 2): light goes toward +x and down [rad]
+    n      refractive index of the water over that of the air; 1.34 for the sea [-]
+    slope, curvature  dz/dx [-] and d2z/dx2 [1/m] as functions of x; by default differences of eighth order
+    spacing  of the samples between which no two features of the surface lie; by default depth / 5000 [m]
+
+    The sum over all places whose refracted ray comes to x of T cos(i) / cos(slope) / |dX/dx|: infinite on folds.
+    Crests shade what is behind them. Light that would leave the water again on its way down is not followed.
+    """
+    rays = _Rays(surface, _finite("x", x), depth, tilt, n, slope, curvature, spacing)
+    where = np.asarray(x, float)
+    target, place, _ = rays.arrivals(where.ravel())
+    _, stretch, flux = rays.at(place)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        light = np.where(rays.lit(place) & (flux > 0.0), flux / np.abs(stretch), 0.0)
+    found = np.bincount(target, light, where.size).reshape(where.shape)
+    return float(found) if found.ndim == 0 else found
+
+
+def caustic_boxes(
+    surface: Surface,
+    edges: ArrayLike,
+    depth: float,
+    tilt: float,
+    n: float,
+    *,
+    sun: float = 0.0,
+    slope: Surface | None = None,
+    curvature: Surface | None = None,
+    spacing: float | None = None,
+) -> Floats:
+    """The same, averaged over each pixel between edges (m + 1,): (m,) [-]. Others as of `caustic_irradiance`.
+
+    sun  half-width of its even disc in air, `SUN` of the real one [rad]: averaged over 32 directions of it in the
+         plane of the waves, weighted by the disc's chords (Chebyshev's points of the second kind)
+
+    Exact: the flux between two edges is that between the places whose rays come to them, so folds need no care.
+    """
+    border = _finite("edges", edges)
+    if border.ndim != 1 or border.size < 2 or not np.all(np.diff(border) > 0):
+        raise InputError(f"edges must be two numbers or more, each above the one before [m], got {shown(edges)}")
+    if not is_number(sun) or not 0.0 <= sun < 0.1:
+        raise InputError(f"sun must be a half-width in radians, in [0, 0.1), got {shown(sun)}")
+    angles = np.pi * np.arange(1, SUNS + 1) / (SUNS + 1)
+    offsets, weights = (np.cos(angles), np.sin(angles) ** 2) if sun else (np.zeros(1), np.ones(1))
+    found = np.zeros(border.size - 1)
+    for offset, weight in zip(offsets.tolist(), (weights / weights.sum()).tolist(), strict=True):
+        rays = _Rays(surface, border, depth, tilt, n, slope, curvature, spacing, sun * offset)
+        found += weight * np.diff(rays.flux_before(border)) / np.diff(border)
+    return found
+
+
+class _Rays:
+    """What a surface sends to a floor, between the places from where rays can come to these x."""
+
+    def __init__(
+        self,
+        surface: Surface,
+        x: Floats,
+        depth: float,
+        tilt: float,
+        n: float,
+        slope: Surface | None,
+        curvature: Surface | None,
+        spacing: float | None,
+        aside: float = 0.0,
+    ):
+        self.depth, self.tilt, self.n = checked_sun(depth, tilt, n)
+        self.tilt += aside
+        self._surface = surface
+        if spacing is not None and not (is_number(spacing) and 0.0 < spacing < np.inf):
+            raise InputError(f"spacing must be a length > 0 [m], got {shown(spacing)}")
+        self._step = float(spacing or self.depth / PER_DEPTH)
+        self._slope, self._curvature = slope, curvature
+        low, high = (float(x.min()), float(x.max())) if x.size else (0.0, 0.0)
+        reach = self.depth
+        while True:  # until no ray from beyond comes in, nor shadow
+            count = int(np.ceil((high - low + 2.0 * reach) / self._step)) + 1
+            if count > MOST_SAMPLES:
+                raise InputError(f"x must span fewer than {MOST_SAMPLES} samples of spacing, got {count}")
+            nodes = np.linspace(low - reach, high + reach, count)
+            landing, stretch, _ = self.at(nodes)
+            if not np.all(np.isfinite(stretch)):
+                raise InputError(
+                    f"n must be one at which light enters everywhere, none is all reflected, got {self.n:g}"
+                )
+            shadow = float(np.ptp(self._height(nodes)) * np.tan(self.tilt))  # of the highest crest
+            farthest = float(np.max(np.abs(landing - nodes))) + abs(shadow) + 8.0 * self._step
+            if farthest <= reach:
+                break
+            reach = 1.5 * farthest
+        self.nodes = self._with_folds(nodes, stretch)
+        self.landing = self.at(self.nodes)[0]
+        self._highest_before()
+
+    def at(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        """Of places on the surface: where their rays land [m], dX/dx [-], and flux per horizontal area [-]."""
+        z, zx, zxx = self._derivatives(x)
+        across, _, flux = refracted(self.tilt, (zx, np.zeros_like(zx)), self.n)
+        # tan(psi), psi the ray's angle to the vertical: slope a, then sin(psi - a) = sin(tilt - a) / n.
+        incident = self.tilt - np.arctan(zx)
+        inside = np.sqrt(np.maximum(1.0 - (np.sin(incident) / self.n) ** 2, 0.0))  # 0 where all is reflected, if n < 1
+        with np.errstate(divide="ignore", invalid="ignore"):
+            turn = 1.0 - np.cos(incident) / (self.n * inside)
+            rate = (1.0 + across**2) * turn / (1.0 + zx**2)
+            stretch = 1.0 + zx * across + (self.depth + z) * rate * zxx
+        return x + (self.depth + z) * across, stretch, flux
+
+    def arrivals(self, x: Floats) -> tuple[NDArray[np.int64], Floats, NDArray[np.bool_]]:
+        """Which of x a ray comes to, from which place [m], and whether it lands farther on with the place."""
+        turning = np.flatnonzero(np.diff(np.sign(np.diff(self.landing))) != 0) + 1
+        ends = np.concatenate([[0], turning, [self.landing.size - 1]])
+        order = np.argsort(x)
+        found: list[tuple[NDArray[np.int64], NDArray[np.int64], bool]] = []
+        for first, last in zip(ends[:-1].tolist(), ends[1:].tolist(), strict=True):
+            branch = self.landing[first : last + 1]
+            rising = bool(branch[-1] > branch[0])
+            low, high = min(branch[0], branch[-1]), max(branch[0], branch[-1])
+            inside = order[np.searchsorted(x, low, "left", order) : np.searchsorted(x, high, "left", order)]
+            cell = np.searchsorted(branch if rising else branch[::-1], x[inside], "right") - 1
+            cell = np.clip(cell if rising else branch.size - 2 - cell, 0, branch.size - 2)
+            found.append((inside, first + cell, rising))
+        target, cell = (np.concatenate([one[part] for one in found]) for part in (0, 1))
+        rises = np.repeat([one[2] for one in found], [one[0].size for one in found])
+        near, far = self.nodes[cell], self.nodes[cell + 1]
+        wanted = x[target]
+        start, end = self.landing[cell], self.landing[cell + 1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            place = near + np.clip(np.nan_to_num((wanted - start) / (end - start), nan=0.5), 0.0, 1.0) * (far - near)
+            for _ in range(HALVINGS):
+                landing, stretch, _ = self.at(place)
+                beyond = (landing > wanted) == rises
+                near, far = np.where(beyond, near, place), np.where(beyond, place, far)
+                step = place - (landing - wanted) / stretch
+                new = np.where((step >= near) & (step <= far), step, 0.5 * (near + far))
+                done = np.abs(new - place) <= 1e-15 * (1.0 + np.abs(place))
+                place = new
+                if np.all(done):
+                    break
+        return target, place, rises
+
+    def flux_before(self, x: Floats) -> Floats:
+        """Flux that lands below each x, but for one constant [m]."""
+        target, place, rises = self.arrivals(x)
+        signed = np.where(rises, 1.0, -1.0) * self._sent(place)
+        return np.bincount(target, signed, x.size).astype(float)
+
+    def lit(self, x: Floats) -> NDArray[np.bool_]:
+        """Whether no crest is in the way: the place is farther across the rays than all before it."""
+        cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 1)
+        return self._across(x) >= self._before[cell]
+
+    def _sent(self, x: Floats) -> Floats:
+        """Flux through the surface from the first sample to x, what crests shade taken off [m]."""
+        cell = np.clip(np.searchsorted(self.nodes, x, "right") - 1, 0, self.nodes.size - 2)
+        return self._cumulated[cell] + self._through(self.nodes[cell], x)
+
+    def _through(self, near: Floats, far: Floats) -> Floats:
+        found = np.zeros_like(near)
+        for point, weight in GAUSS:
+            here = near + point * (far - near)
+            flux = self.at(here)[2]
+            found += weight * np.where(self.lit(here), flux, 0.0)
+        return found * (far - near)
+
+    def _highest_before(self) -> None:
+        self._before = np.maximum.accumulate(self._across(self.nodes))
+        through = self._through(self.nodes[:-1], self.nodes[1:])
+        self._cumulated = np.concatenate([[0.0], np.cumsum(through)])
+
+    def _across(self, x: Floats) -> Floats:
+        """Distance across the rays [m], the same all along one."""
+        return x * np.cos(self.tilt) + self._height(x) * np.sin(self.tilt)
+
+    def _with_folds(self, nodes: Floats, stretch: Floats) -> Floats:
+        """The places where dX/dx changes its sign among them: between two, X is monotone."""
+        cell = np.flatnonzero(np.sign(stretch[:-1]) * np.sign(stretch[1:]) < 0)
+        near, far, sign = nodes[cell], nodes[cell + 1], np.sign(stretch[cell])
+        for _ in range(HALVINGS):
+            middle = 0.5 * (near + far)
+            same = np.sign(self.at(middle)[1]) == sign
+            near, far = np.where(same, middle, near), np.where(same, far, middle)
+        return np.unique(np.concatenate([nodes, 0.5 * (near + far)]))
+
+    def _height(self, x: Floats) -> Floats:
+        try:
+            z = np.asarray(self._surface(x), float)
+        except (TypeError, ValueError) as error:
+            raise InputError(f"surface must be a function of an array of x [m], got {error}") from None
+        z = np.broadcast_to(z, x.shape)
+        if not np.all(np.isfinite(z)):
+            raise InputError(f"surface must be finite, got {z[~np.isfinite(z)].flat[0]:g}")
+        if np.any(z <= -self.depth):
+            raise InputError(f"depth must be below the deepest trough, {-z.min():g} m, got {self.depth:g}")
+        return z
+
+    def _derivatives(self, x: Floats) -> tuple[Floats, Floats, Floats]:
+        z, step = self._height(x), self._step
+        zx, zxx = STILL, STILL
+        if self._slope is not None:
+            zx = np.broadcast_to(np.asarray(self._slope(x), float), x.shape)
+        if self._curvature is not None:
+            zxx = np.broadcast_to(np.asarray(self._curvature(x), float), x.shape)
+        if self._slope is None or self._curvature is None:
+            around = [z if one == 0 else self._height(x + one * step) for one in range(-4, 5)]
+            zx = zx if self._slope else sum(w * one for w, one in zip(FIRST, around, strict=True)) / step
+            zxx = zxx if self._curvature else sum(w * one for w, one in zip(SECOND, around, strict=True)) / step**2
+        return z, zx, zxx
+
+
+def _finite(name: str, value: ArrayLike) -> Floats:
+    array = checked_numbers(name, value, "finite numbers [m]")
+    if not np.all(np.isfinite(array)):
+        raise InputError(f"{name} must be finite numbers [m], got {array[~np.isfinite(array)].flat[0]:g}")
+    return array

@@ -1,0 +1,153 @@
+"""The numpy Monte Carlo of water against what is known of it without photons."""
+
+import numpy as np
+import pytest
+from scipy.integrate import quad
+
+from mcml_sim.media.phase import HenyeyGreenstein, Isotropic, Mixture
+from profilefit.errors import InputError
+from profilefit.scenes.sea.photons import trace_beam, trace_view, turn
+
+SHARP = HenyeyGreenstein(0.924)
+DEPTHS, RADII = np.array([0.3, 1.0, 2.5]), np.array([0.05, 0.5, 2.0])
+
+
+def test_one_scattering_is_its_integral(sidak):
+    """Down through a plane by order 1: int_0^t e^-s int_0^1 p e^{-(t - s) / mu} dmu ds, for two phases."""
+    bound = sidak(6)
+    for phase in (SHARP, Isotropic()):
+        found = trace_beam(phase, DEPTHS, RADII, 200_000, 11).plane.groups[:, 1]
+        value, error = found.mean(axis=0), found.std(axis=0, ddof=1) / np.sqrt(len(found))
+        x, w = np.polynomial.legendre.leggauss(80)
+        # mu = 1 - u^2: even where a sharp lobe is
+        u, weight = 0.5 * (x + 1), 0.5 * w
+        mu = 1 - u * u
+        for t, one, sigma in zip(DEPTHS, value, error, strict=True):
+            rate = 1 / mu - 1
+            inner = np.exp(-t) * -np.expm1(-t * rate) / np.maximum(rate, 1e-300)
+            known = np.sum(weight * 2 * u * 2 * np.pi * phase.pdf(mu) * inner)
+            assert abs(one - known) < 1.5 * bound * sigma  # errors of 16 groups have errors of 18 %
+            assert abs(one - 1.05 * known) > 1.5 * bound * sigma
+
+
+def test_unscattered_light_is_exact():
+    found = trace_beam(SHARP, DEPTHS, RADII, 1000, 0)
+    still = found.within.at(0.0)
+    np.testing.assert_allclose(still.value, np.exp(-DEPTHS)[:, None] * np.ones(3), rtol=1e-14)
+    np.testing.assert_allclose(still.standard_error, 0.0, atol=1e-15)
+
+
+def test_energy_between_planes(sidak):
+    """Of isotropic scattering far down, net flux falls as absorption takes it: both directions, all orders.
+
+    The flux that is absorbed below a plane is what crosses it, net; deep enough under the source the fluence falls as
+    e^{-k t}, with k = 0.7104 for omega 0.8, the root of omega atanh(k) = k.
+    """
+    planes = np.array([2.0, 3.0])
+    found = trace_beam(Isotropic(), planes, [1.0], 400_000, 3)
+    down, up = found.plane.at(0.8), found.upward.at(0.8)
+    net = down.value - up.value
+    error = np.hypot(down.standard_error, up.standard_error) / net
+    assert abs(np.log(net[0] / net[1]) - 0.7104) < 0.08 + 4 * np.hypot(*error)
+    assert np.all(up.value > 0)
+
+
+def test_orders_of_a_lower_albedo_are_those_of_a_run_of_its_own(sidak):
+    """One run answers for every albedo below its own."""
+    together, apart = (trace_beam(SHARP, DEPTHS, RADII, 200_000, seed, h) for seed, h in ((1, 0.9), (2, 0.3)))
+    one, two = together.within.at(0.3), apart.within.at(0.3)
+    z = np.abs(one.value - two.value) / np.hypot(one.standard_error, two.standard_error)
+    assert np.max(z) < 1.5 * sidak(z.size)
+    other = together.within.at(0.35)
+    assert np.max(np.abs(other.value - two.value) / np.hypot(other.standard_error, two.standard_error)) > 10
+
+
+def test_a_term_of_weight_one_is_the_term():
+    mixture = Mixture((1.0, 0.0), (SHARP, HenyeyGreenstein(0.2)))
+    one, two = (trace_beam(phase, DEPTHS, RADII, 2000, 5).within.at(0.5) for phase in (SHARP, mixture))
+    np.testing.assert_array_equal(one.value, two.value)
+
+
+def test_a_seed_is_a_run():
+    one, two, other = (trace_beam(SHARP, DEPTHS, RADII, 2000, seed).plane.at(0.5).value for seed in (5, 5, 6))
+    np.testing.assert_array_equal(one, two)
+    assert np.all(one != other)
+
+
+def test_errors_are_those_of_repeats():
+    """Thirty runs spread as each says that it would."""
+    runs = [trace_beam(SHARP, [1.0], [0.1], 1600, seed).within.at(0.8) for seed in range(30)]
+    spread = np.std([one.value for one in runs], ddof=1)
+    said = np.sqrt(np.mean([one.standard_error**2 for one in runs]))
+    assert 0.6 < spread / said < 1.6
+
+
+def test_turned_directions():
+    """Unit vectors at the angle asked for, from every direction, straight up and down included."""
+    random = np.random.default_rng(2)
+    count = 1000
+    begin = random.normal(size=(3, count))
+    begin /= np.linalg.norm(begin, axis=0)
+    begin[:, :2] = [[0, 0], [0, 0], [1, -1]]
+    below = 10 ** random.uniform(-9, np.log10(2), count)
+    end = np.array(turn(*begin, below, 2 - below, random.uniform(0, 2 * np.pi, count)))
+    np.testing.assert_allclose(np.sum(end**2, axis=0), 1.0, rtol=1e-12)
+    # |a - b|^2 = 2 (1 - cos), which keeps digits that 1 - a b has lost
+    np.testing.assert_allclose(0.5 * np.sum((end - begin) ** 2, axis=0), below, rtol=1e-4, atol=1e-15)
+
+
+def test_a_view_has_single_scattering_by_its_integral():
+    """Order 1, by quadrature along the ray, in any direction and under a low sun; an eye that looks up sees the end."""
+    for cosine, sun in ((0.0, 0.0), (0.6, 0.0), (-0.6, 0.5), (1.0, 0.3), (-1.0, 0.0), (-0.9, 1.0)):
+        found = trace_view(SHARP, [0.4, 2.0], cosine, sun, photons=16, seed=0).groups[0, 1]
+        turned = np.sqrt(1 - cosine**2) * np.sin(sun) - cosine * np.cos(sun)
+        for depth, value in zip((0.4, 2.0), found, strict=True):
+            end = depth / -cosine if cosine < 0 else 50.0
+            known = quad(lambda s, d=depth: np.exp(-(d + cosine * s) / np.cos(sun) - s), 0, end, epsabs=1e-13)[0]  # noqa: B023
+            assert value == pytest.approx(float(SHARP.pdf(turned)) * known, rel=1e-7)
+
+
+def test_backward_is_forward(sidak):
+    """Radiance toward a horizontal eye under isotropic scattering is omega / 4 pi times the fluence there.
+
+    At the surface of a half space in the sun, straight down, that is H(1) times the sun's irradiance (Chandrasekhar,
+    Radiative Transfer, 1950).
+    """
+    depth = 1e-6
+    found = trace_view(Isotropic(), [depth], photons=200_000, seed=4).at(0.8)
+    x, w = np.polynomial.legendre.leggauss(64)
+    mu, weight = 0.5 * (x + 1), 0.5 * w
+    h = np.ones_like(mu)
+    for _ in range(200):  # H(mu) = 1 / (sqrt(1 - omega) + omega / 2 int mu' H / (mu + mu') dmu')
+        h = 1 / (np.sqrt(0.2) + 0.4 * np.sum(weight * mu * h / (mu[:, None] + mu), axis=1))
+    known = 1 / (np.sqrt(0.2) + 0.4 * np.sum(weight * mu * h / (1 + mu)))
+    value, error = found.value[0] * 4 * np.pi / 0.8, found.standard_error[0] * 4 * np.pi / 0.8
+    assert abs(value - known) < 1.5 * sidak(1) * error + 1e-4
+    assert error < 0.01 * known
+
+
+@pytest.mark.parametrize(
+    ("change", "named"),
+    [
+        ({"phase": 0.9}, "phase must be"),
+        ({"depths": [0.0]}, "depths must be"),
+        ({"depths": []}, "depths must be"),
+        ({"radii": [1.0, 0.5]}, "radii must be"),
+        ({"radii": [np.nan]}, "radii must be"),
+        ({"photons": 3}, "photons must be"),
+        ({"highest": 1.0}, "highest must be"),
+        ({"highest": 0.0}, "highest must be"),
+    ],
+)
+def test_what_no_run_has(change, named):
+    with pytest.raises(InputError, match=named):
+        trace_beam(**{"phase": SHARP, "depths": [1.0], "radii": [1.0], "photons": 100, **change})
+
+
+def test_what_no_view_has():
+    with pytest.raises(InputError, match="cosine must be"):
+        trace_view(SHARP, [1.0], cosine=1.1)
+    with pytest.raises(InputError, match="sun must be"):
+        trace_view(SHARP, [1.0], sun=1.6)
+    with pytest.raises(InputError, match="omega must be"):
+        trace_beam(SHARP, [1.0], [1.0], 100).plane.at(0.9)
