@@ -41,15 +41,21 @@ def test_an_empty_term_changes_no_bit():
 
 
 def test_equal_terms_are_one():
-    mixed = Mixture((0.3, 0.7), (ONE, ONE))
-    one, other = tally(None, 0.9, 1).diffuse_reflectance, tally(mixed, seed=2).diffuse_reflectance
+    def reflected(phase, seed):
+        layer = Layer(1.2, 0.1, 1.0, 0.0, phase=phase)
+        return simulate(Medium((layer,)), GRID, 200_000, seed).diffuse_reflectance
+
+    one, other = reflected(ONE, 1), reflected(Mixture((0.3, 0.7), (ONE, ONE)), 2)
     assert abs(one.value - other.value) < 3 * np.hypot(one.standard_error, other.standard_error)
-    blunt = tally(Mixture((0.3, 0.7), (HenyeyGreenstein(0.8), ONE)), seed=2).diffuse_reflectance
+    blunt = reflected(Mixture((0.3, 0.7), (HenyeyGreenstein(0.5), ONE)), 2)
     assert abs(one.value - blunt.value) > 5 * np.hypot(one.standard_error, blunt.standard_error)
 
 
-@BY_PHASE
-@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+@pytest.mark.parametrize(
+    ("phase", "illumination"),
+    [(SEA, "searchlight"), (SEA, "diffuse"), (TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight")],
+    ids=["mixture", "mixture, diffuse", "table", "Forand"],
+)
 def test_light_scattered_once(phase, illumination):
     """Photons of the first order against the closed single scattering of that phase function."""
     found = simulate_orders(GRID, 2**17, 4, Setting(illumination, n=1.2, phase=phase))
