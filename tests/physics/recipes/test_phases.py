@@ -60,7 +60,7 @@ def test_every_form_is_a_phase_function(form):
             mean = float(form.mean_cosine(constants))
         assert np.all(np.isfinite(slope))
         assert start.shape == (form.free,)
-        x = np.cos(np.linspace(np.pi, 1e-4, 40_001))
+        x = np.cos(np.geomspace(np.pi, 1e-4, 40_001))
         p = np.asarray(form.phase(np.asarray(constants)).pdf(x))
         total = 2 * np.pi * np.trapezoid(p, x)
         left = 1 - float(form.phase(np.asarray(constants)).invert(np.cos(1e-4)))
