@@ -18,8 +18,8 @@ from profilefit.scenes.stage.buffers import INSIDE
 from profilefit.scenes.stage.surface import evenly, sees, world
 
 CHOSEN = 400  # pixels
-# What is hidden has a part in an error from this share of the tolerance on: of 120 random scenes
-# (`python -m benchmarks.heart`) the screen breaks it elsewhere for coarse pixels only, where an atlas is worse.
+# What is hidden has a part in an error from this share of the tolerance on: in random scenes (`python -m
+# benchmarks.heart`) where the screen breaks it and less is hidden, coarse pixels do.
 PART = 0.25
 FINE = 6 * CHARTS_END  # texels of a side, of what light goes in
 
