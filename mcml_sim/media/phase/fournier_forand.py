@@ -46,7 +46,7 @@ class FournierForand(Phase):
                 raise InputError(f"{name} must be in ({low:g}, {high:g}), got {shown(value)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]; straight on, as near to that as a cosine can tell."""
+        """Density of the direction [1/sr]; straight on, of the nearest cosine below 1."""
         return self._density(namespace(self.n, self.mu, cosine).maximum(1 - cosine, STRAIGHT))
 
     def invert(self, cosine: Any) -> Any:

@@ -21,7 +21,7 @@ MOST_ROWS = 2**16
 TOLERANCE = 0.02  # by which an integral may miss 1: a table's own interpolation does
 ROUNDING = 1e-6  # of pi, in tables with few digits [rad]
 DIGITS = 16  # of a digest
-STRAIGHT = 2.0**-54  # 1 - c of light that float64 cannot tell from straight on
+STRAIGHT = 2.0**-54  # 1 - c: of cosines nearer to 1 float64 makes 1
 
 
 @dataclass(frozen=True, repr=False)
@@ -75,7 +75,7 @@ class Tabulated(Phase):
         return f"Tabulated({len(self.angles)} angles, {digest[:DIGITS]})"
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]; straight on, as near to that as a cosine can tell."""
+        """Density of the direction [1/sr]; straight on, of the nearest cosine below 1."""
         xp = namespace(cosine, self.pieces.end)
         return self.pieces.value(xp.maximum(1 - cosine, STRAIGHT)) / (2 * np.pi)
 
