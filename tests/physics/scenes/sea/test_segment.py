@@ -8,6 +8,7 @@ import pytest
 from profilefit.errors import InputError
 from profilefit.scenes import sea
 from profilefit.scenes.sea.law import segment_between, segment_integral
+from profilefit.shader.check.shader_law import Board
 from profilefit.shader.context import full_screen, program
 from profilefit.shader.emit import read_text
 from profilefit.shader.languages import translated
@@ -87,17 +88,16 @@ def test_the_text_on_the_gpu(context, arguments):
 def drawn(context, ways, lengths):
     code = program(context, "segment", "#version 330\n" + TEXT + MAIN)
     given = [context.texture((WIDTH, HEIGHT), 4, one.astype("f4").tobytes(), dtype="f4") for one in (ways, lengths)]
-    board = context.texture((WIDTH, HEIGHT), 4, dtype="f4")
-    frame, triangle = context.framebuffer([board]), full_screen(context, code)
+    board, triangle = Board(context, (WIDTH, HEIGHT)), full_screen(context, code)
     try:
-        frame.use()
         for unit, (name, one) in enumerate(zip(("ways", "lengths"), given, strict=True)):
             one.use(unit)
             code[name] = unit
-        triangle.render(vertices=3)
-        return np.frombuffer(frame.read(components=4, dtype="f4"), "f4").reshape(-1, 4)
+        with board.bound():
+            triangle.render(vertices=3)
+        return np.frombuffer(board.frame.read(components=4, dtype="f4"), "f4").reshape(-1, 4)
     finally:
-        for one in (frame, triangle, code, board, *given):
+        for one in (triangle, code, board, *given):
             one.release()
 
 
