@@ -185,7 +185,7 @@ def optics(stack: Stack, layer: Array) -> LayerOptics:
 
 
 def scatter(
-    go: Array, key: Array, lanes: LayeredLanes, event: Array, here: LayerOptics, others: tuple[Phase | None, ...]
+    go: Array, key: Array, lanes: LayeredLanes, event: Array, here: LayerOptics, others: tuple[Phase | None, ...] = ()
 ) -> tuple[LayeredLanes, Array]:
     """Fly each photon to its next interaction, absorb a share of it and scatter the rest; or let it wait.
 
