@@ -143,7 +143,7 @@ ALL_DIGITS = 17  # give every float64 back
 def plain(value: Any, digits: int = ALL_DIGITS) -> Any:
     """Numbers, text, lists and dicts only; floats to so many digits; what is not finite becomes None."""
     if is_dataclass(value) and not isinstance(value, type):
-        own = getattr(value, "content", None)  # of one that says itself what files have of it
+        own = getattr(value, "as_table", None)  # of one that says itself what files have of it
         return plain(own() if callable(own) else asdict(value), digits)
     if isinstance(value, Mapping):
         return {str(key): plain(item, digits) for key, item in value.items()}

@@ -64,14 +64,14 @@ class Setting:
         """True where `mcml_sim.exact` has the half space."""
         return self.n >= 1.0 and self.is_isotropic
 
-    def content(self) -> dict[str, Any]:
+    def as_table(self) -> dict[str, Any]:
         """What files say of it; `phase` where it is not Henyey and Greenstein's."""
         told = {"illumination": self.illumination, "n": self.n, "g": self.g}
         return told if self.phase is None else {**told, "phase": phases.as_table(self.phase)}
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Setting:
-        """What `content` gave; InputError or TypeError on anything else."""
+        """What `as_table` gave; InputError or TypeError on anything else."""
         if "phase" not in content:
             return cls(**content)
         return cls(**{**content, "phase": phases.from_table(content["phase"])})

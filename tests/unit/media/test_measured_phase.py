@@ -116,8 +116,8 @@ def test_tables_of_files(phase):
     assert again == phase
     assert hash(again) == hash(phase)
     setting = Setting("diffuse", n=1.3, phase=phase)
-    assert Setting.of(setting.content()) == setting
-    assert Setting().content() == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
+    assert Setting.of(setting.as_table()) == setting
+    assert Setting().as_table() == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
 
 
 def test_a_layer_has_one_phase_function():
