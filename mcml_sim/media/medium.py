@@ -36,8 +36,7 @@ class Layer:
 
     def __post_init__(self) -> None:
         if self.phase is not None:
-            for name, value in zip(("g", "phase"), phases.own(self.phase), strict=True):
-                object.__setattr__(self, name, value)
+            phases.settle(self)
         _require_index("n", self.n)
         for name in ("mu_a", "mu_s"):
             value = getattr(self, name)

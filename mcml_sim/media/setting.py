@@ -36,8 +36,7 @@ class Setting:
 
     def __post_init__(self) -> None:
         if self.phase is not None:
-            for name, value in zip(("g", "phase"), phases.own(self.phase), strict=True):
-                object.__setattr__(self, name, value)
+            phases.settle(self)
         require_illumination(self.illumination)
         if not (is_traced(self.n) or (is_number(self.n) and math.isfinite(self.n) and self.n > 0)):
             raise InputError(f"n must be a refractive index > 0, got {shown(self.n)}")

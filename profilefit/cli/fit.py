@@ -76,13 +76,14 @@ def fit(
     fit fails.
 
     With --kind phase a table has columns angle (degrees), value and, if known, sigma; one to four terms of Henyey
-    and Greenstein, Haltrin's form, and Fournier and Forand's are fitted to it, moments free or held: a minute.
+    and Greenstein, Haltrin's form, and Fournier and Forand's are fitted to it, moments free or held: a minute. The one
+    named petzold is shipped.
 
     \b
     Examples, on the files of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
-      profilefit fit fits/phases/petzold.csv --kind phase
+      profilefit fit petzold --kind phase
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json
@@ -138,7 +139,7 @@ def _of_phase(
         from mcml_sim.runs.progress import working
         from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.phases.fit import ALL_ANGLES
-        from profilefit.recipes.phases.record import content, fits_of
+        from profilefit.recipes.phases.record import content, fits_of, table_of
         from profilefit.report.tables.phase_table import phase_tables, premise_lines
 
     taken = {"data", "kind", "angles", "out", "as_json", "quiet"}
@@ -146,7 +147,7 @@ def _of_phase(
         source = context.get_parameter_source(name)
         if name not in taken and source is not None and source.name == "COMMANDLINE":
             raise InputError(f"--{name.replace('_', '-')} must be left out where --kind is {PHASE}")
-    table = read_phase(data)
+    table = read_phase(table_of(str(data)) or data)
     if out is not None:
         require_folder(out)
     with working("fitting", quiet):

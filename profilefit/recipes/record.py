@@ -97,6 +97,16 @@ def _of_format_1(content: dict[str, Any]) -> dict[str, Any]:
     return found
 
 
+def read_of(path: Path, pipeline: str, words: str, shown: schema.Kinds) -> dict[str, Any]:
+    """Read a record of one pipeline, `words` what it is of, which holds what is `shown`; RecordError on any other."""
+    content = read(path)
+    if content["pipeline"] != pipeline:
+        raise RecordError(f"{path}: must be a record of {words}, got pipeline {content['pipeline']!r}")
+    if text := schema.mistyped(content, shown):
+        raise RecordError(f"{path}: is damaged: {text}; regenerate it")
+    return content
+
+
 def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
     """RecordError where a record lacks what `read` promises, or holds what is of another kind."""
     if text := schema.problem(content, whole) or _outside(content):

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from mcml_sim.media.phase.henyey_greenstein import HenyeyGreenstein
     from mcml_sim.media.phase.isotropic import Isotropic
     from mcml_sim.media.phase.mixture import Mixture
-    from mcml_sim.media.phase.table import as_table, from_table, own
+    from mcml_sim.media.phase.table import as_table, from_table, settle
     from mcml_sim.media.phase.tabulated import Tabulated
 
 HOMES = {
@@ -19,7 +19,7 @@ HOMES = {
     "Mixture": "mixture",
     "Phase": "base",
     "Tabulated": "tabulated",
-    **dict.fromkeys(("as_table", "from_table", "own"), "table"),
+    **dict.fromkeys(("as_table", "from_table", "settle"), "table"),
 }
 
 __all__ = [
@@ -31,7 +31,7 @@ __all__ = [
     "Tabulated",
     "as_table",
     "from_table",
-    "own",
+    "settle",
 ]
 
 

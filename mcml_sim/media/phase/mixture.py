@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import jax.numpy as jnp
 import numpy as np
 
 from mcml_sim.errors import InputError
@@ -96,6 +97,13 @@ class Mixture(Phase):
         """Without terms of weight 0; one that is alone is itself."""
         kept = [(weight, phase.simplest) for weight, phase in zip(self.weights, self.phases, strict=True) if weight > 0]
         return kept[0][1] if len(kept) == 1 else Mixture(*zip(*kept, strict=True))
+
+    def for_kernel(self) -> Mixture:
+        """With float32 weights, each term as a kernel draws from it: of some that is a table."""
+        return self.of(
+            weights=tuple(jnp.float32(weight) for weight in self.weights),
+            phases=tuple(phase.for_kernel() for phase in self.phases),
+        )
 
     def _mean(self, values: list[Any]) -> Any:
         total = self.weights[0] * values[0]

@@ -66,8 +66,7 @@ class Pieces(NamedTuple):
     @property
     def total(self) -> float:
         """Integral of the density [-]."""
-        last = jnp.shape(self.end)[0] - 1
-        return float(self.before[last] + self._within(self.end[last], last) + self.share[last] - self.before[last])
+        return float(self.below(self.end[-1]))
 
     def normalised(self) -> Pieces:
         """The same, with an integral of 1."""

@@ -25,15 +25,16 @@ KINDS: dict[str, type[Phase]] = {
 DEEPEST = 4  # mixtures within one another
 
 
-def own(phase: object) -> tuple[float, Phase | None]:
-    """Mean cosine and phase function of a layer or a setting: None for Henyey and Greenstein's, which g alone says.
+def settle(of: Any) -> None:
+    """Bring `g` and `phase` of a layer or a setting, frozen, into one: g of a phase function is its mean cosine.
 
-    InputError on what is no phase function.
+    Henyey and Greenstein's, and isotropic, is said by g alone. InputError on what is no phase function.
     """
-    if not isinstance(phase, Phase):
-        raise InputError(f"phase must be a phase function of mcml_sim.phase, got {shown(phase)}")
-    found = phase.simplest
-    return float(found.mean_cosine), None if isinstance(found, HenyeyGreenstein | Isotropic) else found
+    if not isinstance(of.phase, Phase):
+        raise InputError(f"phase must be a phase function of mcml_sim.phase, got {shown(of.phase)}")
+    found = of.phase.simplest
+    object.__setattr__(of, "g", float(found.mean_cosine))
+    object.__setattr__(of, "phase", None if isinstance(found, HenyeyGreenstein | Isotropic) else found)
 
 
 def as_table(phase: Phase) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from profilefit.recipes.folder import LOCAL, PHASES, fits_folder
 from profilefit.recipes.kinds import COUNT, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS
 from profilefit.recipes.phases.data import PhaseData, read_phase
 from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
-from profilefit.recipes.schema import Kinds, mistyped
+from profilefit.recipes.schema import Kinds
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -154,10 +154,8 @@ def table_of(name: str) -> Path | None:
 
 def load(path: Path) -> PhaseRecord:
     """A record; RecordError in one line on one that is damaged."""
-    found = record.read(path)
-    if found["pipeline"] != PIPELINE:
-        raise RecordError(f"{path}: must be a record of phase functions, got pipeline {found['pipeline']!r}")
-    if text := mistyped(found, SHOWN) or _missing(found):
+    found = record.read_of(path, PIPELINE, "phase functions", SHOWN)
+    if text := _missing(found):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     return PhaseRecord(found, path)
 

@@ -22,7 +22,7 @@ from profilefit.materials import CHANNELS
 from profilefit.recipes import record
 from profilefit.recipes.folder import SUMS
 from profilefit.recipes.kinds import COUNT, DIGEST, LIST, MEASURE, NUMBERS, TABLE, TEXT
-from profilefit.recipes.schema import Kinds, mistyped
+from profilefit.recipes.schema import Kinds
 from profilefit.recipes.stack import fit, gaussians
 from profilefit.recipes.stack.file import LayerStack
 from profilefit.recipes.stack.gaussians import SumLight
@@ -125,10 +125,8 @@ def beside(stack: Path) -> Path | None:
 
 def load(path: Path) -> SumRecord:
     """A record; RecordError in one line on one that is damaged."""
-    content = record.read(path)
-    if content["pipeline"] != PIPELINE:
-        raise RecordError(f"{path}: must be a record of sums of Gaussians, got pipeline {content['pipeline']!r}")
-    if text := mistyped(content, SHOWN) or _mismatched(content):
+    content = record.read_of(path, PIPELINE, "sums of Gaussians", SHOWN)
+    if text := _mismatched(content):
         raise RecordError(f"{path}: is damaged: {text}; regenerate it")
     record.record_setting(content)
     with damage(path):

@@ -120,6 +120,13 @@ def test_tables_of_files(phase):
     assert Setting().as_table() == {"illumination": "searchlight", "n": 1.0, "g": 0.0}
 
 
+def test_a_kernel_takes_a_mixture_of_any():
+    """Each of three terms may gain or lose a stratum at its end."""
+    mixture = Mixture((0.3, 0.3, 0.4), (PETZOLD, FORAND, HenyeyGreenstein(-0.2)))
+    v = (2 * (np.arange(STRATA) + 0.5) / STRATA - 1).astype(np.float32)
+    assert apart(drawn(mixture, v), mixture) < 3 / STRATA + 1e-6
+
+
 def test_a_layer_has_one_phase_function():
     layer = Layer(1.3, 0.1, 1.0, 0.5, phase=SEA)
     assert layer.g == pytest.approx(SEA.mean_cosine)
