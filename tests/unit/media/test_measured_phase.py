@@ -20,6 +20,8 @@ STRATA = 2 * 10**6
 
 def below(phase, u):
     """Share of all scatterings with 1 - c < u, without the rounding of a cosine."""
+    if isinstance(phase, Mixture):
+        return sum(weight * below(one, u) for weight, one in zip(phase.weights, phase.phases, strict=True))
     if isinstance(phase, Tabulated):
         return phase.pieces.below(u)
     return phase._below(u) if isinstance(phase, FournierForand) else 1 - phase.invert(1 - u)
