@@ -6,12 +6,10 @@ from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import fields
 from functools import partial
-from typing import Any, TypeVar
+from typing import Any, Self
 
 import jax
 import jax.numpy as jnp
-
-P = TypeVar("P", bound="Phase")
 
 
 class Phase(ABC):
@@ -28,9 +26,10 @@ class Phase(ABC):
         jax.tree_util.register_pytree_node(cls, _leaves, partial(_from_leaves, cls))
 
     @classmethod
-    def of(cls: type[P], **leaves: Any) -> P:
+    def of(cls, **leaves: Any) -> Self:
         """With these fields, without the checks of the constructor: arrays that a kernel needs in place of numbers."""
-        return _from_leaves(cls, None, [leaves[field.name] for field in fields(cls)])  # type: ignore[arg-type]
+        names = (field.name for field in fields(cls))  # type: ignore[arg-type]
+        return _from_leaves(cls, None, [leaves[name] for name in names])
 
     @abstractmethod
     def pdf(self, cosine: Any) -> Any:
@@ -72,9 +71,9 @@ def _leaves(phase: Phase) -> tuple[tuple[Any, ...], None]:
     return tuple(getattr(phase, field.name) for field in fields(phase)), None  # type: ignore[arg-type]
 
 
-def _from_leaves(cls: type[P], _: None, leaves: Sequence[Any]) -> P:
+def _from_leaves(cls: Any, _: None, leaves: Sequence[Any]) -> Any:
     """Without the checks of the constructor: jax puts in place of numbers whatever it needs."""
     phase = object.__new__(cls)
-    for field, leaf in zip(fields(cls), leaves, strict=True):  # type: ignore[arg-type]
+    for field, leaf in zip(fields(cls), leaves, strict=True):
         object.__setattr__(phase, field.name, leaf)
     return phase
