@@ -17,7 +17,8 @@ def scene(
     file: Annotated[
         str,
         typer.Argument(
-            metavar="FILE.toml", help="What is drawn, and how; with --example the name of a scene: skin, layers, heart."
+            metavar="FILE.toml",
+            help="What is drawn, and how; with --example the name of a scene: skin, layers, heart, sea.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,

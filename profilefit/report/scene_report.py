@@ -45,7 +45,7 @@ def _error_map(drawn: Drawn) -> bytes:
     most = float(np.nanquantile(drawn.error, LAST))
     shown = ax.imshow(drawn.error, cmap=colours, vmin=0.0, vmax=most or 1.0, interpolation="nearest")
     bar = figure.colorbar(shown, ax=ax, extend="max", pad=0.02)
-    bar.set_label("error of scattered light over its mean [-]")
+    bar.set_label(f"error of {drawn.of} over its mean [-]")
     point = drawn.point
     ax.set_title(f"{point.label}, {point.samples} samples: root mean square {point.rmse:.3g}")
     return _written(figure)
@@ -87,11 +87,13 @@ def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
         what = f"{point.label}, {point.samples} samples"
         yield f"{what}: error {point.rmse:.3g}, {_times(point.milliseconds)} for its passes"
     yield f"a whole frame with {drawn.point.samples} samples: {_times(drawn.frame)}"
+    for name, times in drawn.passes.items():
+        yield f"  {name}: {_times(times)}"
     yield (
         f"the truth's own error: {drawn.truth_error.half:.1e} at half of the pixels, {drawn.truth_error.most:.1e} at "
         f"nine in ten, {drawn.truth_error.rms:.1e} root mean square"
     )
-    yield f"errors are root mean squares of scattered light, over its mean; times are of {device}"
+    yield f"errors are root mean squares of {drawn.of}, over its mean; times are of {device}"
 
 
 def content(drawn: Drawn, device: str) -> dict[str, Any]:
@@ -100,6 +102,7 @@ def content(drawn: Drawn, device: str) -> dict[str, Any]:
         "device": device,
         **_point(drawn.point),
         "frame_milliseconds": _spread(drawn.frame),
+        **({"passes": {name: _spread(times) for name, times in drawn.passes.items()}} if drawn.passes else {}),
         "truth_error": drawn.truth_error._asdict(),
         "chart": [_point(one) for one in drawn.chart],
     }

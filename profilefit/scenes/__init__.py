@@ -48,6 +48,7 @@ SCENES = {
     "skin": ("profilefit.scenes.skin.scene", "skin-head.toml"),
     "layers": ("profilefit.scenes.layers.scene", "layers-head.toml"),
     "heart": ("profilefit.scenes.heart.scene", "heart.toml"),
+    "sea": ("profilefit.scenes.sea.scene", "sea.toml"),
 }
 
 __all__ = [

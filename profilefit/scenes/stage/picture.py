@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -45,9 +46,10 @@ class Drawn:
 
     picture, truth  (h, w, 3) as a screen shows them
     error           (h, w) root mean square of the channels' errors, over the mean of the truth [-]; NaN where none is
-                    measured. Its own root mean square is `point.rmse`
+                    measured. Its own root mean square is `point.rmse`, or more if the truth has noise
     point           of the technique;  chart  the same with other numbers of samples, too, the least first
     frame           milliseconds of a whole frame, each time that it was drawn (turns,)
+    of              what the errors are of;  passes  milliseconds of parts of the frame by their names, if known
     """
 
     picture: Bytes
@@ -57,6 +59,8 @@ class Drawn:
     chart: tuple[ChartPoint, ...]
     frame: tuple[float, ...]
     truth_error: TruthError
+    of: str = "scattered light"
+    passes: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
 
 
 def to_srgb(image: ArrayLike, exposure: float = 1.0) -> Bytes:

@@ -83,7 +83,7 @@ def view(tables: Tables, content: Table, default: Viewpoint = HEAD) -> dict[str,
     return {
         "file": tables.file,
         "sampling": tables.made("technique", lambda: Sampling(named.get("samples", 16))),
-        "chart": _chart(tables, named),
+        "chart": chart(tables, named),
         "camera": _camera(tables, seen, default),
         "light": Light(direction, tables.three("light", "irradiance", lit, light.irradiance, 0.0, MOST_LIGHT)),
         "ambient": tables.three("light", "ambient", lit, Scene(()).ambient, 0.0, MOST_LIGHT),
@@ -119,7 +119,8 @@ def drawn(judge: Judge, request: ViewRequest, shown: Shown, truth_error: TruthEr
     )
 
 
-def _chart(tables: Tables, named: Table) -> tuple[int, ...]:
+def chart(tables: Tables, named: Table) -> tuple[int, ...]:
+    """Numbers of samples; InputError."""
     numbers: Any = named.get("chart", [])
     whole = isinstance(numbers, list) and all(type(one) is int and 1 <= one <= MOST_SAMPLES for one in numbers)
     if not whole or len(numbers) > MOST_CHART:

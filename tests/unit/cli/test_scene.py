@@ -17,11 +17,15 @@ from profilefit.scenes import SCENES
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
-NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",)}
+NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",)}
 OWN = {
     "skin": ("label", "material"),
     "layers": ("kind", "pose", "single", "least", "most"),
     "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel", "tolerance"),
+    "sea": (
+        *("lobes", "n", "tile", "slope", "wind", "sea_seed", "depth", "floor_slope", "floor_seed", "reflectance"),
+        *("kind", "splat", "vertices", "texels", "slices", "steps"),
+    ),
 }
 SMALL = """\
 scene = "skin"
@@ -82,8 +86,8 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, got 'fog'"),
-        ('scene = "skin"', "", "scene must be one of skin, layers, heart, got nothing"),
+        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, got 'fog'"),
+        ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, got nothing"),
         ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
         ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
         ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
@@ -110,6 +114,70 @@ def test_a_mistake_is_one_line_that_names_file_and_key(command, small, old, new,
     assert not Path("drawn").exists()
 
 
+SEA = """\
+scene = "sea"
+[water]
+a = [0.3, 0.1, 0.08]
+b = [0.1, 0.1, 0.1]
+source = "assumed"
+phase = [[0.9, 0.95], [0.1, 0.3]]
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        (
+            "[0.3, 0.1, 0.08]",
+            "[-0.3, 0.1, 0.08]",
+            "[water] a must be three numbers in 0 ... 100, got [-0.3, 0.1, 0.08]",
+        ),
+        ("[0.3, 0.1, 0.08]", "[0.3, nan, 0.08]", "[water] a must be three numbers in 0 ... 100, got [0.3, nan, 0.08]"),
+        ('source = "assumed"\n', "", "[water] source must be a text that says where a and b are from, got nothing"),
+        ("[0.1, 0.3]]", "[0.2, 0.3]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
+        ("[0.1, 0.3]]", "[0.1, 1.0]]", "[water] lobes must be a list of pairs [weight, g], weights >= 0 that sum to 1"),
+        (
+            "[[0.9, 0.95], [0.1, 0.3]]",
+            '"fog"',
+            "[water] the record of a phase function must be one of petzold, or a .json, got 'fog'",
+        ),
+        ("[water]", "[floor]\ndepth = 0.1\n[water]", "floor must be below the sea's lowest trough, "),
+        ("[water]", "[sea]\nwind = [0, 0]\n[water]", "[sea] wind must be two speeds in -100 ... 100 [m/s], not both 0"),
+        ("[water]", "[sea]\nseed = 0.5\n[water]", "[sea] seed must be a whole number in 0 ... 2147483648, got 0.5"),
+        (
+            "[water]",
+            "[camera]\nangle = 60\n[water]",
+            "[camera] angle must be the picture's height as an angle in 0 ...",
+        ),
+        ("[water]", "[camera]\neye = [0, 0, 1]\n[water]", "[camera] eye must be in the water, with z in "),
+        ("[water]", "[camera]\ntarget = [6, 2.5, 0]\n[water]", "[camera] target must be a point that is not straight"),
+        ("[water]", "[light]\ndirection = [1, 0, 1]\n[water]", "[light] direction must be toward the sun, [x <= 0,"),
+        (
+            "[water]",
+            "[technique]\nslices = 33\n[water]",
+            "[technique] slices must be a whole number in 2 ... 32, got 33",
+        ),
+        (
+            "[water]",
+            "[technique]\nslices = 32\ntexels = 1024\n[water]",
+            "[technique] slices must be so many that texels times slices is 16384 at most, got 32",
+        ),
+        (
+            "[water]",
+            "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n[water]",
+            "[light] irradiance and ambient must not both be 0: nothing would be seen",
+        ),
+    ],
+)
+def test_a_mistake_in_a_sea_is_one_line(command, small, old, new, said):
+    assert old in SEA
+    small.write_text(SEA.replace(old, new, 1), encoding="utf-8")
+    status, out, err = command("scene", str(small), "--out", "drawn")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"profilefit: {small}: {said}")
+    assert not Path("drawn").exists()
+
+
 @pytest.mark.slow
 def test_nothing_to_see_is_one_line(command, small, opengl):
     dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
@@ -124,7 +192,7 @@ def test_names_and_places(command, small):
     assert command("scene", "fog", "--example") == (
         2,
         "",
-        "profilefit: NAME must be one of skin, layers, heart with --example, got 'fog'\n",
+        "profilefit: NAME must be one of skin, layers, heart, sea with --example, got 'fog'\n",
     )
     assert command("scene", "nowhere.toml")[0] == 2
     Path("file").write_text("")

@@ -1,0 +1,290 @@
+"""The truth of a view under the sea: all light that comes to a pixel, of all orders, by paths followed backward.
+
+Whatever a path is scattered or reflected by is lit by the sun as its rays came through the waves, `Sunlight`, and by
+the sky where a path leaves the water. Of the picture that this judges it has the world and the first refraction, none
+of its closed forms. Lengths in metres, z up.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.media.checks import checked_whole
+from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
+from profilefit.scenes.sea.hits import first_hit
+from profilefit.scenes.sea.photons import turn
+from profilefit.scenes.sea.waves import Waves, refracted
+from profilefit.scenes.sea.world import World
+
+Floats = NDArray[np.float64]
+LEVELS, PIXELS, RAYS = 48, 256, 1024  # of sunlight in the water: depths, and pixels and rays along a side of the tile
+TOGETHER = 1 << 16  # paths in memory at once
+SUNWARD = 0.25  # share of all turns that are drawn around the way to the sun, from where most light comes
+LEAST_SPREAD = 1e-3  # of rays [-], below which the phase function alone is wide enough
+SURE = 0.25  # below this weight a path goes on with a chance in its proportion
+MOST_EVENTS = 1000
+NEWTON, STEPS = 4, 16  # to a surface that a ray meets once; of one that it may meet more often
+ONCE = 0.5  # steepness up to which a surface is met once, with a margin
+WATER, FLOOR, SURFACE = range(3)
+ABOVE = 1e-7  # a path leaves the floor from so far above it [m]
+
+
+class Sunlight:
+    """Rays of a point sun behind the waves, unscattered and unabsorbed, in all of the water.
+
+    A lattice of rays on the surface; at each of some depths the flux and the mean direction of those in a pixel. It
+    moves with the calm sea's ray, so that it changes little from depth to depth, between which it is linear.
+    """
+
+    def __init__(self, world: World, levels: int = LEVELS, pixels: int = PIXELS, rays: int = RAYS) -> None:
+        self.tile, self.calm = world.sea.tile, world.calm[0]
+        self.pixels = checked_whole("pixels", pixels, 1, 4096)
+        count = checked_whole("rays", rays, 1, 8192)
+        side = (np.arange(count) + 0.5) * self.tile / count
+        height, *slope = world.sea.lattice(side, side)
+        along, across, flux = refracted(world.tilt, (slope[0], slope[1]), world.n)
+        self.top = min(world.sea.lowest, -1e-3 * world.depth)
+        self.step = (self.top - world.floor.lowest) / (checked_whole("levels", levels, 2, 1024) - 1)
+        self.light = np.zeros((levels, pixels * pixels, 3), np.float32)
+        weights = (flux.ravel(), (flux * along).ravel(), (flux * across).ravel())
+        for level in range(levels):
+            z = self.top - level * self.step
+            x = side + (height - z) * along + self.calm * z
+            y = side[:, None] + (height - z) * across
+            at = self._pixel(x.ravel(), y.ravel())
+            for column, weight in enumerate(weights):
+                self.light[level, :, column] = np.bincount(at, weight, pixels * pixels)
+        self.light *= (pixels / count) ** 2
+        spread = float(np.sqrt(np.mean((along - self.calm) ** 2 + across**2)))
+        self.around: Phase = world.phase
+        if spread > LEAST_SPREAD:
+            self.around = Mixture((0.5, 0.5), (world.phase, HenyeyGreenstein(max(1.0 - spread, 0.0))))
+
+    def at(self, x: Floats, y: Floats, z: Floats) -> tuple[Floats, Floats]:
+        """Flux (n,) per horizontal area, over the sun's across its rays in air; and the unit way (n, 3) it goes."""
+        level = np.clip((self.top - z) / self.step, 0.0, len(self.light) - 1.000001)
+        whole = level.astype(int)
+        rest = (level - whole)[:, None]
+        at = self._pixel(x + self.calm * z, y)
+        found = (1.0 - rest) * self.light[whole, at] + rest * self.light[whole + 1, at]
+        flux = np.maximum(found[:, 0], 1e-30)
+        way = np.column_stack([found[:, 1] / flux, found[:, 2] / flux, -np.ones(len(flux))])
+        way[found[:, 0] <= 0] = self.calm, 0.0, -1.0
+        return found[:, 0], way / np.linalg.norm(way, axis=1)[:, None]
+
+    def _pixel(self, x: Floats, y: Floats) -> NDArray[np.intp]:
+        row, column = (np.floor(np.mod(one / self.tile, 1.0) * self.pixels).astype(int) for one in (y, x))
+        row, column = (np.minimum(one, self.pixels - 1) for one in (row, column))
+        return np.asarray(row * self.pixels + column)
+
+
+class Event(NamedTuple):
+    """seen  (n, 3) radiance that comes into the path there;  kept  of the path's light, (n or 1, 3 or 1)
+    turned  (n,) density of the turn that light would take over that of the one drawn;  place, way  (n, 3) on from there
+    """
+
+    seen: Floats
+    kept: Floats
+    turned: Floats
+    place: Floats
+    way: Floats
+
+
+class Traced(NamedTuple):
+    """radiance (n, 3) of red, green and blue by each ray's paths, of two independent halves of them (2, n, 3)."""
+
+    halves: Floats
+
+    @property
+    def radiance(self) -> Floats:
+        """By both."""
+        return np.asarray(self.halves.mean(axis=0))
+
+
+def traced(
+    world: World, light: Sunlight, origin: Floats, corner: Floats, across: Floats, up: Floats, paths: int, seed: int = 0
+) -> Traced:
+    """Radiance of pixels (n, 3) that an eye below the waves sees, each the mean over its area.
+
+    origin  (3,) the eye [m];  corner  (n, 3) of pixels as seen from it;  across, up  (3,) their sides
+    paths   of a pixel, an even number
+
+    Sight of the sun itself is left out. A ray that goes down meets no trough of the waves.
+    """
+    each = checked_whole("paths", paths, 2) // 2
+    found = np.zeros((2, len(corner), 3))
+    at_once = max(TOGETHER // each, 1)
+    for half in range(2):
+        for first in range(0, len(corner), at_once):
+            part = np.repeat(corner[first : first + at_once], each, axis=0)
+            rng = np.random.default_rng([seed, half, first])
+            spot = rng.random((2, len(part), 1))
+            way = part + spot[0] * across + spot[1] * up
+            way /= np.linalg.norm(way, axis=1)[:, None]
+            start = np.broadcast_to(origin, way.shape).copy()
+            found[half, first : first + at_once] = followed(world, light, start, way, rng).reshape(-1, each, 3).mean(1)
+    return Traced(found)
+
+
+def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Floats:
+    """Radiance (n, 3) that each of these rays finds, by one path."""
+    c, b = world.c, np.asarray(world.b, float)
+    found = np.zeros((len(place), 3))
+    own = np.arange(len(place))
+    hero = rng.integers(0, 3, len(place))  # whose ways the path goes; the others weigh what they would have gone
+    worth, chance = np.ones((len(place), 3)), np.ones((len(place), 3))
+    aside = np.ones(len(place))  # density of the turns that light would take over that of those that were drawn
+    for _ in range(MOST_EVENTS):
+        if not len(own):
+            break
+        length = rng.exponential(size=len(own)) / c[hero]
+        end, kind = _ends(world, place, way, length)
+        faded = np.exp(-c * end[:, None])
+        worth, chance = worth * faded, chance * faded
+        place = place + end[:, None] * way
+        inside = kind == WATER
+        worth[inside] *= b
+        chance[inside] *= c
+        for number, event in enumerate((_scattered, _reflected, _surfaced)):
+            some = np.flatnonzero(kind == number)
+            if len(some):
+                seen, kept, turned, place[some], way[some] = event(world, light, place[some], way[some], rng)
+                found[own[some]] += (aside[some] / chance[some].mean(axis=1))[:, None] * worth[some] * seen
+                worth[some] *= kept
+                aside[some] *= turned
+        # Paths that would bring little more end, by chance, and the others stand for them. Turns do not count: few that
+        # were drawn away from the sun's glare come back to it, and would then stand for too many.
+        lives = np.minimum(np.max(worth / chance.mean(axis=1, keepdims=True), axis=1) / SURE, 1.0)
+        goes = np.flatnonzero((rng.random(len(own)) < lives) & (aside > 0))
+        own, hero, aside = own[goes], hero[goes], aside[goes]
+        place, way, chance = place[goes], way[goes], chance[goes]
+        worth = worth[goes] / lives[goes, None]
+    return found
+
+
+def _scattered(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
+    """In the water: what the sun's light is turned into the path, and where the path goes on backward."""
+    seen, sunward = _sunlit(world, light, place, way)
+    new = _turned(world.phase, way, rng)
+    sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
+    new[sunny] = _turned(light.around, sunward[sunny], rng)
+    straight, aside = _density(world.phase, way, new), _density(light.around, sunward, new)
+    factor = straight / ((1.0 - SUNWARD) * straight + SUNWARD * aside)
+    return Event(seen, np.ones((1, 3)), factor, place, new)
+
+
+def _sunlit(world: World, light: Sunlight, place: Floats, way: Floats) -> tuple[Floats, Floats]:
+    """Sunlight (n, 3) that a scattering turns into a ray, which `way` follows backward; and the way to the sun."""
+    flux, beam = light.at(*place.T)
+    turned = np.clip(-np.sum(beam * way, axis=1), -1.0, 1.0)
+    return (flux / -beam[:, 2] * world.phase.pdf(turned))[:, None] * _come(world, place, beam), -beam
+
+
+def _come(world: World, place: Floats, beam: Floats) -> Floats:
+    """The sun's irradiance (n, 3) times what the water leaves of its rays as they come to a place."""
+    return np.asarray(world.sun) * np.exp(world.c * np.minimum(place[:, 2] / -beam[:, 2], 0.0)[:, None])
+
+
+def _reflected(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
+    """At the floor: Lambert's."""
+    normal = _normal(world.floor, place)
+    flux, beam = light.at(*place.T)
+    facing = np.maximum(-np.sum(beam * normal, axis=1), 0.0)
+    seen = (flux / -beam[:, 2] * facing / np.pi)[:, None] * _come(world, place, beam) * np.asarray(world.reflectance)
+    below = 1.0 - np.sqrt(rng.random(len(way)))
+    new = np.column_stack(turn(*_columns(normal), below, 2.0 - below, 2.0 * np.pi * rng.random(len(way))))
+    sunny = np.flatnonzero(rng.random(len(way)) < SUNWARD)
+    new[sunny] = _turned(light.around, -beam[sunny], rng)
+    lambert = np.maximum(np.sum(new * normal, axis=1), 0.0) / np.pi
+    factor = lambert / ((1.0 - SUNWARD) * lambert + SUNWARD * _density(light.around, -beam, new))
+    lifted = place.copy()
+    lifted[:, 2] = world.floor.height(*place[:, :2].T) + ABOVE
+    return Event(seen, np.array([world.reflectance]), factor, lifted, new)
+
+
+def _surfaced(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.random.Generator) -> Event:
+    """At the waves from below: the sky behind them, and the path reflected."""
+    normal = _normal(world.sea, place)
+    cosine = np.clip(np.sum(way * normal, axis=1), 0.0, 1.0)
+    share = fresnel(world.n, 1.0, cosine)[0][:, None]
+    seen = (1.0 - share) * world.n**2 * np.asarray(world.sky) / np.pi
+    new = way - 2.0 * np.sum(way * normal, axis=1)[:, None] * normal
+    new[:, 2] = -np.abs(new[:, 2])  # where a steep wave turns it up it would meet the next one
+    return Event(seen, share, np.ones(len(way)), place, new)
+
+
+def _ends(world: World, place: Floats, way: Floats, length: Floats) -> tuple[Floats, NDArray[np.int8]]:
+    """How far each ray comes (n,) [m], and what is there: `WATER`, `FLOOR` or `SURFACE`."""
+    end, kind = length.copy(), np.full(len(way), WATER, np.int8)
+    last = place[:, 2] + length * way[:, 2]
+    for is_near, surface, event in (
+        ((way[:, 2] < 0) & (last < world.floor.highest), world.floor, FLOOR),
+        ((way[:, 2] > 0) & (last > world.sea.lowest), world.sea, SURFACE),
+    ):
+        near = np.flatnonzero(is_near)
+        far = met(surface, place[near], way[near])
+        reached = far < length[near]
+        end[near[reached]], kind[near[reached]] = far[reached], event
+    return end, kind
+
+
+def met(surface: Waves, place: Floats, way: Floats) -> Floats:
+    """Distance (n,) at which rays come to a surface: to a floor from above, or to the waves from below [m]; or inf."""
+    if not len(way):
+        return np.zeros(0)
+    rises = 1.0 if way[0, 2] > 0 else -1.0
+    found = np.maximum((surface.mean - place[:, 2]) / way[:, 2], 0.0)
+    if not surface.amplitudes.size:
+        return found
+    steep = surface.steepest * np.hypot(way[:, 0], way[:, 1]) > ONCE * np.abs(way[:, 2])
+    once, often = np.flatnonzero(~steep), np.flatnonzero(steep)
+    k, start, along = found[once], place[once], way[once]
+    for _ in range(NEWTON):
+        x, y, z = (start + k[:, None] * along).T
+        slope = surface.slope(x, y)
+        gap, rate = z - surface.height(x, y), along[:, 2] - slope[0] * along[:, 0] - slope[1] * along[:, 1]
+        k = k - gap / rate
+    found[once] = np.maximum(k, 0.0)
+    if len(often):
+        flip = np.array([1.0, 1.0, -rises])
+        start = place[often] * flip
+        # What stands on a surface may be below it by a rounding.
+        start[:, 2] = np.maximum(start[:, 2], -rises * surface.height(*place[often, :2].T))
+        bounds = (-rises * surface.highest, -rises * surface.lowest)
+        hit = first_hit(
+            lambda x, y: -rises * surface.height(x, y),
+            start,
+            way[often] * flip,
+            min(bounds),
+            max(bounds),
+            STEPS,
+            lambda x, y: (-rises * surface.slope(x, y)[0], -rises * surface.slope(x, y)[1]),
+        )
+        found[often] = np.where(np.isnan(hit), np.inf, hit)
+    return found
+
+
+def _turned(phase: Phase, way: Floats, rng: np.random.Generator) -> Floats:
+    """Directions (n, 3) drawn around others."""
+    below, above = phase.deflection(2.0 * rng.random(len(way)) - 1.0)
+    return np.column_stack(turn(*_columns(way), below, above, 2.0 * np.pi * rng.random(len(way))))
+
+
+def _columns(way: Floats) -> tuple[Floats, Floats, Floats]:
+    return way[:, 0], way[:, 1], way[:, 2]
+
+
+def _density(phase: Phase, way: Floats, new: Floats) -> Floats:
+    """Of such a draw [1/sr]."""
+    return np.asarray(phase.pdf(np.clip(np.sum(way * new, axis=1), -1.0, 1.0)))
+
+
+def _normal(surface: Waves, place: Floats) -> Floats:
+    """Upward unit normals (n, 3)."""
+    x, y = surface.slope(*place[:, :2].T)
+    found = np.column_stack([-x, -y, np.ones(len(place))])
+    return found / np.linalg.norm(found, axis=1)[:, None]

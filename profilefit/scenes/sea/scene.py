@@ -1,0 +1,334 @@
+"""Under a sea with waves: SEA.toml, drawn with caustics and shafts, beside all the light that comes to the eye."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import moderngl
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from mcml_sim.media.checks import is_number
+from mcml_sim.media.phase import Mixture
+from profilefit.errors import InputError
+from profilefit.recipes.phases import record as phases
+from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.scenes.sea.caustics import Splat, focus, splat_for
+from profilefit.scenes.sea.haze import KINDS
+from profilefit.scenes.sea.passes import Passes, axes
+from profilefit.scenes.sea.paths import Sunlight, traced
+from profilefit.scenes.sea.waves import WIND, Waves, random_floor, random_sea
+from profilefit.scenes.sea.world import World, checked_lobes
+from profilefit.scenes.stage import request
+from profilefit.scenes.stage.judge import TURNS
+from profilefit.scenes.stage.pattern import Sampling
+from profilefit.scenes.stage.picture import ChartPoint, Drawn, TruthError, to_srgb
+from profilefit.scenes.stage.request import ViewRequest
+from profilefit.scenes.stage.world import Camera, Light, Rgb
+
+Floats = NDArray[np.float64]
+TABLES = {
+    "": ("title", "scene", "unit", "water", "sea", "floor", "technique", "camera", "light"),
+    "water": ("a", "b", "phase", "n", "source"),
+    "sea": ("slope", "tile", "wind", "seed"),
+    "floor": ("depth", "slope", "reflectance", "seed"),
+    "technique": ("kind", "splat", *request.TABLES["technique"], "vertices", "texels", "slices", "steps"),
+    "camera": ("resolution", "eye", "target", "angle"),
+    "light": request.TABLES["light"],
+}
+PHASE = "petzold"
+FORM = "3-terms"  # of its record: four are nearer, and cost a third more
+INDEX = 1.34
+SLOPE, TILE, SEA_SEED = 0.12, 5.0, 4
+DEPTH, FLOOR_SLOPE, FLOOR_SEED, REFLECTANCE = 4.0, 0.08, 2, (0.42, 0.38, 0.30)
+AUTO = "auto"
+SPLATS = {"points": Splat.POINTS, "wireframe": Splat.WIREFRAME_ENERGY, "faces": Splat.FACES, "cells": Splat.CELLS}
+SAMPLES, VERTICES, TEXELS, SLICES, STEPS = 24, 128, 256, 12, 16
+RANGES = {"vertices": (2, 1024), "texels": (2, 1024), "slices": (2, 32), "steps": (1, 64)}
+MOST_ROWS = 16384  # of a column of maps
+EYE, TARGET, ANGLE = (6.0, 2.5, -2.2), (0.0, 2.5, -2.4), 1.1
+WIDEST = 2.5  # [rad]
+SUN, IRRADIANCE, AMBIENT = (-0.5, 0.0, 0.9), (3.0, 2.9, 2.7), (0.25, 0.32, 0.42)
+LARGEST = 1000.0  # length [m]
+MOST_WATER = 100.0  # a coefficient [1/m]
+PATHS, MOST_PATHS = 2_000_000, 1024  # of a truth, and of one of its pixels
+SQUARE = 7  # pixels of a side, over which a map of errors takes a mean
+WHITE = 0.99  # share of the truth that a picture does not clip
+
+
+@dataclass(frozen=True)
+class SeaRequest(ViewRequest):
+    """What a file requests; of `ViewRequest` the lengths are metres here, and z is up.
+
+    a, b     absorption and scattering of red, green and blue [1/m];  lobes  (weight, g) of the phase function's terms
+    n        refractive index;  sea, floor  surfaces, each by (slope, seed), tile and depth [m], wind [m/s]
+    kind     of the technique;  splat  by its name, or `AUTO`;  vertices, texels  of a side of maps of light
+    slices   maps in depths;  steps  of a search for a hit
+    """
+
+    a: Rgb
+    b: Rgb
+    lobes: tuple[tuple[float, float], ...]
+    n: float
+    tile: float
+    slope: float
+    wind: tuple[float, float]
+    sea_seed: int
+    depth: float
+    floor_slope: float
+    floor_seed: int
+    reflectance: Rgb
+    kind: str
+    splat: str
+    vertices: int
+    texels: int
+    slices: int
+    steps: int
+
+    @property
+    def world(self) -> World:
+        """What it is a picture of."""
+        level = -float(self.depth)
+        sea, bed = Waves(self.tile), Waves(self.tile, mean=level)
+        if self.slope:
+            sea = random_sea(self.slope, self.tile, self.sea_seed, wind=self.wind)
+        if self.floor_slope:
+            bed = random_floor(self.floor_slope, self.tile, self.depth, self.floor_seed)
+        x, _, z = self.light.direction
+        return World(
+            self.a,
+            self.b,
+            self.lobes,
+            self.n,
+            sea,
+            bed,
+            self.reflectance,
+            float(np.arctan2(-x, z)),
+            self.light.irradiance,
+            self.ambient,
+        )
+
+    @property
+    def splats(self) -> tuple[Splat, Splat]:
+        """Of the floor's map, and of those in depths."""
+        if self.splat != AUTO:
+            return (SPLATS[self.splat],) * 2
+        world = self.world
+        f = focus(world.sea, world.depth, world.n, world.tilt)
+        return (splat_for(f),) * 2
+
+
+def read(file: str, content: Table) -> SeaRequest:
+    """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
+    tables = Tables(file, TABLES)
+    tables.known("", content)
+    for key in ("title", "unit"):
+        tables.text("", key, content, "m")
+    water, sea, floor, named, seen, lit = (tables.table(content, name, {}) for name in list(TABLES)[1:])
+    for key in ("a", "b"):
+        if key not in water:
+            raise tables.bad("water", key, f"three numbers in 0 ... {MOST_WATER:g} [1/m]", None)
+    if "source" not in water:
+        raise tables.bad("water", "source", "a text that says where a and b are from", None)
+    tables.text("water", "source", water)
+    size = tables.sides("camera", "resolution", seen, (128, 96), 1024)
+    if size[0] * size[1] > request.MOST_PIXELS:
+        accepted = f"{request.MOST_PIXELS} pixels at most, whose truth is traced"
+        raise tables.bad("camera", "resolution", accepted, list(size))
+    found = SeaRequest(
+        file=file,
+        sampling=tables.made("technique", lambda: Sampling(named.get("samples", SAMPLES))),
+        chart=request.chart(tables, named),
+        camera=_camera(tables, seen),
+        light=_light(tables, lit),
+        ambient=tables.three("light", "ambient", lit, AMBIENT, 0.0, request.MOST_LIGHT),
+        size=size,
+        a=tables.three("water", "a", water, (0.0,) * 3, 0.0, MOST_WATER),
+        b=tables.three("water", "b", water, (0.0,) * 3, 0.0, MOST_WATER),
+        lobes=_lobes(tables, water),
+        n=tables.number("water", "n", water, INDEX, 2.0),
+        tile=tables.number("sea", "tile", sea, TILE, LARGEST),
+        slope=_slope(tables, "sea", sea, SLOPE),
+        wind=_wind(tables, sea),
+        sea_seed=_whole(tables, "sea", "seed", sea, SEA_SEED, 0, 2**31),
+        depth=tables.number("floor", "depth", floor, DEPTH, LARGEST),
+        floor_slope=_slope(tables, "floor", floor, FLOOR_SLOPE),
+        floor_seed=_whole(tables, "floor", "seed", floor, FLOOR_SEED, 0, 2**31),
+        reflectance=tables.three("floor", "reflectance", floor, REFLECTANCE, 0.0, 1.0),
+        kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
+        splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
+        **{
+            key: _whole(tables, "technique", key, named, default, *RANGES[key])
+            for key, default in zip(RANGES, (VERTICES, TEXELS, SLICES, STEPS), strict=True)
+        },
+    )
+    if found.texels * found.slices > MOST_ROWS:
+        accepted = f"so many that texels times slices is {MOST_ROWS} at most"
+        raise tables.bad("technique", "slices", accepted, found.slices)
+    try:
+        world = found.world
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from None
+    _require_sight(tables, found, world)
+    return found
+
+
+def draw(context: moderngl.Context, of: SeaRequest) -> Drawn:
+    """The picture, its truth, error and cost: a minute."""
+    with bench(context, of) as found:
+        numbers = sorted({of.sampling.samples, *of.chart})
+        chart = tuple(found.point(of.kind, samples) for samples in numbers)
+        radiance, _ = found.view(of.kind, of.sampling.samples)
+        truth, exposure = found.truth, found.exposure
+        maps = [found.passes.light() for _ in range(TURNS)]
+        point = chart[numbers.index(of.sampling.samples)]
+        light = {name: tuple(one[name] for one in maps) for name in maps[0]}
+        frame = tuple(map(sum, zip(*light.values(), point.milliseconds, strict=True)))
+        return Drawn(
+            picture=to_srgb(radiance[::-1], exposure),
+            truth=to_srgb(truth[::-1], exposure),
+            error=found.relative_error(radiance)[::-1],
+            point=point,
+            chart=chart,
+            frame=frame,
+            truth_error=found.truth_error,
+            of="light",
+            passes={**light, "view": point.milliseconds},
+        )
+
+
+class SeaBench(NamedTuple):
+    """A scene with its maps of light and its truth, (2, h, w, 3) halves of it; row 0 at the bottom."""
+
+    request: SeaRequest
+    passes: Passes
+    halves: Floats
+
+    @property
+    def truth(self) -> Floats:
+        """Radiance (h, w, 3)."""
+        return np.asarray(self.halves.mean(axis=0))
+
+    @property
+    def exposure(self) -> float:
+        """By which the brightest of the truth becomes white."""
+        return float(1.0 / max(np.quantile(self.truth, WHITE), 1e-30))
+
+    def view(self, kind: str, samples: int) -> tuple[Floats, float]:
+        """Radiance by a technique, and milliseconds of its pass."""
+        of = self.request
+        return self.passes.view(of.camera, of.size, kind, samples, of.steps)
+
+    def rmse(self, radiance: Floats) -> float:
+        """Root mean square error over the mean of the truth [-], without the noise of its halves, which err apart."""
+        first, second = radiance - self.halves
+        return float(np.sqrt(max(np.mean(first * second), 0.0)) / np.mean(self.truth))
+
+    def relative_error(self, radiance: Floats) -> Floats:
+        """(h, w) the same over squares of so many pixels around each [-]."""
+        first, second = radiance - self.halves
+        square = uniform_filter(np.mean(first * second, axis=-1), SQUARE, mode="nearest")
+        return np.asarray(np.sqrt(np.maximum(square, 0.0)) / np.mean(self.truth))
+
+    def point(self, kind: str, samples: int, turns: int = TURNS) -> ChartPoint:
+        """Error, and cost of the view's pass."""
+        views = [self.view(kind, samples) for _ in range(turns)]
+        return ChartPoint(kind, samples, self.rmse(views[0][0]), tuple(one for _, one in views))
+
+    @property
+    def truth_error(self) -> TruthError:
+        """Standard errors of its pixels, over its mean."""
+        share = np.sqrt(np.mean((self.halves[1] - self.halves[0]) ** 2, axis=-1)) / 2.0 / np.mean(self.truth)
+        half, most = np.quantile(share, (0.5, 0.9)).tolist()
+        return TruthError(half, most, float(np.sqrt(np.mean(share**2))))
+
+
+@contextmanager
+def bench(context: moderngl.Context, of: SeaRequest, paths: int = PATHS) -> Iterator[SeaBench]:
+    """All that ways to draw a request are measured with; paths  of the truth, all pixels together."""
+    world = of.world
+    with Passes(context, world, of.splats, of.vertices, of.texels, of.slices) as passes:
+        passes.light()
+        yield SeaBench(of, passes, truth_of(of, world, paths))
+
+
+def truth_of(of: SeaRequest, world: World, paths: int = PATHS, seed: int = 0) -> Floats:
+    """(2, h, w, 3) halves of the radiance that the camera sees, row 0 at the bottom."""
+    columns, rows = of.size
+    each = 2 * int(np.clip(paths / (2 * columns * rows), 1, MOST_PATHS // 2))
+    right, up, forward = axes(of.camera, of.size)
+    x, y = (2.0 * np.arange(count) / count - 1.0 for count in of.size)
+    corner = forward + x[None, :, None] * right + y[:, None, None] * up
+    sides = 2.0 * right / columns, 2.0 * up / rows
+    eye = np.array(of.camera.eye)
+    found = traced(world, Sunlight(world), eye, corner.reshape(-1, 3), *sides, paths=each, seed=seed)
+    return found.halves.reshape(2, rows, columns, 3)
+
+
+def _camera(tables: Tables, seen: Table) -> Camera:
+    eye = tables.three("camera", "eye", seen, EYE, -LARGEST, LARGEST)
+    target = tables.three("camera", "target", seen, TARGET, -LARGEST, LARGEST)
+    if not np.hypot(*np.subtract(target, eye)[:2]) > 1e-3 * abs(target[2] - eye[2]):
+        raise tables.bad("camera", "target", "a point that is not straight above or below the eye", list(target))
+    angle = tables.number("camera", "angle", seen, ANGLE)
+    if angle > WIDEST:
+        raise tables.bad("camera", "angle", f"the picture's height as an angle in 0 ... {WIDEST:g} radians", angle)
+    return Camera(eye, target, float(2.0 * np.tan(0.5 * angle) * np.linalg.norm(np.subtract(target, eye))))
+
+
+def _light(tables: Tables, lit: Table) -> Light:
+    direction = tables.three("light", "direction", lit, SUN, -1e6, 1e6)
+    x, y, z = direction
+    if not (x <= 0 and y == 0 and z > 0):
+        accepted = "toward the sun, [x <= 0, 0, z > 0]: its light goes toward +x"
+        raise tables.bad("light", "direction", accepted, list(direction))
+    return Light(direction, tables.three("light", "irradiance", lit, IRRADIANCE, 0.0, request.MOST_LIGHT))
+
+
+def _lobes(tables: Tables, water: Table) -> tuple[tuple[float, float], ...]:
+    named: Any = water.get("phase", PHASE)
+    if isinstance(named, str):
+        return tables.made("water", lambda: lobes_of(named))
+    tables.made("water", lambda: checked_lobes(named))
+    return tuple((float(weight), float(g)) for weight, g in named)
+
+
+def lobes_of(name: str) -> tuple[tuple[float, float], ...]:
+    """(weight, g) of the terms fitted to a phase function that has a record. InputError."""
+    found = phases.find(name).phase(FORM)
+    assert isinstance(found, Mixture)
+    return tuple((float(w), float(one.mean_cosine)) for w, one in zip(found.weights, found.phases, strict=True))
+
+
+def _slope(tables: Tables, where: str, table: Table, default: float) -> float:
+    """Root mean square, 0 of a level surface."""
+    value = table.get("slope", default)
+    return 0.0 if value == 0 else tables.number(where, "slope", table, default, 2.0)
+
+
+def _wind(tables: Tables, sea: Table) -> tuple[float, float]:
+    value = sea.get("wind", [WIND, 0.0])
+    numbers = value if isinstance(value, list) else []
+    if len(numbers) != 2 or not all(is_number(one) and abs(one) <= 100 for one in numbers) or not any(numbers):
+        raise tables.bad("sea", "wind", "two speeds in -100 ... 100 [m/s], not both 0", value)
+    return float(numbers[0]), float(numbers[1])
+
+
+def _whole(tables: Tables, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
+    value = table.get(key, default)
+    if type(value) is not int or not least <= value <= most:
+        raise tables.bad(where, key, f"a whole number in {least} ... {most}", value)
+    return value
+
+
+def _require_sight(tables: Tables, of: SeaRequest, world: World) -> None:
+    z = of.camera.eye[2]
+    if not world.floor.highest < z < world.sea.lowest:
+        accepted = f"in the water, with z in {world.floor.highest:.3g} ... {world.sea.lowest:.3g} m"
+        raise tables.bad("camera", "eye", accepted, list(of.camera.eye))
+    if not any((*of.light.irradiance, *of.ambient)):
+        raise InputError(f"{of.file}: [light] irradiance and ambient must not both be 0: nothing would be seen")

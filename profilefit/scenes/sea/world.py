@@ -1,0 +1,127 @@
+"""The sea of a scene: its water, the waves on it, the floor below it, and the light that comes in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.media.checks import checked_numbers, shown
+from mcml_sim.media.fresnel import fresnel
+from mcml_sim.media.phase import HenyeyGreenstein, Mixture
+from profilefit.errors import InputError
+from profilefit.scenes.sea.waves import Waves, checked_sun, refracted
+
+Floats = NDArray[np.float64]
+Rgb = tuple[float, float, float]
+ROUNDING = 1e-6  # by which weights may miss a sum of 1
+
+
+@dataclass(frozen=True, eq=False)
+class World:
+    """What light meets; lengths in metres, z up, the sea's mean level at 0. InputError.
+
+    a, b         absorption >= 0 and scattering >= 0 of red, green and blue [1/m], a + b > 0
+    lobes        (weight, g) of Henyey and Greenstein's terms, weights that sum to 1
+    n            refractive index of the water over that of the air, > 1
+    sea, floor   the two surfaces, of one tile; the floor lies below the lowest trough
+    reflectance  of the floor, Lambert's, 0 ... 1
+    tilt         of the sun from the vertical in air, light goes toward +x [rad]
+    sun          its irradiance across its rays in air;  sky  that of the level sea by a sky alike all over
+    """
+
+    a: Rgb
+    b: Rgb
+    lobes: tuple[tuple[float, float], ...]
+    n: float
+    sea: Waves
+    floor: Waves
+    reflectance: Rgb
+    tilt: float
+    sun: Rgb
+    sky: Rgb
+
+    def __post_init__(self) -> None:
+        for name, most in (("a", np.inf), ("b", np.inf), ("reflectance", 1.0), ("sun", np.inf), ("sky", np.inf)):
+            accepted = f"three numbers >= 0{f' and <= {most:g}' if most < np.inf else ''}"
+            numbers = checked_numbers(name, getattr(self, name), accepted)
+            if numbers.shape != (3,) or not np.all((numbers >= 0) & (numbers <= most) & np.isfinite(numbers)):
+                raise InputError(f"{name} must be {accepted}, got {shown(getattr(self, name))}")
+        if not np.all(self.c > 0):
+            raise InputError(f"a + b must be > 0, got {shown(self.c.tolist())}")
+        checked_lobes(self.lobes)
+        checked_sun(self.depth, self.tilt, self.n)
+        if not self.n > 1:
+            raise InputError(f"n must be a refractive index > 1, got {shown(self.n)}")
+        if self.floor.tile != self.sea.tile:
+            raise InputError(f"floor must have the sea's tile of {self.sea.tile:g} m, got {self.floor.tile:g}")
+        if self.floor.highest >= self.sea.lowest:
+            raise InputError(
+                f"floor must be below the sea's lowest trough, {self.sea.lowest:g} m, got {self.floor.highest:g}"
+            )
+
+    @property
+    def c(self) -> Floats:
+        """Attenuation (3,) [1/m]."""
+        return np.add(self.a, self.b)
+
+    @property
+    def omega(self) -> Floats:
+        """Albedo b / c (3,) [-]."""
+        return np.asarray(self.b) / self.c
+
+    @property
+    def depth(self) -> float:
+        """Of the floor's mean level [m]."""
+        return -self.floor.mean
+
+    @cached_property
+    def phase(self) -> Mixture:
+        """Of the lobes."""
+        weights = np.array([weight for weight, _ in self.lobes])
+        shares = tuple((weights / weights.sum()).tolist())
+        return Mixture(shares, tuple(HenyeyGreenstein(g) for _, g in self.lobes))
+
+    @cached_property
+    def calm(self) -> tuple[float, float]:
+        """Tangent of the ray below a calm surface to the vertical, and its flux over that across the sun's rays [-]."""
+        x, _, flux = refracted(self.tilt, (np.zeros(1), np.zeros(1)), self.n)
+        return float(x[0]), float(flux[0])
+
+    @property
+    def beam(self) -> Floats:
+        """Unit vector (3,) along which the calm sea's ray goes down."""
+        found = np.array([self.calm[0], 0.0, -1.0])
+        return found / np.linalg.norm(found)
+
+    @property
+    def slant(self) -> float:
+        """Length of that ray by its depth, 1 / cosine [-]."""
+        return float(-1.0 / self.beam[2])
+
+    @cached_property
+    def diffuse_in(self) -> float:
+        """Share of the sky's irradiance that a calm sea lets in [-]."""
+        cosine = (np.arange(4096) + 0.5) / 4096
+        return float(2.0 * np.mean((1.0 - fresnel(1.0, self.n, cosine)[0]) * cosine))
+
+    @property
+    def shaft(self) -> float:
+        """Half-width of shafts [m]: a quarter of the length of a wave with the sea's curvature by its slope."""
+        slope = self.sea.rms_slope
+        squares = np.sum(self.sea.vectors**2, axis=1)
+        curved = float(np.sqrt(0.5 * np.sum(self.sea.amplitudes**2 * squares**2)))
+        return 0.5 * np.pi * slope / curved if slope > 0 else np.inf
+
+
+def checked_lobes(lobes: ArrayLike) -> None:
+    """InputError where they are no mixture of Henyey and Greenstein's terms."""
+    accepted = "a list of pairs [weight, g], weights >= 0 that sum to 1, g in (-1, 1)"
+    terms = checked_numbers("lobes", lobes, accepted)
+    good = terms.ndim == 2 and terms.shape[1] == 2 and len(terms) > 0
+    if not good or not (
+        np.all(terms[:, 0] >= 0) and np.all(np.abs(terms[:, 1]) < 1) and abs(np.sum(terms[:, 0]) - 1) < ROUNDING
+    ):
+        raise InputError(f"lobes must be {accepted}, got {shown(lobes)}")
