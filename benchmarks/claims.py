@@ -17,7 +17,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict
 from functools import reduce
 from pathlib import Path
@@ -54,6 +54,21 @@ class Run(NamedTuple):
 def at(numbers: Any, place: str) -> Any:
     """What lies at a dotted place."""
     return reduce(lambda inside, key: inside[key], place.split("."), numbers)
+
+
+def of_phase(form: str) -> Callable[[Any], float]:
+    """How far a form with its moments held is from the data."""
+    return lambda numbers: numbers["phases"]["petzold"]["phases"][form]["held"]["rms"]
+
+
+def splat_of(f: float, fragments: int, key: str) -> Callable[[Any], float]:
+    """A figure's size, of the map with the least rms of all that draw no more fragments."""
+
+    def found(numbers: Any) -> float:
+        fits = [one for one in numbers["splats"] if one["F"] == f and one["fragments"] <= fragments]
+        return abs(min(fits, key=lambda one: one["rms"])[key])
+
+    return found
 
 
 def worst(place: str, scale: float = 1.0):
@@ -310,6 +325,31 @@ RUNS = (
     Run("python -m benchmarks.layers", "", "surface integral with the exact stack at each point", EXACT, (
         ("head-nearer", "≥ 5", pictured(lambda n: min(one["dipole"] / one["stack"] for one in n.values())),
          "error of a head of layers by the first layer's dipole over that by the stack's law, least of three poses"),
+    )),
+    Run("profilefit report petzold", "", "Petzold's mean particle phase function, 55 angles", EXACT, (
+        ("phase-three", "≤ 0.171", of_phase("3-terms"),
+         "rms of ln(law / data), three terms, mean cosine and backscattered share held"),
+        ("phase-four", "≤ 0.07", of_phase("4-terms"), "the same of four terms"),
+    )),
+    Run("python -m benchmarks.sea --only beam segment shafts exact hits splats", "",
+        "photons; float64; quadrature; exact light of ridges; dense steps; 2048 x 2048 photons", EXACT, (
+        ("beam-share", "≤ 2 %", lambda n: 100 * max(one["within"] for one in n["beam"]),
+         "largest relative error of the share of a beam, omega to 0.8, ct to 4, c w to 1", "300000 photons"),
+        ("beam-plane", "≤ 1 %", lambda n: 100 * max(one["all the plane"] for one in n["beam"]),
+         "the same of all the plane", "300000 photons"),
+        ("sea-segment", "≤ 5e-07", lambda n: max(one["as here"] for one in n["segment"]),
+         "largest relative error of a segment's integral in float32, in any direction"),
+        ("sea-slices", "≤ 1 %", lambda n: 100 * next(one["slices"] for one in n["shafts"] if one["samples"] == 64),
+         "rms error of shafts by 64 slices, over twenty views"),
+        ("caustic-photons", "≤ 1 %", lambda n: 100 * max(one["worst"] for one in n["exact"]),
+         "worst pixel of 6.7e7 photons against exact light"),
+        ("sea-hits", "≤ 0.2 %", lambda n: 100 * max(n["hits"][-1][s] for s in ("0.5", "0.9", "1.5", "3", "5")),
+         "hits off by more than 1 % of the depth, 16 steps and 3 iterations, S to 5", "3000 rays each"),
+        ("caustics-before", "≤ 0.008", splat_of(0.32, 70_000, "rms"), "rms of a caustic map, F 0.32, 70 k fragments"),
+        ("caustics-beyond", "≤ 0.1", splat_of(1.18, 300_000, "rms"), "the same beyond folds, F 1.18, 300 k fragments"),
+        ("caustics-bias", "≤ 0.5 %", lambda n: 100 * max(splat_of(1.18, 300_000, key)(n) for key in ("bright", "dark")),
+         "bias of that map where it is bright, and where it is dark"),
+        ("caustics-energy", "≤ 1e-06", splat_of(1.18, 300_000, "energy"), "energy that it gains or loses"),
     )),
     Run("python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",
         "constants of the law, or of the exact half space, in runs drawn anew", EXACT, (

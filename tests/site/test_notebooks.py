@@ -18,7 +18,7 @@ from profilefit.shader.context import opened
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SECONDS = 120  # of a cell, which takes a tenth of that: what hangs is ended
-NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen")
+NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen", "09-under-the-sea")
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
@@ -85,8 +85,8 @@ def definitions(source: str) -> Iterator[list[str]]:
         yield block.rstrip().splitlines()
 
 
-def test_there_are_eight_and_a_table_of_them():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08"]
+def test_there_are_nine_and_a_table_of_them():
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08", "09"]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
 
 
@@ -264,3 +264,17 @@ def test_without_opengl_one_line_says_so(stem, monkeypatch):
     assert "libEGL-none.so is missing" in told[0]
     assert outputs(notebook, "error") == []
     assert pictures(notebook)
+
+
+@pytest.mark.slow
+def test_light_of_the_sea_is_turned_more_than_once():
+    text = printed("09-under-the-sea")
+    more = numbers(r"there is (\S+) times as much light", text)
+    assert more == sorted(more)
+    assert more[-1] > 2.0
+    wrong, *_ = numbers(r"wireframe, constant .* bright (\S+) %", text)
+    right, *_ = numbers(r"cells .* bright (\S+) %", text)
+    assert abs(right) < 1.0
+    assert wrong < -20.0
+    broadened, scaled, single = numbers(r"error (\S+)", text)
+    assert broadened < 0.6 * scaled < 0.6 * single

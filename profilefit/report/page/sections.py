@@ -26,7 +26,7 @@ RENDERS = {
     "render-choices.png": "The same head by each way to sample.",
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
 }
-# `python -m benchmarks.layers --pictures` and `python -m benchmarks.heart --pictures` make them.
+# `python -m benchmarks.layers --pictures`, `... heart --pictures` and `... sea --pictures` make them.
 OF_LAYERS = {
     "render-layers.png": "A head of layered skin: its truth, the law of the stack, the first layer's dipole (Zhao et "
     "al.), the nearest half space.",
@@ -35,6 +35,9 @@ OF_LAYERS = {
     "alone, no light scattering sideways.",
     "render-heart-cost.png": "The heart's error over the time of its passes, by each way at four sizes.",
     "render-heart-map.png": "The heart's error by texel and view; the least of the three in bold.",
+    "render-sea.png": "Under the sea, from the top left: all light, light broadened on its way, the forward peak kept, "
+    "single scattering.",
+    "render-sea-cost.png": "The sea's error over the time of its view, by each kind.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),

@@ -134,7 +134,7 @@ def followed(world: World, light: Sunlight, place: Floats, way: Floats, rng: np.
     """Radiance (n, 3) that each of these rays finds, by one path."""
     c, b = world.c, np.asarray(world.b, float)
     found = np.zeros((len(place), 3))
-    own = np.arange(len(place))
+    own, way = np.arange(len(place)), way.copy()
     hero = rng.integers(0, 3, len(place))  # whose ways the path goes; the others weigh what they would have gone
     worth, chance = np.ones((len(place), 3)), np.ones((len(place), 3))
     aside = np.ones(len(place))  # density of the turns that light would take over that of those that were drawn

@@ -1,0 +1,48 @@
+"""Figures of the sea: the scene by each kind beside its truth, and error over time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib import image
+
+from benchmarks.render_figure import save
+from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, plain_log, styled
+from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE
+from profilefit.scenes.sea.scene import SeaBench
+from profilefit.scenes.stage.picture import ChartPoint, to_srgb
+
+COLOURS = {BROADENED: BLUE, SCALED: GREEN, SINGLE: VERMILION}
+LARGER = 3  # pixels of the figure that one of the picture has, along a side
+
+
+def picture(found: SeaBench, path: Path) -> None:
+    """The truth, and the scene by each kind, two beside two."""
+    samples = found.request.sampling.samples
+    truth, *ways = (
+        np.kron(to_srgb(one[::-1], found.exposure), np.ones((LARGER, LARGER, 1), np.uint8))
+        for one in (found.truth, *(found.view(kind, samples)[0] for kind in KINDS))
+    )
+    top, bottom = (np.concatenate(row, axis=1) for row in ((truth, ways[0]), (ways[1], ways[2])))
+    image.imsave(path, np.concatenate([top, bottom]))
+
+
+@styled
+def cost_figure(of_kind: Mapping[str, Sequence[ChartPoint]], device: str, path: Path) -> None:
+    """Each kind over the time of its view, bars from the least to the most, samples beside the points."""
+    figure = canvas(3.1, 5.0)
+    ax = figure.subplots()
+    for kind, points in of_kind.items():
+        least, most = (np.array([of(one.milliseconds) for one in points]) for of in (min, max))
+        style = {"color": COLOURS[kind], "marker": "o", "markersize": 4.0, "capsize": 2, "elinewidth": 0.8}
+        ax.errorbar(least, [one.rmse for one in points], xerr=(0.0 * least, most - least), label=kind, **style)
+        for one, x in zip(points, least, strict=True):
+            ax.annotate(str(one.samples), (x, one.rmse), (0, 4), textcoords="offset points", fontsize=7.0)
+    ax.set(xscale="log", yscale="log", xlabel="ms of the view", ylabel="root mean square error / mean [-]")
+    plain_log(ax.xaxis)
+    plain_log(ax.yaxis)
+    ax.legend()
+    figure.suptitle(f"The sea by each kind, samples beside points, on {device.partition(' (')[0]}", fontsize=9.0)
+    save(figure, path, 64)
