@@ -19,19 +19,20 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks import sea_chart as chart
 from benchmarks.sea_figure import cost_figure, picture
 from benchmarks.table import show
 from mcml_sim.files.text_file import as_json, read_toml
 from mcml_sim.files.whole_file import write_whole
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.recipes.folder import shipped
-from profilefit.scenes.sea import chart, hits, scene
+from profilefit.scenes.sea import hits, scene
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
 from profilefit.scenes.sea.paths import Sunlight, followed
 from profilefit.scenes.sea.photons import trace_beam
-from profilefit.scenes.sea.reference import caustic_photons, misfit
+from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons, misfit
 from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
 from profilefit.scenes.sea.truth import caustic_boxes
 from profilefit.scenes.sea.waves import Waves, random_sea
@@ -169,13 +170,26 @@ def first_hits() -> Rows:
     ]
 
 
+def seas() -> list[tuple[float, Waves]]:
+    """F, and a random sea whose most curved crest has it."""
+    one = random_sea(0.15, TILE, 1)
+    return [(f, one.scaled(f / focus(one, DEPTH))) for f in (BEFORE, BEYOND)]
+
+
+def filters() -> Rows:
+    """Light that the published filter makes of nothing, as it gathers, and as it spreads."""
+    lights = [(f, caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)) for f, waves in seas()]
+    return [
+        (f, *(float(adaptive_filter(light, spreads).mean() / light.mean() - 1.0) for spreads in (False, True)))
+        for f, light in lights
+    ]
+
+
 def splats() -> Rows:
     """Caustic maps of 256 x 256 pixels against 2048 x 2048 photons: error, where it is bright and dark, and cost."""
     found = []
     with opened() as context:
-        for f in (BEFORE, BEYOND):
-            one = random_sea(0.15, TILE, 1)
-            waves: Waves = one.scaled(f / focus(one, DEPTH))
+        for f, waves in seas():
             true = caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)
             for splat in Splat:
                 for vertices in VERTICES:
@@ -273,6 +287,7 @@ TABLES = {
         },
         splats,
     ),
+    "filter": Listed("Energy by the published filter", {"F": "g", "gathers": "+.2%", "spreads": "+.1e"}, filters),
     "scene": Listed(f"examples/{FILE}", {"kind, or maps": "", "samples": "", "error": ".3f", "ms": ".0f"}, kinds),
     "water": Listed(
         f"examples/{FILE} where the water scatters so many times as much",

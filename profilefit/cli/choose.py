@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from profilefit.studies.choose.requirements import Requirements
 
 UNSERVED = 1  # exit status
-HEART = "heart"  # what a scene's file says
+HEART, SEA = "heart", "sea"  # what a scene's file says
 
 
 def choose(
@@ -40,6 +40,7 @@ def choose(
     option and its constants. Exit status 1 if no option is within the limits.
 
     Of a file that `profilefit scene` draws as a heart: whether it needs an atlas, or the screen by itself is enough.
+    As a sea: which terms of its water's light, which splat and how many steps to a hit it needs.
 
     \b
     Example, on a file of profilefit examples:
@@ -57,10 +58,10 @@ def choose(
         from profilefit.studies.choose.requirements import read
 
     told = read_toml(scene)
-    if told.get("scene") == HEART:
+    if (kind := told.get("scene")) in (HEART, SEA):
         if measure:
-            raise InputError(f"{scene}: --measure must be left out of a heart's file, of which no cost is asked")
-        _of_heart(scene, told, as_json, quiet)
+            raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
+        (_of_heart if kind == HEART else _of_sea)(scene, told, as_json, quiet)
         return
     requirements = read(scene)
     ratios = _measured(requirements, quiet) if measure else cost.shipped()
@@ -91,6 +92,24 @@ def _of_heart(file: Path, told: Table, as_json: bool, quiet: bool) -> None:
         print_json(atlas_content(need))
     else:
         screen().print(atlas_line(need), markup=False)
+
+
+def _of_sea(file: Path, told: Table, as_json: bool, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.runs.progress import working
+        from profilefit.report.tables.choose_table import sea_content, sea_lines
+        from profilefit.scenes.sea.scene import read as read_sea
+        from profilefit.studies.choose.sea import sea_need
+
+    request = read_sea(str(file), told)
+    with working("summing the haze", quiet):
+        need = sea_need(request)
+    if as_json:
+        print_json(sea_content(need))
+    else:
+        for line in sea_lines(need):
+            screen().print(line, markup=False)
 
 
 def _measured(requirements: Requirements, quiet: bool) -> Ratios:

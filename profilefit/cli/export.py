@@ -14,13 +14,15 @@ from profilefit.cli.folders import known_phases, records_folder
 from profilefit.cli.options import Fits
 from profilefit.errors import InputError
 
+SEGMENT, SCENE = "sea-segment", ".toml"  # a name, and how that of a file ends
+
 
 def export(
     what: Annotated[
         str,
         typer.Argument(
             metavar="NAME",
-            help="A record (hazard-diffuse), a law (burley), a map (chiang), a stack (skin) or a phase (petzold).",
+            help="A record (hazard-diffuse), law (burley), map (chiang), stack (skin), phase (petzold) or sea-segment.",
             autocompletion=options.subjects,
         ),
     ],
@@ -50,6 +52,7 @@ def export(
     Its functions, every constant with its errors, units, illumination, range and digests. Without --constants a law or
     map that was not regenerated has its printed ones. Of a stack: the law of its three colours with the first layer's
     thickness as an argument, and light scattered once. Of a phase function: its best sum of terms, with its sampler.
+    sea-segment: what a beam brings to a view ray in water. Of a sea's file, SEA.toml: the blur of light on its floor.
 
     \b
     Examples:
@@ -71,16 +74,46 @@ def export(
     if path is None and fits is None:  # beside one's own records of other laws, or where there are none of these
         path = stack_record.find(what, LOCAL) or stack_record.find(what, fits_folder())
     if path is not None:
-        if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
-            raise InputError(f"{given[0]} must be left out where NAME is a stack, got {what!r}")
+        _require_none("a stack", what, constants, n)
         text = export_stack(stack_record.load(path), lang, name)
     elif what in (phases := known_phases(fits)):
-        if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
-            raise InputError(f"{given[0]} must be left out where NAME is a phase function, got {what!r}")
+        _require_none("a phase function", what, constants, n)
         text = export_phase(load(phases[what]), lang, name)
+    elif what == SEGMENT or what.endswith(SCENE):
+        _require_none("of light in water", what, constants, n)
+        text = _of_sea(what, lang, name)
     else:
         text = exported(find(what, folder, constants, n), folder, lang, name)
     if out is None:
         sys.stdout.write(text)
     else:
         write_whole(out, text)
+
+
+def _require_none(kind: str, what: str, constants: str | None, n: float | None) -> None:
+    """Options that only laws have."""
+    if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
+        raise InputError(f"{given[0]} must be left out where NAME is {kind}, got {what!r}")
+
+
+def _of_sea(what: str, lang: str, name: str | None) -> str:
+    with interruptible(__name__):
+        from mcml_sim.files.text_file import read_toml
+        from profilefit.scenes.sea import law
+        from profilefit.scenes.sea.passes import GAUSSIANS
+        from profilefit.scenes.sea.scene import read
+        from profilefit.shader.emit import text_beside
+        from profilefit.shader.sea_file import export_blur, export_segment
+
+    if what == SEGMENT:
+        return export_segment(text_beside(law.__name__, "glsl/segment.glsl"), lang, name)
+    told = read_toml(Path(what))
+    if (kind := told.get("scene")) != "sea":
+        raise InputError(f"{what}: scene must be sea, whose water has a text, got {kind!r}")
+    world = read(what, told).world
+    depth, rates = world.depth * world.slant, world.c.tolist()
+    blurs = [
+        law.water_gaussians(omega, c * depth, world.lobes, GAUSSIANS)
+        for omega, c in zip(world.omega.tolist(), rates, strict=True)
+    ]
+    return export_blur(blurs, rates, depth, lang, name)

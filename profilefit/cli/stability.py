@@ -23,7 +23,8 @@ def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Laws, maps, records, or exact, convert, solver, stacks, heart; none: all but heart (OpenGL).",
+            help="Laws, maps, records, or exact, convert, solver, stacks, heart, sea; none: all but heart (OpenGL) "
+            "and sea.",
             autocompletion=options.tested,
         ),
     ] = None,

@@ -20,6 +20,7 @@ from profilefit.studies.choose.response import reference_light
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
     from profilefit.studies.choose.atlas import AtlasNeed
+    from profilefit.studies.choose.sea import SeaNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
 CAUSES = {
@@ -82,6 +83,34 @@ def atlas_line(need: AtlasNeed) -> str:
 def atlas_content(need: AtlasNeed) -> dict[str, Any]:
     """The same as data."""
     return {"verdict": need.verdict, "error": need.error, "hidden": need.hidden, "tolerance": need.tolerance}
+
+
+def sea_lines(need: SeaNeed) -> list[str]:
+    """What a scene under the sea needs, a line each for terms, splat and steps, with the numbers."""
+    off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in need.haze.items())
+    folds = "light folds" if need.focus >= 1.0 else "no light folds"
+    ways = {"sunlight": (need.light_steps, need.light), "views": (need.view_steps, need.view)}
+    steps = ", ".join(
+        f"{name} {number or 'none, Newton alone'} (S {significant(steep)})" for name, (number, steep) in ways.items()
+    )
+    return [
+        f"terms: {need.terms}; off the broadened haze at worst: {off} (requested: {_percent(need.tolerance)} %)",
+        f"splat: {need.splat}; {folds} before the floor (F {significant(need.focus)})",
+        f"steps to a hit: {steps}",
+    ]
+
+
+def sea_content(need: SeaNeed) -> dict[str, Any]:
+    """The same as data."""
+    return {
+        "terms": need.terms,
+        "haze": dict(need.haze),
+        "tolerance": need.tolerance,
+        "splat": need.splat,
+        "focus": need.focus,
+        "steps": {"light": need.light_steps, "view": need.view_steps},
+        "steepness": {"light": need.light, "view": need.view},
+    }
 
 
 def headline(choice: Choice) -> str:

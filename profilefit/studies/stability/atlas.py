@@ -24,6 +24,7 @@ from profilefit.studies.stability import (
     misuse,
     model_cells,
     refracting,
+    sea,
     stacks,
 )
 from profilefit.studies.stability.cells import Cells
@@ -31,9 +32,9 @@ from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.regions import Region, regions_of
 
-EXACT, CONVERT, SOLVER, STACKS, HEART = "exact", "convert", "solver", "stacks", "heart"
-FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS, HEART)
-IF_NAMED = (HEART,)  # it needs OpenGL
+EXACT, CONVERT, SOLVER, STACKS, HEART, SEA = "exact", "convert", "solver", "stacks", "heart", "sea"
+FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS, HEART, SEA)
+IF_NAMED = (HEART, SEA)  # one needs OpenGL, and neither is of a law
 SETTINGS = (Setting(), Setting("diffuse"))
 WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
 # Whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
@@ -173,6 +174,7 @@ def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]
         SOLVER: of_solver,
         STACKS: lambda: _part(STACKS, list(stacks.cells_of(folder.folder))),
         HEART: lambda: _part(HEART, list(heart.cells_of())),
+        SEA: lambda: _part(SEA, list(sea.cells_of())),
     }
 
 

@@ -16,11 +16,12 @@ from profilefit.studies.stability.cause import UNEXPLAINED, Cause, nowhere
 from profilefit.studies.stability.causes_of_heart import HEART
 from profilefit.studies.stability.causes_of_liang import LIANG
 from profilefit.studies.stability.causes_of_models import FORMAT, MODELS
+from profilefit.studies.stability.causes_of_sea import SEA
 from profilefit.studies.stability.causes_of_stacks import STACKS
 from profilefit.studies.stability.cells import Cells, Mask, Verdict, red
 
 # The first that holds is told: what is special before what is general.
-CAUSES: tuple[Cause, ...] = (*LIANG, *MODELS, *STACKS, *HEART, *FORMAT)
+CAUSES: tuple[Cause, ...] = (*LIANG, *MODELS, *STACKS, *HEART, *SEA, *FORMAT)
 
 
 NOT_JUDGED = "not judged"

@@ -20,10 +20,12 @@ def test_jobs_by_name():
         "exact",
     ]
     everything = [name for name, _ in atlas.jobs([], FITS, False)]
-    assert set(atlas.QUICK) | set(atlas.FUNCTIONS) - {atlas.HEART} | set(atlas.DERIVED) | {"albedo-liang"} <= set(
+    assert set(atlas.QUICK) | set(atlas.FUNCTIONS) - set(atlas.IF_NAMED) | set(atlas.DERIVED) | {"albedo-liang"} <= set(
         everything
     )
     assert len(everything) == len(set(everything))
+    assert not set(atlas.IF_NAMED) & set(everything)
+    assert [name for name, _ in atlas.jobs(["sea"], FITS, True)] == ["sea"]
     with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
         atlas.jobs(["hazzard"], FITS, False)
 

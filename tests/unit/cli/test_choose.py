@@ -10,7 +10,7 @@ from profilefit.cli import app
 from profilefit.errors import InputError
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
-SKIN, HEART = EXAMPLES / "skin.toml", EXAMPLES / "heart.toml"
+SKIN, HEART, SEA = (EXAMPLES / f"{name}.toml" for name in ("skin", "heart", "sea"))
 
 
 def run(*arguments):
@@ -61,3 +61,25 @@ def test_whether_a_heart_needs_an_atlas(opengl):
     assert line.startswith(f"no atlas: the screen by itself is wrong by {error} of the light, by {hidden} for what it")
     refused = run(HEART, "--measure").exception
     assert str(refused) == f"{HEART}: --measure must be left out of a heart's file, of which no cost is asked"
+
+
+def test_what_a_sea_needs():
+    told = json.loads(run(SEA, "--json").stdout)
+    assert (told["terms"], told["splat"], told["steps"]) == ("broadened", "cells", {"light": 0, "view": 16})
+    assert 0.1 == told["tolerance"] < told["haze"]["scaled"] < told["haze"]["single"] < 1.0
+    lines = " ".join(run(SEA).stdout.split())
+    scaled, single = (f"{kind} {100 * told['haze'][kind]:.2g} %" for kind in ("scaled", "single"))
+    assert lines.startswith("terms: broadened; off the broadened haze at worst: ")
+    for text in (scaled, single, "(requested: 10 %)", f"(F {told['focus']:.2g})", "views 16 (S 11)"):
+        assert text in lines
+    refused = run(SEA, "--measure").exception
+    assert str(refused) == f"{SEA}: --measure must be left out of a sea's file, of which no cost is asked"
+
+
+def test_a_sea_that_there_is_not(tmp_path):
+    path = tmp_path / "sea.toml"
+    path.write_text(SEA.read_text(encoding="utf-8").replace("depth = 4.0", "depth = 0.01"), encoding="utf-8")
+    found = run(path)
+    assert isinstance(found.exception, InputError)
+    assert str(found.exception).startswith(f"{path}: ")
+    assert "\n" not in str(found.exception)

@@ -1,13 +1,22 @@
 """`profilefit export` as a user meets it: what it writes, what it refuses, and in how many lines."""
 
+import json
 import shutil
 from pathlib import Path
 
+import numpy as np
+import pytest
+
+from mcml_sim.files.text_file import read_toml
 from profilefit.recipes import catalogue
+from profilefit.recipes.folder import shipped
 from profilefit.recipes.inventory import find
-from profilefit.shader.law_file import export
+from profilefit.scenes.sea import beam_share
+from profilefit.scenes.sea.scene import read
+from profilefit.shader.law_file import LANGUAGES, export
 
 FITS = catalogue.fits_folder()
+SEA = (shipped("examples") / "sea.toml").resolve()
 
 
 def test_prints_the_text_or_writes_it(command):
@@ -91,3 +100,35 @@ def test_bad_input_is_one_line_and_writes_nothing(command, tmp_path):
         assert err.startswith(told)
         assert err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_light_in_water(command):
+    """The segment by its name, and the blur of a scene's file in every language."""
+    status, text, err = command("export", "sea-segment", "--lang", "python")
+    assert (status, err) == (0, "")
+    made: dict = {}
+    exec(text, made)
+    assert made["sea_segment_integral"](2.0, 1.0, 0.5, -1.0, 3.0) == pytest.approx(3 * np.exp(-3.0))
+    told = json.loads(command("export", str(SEA), "--lang", "json")[1])
+    exec(command("export", str(SEA), "--lang", "python", "--name", "fog")[1], made)
+    assert made["fog_sigma4"](2.0) == pytest.approx(told["numbers"]["blue"]["sigma"][3])
+    world = read(str(SEA), read_toml(SEA)).world
+    exact = beam_share(world.omega[1], world.c[1] * told["depth"], world.c[1] * 0.1, world.lobes)
+    assert made["fog_share"](0.1, 1.0) == pytest.approx(exact, abs=0.01)
+    for lang in LANGUAGES:
+        assert command("export", str(SEA), "--lang", lang)[0] == 0
+        assert command("export", "sea-segment", "--lang", lang)[0] == 0
+
+
+def test_what_light_in_water_does_not_take(command):
+    heart = str(SEA.with_name("heart.toml"))
+    for words, told in (
+        (("sea-segment", "--n", "1.3"), "--n must be left out where NAME is of light in water, got 'sea-segment'"),
+        ((heart,), f"{heart}: scene must be sea, whose water has a text, got 'heart'"),
+        (("nope.toml",), "nope.toml: expected a file that can be read, got: No such file or directory"),
+        (("sea-segment", "--name", "fog", "--lang", "json"), "name must be left out where lang is json"),
+        ((str(SEA), "--lang", "wgsl"), "lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
+    ):
+        status, out, err = command("export", *words)
+        assert (status, out, err.count("\n")) == (2, "", 1), err
+        assert err.startswith(f"profilefit: {told}")

@@ -7,13 +7,14 @@ import pytest
 from rich.console import Console
 
 from mcml_sim import Setting
-from profilefit.report.tables.choose_table import choose_table, content, headline
+from profilefit.report.tables.choose_table import choose_table, content, headline, sea_content, sea_lines
 from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.requirements import Budget, Requirements
+from profilefit.studies.choose.sea import SeaNeed
 
 ONE = ((0.5, 0.5),) * 3
 SCENE = Requirements("mm", Setting("diffuse", n=1.4), ONE, ONE, (0.1, 0.1), 5.0, 0.02, Within(), Budget(ms=4.0))
@@ -116,3 +117,21 @@ def test_as_data(choice):
     assert made["one_layer"]["verdict"] == "enough"
     (one,) = made["filters"]
     assert math.isclose(sum(tap[0] for tap in one["taps"]), 1.0, rel_tol=1e-6)
+
+
+def test_what_a_sea_needs_and_why():
+    need = SeaNeed({"single": 0.34, "scaled": 0.056}, focus=0.8, light=1.2, view=0.25)
+    assert sea_lines(need) == [
+        "terms: scaled; off the broadened haze at worst: single 34 %, scaled 5.6 % (requested: 10 %)",
+        "splat: faces; no light folds before the floor (F 0.80)",
+        "steps to a hit: sunlight 8 (S 1.2), views none, Newton alone (S 0.25)",
+    ]
+    assert sea_content(need) == {
+        "terms": "scaled",
+        "haze": {"single": 0.34, "scaled": 0.056},
+        "tolerance": 0.1,
+        "splat": "faces",
+        "focus": 0.8,
+        "steps": {"light": 8, "view": 0},
+        "steepness": {"light": 1.2, "view": 0.25},
+    }

@@ -1,0 +1,147 @@
+"""Light in water as a file: what a beam brings to a segment of a view ray, and the blur of a scene's water."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import __version__
+from profilefit.errors import InputError
+from profilefit.materials import CHANNELS
+from profilefit.shader import emit
+from profilefit.shader.law_file import ES_HEAD, LANGUAGES, MARKS, TARGETS, TRANSLATED, commented
+
+SEGMENT, BLUR = "sea_segment", "sea_blur"  # what names begin with
+OWN = "segment_"  # in the scene's text
+SEGMENT_NAMES = (
+    ("integral(c, s0, t0, m, t1)", "int_0^t1 e^{-c (s0 + m t)} e^{-c (t0 + t)} dt [length]"),
+    ("between(begin, end, t1)", "the same of optical ways c (s + t) at both ends [-]"),
+)
+SEGMENT_NOTE = (
+    "c attenuation [1/length]; s0, t0 ways of the light to the segment's begin, and from there to the eye [length]",
+    "m cosine of the view ray to the beam, in [-1, 1]; t1 length of the segment; times b and the phase function it is",
+    "the radiance that the segment scatters to the eye, by the beam's irradiance where the ways begin",
+)
+BLUR_NAMES = (
+    ("unscattered(channel)", "share of a pencil beam that is not scattered [-]"),
+    ("weight1(channel), ...", "share in a Gaussian [-]"),
+    ("sigma1(channel), ...", "its standard deviation, across the beam [m]"),
+    ("share(r, channel)", "share of the light within r [m]"),
+    ("mtf(k, channel)", "contrast that is left of a pattern of angular frequency k [1/m], times its mean"),
+)
+
+
+class WaterBlur(Protocol):
+    """Of one colour, as `scenes.sea.law.WaterGaussians`: lengths in 1 / c."""
+
+    @property
+    def unscattered(self) -> float: ...
+    @property
+    def variances(self) -> NDArray[np.float64]: ...
+    @property
+    def weights(self) -> NDArray[np.float64]: ...
+    @property
+    def error(self) -> float: ...
+
+
+def segment_text(source: str, lang: str = "glsl", name: str = SEGMENT) -> str:
+    """NAME_integral(c, s0, t0, m, t1) and NAME_between(begin, end, t1), ready to include.
+
+    source  the sea's glsl/segment.glsl;  lang, name  as for `emit.law_text`
+    """
+    parts = [emit.read_text("common"), emit.read_text("near_zero"), source.replace(OWN, emit.PLACEHOLDER)]
+    return emit.filled(parts, name, {}, 0, lang, {})
+
+
+def blur_text(blurs: Sequence[WaterBlur], c: Sequence[float], lang: str = "glsl", name: str = BLUR) -> str:
+    """Sums of as many Gaussians for red, green and blue, ready to include: `BLUR_NAMES`.
+
+    c  attenuations [1/m];  lang, name  as for `emit.law_text`;  InputError on sums of unlike numbers
+    """
+    if len(blurs) != len(CHANNELS) or len(c) != len(CHANNELS) or len({one.weights.size for one in blurs}) > 1:
+        told = ", ".join(str(one.weights.size) for one in blurs) or "none"
+        raise InputError(f"blurs must be three of one number of Gaussians, of red, green and blue, got {told}")
+    constants: dict[str, float] = {}
+    for channel, one in zip(CHANNELS, _by_channel(blurs, c), strict=True):
+        constants[f"{channel}_unscattered"] = one["unscattered"]
+        for key in ("weight", "sigma"):
+            constants |= {f"{channel}_{key}{i}": value for i, value in enumerate(one[key], start=1)}
+    parts = [emit.read_text(part) for part in ("common", "channel", "sea_blur")]
+    return emit.filled(parts, name, constants, blurs[0].weights.size, lang, {})
+
+
+def export_segment(source: str, lang: str = "glsl", name: str | None = None) -> str:
+    """The whole file of the segment in one of `law_file.LANGUAGES`; arguments as of `segment_text`."""
+    _require(lang, name)
+    title = "what a beam of sun brings to a segment of a view ray in water, and that to the eye, per scattering"
+    if lang == "json":
+        equations = "e^{-c (s0 + t0)} t1 phi(c (1 + m) t1), phi(x) = (1 - e^-x) / x"
+        return _json({"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)})
+    start = name or SEGMENT
+    head = [title, *_named(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
+    return _file(head, lang, segment_text(source, TRANSLATED.get(lang, lang), start))
+
+
+def export_blur(
+    blurs: Sequence[WaterBlur], c: Sequence[float], depth: float, lang: str = "glsl", name: str | None = None
+) -> str:
+    """The whole file of a blur; depth  along the beam [m], others as of `blur_text`."""
+    _require(lang, name)
+    title = f"blur of a beam after {depth:.6g} m of water, of red, green and blue"
+    worst = max(one.error for one in blurs)
+    note = f"off by {worst:.2g} at most of the law's own transform, by the plane's light, at any frequency"
+    if lang == "json":
+        told = dict(zip(CHANNELS, _by_channel(blurs, c), strict=True))
+        return _json(
+            {
+                "law": "sea-blur",
+                "title": title,
+                "note": note,
+                "depth": depth,
+                "unit": "m",
+                "c": list(c),
+                "numbers": told,
+            }
+        )
+    start = name or BLUR
+    rates = ", ".join(f"{one:g}" for one in c)
+    head = [title, *_named(start, BLUR_NAMES), "channel 0, 1, 2: red, green, blue", ""]
+    head += [f"attenuation of red, green, blue {rates} [1/m]", note]
+    return _file(head, lang, blur_text(blurs, c, TRANSLATED.get(lang, lang), start))
+
+
+def _by_channel(blurs: Sequence[WaterBlur], c: Sequence[float]) -> list[dict[str, Any]]:
+    """Weights [-] and standard deviations [m] of each colour."""
+    return [
+        {
+            "unscattered": float(one.unscattered),
+            "weight": one.weights.tolist(),
+            "sigma": (np.sqrt(one.variances) / rate).tolist(),
+        }
+        for one, rate in zip(blurs, c, strict=True)
+    ]
+
+
+def _require(lang: str, name: str | None) -> None:
+    if lang not in LANGUAGES:
+        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    if lang == "json" and name is not None:
+        raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
+
+
+def _named(start: str, names: Sequence[tuple[str, str]]) -> list[str]:
+    return [f"{start}_{called:<30}{words}" for called, words in names]
+
+
+def _json(content: Mapping[str, Any]) -> str:
+    body = {**content, "made_by": f"profilefit {__version__}"}
+    return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+
+
+def _file(head: Sequence[str], lang: str, text: str) -> str:
+    lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
+    return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text

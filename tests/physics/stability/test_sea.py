@@ -1,0 +1,74 @@
+"""Light in water holds where it says so; and what fails has a cause."""
+
+import numpy as np
+import pytest
+
+from profilefit.studies.stability import sea
+from profilefit.studies.stability.causes_of_sea import LENGTH, NEAR
+from profilefit.studies.stability.cells import Verdict
+from profilefit.studies.stability.regions import regions_of
+
+
+@pytest.fixture(scope="module")
+def hits():
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(sea, "RAYS", 200)
+        return list(sea.of_hits())
+
+
+@pytest.fixture(scope="module")
+def segments():
+    return list(sea.of_segment())
+
+
+def causes(cells):
+    return {one.cause.key for one in regions_of(cells)}
+
+
+def test_steps_hold_and_iterations_fail_where_rays_cross_twice(hits):
+    ours, published = hits
+    sixteen, eight, newton = ours.value
+    assert np.all(sixteen <= 0.01)
+    assert np.all(eight[:-1] <= 0.01)
+    assert np.all(newton[:2] == 0)
+    assert newton[-1] > 0.3
+    assert not any(one.is_failure for one in regions_of(ours))
+    assert causes(ours) <= {"several crossings", "few steps"}
+    assert causes(published) == {"several crossings", "a start off the floor, or no slopes"}
+    assert np.all(published.value[:, -1] > 0.8)
+
+
+def test_e_to_the_minus_ct_fails_from_the_depth_that_is_told():
+    """Where it begins to fail is where a law that is not of these cells says: exactly the red ones."""
+    beam = sea.of_beam()
+    assert np.array_equal(beam.codes == Verdict.INACCURATE, ~beam.inside)
+    assert 0.2 < np.mean(beam.inside) < 0.9
+    assert causes(beam) == {"light that is scattered on"}
+    assert np.max(beam.error) > 0.5
+
+
+def test_the_segment_holds_from_against_the_beam_to_along_it(segments):
+    text, library, plain = segments
+    for one in (text, library):
+        assert one.verdicts == {Verdict.RIGHT}
+        assert np.max(one.error) < 1e-6
+    assert causes(plain) == {"looking along the beam"}
+    assert not any(one.is_failure for one in regions_of(plain))
+    along = plain.spread(NEAR, 0.0) == 0
+    assert np.array_equal(plain.codes == Verdict.NOT_FINITE, along)
+    wide = plain.spread(NEAR, 0.0) * plain.spread(LENGTH, 0.0) > 1.0
+    assert np.all(plain.codes[wide] == Verdict.RIGHT)
+
+
+def test_the_plain_formula_as_ours_would_be_a_failure(monkeypatch):
+    """Negative control."""
+    monkeypatch.setattr(sea, "segment_text", lambda *_: PLAIN)
+    text = next(sea.of_segment())
+    assert any(one.is_failure for one in regions_of(text))
+
+
+PLAIN = """\
+def law_integral(c, s0, t0, m, t1):
+    x = c * (1.0 + m) * t1
+    return np.exp(-c * (s0 + t0)) * (1.0 - np.exp(-x)) / x * t1
+"""

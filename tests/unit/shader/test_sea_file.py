@@ -1,0 +1,141 @@
+"""The texts of light in water are the library's functions: in float64, on OpenGL, and they compile everywhere."""
+
+import json
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+
+from profilefit.errors import InputError
+from profilefit.scenes.sea import law
+from profilefit.shader.check.shader_law import _Pass
+from profilefit.shader.context import program
+from profilefit.shader.emit import text_beside
+from profilefit.shader.law_file import LANGUAGES
+from profilefit.shader.sea_file import blur_text, export_blur, export_segment, segment_text
+from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
+
+SOURCE = text_beside(law.__name__, "glsl/segment.glsl")
+LOBES = ((0.7, 0.95), (0.3, 0.6))
+C, OMEGA, DEPTH = (0.5, 0.2, 0.4), (0.3, 0.6, 0.8), 4.0
+BLURS = [law.water_gaussians(omega, c * DEPTH, LOBES, 3) for omega, c in zip(OMEGA, C, strict=True)]
+TEXTS = {
+    "segment": lambda lang: segment_text(SOURCE, lang),
+    "blur": lambda lang: blur_text(BLURS, C, lang),
+}
+CALLS = {
+    "segment": "sea_segment_integral(u.x, u.y, u.z, u.x, u.y) + sea_segment_between(u.x, u.y, u.z)",
+    "blur": " + ".join(
+        (
+            *("sea_blur_unscattered(u.x)", "sea_blur_weight1(u.x)", "sea_blur_sigma3(u.x)"),
+            *("sea_blur_share(u.y, u.x)", "sea_blur_mtf(u.z, u.x)"),
+        )
+    ),
+}
+DRAW = """#version 330
+{text}
+uniform sampler2D arguments;
+layout(location = 0) out vec4 found;
+void main() {{
+    vec4 q = texelFetch(arguments, ivec2(gl_FragCoord.xy), 0);
+    found = vec4(sea_blur_share(q.x, 2.0), sea_blur_mtf(q.y, 1.0), sea_segment_integral(0.4, 1.0, 0.5, q.z, 3.0), 0.0);
+}}
+"""
+WAY = np.append(0.0, np.geomspace(1e-4, 1e3, 4095))  # [m]
+
+
+def functions(text):
+    names: dict = {}
+    exec(text, names)
+    return names
+
+
+def test_the_segment_in_float64():
+    random = np.random.default_rng(2)
+    c, s0, t0, t1 = random.uniform(0.01, 2.0, (4, 1000))
+    m = np.append(-1.0, random.uniform(-1.0, 1.0, 999))
+    made = functions(segment_text(SOURCE, "python"))
+    np.testing.assert_allclose(
+        made["sea_segment_integral"](c, s0, t0, m, t1), law.segment_integral(c, s0, t0, m, t1), rtol=1e-8
+    )
+    np.testing.assert_allclose(made["sea_segment_between"](s0, t0, t1), law.segment_between(s0, t0, t1), rtol=1e-8)
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_the_blur_in_float64(channel):
+    made, blur, c = functions(blur_text(BLURS, C, "python")), BLURS[channel], C[channel]
+    np.testing.assert_allclose(made["sea_blur_share"](WAY, float(channel)), blur.share(c * WAY), rtol=1e-7)
+    np.testing.assert_allclose(made["sea_blur_mtf"](WAY, float(channel)), blur.mtf(WAY / c), rtol=1e-9)
+    sigma = made["sea_blur_sigma2"](float(channel))
+    assert sigma == pytest.approx(np.sqrt(blur.variances[1]) / c, rel=1e-10)
+    assert made["sea_blur_weight2"](float(channel)) == pytest.approx(blur.weights[1], rel=1e-10)
+    assert made["sea_blur_unscattered"](float(channel)) == pytest.approx(np.exp(-c * DEPTH), rel=1e-10)
+
+
+def test_in_float32_on_opengl(context):
+    text = "".join(one("glsl") for one in TEXTS.values())
+    m = np.linspace(-1.0, 1.0, WAY.size).astype(np.float32).astype(float)
+    share, mtf, segment, _ = _Pass(context, "sea", DRAW.format(text=text), "f4")(WAY, WAY, m, 0.0)
+    np.testing.assert_allclose(share, BLURS[2].share(C[2] * WAY), rtol=3e-6)
+    np.testing.assert_allclose(mtf, BLURS[1].mtf(WAY / C[1]), rtol=3e-6)
+    np.testing.assert_allclose(segment, law.segment_integral(0.4, 1.0, 0.5, m, 3.0), rtol=3e-6)
+
+
+@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("which", TEXTS)
+def test_glsl(context, which, head):
+    fragment = HEADS[head] + 2 * TEXTS[which]("glsl") + MAIN.format(calls=CALLS[which])
+    program(context, which, fragment, HEADS[head] + VERTEX).release()
+
+
+@pytest.mark.parametrize("which", TEXTS)
+def test_hlsl(tmp_path, which):
+    compiler = shutil.which(HLSL_COMPILER)
+    if compiler is None:
+        pytest.skip(f"needs {HLSL_COMPILER}")
+    source = tmp_path / "sea.frag"
+    source.write_text(TEXTS[which]("hlsl") + HLSL_MAIN.format(calls=CALLS[which]), encoding="utf-8")
+    done = subprocess.run(
+        [compiler, "-D", "-e", "main", "-S", "frag", "-V", "-o", str(tmp_path / "out"), str(source)],
+        capture_output=True, text=True, check=False,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+
+
+@pytest.mark.parametrize("lang", LANGUAGES)
+def test_whole_files(lang):
+    segment, blur = export_segment(SOURCE, lang), export_blur(BLURS, C, DEPTH, lang)
+    if lang == "json":
+        assert json.loads(segment)["law"] == "sea-segment"
+        green = json.loads(blur)["numbers"]["green"]
+        assert green["unscattered"] + sum(green["weight"]) == pytest.approx(BLURS[1].mtf(0.0))
+        return
+    assert "sea_segment_integral(c, s0, t0, m, t1)" in segment
+    assert "after 4 m of water" in blur
+    assert "attenuation of red, green, blue 0.5, 0.2, 0.4 [1/m]" in blur
+    assert "sea_" not in export_segment(SOURCE, lang, "fog")
+    assert "fog_share(" in export_blur(BLURS, C, DEPTH, lang, "fog")
+    if lang == "python":
+        assert functions(segment)["sea_segment_integral"](1.0, 0.0, 0.0, -1.0, 2.0) == 2.0
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: segment_text(SOURCE, "wgsl"), "lang must be one of glsl, hlsl, python, got 'wgsl'"),
+        (lambda: export_segment(SOURCE, "wgsl"), "lang must be one of glsl, .*, got 'wgsl'"),
+        (lambda: export_segment(SOURCE, "json", "fog"), "name must be left out where lang is json"),
+        (lambda: export_blur(BLURS, C, DEPTH, "json", "fog"), "name must be left out where lang is json"),
+        (lambda: export_segment(SOURCE, "glsl", "gl_fog"), "name must be letters, digits"),
+        (lambda: blur_text(BLURS[:2], C), "blurs must be three of one number of Gaussians, .*, got 3, 3"),
+        (lambda: blur_text([], C), "blurs must be three .*, got none"),
+        (
+            lambda: blur_text([*BLURS[:2], law.water_gaussians(0.5, 1.0, LOBES, 2)], C),
+            "blurs must be three of one number of Gaussians, .*, got 3, 3, 2",
+        ),
+    ],
+)
+def test_refused(make, message):
+    with pytest.raises(InputError, match=message):
+        make()
