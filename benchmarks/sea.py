@@ -49,7 +49,7 @@ STEEP = (0.5, 0.9, 1.5, 3.0, 5.0, 10.0)
 WAYS = ("newton_1m", "newton", "shah", 4, 8, 16)
 TILE, DEPTH, PIXELS, VERTICES = 10.0, 5.0, 256, (128, 192, 256)
 BEFORE, BEYOND = 0.32, 1.18  # F
-SAMPLES, SLICES, FACTORS = (3, 6, 12, 24, 48), (3, 12, 24), (0.25, 1.0, 4.0)
+SAMPLES, SLICES, FINER, FACTORS = (3, 6, 12, 24, 48), (3, 12, 24), (1, 2, 4), (0.25, 1.0, 4.0)
 PATHS, OF_WATER = 4_000_000, 1_000_000  # of a truth
 Rows = list[tuple[str | float, ...]]
 
@@ -220,7 +220,8 @@ def request() -> scene.SeaRequest:
 def costs() -> tuple[dict[str, list[chart.ChartPoint]], list[chart.MapPoint], str]:
     """Of the example: each kind over samples, maps of light, and the device."""
     with opened() as context, scene.bench(context, request(), PATHS) as found:
-        return chart.over_samples(found, SAMPLES), chart.over_maps(found, SLICES), renderer(context)
+        maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
+        return chart.over_samples(found, SAMPLES), maps, renderer(context)
 
 
 def kinds() -> Rows:

@@ -45,6 +45,16 @@ def over_maps(found: SeaBench, slices: Sequence[int]) -> list[MapPoint]:
     return told
 
 
+def over_pixels(found: SeaBench, supersampling: Sequence[int]) -> list[MapPoint]:
+    """Of the request's kind, by views of a pixel along a side; time is the view's."""
+    told = []
+    for fine in supersampling:
+        own = found._replace(request=replace(found.request, supersampling=fine))
+        point = own.point(own.request.kind, own.request.sampling.samples, TURNS)
+        told.append(MapPoint(f"{fine} x {fine} views of a pixel", point.rmse, min(point.milliseconds)))
+    return told
+
+
 def over_water(
     context: moderngl.Context, request: SeaRequest, factors: Sequence[float], paths: int
 ) -> list[tuple[float, dict[str, float]]]:

@@ -36,7 +36,16 @@ TABLES = {
     "water": ("a", "b", "phase", "n", "source"),
     "sea": ("slope", "tile", "wind", "seed"),
     "floor": ("depth", "slope", "reflectance", "seed"),
-    "technique": ("kind", "splat", *request.TABLES["technique"], "vertices", "texels", "slices", "steps"),
+    "technique": (
+        "kind",
+        "splat",
+        *request.TABLES["technique"],
+        "vertices",
+        "texels",
+        "slices",
+        "steps",
+        "supersampling",
+    ),
     "camera": ("resolution", "eye", "target", "angle"),
     "light": request.TABLES["light"],
 }
@@ -47,8 +56,15 @@ SLOPE, TILE, SEA_SEED = 0.12, 5.0, 4
 DEPTH, FLOOR_SLOPE, FLOOR_SEED, REFLECTANCE = 4.0, 0.08, 2, (0.42, 0.38, 0.30)
 AUTO = "auto"
 SPLATS = {"points": Splat.POINTS, "wireframe": Splat.WIREFRAME_ENERGY, "faces": Splat.FACES, "cells": Splat.CELLS}
-SAMPLES, VERTICES, TEXELS, SLICES, STEPS = 12, 128, 256, 6, 16
-RANGES = {"vertices": (2, 1024), "texels": (2, 1024), "slices": (2, 32), "steps": (1, 64)}
+SAMPLES = 12
+# Of whole numbers in [technique]: least, most, and what is taken if a file says nothing.
+RANGES = {
+    "vertices": (2, 1024, 128),
+    "texels": (2, 1024, 256),
+    "slices": (2, 32, 6),
+    "steps": (1, 64, 16),
+    "supersampling": (1, 8, 2),
+}
 MOST_ROWS = 16384  # of a column of maps
 EYE, TARGET, ANGLE = (6.0, 2.5, -2.2), (0.0, 2.5, -2.4), 1.1
 WIDEST = 2.5  # [rad]
@@ -67,7 +83,7 @@ class SeaRequest(ViewRequest):
     a, b     absorption and scattering of red, green and blue [1/m];  lobes  (weight, g) of the phase function's terms
     n        refractive index;  sea, floor  surfaces, each by (slope, seed), tile and depth [m], wind [m/s]
     kind     of the technique;  splat  by its name, or `AUTO`;  vertices, texels  of a side of maps of light
-    slices   maps in depths;  steps  of a search for a hit
+    slices   maps in depths;  steps  of a search for a hit;  supersampling  views of a pixel along a side, averaged
     """
 
     a: Rgb
@@ -88,6 +104,7 @@ class SeaRequest(ViewRequest):
     texels: int
     slices: int
     steps: int
+    supersampling: int
 
     @property
     def world(self) -> World:
@@ -162,8 +179,8 @@ def read(file: str, content: Table) -> SeaRequest:
         kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
         splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
         **{
-            key: _whole(tables, "technique", key, named, default, *RANGES[key])
-            for key, default in zip(RANGES, (VERTICES, TEXELS, SLICES, STEPS), strict=True)
+            key: _whole(tables, "technique", key, named, default, least, most)
+            for key, (least, most, default) in RANGES.items()
         },
     )
     if found.texels * found.slices > MOST_ROWS:
@@ -220,8 +237,10 @@ class SeaBench(NamedTuple):
 
     def view(self, kind: str, samples: int) -> tuple[Floats, float]:
         """Radiance by a technique, and milliseconds of its pass."""
-        of = self.request
-        return self.passes.view(of.camera, of.size, kind, samples, of.steps)
+        of, fine = self.request, self.request.supersampling
+        columns, rows = of.size
+        found, milliseconds = self.passes.view(of.camera, (columns * fine, rows * fine), kind, samples, of.steps)
+        return found.reshape(rows, fine, columns, fine, 3).mean(axis=(1, 3)), milliseconds
 
     def rmse(self, radiance: Floats) -> float:
         """Root mean square error over the mean of the truth [-], without the noise of its halves, which err apart."""

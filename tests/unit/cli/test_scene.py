@@ -24,7 +24,7 @@ OWN = {
     "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel", "tolerance"),
     "sea": (
         *("lobes", "n", "tile", "slope", "wind", "sea_seed", "depth", "floor_slope", "floor_seed", "reflectance"),
-        *("kind", "splat", "vertices", "texels", "slices", "steps"),
+        *("kind", "splat", "vertices", "texels", "slices", "steps", "supersampling"),
     ),
 }
 SMALL = """\
