@@ -26,13 +26,15 @@ from mcml_sim.files.text_file import as_json, read_toml
 from mcml_sim.files.whole_file import write_whole
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
 from profilefit.recipes.folder import shipped
-from profilefit.scenes.sea import hits, scene
+from profilefit.scenes.sea import hits
+from profilefit.scenes.sea.bench import bench
 from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
 from profilefit.scenes.sea.paths import Sunlight, followed
 from profilefit.scenes.sea.photons import trace_beam
 from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons, misfit
+from profilefit.scenes.sea.request import SeaRequest, lobes_of, read
 from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
 from profilefit.scenes.sea.truth import caustic_boxes
 from profilefit.scenes.sea.waves import Waves, random_sea
@@ -57,7 +59,7 @@ Rows = list[tuple[str | float, ...]]
 @cache
 def lobes() -> tuple[tuple[float, float], ...]:
     """Three terms fitted to Petzold's mean particle function."""
-    return scene.lobes_of("petzold")
+    return lobes_of("petzold")
 
 
 def phase(terms: tuple[tuple[float, float], ...]) -> Mixture:
@@ -211,15 +213,15 @@ def splats() -> Rows:
     return found
 
 
-def request() -> scene.SeaRequest:
+def request() -> SeaRequest:
     """The shipped example."""
     path = shipped("examples") / FILE
-    return scene.read(str(path), read_toml(path))
+    return read(str(path), read_toml(path))
 
 
 def costs() -> tuple[dict[str, list[chart.ChartPoint]], list[chart.MapPoint], str]:
     """Of the example: each kind over samples, maps of light, and the device."""
-    with opened() as context, scene.bench(context, request(), PATHS) as found:
+    with opened() as context, bench(context, request(), PATHS) as found:
         maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
         return chart.over_samples(found, SAMPLES), maps, renderer(context)
 
@@ -305,7 +307,7 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the scene, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
-        with opened() as context, scene.bench(context, request(), PATHS) as found:
+        with opened() as context, bench(context, request(), PATHS) as found:
             picture(found, given.pictures / "render-sea.png")
             cost_figure(chart.over_samples(found, SAMPLES), renderer(context), given.pictures / "render-sea-cost.png")
         return

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import moderngl
 
+from profilefit.scenes.sea.bench import SeaBench, bench
 from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.passes import Passes
-from profilefit.scenes.sea.scene import SeaBench, SeaRequest, bench
+from profilefit.scenes.sea.request import SeaRequest
 from profilefit.scenes.stage.picture import ChartPoint
 
 TURNS = 3

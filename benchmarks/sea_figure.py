@@ -10,8 +10,8 @@ from matplotlib import image
 
 from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, plain_log, styled
+from profilefit.scenes.sea.bench import SeaBench
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE
-from profilefit.scenes.sea.scene import SeaBench
 from profilefit.scenes.stage.picture import ChartPoint, to_srgb
 
 COLOURS = {BROADENED: BLUE, SCALED: GREEN, SINGLE: VERMILION}

@@ -8,7 +8,7 @@ from mcml_sim.cli.lazy import attributes
 
 TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
 if TYPE_CHECKING:
-    from profilefit.scenes import heart, layers, sea
+    from profilefit.scenes import fur, heart, layers, sea
     from profilefit.scenes.skin.law import Separable
     from profilefit.scenes.skin.material import translucent
     from profilefit.scenes.skin.passes import SeparableFilter
@@ -26,7 +26,7 @@ else:
     __getattr__ = attributes(
         __name__,
         {
-            **dict.fromkeys(("heart", "layers", "sea"), ""),
+            **dict.fromkeys(("fur", "heart", "layers", "sea"), ""),
             "Separable": "skin.law",
             "translucent": "skin.material",
             "SeparableFilter": "skin.passes",
@@ -61,6 +61,7 @@ __all__ = [
     "SeparableFilter",
     "Stage",
     "covering",
+    "fur",
     "gathered",
     "head_scene",
     "heart",

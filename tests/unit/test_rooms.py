@@ -17,7 +17,7 @@ ROOMS = {
         *("errors", "laws", "materials", "convert", "fitting", "recipes", "measured", "shader"),
         *("scenes", "studies", "report", "__init__", "cli", "__main__"),
     ],
-    "profilefit.scenes": ["stage", "skin", "layers", "heart", "sea", "__init__"],
+    "profilefit.scenes": ["stage", "skin", "layers", "heart", "sea", "fur", "__init__"],
 }
 
 PACKAGES = ("mcml_sim", "profilefit")

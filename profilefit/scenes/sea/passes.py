@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.fresnel import fresnel
 from profilefit.scenes.sea.caustics import VERSION, Caustics, Splat
-from profilefit.scenes.sea.haze import BROADENED, ways
+from profilefit.scenes.sea.haze import BROADENED, TURN, turned, ways
 from profilefit.scenes.sea.haze import table as fade_table
 from profilefit.scenes.sea.law import water_gaussians
 from profilefit.scenes.sea.world import World
@@ -29,9 +29,8 @@ GAUSSIANS = 4  # of the floor's light
 FADING = 512  # texels of the table of what the water leaves
 DARK = 1e-3  # of wide light, from where on nothing is seen
 FARTHEST = 60.0  # by the attenuation, where that is not reached before
-NEAR = 0.99  # cosine of turns that are no second broadening: light that was broadened before is that of the one after
 GLOW, DEPTHS = 128, 32  # cosines and depths of the sky's and the floor's light
-CONE = 64  # directions of it, in each of two angles
+CONE = 512  # angles of that light to the vertical
 
 
 class Lit(NamedTuple):
@@ -173,6 +172,7 @@ class Passes:
             "sky_on_floor": _rgb(lit.sky_on_floor),
             "again": _rgb(lit.again),
             "glow_depth": self._deepest,
+            "turn": TURN,
             "rate": float(np.min(world.c)),
             "pieces": checked_whole("pieces", pieces, 1, 1024),
         }
@@ -272,45 +272,48 @@ def glow(world: World, kind: str, depths: Floats, sky: Floats, floor: Floats) ->
 
     sky, floor  (3,) irradiance that comes in, and radiant exitance of the floor
     """
-    inside, weight = window(world)
-    even = (np.arange(CONE) + 0.5) / CONE  # cosines of a radiance that is the same in all directions
-    lambert, back = np.full(CONE, 2.0 / CONE), fresnel(world.n, 1.0, even)[0]
+    inside, flux = window(world)
+    even, width = _cosines(1.0)
+    back = fresnel(world.n, 1.0, even)[0]
     rises = np.maximum(world.depth - depths, 0.0)
     view = np.linspace(-1.0, 1.0, GLOW)
-    azimuth = (np.arange(CONE) + 0.5) * np.pi / CONE
     found = np.zeros((depths.size, GLOW, 3))
-    for upward, cosines, flux, lengths, light in (
-        (1.0, inside, weight / inside / np.sum(weight), depths, sky),
-        (-1.0, even, lambert, rises, floor),
-        (1.0, even, lambert * back, world.depth + depths, floor),
+    # Light from above goes down: a view up, against it, sees what is turned little.
+    for upward, cosines, share, lengths, light in (
+        (1.0, inside, flux / inside / np.sum(flux), depths, sky),
+        (-1.0, even, 2.0 * width, rises, floor),
+        (1.0, even, 2.0 * width * back, world.depth + depths, floor),
     ):
-        aside = np.sqrt((1 - view**2)[:, None] * (1 - cosines**2))
-        # Light from above goes down: a view up, against it, sees what is turned little.
-        cosine = upward * view[:, None, None] * cosines[:, None] + aside[..., None] * np.cos(azimuth)
-        turned, near = np.asarray(world.phase.pdf(np.clip(cosine, -1, 1))), cosine > NEAR
         sharp, _, wide = (np.exp(-one) for one in optical(world, kind, lengths[:, None] / cosines))  # (m, CONE, 3)
-        for share, left in ((near, sharp), (~near, wide)):
-            found += light * np.einsum("vd,mdc->mvc", np.mean(turned * share, axis=-1) * flux, left)
+        for part, left in zip(turned(world.lobes, upward * view, cosines), (sharp, wide), strict=True):
+            found += light * np.einsum("vd,mdc->mvc", part * share, left)
     return _four(-np.log(np.maximum(found, 1e-30)))
 
 
 def optical(world: World, kind: str, lengths: Floats) -> tuple[Floats, Floats, Floats]:
-    """`haze.ways` of lengths (...) [m] in the world's water, each (..., 3)."""
-    return ways(world.omega, world.c * lengths[..., None], world.c * world.shaft, world.lobes, kind)
+    """`haze.ways` of lengths (...) [m] in the world's water, each (..., 3), for a shaft that is endless."""
+    return ways(world.omega, world.c * lengths[..., None], np.inf, world.lobes, kind)
 
 
 def mirrored(world: World, kind: str) -> Floats:
     """Share (3,) of the floor's light that comes back to it from the calm surface: 2 int mu R e^{-wide way} dmu."""
-    cosine = (np.arange(CONE) + 0.5) / CONE
+    cosine, width = _cosines(1.0)
     left = np.exp(-optical(world, kind, 2.0 * world.depth / cosine)[2])
-    return np.asarray((2.0 * cosine * fresnel(world.n, 1.0, cosine)[0] / CONE) @ left)
+    return np.asarray((2.0 * cosine * fresnel(world.n, 1.0, cosine)[0] * width) @ left)
 
 
 def window(world: World) -> tuple[Floats, Floats]:
     """Cosines in the calm water of the sky's light (n,), and its flux in each."""
-    outside = (np.arange(CONE) + 0.5) / CONE
-    mirrored, inside = fresnel(1.0, world.n, outside)
-    return inside, (1.0 - mirrored) * outside
+    inside, width = _cosines(np.arcsin(1.0 / world.n) / (0.5 * np.pi))
+    mirrored_there, _ = fresnel(world.n, 1.0, inside)
+    return inside, (1.0 - mirrored_there) * inside * width
+
+
+def _cosines(share: float) -> tuple[Floats, Floats]:
+    """Cosines (CONE,) of angles that are even from 0 to a share of a right angle, and their widths."""
+    step = 0.5 * np.pi * share / CONE
+    angle = (np.arange(CONE) + 0.5) * step
+    return np.cos(angle), np.sin(angle) * step
 
 
 def _four(array: NDArray) -> NDArray[np.float32]:

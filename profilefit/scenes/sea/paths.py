@@ -17,11 +17,12 @@ from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture, Phase
 from profilefit.scenes.sea.hits import first_hit
 from profilefit.scenes.sea.photons import turn
+from profilefit.scenes.sea.reference import Photons, boxes
 from profilefit.scenes.sea.waves import Waves, refracted
 from profilefit.scenes.sea.world import World
 
 Floats = NDArray[np.float64]
-LEVELS, PIXELS, RAYS = 48, 256, 1024  # of sunlight in the water: depths, and pixels and rays along a side of the tile
+LEVELS, PIXELS, RAYS = 48, 256, 512  # of sunlight in the water: depths, and pixels and rays along a side of the tile
 TOGETHER = 1 << 16  # paths in memory at once
 SUNWARD = 0.25  # share of all turns that are drawn around the way to the sun, from where most light comes
 LEAST_SPREAD = 1e-3  # of rays [-], below which the phase function alone is wide enough
@@ -36,28 +37,28 @@ ABOVE = 1e-7  # a path leaves the floor from so far above it [m]
 class Sunlight:
     """Rays of a point sun behind the waves, unscattered and unabsorbed, in all of the water.
 
-    A lattice of rays on the surface; at each of some depths the flux and the mean direction of those in a pixel. It
-    moves with the calm sea's ray, so that it changes little from depth to depth, between which it is linear.
+    A lattice of rays on the surface; at each of some depths the flux and the mean direction of those in a pixel, each
+    spread as its cell is. The pixels move with the calm sea's ray, so that little changes from depth to depth, between
+    which they are linear.
     """
 
     def __init__(self, world: World, levels: int = LEVELS, pixels: int = PIXELS, rays: int = RAYS) -> None:
         self.tile, self.calm = world.sea.tile, world.calm[0]
         self.pixels = checked_whole("pixels", pixels, 1, 4096)
         count = checked_whole("rays", rays, 1, 8192)
-        side = (np.arange(count) + 0.5) * self.tile / count
+        side = (np.arange(-1, count + 1) + 0.5) * self.tile / count
         height, *slope = world.sea.lattice(side, side)
         along, across, flux = refracted(world.tilt, (slope[0], slope[1]), world.n)
         self.top = min(world.sea.lowest, -1e-3 * world.depth)
         self.step = (self.top - world.floor.lowest) / (checked_whole("levels", levels, 2, 1024) - 1)
         self.light = np.zeros((levels, pixels * pixels, 3), np.float32)
-        weights = (flux.ravel(), (flux * along).ravel(), (flux * across).ravel())
+        weights = [one[1:-1, 1:-1].ravel() for one in (flux, flux * along, flux * across)]
         for level in range(levels):
             z = self.top - level * self.step
-            x = side + (height - z) * along + self.calm * z
-            y = side[:, None] + (height - z) * across
-            at = self._pixel(x.ravel(), y.ravel())
-            for column, weight in enumerate(weights):
-                self.light[level, :, column] = np.bincount(at, weight, pixels * pixels)
+            x, y = side + (height - z) * along + self.calm * z, side[:, None] + (height - z) * across
+            for at, share in boxes(Photons(x, y, flux), pixels, pixels / self.tile):
+                for column, weight in enumerate(weights):
+                    self.light[level, :, column] += np.bincount(at, share * weight, pixels * pixels)
         self.light *= (pixels / count) ** 2
         spread = float(np.sqrt(np.mean((along - self.calm) ** 2 + across**2)))
         self.around: Phase = world.phase

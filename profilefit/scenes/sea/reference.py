@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -102,8 +103,11 @@ def caustic_photons(
     return found.reshape(columns, columns) * (columns / fine) ** 2 / count
 
 
-def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
-    """All but the outermost photons of a lattice, each over its box (pixels^2,) [photons]; scale  [pixels/m]."""
+def boxes(sent: Photons, pixels: int, scale: float) -> Iterator[tuple[NDArray[np.int64], Floats]]:
+    """Pixels, in one row, that all but the outermost photons of a lattice come to, each over its box, and its share.
+
+    Four pixels each, all photons in each of four turns;  scale  [pixels/m]
+    """
     inner = slice(1, -1)
     shares = []
     for where in (sent.x, sent.y):
@@ -114,11 +118,17 @@ def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
         pixel = np.floor(low)
         shares.append((pixel.astype(np.int64), np.clip((low + width - pixel - 1.0) / width, 0.0, 1.0)))
     (column, right), (row, up) = shares
-    found = np.zeros(pixels * pixels)
     for aside, part in ((0, 1.0 - right), (1, right)):
         for above, share in ((0, 1.0 - up), (1, up)):
             at = np.mod(row + above, pixels) * pixels + np.mod(column + aside, pixels)
-            found += np.bincount(at.ravel(), (sent.flux[inner, inner] * part * share).ravel(), pixels * pixels)
+            yield at.ravel(), (part * share).ravel()
+
+
+def _spread(sent: Photons, pixels: int, scale: float) -> Floats:
+    """All but the outermost photons of a lattice, each over its box (pixels^2,) [photons]; scale  [pixels/m]."""
+    flux, found = sent.flux[1:-1, 1:-1].ravel(), np.zeros(pixels * pixels)
+    for at, share in boxes(sent, pixels, scale):
+        found += np.bincount(at, flux * share, pixels * pixels)
     return found
 
 

@@ -33,6 +33,7 @@ uniform vec3 sky;  // irradiance above
 uniform vec3 reflectance;
 uniform vec3 sky_on_floor;  // share of its light
 uniform vec3 again;  // irradiance of the floor by its own light, which the surface mirrors
+uniform float turn;  // 1 - cosine of turns, a share of 1 / e of which are of unscattered light
 uniform float rate;  // of pieces with equal shares of the light [1/m]
 uniform int pieces;
 const float PI = 3.141592653589793;
@@ -116,10 +117,12 @@ vec3 haze(vec3 from, vec3 along, float gone, float way) {
     vec3 sum = vec3(0.0);
     float turned = phase_of(-dot(along, beam)), slant = -1.0 / beam.z;
     vec3 sunny = b * sunlight * slant * turned;
+    float fresh = exp(-(1.0 + dot(along, beam)) / turn);  // share of this turn's light that was not scattered before
     // A piece that crosses shafts sees their mean: sinc to its second order, of light whose waves are four half-widths.
     float crossed = length(along - beam * along.z / beam.z) / shaft;
     float k = rate, whole = 1.0 - exp(-k * way), t = 0.0;
     vec3 narrow = fading(1, gone) + fading(1, -from.z * slant), wide = fading(2, gone) + fading(2, -from.z * slant);
+    vec3 sharp = fading(2, gone) + fading(0, -from.z * slant);
     vec3 glow = fading(2, gone) + glowing(along.z, -from.z);
     for (int i = 1; i <= pieces; ++i) {
         float next = i == pieces ? way : -log(1.0 - whole * float(i) / float(pieces)) / k;
@@ -127,11 +130,14 @@ vec3 haze(vec3 from, vec3 along, float gone, float way) {
         vec3 back = fading(2, gone + next);
         vec3 narrow_end = fading(1, gone + next) + fading(1, depth * slant);
         vec3 wide_end = back + fading(2, depth * slant), glow_end = back + glowing(along.z, depth);
+        vec3 sharp_end = back + fading(0, depth * slant);
         float light = shaft_at(from + 0.5 * (t + next) * along) - 1.0, share = exp(-0.1028 * step * step * crossed * crossed);
-        sum += sunny * (share * light * between(narrow, narrow_end, step) + between(wide, wide_end, step));
+        vec3 mean = mix(between(wide, wide_end, step), between(sharp, sharp_end, step), fresh);
+        sum += sunny * (share * light * between(narrow, narrow_end, step) + mean);
         sum += b * between(glow, glow_end, step);
         narrow = narrow_end;
         wide = wide_end;
+        sharp = sharp_end;
         glow = glow_end;
         t = next;
     }

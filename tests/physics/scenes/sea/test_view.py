@@ -10,11 +10,12 @@ from scipy.integrate import quad
 
 import profilefit
 from profilefit.scenes.sea import passes as views
+from profilefit.scenes.sea.bench import SeaBench, bench, truth_of
 from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE, sunlit_haze
 from profilefit.scenes.sea.passes import Passes, axes, glow, mirrored
 from profilefit.scenes.sea.paths import Sunlight, followed
-from profilefit.scenes.sea.scene import SeaBench, bench, lobes_of, read, truth_of
+from profilefit.scenes.sea.request import lobes_of, read
 from profilefit.scenes.sea.waves import Waves, random_floor, random_sea
 from profilefit.scenes.sea.world import World
 from profilefit.scenes.stage.world import Camera
@@ -190,7 +191,7 @@ def test_the_haze_of_a_view_is_that_of_its_quadrature(context, few_directions, k
 
 
 @pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("lobes", [((1.0, 0.8),), ((0.7, 0.8), (0.3, -0.4))])
+@pytest.mark.parametrize("lobes", [((1.0, 0.8),), ((0.7, 0.8), (0.3, -0.4)), PETZOLD])
 def test_the_light_of_sky_and_floor_is_all_turned(kind, lobes):
     """Without loss, over all views: scalar irradiance of the sky's window, and of a floor twice what it sends out."""
     world = World(NONE, (1e-9,) * 3, lobes, N, CALM, LEVEL, NONE, 0.0, NONE, NONE)
@@ -251,6 +252,18 @@ def test_every_view_of_water_that_only_scatters(context, few_directions, kind):
         )
 
 
+@pytest.mark.parametrize(("a", "b"), [((20.0, 0.05, 0.03), (0.05,) * 3), (NONE, (0.01, 0.01, 100.0))])
+def test_water_that_lets_next_to_nothing_through_in_one_colour(context, few_directions, a, b):
+    sea, floor = random_sea(0.12, TILE, 4), random_floor(0.08, TILE, DEPTH, 2)
+    world = World(a, b, PETZOLD, N, sea, floor, (0.4,) * 3, 0.5, (3.0,) * 3, (0.3,) * 3)
+    with Passes(context, world, (Splat.CELLS, Splat.CELLS), 32, 32, 4) as passes:
+        passes.light()
+        for kind in KINDS:
+            found, _ = passes.view(toward((1.0, 2.0, -2.0), (-1, 0, 0.1), 1.2), (9, 9), kind, 8, 16)
+            assert np.all(np.isfinite(found)), kind
+            assert np.all(found >= 0.0)
+
+
 @pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (-1.0, 2.0, 0.7), (0.0, -3.0, -5.0), (0.01, 0.0, 1.0)])
 def test_axes(direction):
     """Right-handed, half a picture's sides at a distance of 1; up is up, right is level."""
@@ -306,9 +319,9 @@ def test_the_example(context, example):
         means = picture.mean(axis=(0, 1)) / found.truth.mean(axis=(0, 1))
         print(errors, f"by 96 pieces {found.rmse(more):.4f}, mirrored {swapped:.2f}, upside down {upside_down:.2f}")
         print(f"truth's errors {found.truth_error}; means by its {means}")
-        assert errors[BROADENED] < 0.25
-        assert errors[SCALED] > 1.5 * errors[BROADENED]
-        assert errors[SINGLE] > 1.5 * errors[BROADENED]
+        assert errors[BROADENED] < 0.17
+        assert errors[SCALED] > 2.0 * errors[BROADENED]
+        assert errors[SINGLE] > 1.5 * errors[SCALED]
         assert abs(found.rmse(more) - errors[BROADENED]) < 0.01
         assert swapped > 1.8 * errors[BROADENED]
         assert upside_down > 1.8 * errors[BROADENED]

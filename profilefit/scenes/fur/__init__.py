@@ -1,0 +1,16 @@
+"""Fur in shells after Fang et al.: random cones in closed form, thresholds and layers; imported on first use."""
+
+from mcml_sim.cli.lazy import attributes
+
+TYPE_CHECKING = False  # importing typing for it would take longer than all the rest
+if TYPE_CHECKING:
+    from profilefit.scenes.fur.law import best_exponent, shell_shadow, visibility
+else:
+    __getattr__ = attributes(__name__, dict.fromkeys(("best_exponent", "shell_shadow", "visibility"), "law"))
+
+__all__ = ["best_exponent", "shell_shadow", "visibility"]
+
+
+def __dir__() -> list[str]:
+    """What an interactive shell completes: names that were not used yet, too."""
+    return [*globals(), *__all__]

@@ -1,0 +1,74 @@
+"""Rays against cones: each against all images of all strands; shells and slabs tend to them."""
+
+import numpy as np
+import pytest
+
+from profilefit.errors import InputError
+from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays
+
+
+def rms(found, true):
+    return float(np.sqrt(np.mean((found - true) ** 2)))
+
+
+@pytest.mark.parametrize("lean", [(0.0, 0.0), (0.3, -0.5)])
+@pytest.mark.parametrize("degrees", [0.0, 3.0, 50.0, 80.0])
+def test_against_steps_along_each_ray(degrees, lean):
+    """Four hundred heights, at each of them all images of all strands: the first inside is within a step of the hit."""
+    patch, theta, steps = random_patch(6.0, 0.08, 1.5, 2.0, 3, lean), np.radians(degrees), 400
+    start = rays(patch, 25, 3)
+    found = cast(patch, theta, start)
+    stepped = np.zeros(len(start))
+    images = np.arange(-6, 7)
+    shifts = patch.side * np.stack(np.meshgrid(images, images), axis=-1).reshape(-1, 2)
+    feet = (patch.feet[:, None] + shifts).reshape(-1, 2)
+    for z in (np.arange(steps) + 0.5)[::-1] * patch.length / steps:
+        place = start + np.array([-np.tan(theta), 0.0]) * (patch.length - z)
+        away = place[:, None] - feet - np.array(patch.lean) * z
+        inside = np.any(np.sum(away**2, axis=-1) < (patch.radius * (1.0 - z / patch.length)) ** 2, axis=1)
+        stepped = np.where(inside & (stepped == 0.0), z, stepped)
+    same = np.abs(found - stepped) < 2.0 * patch.length / steps
+    assert np.mean(same) > 0.85  # a ray that grazes a cone is inside of it for less than a step
+    assert np.all(found >= stepped - patch.length / steps)
+    assert found.max() > 0.1
+
+
+def test_shells_and_slabs_tend_to_the_cones():
+    """At 45 degrees: shells slowly, slabs at once; quadratic shells to another strand."""
+    patch, theta = random_patch(64.0, 0.05, 1.0, 4.0, 1), np.radians(45.0)
+    start = rays(patch, 2500, 1)
+    true = cast(patch, theta, start)
+    linear, quadratic = ([rms(by_shells(patch, theta, start, n, p), true) for n in (16, 240)] for p in (1.0, 2.0))
+    slabs = {n: rms(by_slabs(patch, theta, start, n), true) for n in (8, 16)}
+    two = {n: rms(by_slabs(patch, theta, start, n, 2), true) for n in (8, 12)}
+    print(f"shells {linear}, quadratic {quadratic}, slabs {slabs}, of two strands {two}")
+    assert linear[0] > 0.2
+    assert linear[1] < 0.06
+    assert quadratic[1] > 0.15
+    assert slabs[16] < 0.02
+    assert two[12] < 0.005
+    assert two[8] < 0.6 * slabs[8]
+
+
+def test_one_strand_head_on_and_aside():
+    patch = Patch(np.array([[0.5, 0.5]]), 1.0, 0.1, 2.0)
+    start = np.array([[0.5, 0.5], [0.55, 0.5], [0.7, 0.5]])
+    np.testing.assert_allclose(cast(patch, 0.0, start), [2.0, 1.0, 0.0], atol=1e-12)
+    # Past the strand, and into its image in the next tile: |0.95 - 2 s| = 0.05 s.
+    np.testing.assert_allclose(cast(patch, np.arctan(2.0), np.array([[0.45, 0.5]])), [2.0 - 0.95 / 2.05], rtol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: random_patch(0.0, 0.1, 1.0, 1.0), "density must be a number > 0"),
+        (lambda: random_patch(np.nan, 0.1, 1.0, 1.0), "density must be a number > 0"),
+        (lambda: random_patch(1e9, 0.1, 1.0, 1.0), "density must be a number > 0 of 1048576 strands at most"),
+        (lambda: Patch(np.zeros((0, 2)), 1.0, 0.1, 1.0), "feet must be 1 to 1048576 strands"),
+        (lambda: Patch(np.zeros((1, 2)), 1.0, -0.1, 1.0), "radius must be a finite length > 0, got -0.1"),
+        (lambda: by_slabs(random_patch(9.0, 0.1, 1.0, 1.0), 0.5, np.zeros((1, 2)), 0), "layers must be a whole"),
+    ],
+)
+def test_what_no_patch_has(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
