@@ -54,7 +54,7 @@ def test_an_interactive_shell_completes_names_that_nobody_has_asked_for(package)
 def test_no_module_has_the_name_of_what_is_exported_beside_it(package):
     """It would stand in the place of the function as soon as anybody imports it."""
     beside = {path.stem for path in Path(package.__file__).parent.iterdir()}
-    assert beside & set(package.__all__) <= {"exact", "heart", "layers", "scenes", "sea"}, (
+    assert beside & set(package.__all__) <= {"exact", "fur", "heart", "layers", "scenes", "sea"}, (
         "which are modules themselves"
     )
 
