@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from profilefit.studies.choose.requirements import Requirements
 
 UNSERVED = 1  # exit status
-HEART, SEA = "heart", "sea"  # what a scene's file says
+HEART, SEA, FUR = "heart", "sea", "fur"  # what a scene's file says
 
 
 def choose(
@@ -41,6 +41,7 @@ def choose(
 
     Of a file that `profilefit scene` draws as a heart: whether it needs an atlas, or the screen by itself is enough.
     As a sea: which terms of its water's light, which splat and how many steps to a hit it needs.
+    As a ball of fur: how many layers by the angle of the view, and drawn which way.
 
     \b
     Example, on a file of profilefit examples:
@@ -58,10 +59,10 @@ def choose(
         from profilefit.studies.choose.requirements import read
 
     told = read_toml(scene)
-    if (kind := told.get("scene")) in (HEART, SEA):
+    if (kind := told.get("scene")) in OF_SCENES:
         if measure:
             raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
-        (_of_heart if kind == HEART else _of_sea)(scene, told, as_json, quiet)
+        OF_SCENES[kind](scene, told, as_json, quiet)
         return
     requirements = read(scene)
     ratios = _measured(requirements, quiet) if measure else cost.shipped()
@@ -110,6 +111,28 @@ def _of_sea(file: Path, told: Table, as_json: bool, quiet: bool) -> None:
     else:
         for line in sea_lines(need):
             screen().print(line, markup=False)
+
+
+def _of_fur(file: Path, told: Table, as_json: bool, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.runs.progress import tracked
+        from profilefit.report.tables.choose_table import fur_content, fur_lines
+        from profilefit.scenes.fur.request import read as read_fur
+        from profilefit.studies.choose.fur import ANGLES, fur_need
+
+    request = read_fur(str(file), told)
+    need = fur_need(request, tracked(ANGLES, "casting rays", "angles", quiet=quiet))
+    if as_json:
+        print_json(fur_content(need))
+    else:
+        for line in fur_lines(need):
+            screen().print(line, markup=False)
+    if need.way is None:
+        raise typer.Exit(UNSERVED)
+
+
+OF_SCENES = {HEART: _of_heart, SEA: _of_sea, FUR: _of_fur}
 
 
 def _measured(requirements: Requirements, quiet: bool) -> Ratios:

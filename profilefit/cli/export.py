@@ -14,7 +14,7 @@ from profilefit.cli.folders import known_phases, records_folder
 from profilefit.cli.options import Fits
 from profilefit.errors import InputError
 
-SEGMENT, SCENE = "sea-segment", ".toml"  # a name, and how that of a file ends
+SEGMENT, FUR, SCENE = "sea-segment", "fur", ".toml"  # names, and how that of a file ends
 
 
 def export(
@@ -22,7 +22,8 @@ def export(
         str,
         typer.Argument(
             metavar="NAME",
-            help="A record (hazard-diffuse), law (burley), map (chiang), stack (skin), phase (petzold) or sea-segment.",
+            help="A record (hazard-diffuse), law (burley), map (chiang), stack (skin), phase (petzold), sea-segment or "
+            "fur.",
             autocompletion=options.subjects,
         ),
     ],
@@ -53,6 +54,7 @@ def export(
     map that was not regenerated has its printed ones. Of a stack: the law of its three colours with the first layer's
     thickness as an argument, and light scattered once. Of a phase function: its best sum of terms, with its sampler.
     sea-segment: what a beam brings to a view ray in water. Of a sea's file, SEA.toml: the blur of light on its floor.
+    fur: what cones of fur hide, their discs on shells, and where a ray comes into one.
 
     \b
     Examples:
@@ -82,6 +84,9 @@ def export(
     elif what == SEGMENT or what.endswith(SCENE):
         _require_none("of light in water", what, constants, n)
         text = _of_sea(what, lang, name)
+    elif what == FUR:
+        _require_none("of fur", what, constants, n)
+        text = _of_fur(lang, name)
     else:
         text = exported(find(what, folder, constants, n), folder, lang, name)
     if out is None:
@@ -117,3 +122,12 @@ def _of_sea(what: str, lang: str, name: str | None) -> str:
         for omega, c in zip(world.omega.tolist(), rates, strict=True)
     ]
     return export_blur(blurs, rates, depth, lang, name)
+
+
+def _of_fur(lang: str, name: str | None) -> str:
+    with interruptible(__name__):
+        from profilefit.scenes.fur import law
+        from profilefit.shader.emit import text_beside
+        from profilefit.shader.fur_file import export_strand
+
+    return export_strand(text_beside(law.__name__, "glsl/strand.glsl"), lang, name)

@@ -24,6 +24,7 @@ NUMPY = {
     "clamp": "np.clip",
     "sin": "np.sin",
     "cos": "np.cos",
+    "atan": "np.arctan",
     "PF_SELECT": "np.where",
 }
 COMMON = "shader source must keep to what GLSL, HLSL and numpy share"

@@ -68,17 +68,40 @@ def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = 
     InputError for another language, for a name that is none, or for a law without shader source; RecordError where a
     record behind it is missing or damaged.
     """
-    if lang not in LANGUAGES:
-        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    require_language(lang, name)
     sources = _sources(named, Records.of(folder))
     if lang == "json":
-        if name is not None:
-            raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
         return json.dumps(_plain(named, sources), indent=1, sort_keys=True, allow_nan=False) + "\n"
     make = emit.map_text if isinstance(named.law, AlbedoLaw) else emit.law_text
     body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(named, sources))
     head = commented(_head(named, sources, lang, name), MARKS.get(lang, "//"))
     return head + "\n" + (ES_HEAD if lang == "glsl-es" else "") + body
+
+
+def require_language(lang: str, name: str | None) -> None:
+    """InputError unless it is one of `LANGUAGES`, and no name is given to JSON."""
+    if lang not in LANGUAGES:
+        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    if lang == "json" and name is not None:
+        raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
+
+
+def function_lines(start: str, names: Sequence[tuple[str, str]]) -> list[str]:
+    """What each function gives, a line each; names (call, words), the call less what it begins with, `start`."""
+    width = max(30, *(len(called) + 2 for called, _ in names))
+    return [f"{start}_{called:<{width}}{words}" for called, words in names]
+
+
+def json_file(content: Mapping[str, Any]) -> str:
+    """A whole file of data, and what made it."""
+    body = {**content, "made_by": f"profilefit {__version__}"}
+    return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
+
+
+def text_file(head: Sequence[str], lang: str, text: str) -> str:
+    """A whole file of a text in a language, under a head of lines (comments)."""
+    lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
+    return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text
 
 
 def commented(lines: Iterable[str], mark: str) -> str:

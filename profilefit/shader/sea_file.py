@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import __version__
 from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.shader import emit
-from profilefit.shader.law_file import ES_HEAD, LANGUAGES, MARKS, TARGETS, TRANSLATED, commented
+from profilefit.shader.law_file import TRANSLATED, function_lines, json_file, require_language, text_file
 
 SEGMENT, BLUR = "sea_segment", "sea_blur"  # what names begin with
 OWN = "segment_"  # in the scene's text
@@ -76,27 +74,27 @@ def blur_text(blurs: Sequence[WaterBlur], c: Sequence[float], lang: str = "glsl"
 
 def export_segment(source: str, lang: str = "glsl", name: str | None = None) -> str:
     """The whole file of the segment in one of `law_file.LANGUAGES`; arguments as of `segment_text`."""
-    _require(lang, name)
+    require_language(lang, name)
     title = "what a beam of sun brings to a segment of a view ray in water, and that to the eye, per scattering"
     if lang == "json":
         equations = "e^{-c (s0 + t0)} t1 phi(c (1 + m) t1), phi(x) = (1 - e^-x) / x"
-        return _json({"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)})
+        return json_file({"law": "sea-segment", "title": title, "equations": equations, "note": " ".join(SEGMENT_NOTE)})
     start = name or SEGMENT
-    head = [title, *_named(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
-    return _file(head, lang, segment_text(source, TRANSLATED.get(lang, lang), start))
+    head = [title, *function_lines(start, SEGMENT_NAMES), "", *SEGMENT_NOTE]
+    return text_file(head, lang, segment_text(source, TRANSLATED.get(lang, lang), start))
 
 
 def export_blur(
     blurs: Sequence[WaterBlur], c: Sequence[float], depth: float, lang: str = "glsl", name: str | None = None
 ) -> str:
     """The whole file of a blur; depth  along the beam [m], others as of `blur_text`."""
-    _require(lang, name)
+    require_language(lang, name)
     title = f"blur of a beam after {depth:.6g} m of water, of red, green and blue"
     worst = max(one.error for one in blurs)
     note = f"off by {worst:.2g} at most of the law's own transform, by the plane's light, at any frequency"
     if lang == "json":
         told = dict(zip(CHANNELS, _by_channel(blurs, c), strict=True))
-        return _json(
+        return json_file(
             {
                 "law": "sea-blur",
                 "title": title,
@@ -109,9 +107,9 @@ def export_blur(
         )
     start = name or BLUR
     rates = ", ".join(f"{one:g}" for one in c)
-    head = [title, *_named(start, BLUR_NAMES), "channel 0, 1, 2: red, green, blue", ""]
+    head = [title, *function_lines(start, BLUR_NAMES), "channel 0, 1, 2: red, green, blue", ""]
     head += [f"attenuation of red, green, blue {rates} [1/m]", note]
-    return _file(head, lang, blur_text(blurs, c, TRANSLATED.get(lang, lang), start))
+    return text_file(head, lang, blur_text(blurs, c, TRANSLATED.get(lang, lang), start))
 
 
 def _by_channel(blurs: Sequence[WaterBlur], c: Sequence[float]) -> list[dict[str, Any]]:
@@ -124,24 +122,3 @@ def _by_channel(blurs: Sequence[WaterBlur], c: Sequence[float]) -> list[dict[str
         }
         for one, rate in zip(blurs, c, strict=True)
     ]
-
-
-def _require(lang: str, name: str | None) -> None:
-    if lang not in LANGUAGES:
-        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
-    if lang == "json" and name is not None:
-        raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
-
-
-def _named(start: str, names: Sequence[tuple[str, str]]) -> list[str]:
-    return [f"{start}_{called:<30}{words}" for called, words in names]
-
-
-def _json(content: Mapping[str, Any]) -> str:
-    body = {**content, "made_by": f"profilefit {__version__}"}
-    return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"
-
-
-def _file(head: Sequence[str], lang: str, text: str) -> str:
-    lines = [f"by profilefit {__version__}; generated, do not edit", TARGETS[lang], "", *head]
-    return commented(lines, MARKS.get(lang, "//")) + "\n" + (ES_HEAD if lang == "glsl-es" else "") + text

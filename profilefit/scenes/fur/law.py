@@ -15,6 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import minimize_scalar
+from scipy.special import gammaln
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
@@ -25,6 +26,7 @@ SLENDER = (10.0, 20.0, 50.0)  # L / r0
 PER_DECADE = 8  # x = N r0 / L, even in its logarithm
 ANGLES = np.radians(np.arange(2.0, 80.0, 4.0))  # middles of equal parts of 0 to 80 degrees
 LARGEST = 8.0
+NODES = 48  # of quadratures over directions
 LEAST_X, MOST_X = 0.64, 6.4  # N r0 / L for which an exponent is fitted
 
 
@@ -112,6 +114,27 @@ def best_exponent(x: ArrayLike) -> Any:
     if not np.all((number >= LEAST_X) & (number <= MOST_X)):
         raise InputError(f"x = N r0 / L must be in [{LEAST_X:g}, {MOST_X:g}], got {shown(x)}")
     return (1.0 + FITTED.size * number**FITTED.power)[()]
+
+
+def occlusion(density: float, radius: float, length: float, z: float, lean: float = 0.0) -> float:
+    """Share of even light from above that comes to a height [-]: the mean of `visibility`, weighed by the cosine.
+
+    Arguments as of `visibility`, numbers; a square of the cosine that is even, times an even angle about the normal.
+    """
+    node, weight = np.polynomial.legendre.leggauss(NODES)
+    square, angle = 0.5 * (node + 1.0)[:, None], 0.5 * np.pi * (node + 1.0)
+    tangent = np.sqrt(1.0 / square - 1.0)
+    aside = np.hypot(tangent * np.cos(angle) - lean, tangent * np.sin(angle))
+    seen = visibility(density, radius, length, np.arctan(aside), z)  # a lean is but another angle
+    return float(weight @ seen @ weight / 4.0)
+
+
+def lobe_mean(exponent: ArrayLike) -> Any:
+    """Mean of sin^p over all directions [-], by which a lobe of Kajiya and Kay (1989) is as bright for every p >= 0."""
+    p = checked_numbers("exponent", exponent, "a number >= 0")
+    if not np.all((p >= 0) & np.isfinite(p)):
+        raise InputError(f"exponent must be a finite number >= 0, got {shown(exponent)}")
+    return (0.5 * np.sqrt(np.pi) * np.exp(gammaln(0.5 * p + 1.0) - gammaln(0.5 * p + 1.5)))[()]
 
 
 def misfit(layers: int, exponent: float, slender: float) -> float:

@@ -6,6 +6,7 @@ toward -x; what it finds is the height of its first hit, 0 where it meets the sk
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,20 +19,21 @@ from profilefit.scenes.fur.law import MOST_LAYERS
 
 Floats = NDArray[np.float64]
 MOST_STRANDS = 1 << 20
+MOST_PACKING = 0.6
 
 
 @dataclass(frozen=True, eq=False)
 class Patch:
-    """Alike upright or leaning cones, feet (k, 2) within a square of this side, which repeats.
+    """Alike cones, upright or leaning, feet (k, 2) within a square of this side, which repeats.
 
-    radius, length  of a strand;  lean  of the tip along x and y, by the length [-]
+    radius, length  of a strand;  lean  of the tip along x and y, by the length [-]: of all, or of each (k, 2)
     """
 
     feet: Floats
     side: float
     radius: float
     length: float
-    lean: tuple[float, float] = (0.0, 0.0)
+    lean: tuple[float, float] | Floats = (0.0, 0.0)
 
     def __post_init__(self) -> None:
         for name in ("side", "radius", "length"):
@@ -40,6 +42,13 @@ class Patch:
                 raise InputError(f"{name} must be a finite length > 0, got {shown(value)}")
         if self.feet.ndim != 2 or self.feet.shape[1] != 2 or not 1 <= len(self.feet) <= MOST_STRANDS:
             raise InputError(f"feet must be 1 to {MOST_STRANDS} strands (k, 2), got shape {self.feet.shape}")
+        if self.leans.shape not in ((1, 2), self.feet.shape):
+            raise InputError(f"lean must be two numbers, or two of each strand, got shape {np.shape(self.lean)}")
+
+    @property
+    def leans(self) -> Floats:
+        """Of all strands (1, 2), or of each (k, 2)."""
+        return np.atleast_2d(np.asarray(self.lean, float))
 
     @property
     def density(self) -> float:
@@ -51,11 +60,53 @@ def random_patch(
     density: float, radius: float, length: float, side: float, seed: int = 0, lean: tuple[float, float] = (0.0, 0.0)
 ) -> Patch:
     """Feet that are independent of each other; as many as the density says on average, 1 at least."""
+    count, rng = _counted(density, side), np.random.default_rng([seed, 0])
+    return Patch(rng.random((count, 2)) * side, side, radius, length, lean)
+
+
+def spaced_patch(density: float, radius: float, length: float, side: float, packing: float, seed: int = 0) -> Patch:
+    """As many upright strands, none nearer to another one than d: packing n d^2 in [0, 0.6], 0.7 being jammed.
+
+    Darts are thrown anywhere, one by one, and stay where all that stayed before are d away.
+    """
+    count, rng = _counted(density, side), np.random.default_rng([seed, 2])
+    if not (is_number(packing) and 0 <= packing <= MOST_PACKING):
+        raise InputError(f"packing must be a number in [0, {MOST_PACKING:g}], got {shown(packing)}")
+    apart = float(np.sqrt(packing / count)) * side
+    feet = np.empty((0, 2))
+    while len(feet) < count:
+        thrown = rng.random((2 * (count - len(feet)) + 16, 2)) * side
+        if len(feet):
+            thrown = thrown[cKDTree(feet, boxsize=side).query(thrown)[0] >= apart]
+        falls = np.zeros(len(thrown), bool)
+        pairs = cKDTree(thrown, boxsize=side).query_pairs(apart, output_type="ndarray") if len(thrown) else []
+        for first, later in sorted(map(tuple, pairs), key=lambda pair: (pair[1], pair[0])):
+            falls[later] |= not falls[first]
+        feet = np.concatenate([feet, thrown[~falls]])[:count]
+    return Patch(feet, side, radius, length)
+
+
+def tufted_patch(
+    density: float, radius: float, length: float, side: float, each: int, spread: float, seed: int = 0
+) -> Patch:
+    """As many upright strands in tufts of so many each, anywhere within discs of radius `spread`, which are anywhere.
+
+    Discs may overlap; tufts are as many as the density says on average, 1 at least.
+    """
+    many, tufts = checked_whole("each", each, 1), _counted(density / max(each, 1), side)
+    if not (is_number(spread) and 0 <= spread < np.inf):
+        raise InputError(f"spread must be a finite length >= 0, got {shown(spread)}")
+    rng = np.random.default_rng([seed, 3])
+    turn, away = 2.0 * np.pi * rng.random((tufts, many)), spread * np.sqrt(rng.random((tufts, many)))
+    middles = rng.random((tufts, 1, 2)) * side
+    feet = middles + away[..., None] * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+    return Patch(np.mod(feet.reshape(-1, 2), side), side, radius, length)
+
+
+def _counted(density: float, side: float) -> int:
     if not (is_number(density) and 0 < density < np.inf and 0 < density * side * side <= MOST_STRANDS):
         raise InputError(f"density must be a number > 0 of {MOST_STRANDS} strands at most, got {shown(density)}")
-    rng = np.random.default_rng([seed, 0])
-    count = max(round(density * side * side), 1)
-    return Patch(rng.random((count, 2)) * side, side, radius, length, lean)
+    return max(round(density * side * side), 1)
 
 
 def rays(patch: Patch, count: int, seed: int = 0) -> Floats:
@@ -64,33 +115,49 @@ def rays(patch: Patch, count: int, seed: int = 0) -> Floats:
 
 
 def cast(patch: Patch, theta: float, start: Floats) -> Floats:
-    """Height of the first hit (n,) of rays that start (n, 2) at the level of the tips, against the cones themselves.
+    """Height of the first hit (n,) of rays that start (n, 2) at the level of the tips, against the cones themselves."""
+    return struck(patch, theta, start)[0]
 
-    A cone that is met is within r0 and half a step of one of the places along a ray that are tried, a root apart.
+
+def struck(patch: Patch, theta: float, start: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """`cast`, and the strand that is met (n,), -1 where none is.
+
+    A cone that is met is within its radius and half a step of one of the places along a ray that are tried, at most a
+    root apart; what is met above the lower end of a step needs no further one.
     """
-    rate, tree = _rate(patch, theta), _tree(patch)
-    steps = int(np.ceil(float(np.hypot(*rate)) * patch.length / patch.radius)) + 1
-    found = np.zeros(len(start))
+    rate, trees = float(np.max(np.hypot(*_rate(patch, theta).T))), _trees(patch)
+    steps = int(np.ceil(rate * patch.length / patch.radius)) + 1
+    found, which = np.zeros(len(start)), np.full(len(start), -1)
+    left = np.arange(len(start))
     for number in range(steps):
-        z = patch.length * (1.0 - (number + 0.5) / steps)
-        place = _at(patch, theta, start, z)
-        near = tree.query_ball_point(place, 1.5001 * patch.radius)
-        ray = np.repeat(np.arange(len(start)), [len(one) for one in near])
-        strand = np.fromiter((i for one in near for i in one), np.intp, ray.size)
-        np.maximum.at(found, ray, _heights(patch, place[ray], strand, z, theta))
-    return found
+        z, half = patch.length * (1.0 - (number + 0.5) / steps), 0.5 * patch.length / steps
+        place = _at(patch, theta, start[left], z)
+        widest = patch.radius * (1.0 - (z - half) / patch.length) + half * rate
+        near = cKDTree(place, boxsize=patch.side).sparse_distance_matrix(
+            trees(z), 1.0001 * widest, output_type="ndarray"
+        )
+        ray, strand = near["i"], near["j"]
+        heights = _heights(patch, place[ray], strand, z, theta)
+        order = np.argsort(heights)  # of those of one ray, the last to be written is the highest
+        highest, own = np.zeros(len(left)), np.full(len(left), -1)
+        highest[ray[order]], own[ray[order]] = heights[order], strand[order]
+        better = highest > found[left]
+        found[left[better]], which[left[better]] = highest[better], own[better]
+        left = left[found[left] < z - half]
+    return found, which
 
 
 def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: float) -> Floats:
     """The same against discs on N shells of radius r0 (1 - t^p)."""
     count = checked_whole("layers", layers, 1, MOST_LAYERS)
-    tree, found = _tree(patch), np.zeros(len(start))
+    trees, found = _trees(patch), np.zeros(len(start))
     left = np.arange(len(start))
     for layer in reversed(range(count)):
         t = layer / count
-        distance, _ = tree.query(_at(patch, theta, start[left], t * patch.length))
+        z = t * patch.length
+        distance, _ = trees(z).query(_at(patch, theta, start[left], z))
         hit = distance < patch.radius * (1.0 - t**exponent)
-        found[left[hit]] = t * patch.length
+        found[left[hit]] = z
         left = left[~hit]
     return found
 
@@ -99,14 +166,16 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
     """The same against the cone that is nearest to the middle of a ray's way through each of N slabs, from the top.
 
     tested  strands, the nearest ones;  a cone counts wherever the ray comes into it, within the slab or not
+
+    Where leans differ that does not tend to the cones: a ray along one strand meets it far below, and others before.
     """
     count, near = checked_whole("layers", layers, 1, MOST_LAYERS), checked_whole("tested", tested, 1, len(patch.feet))
-    tree, found = _tree(patch), np.zeros(len(start))
+    trees, found = _trees(patch), np.zeros(len(start))
     left = np.arange(len(start))
     for layer in reversed(range(count)):
         middle = (layer + 0.5) / count * patch.length
         place = _at(patch, theta, start[left], middle)
-        _, nearest = tree.query(place, near)
+        _, nearest = trees(middle).query(place, near)
         z = _heights(patch, np.repeat(place, near, axis=0), nearest.ravel(), middle, theta)
         best = z.reshape(len(left), near).max(axis=1)
         found[left] = best
@@ -114,28 +183,43 @@ def by_slabs(patch: Patch, theta: float, start: Floats, layers: int, tested: int
     return found
 
 
-def _tree(patch: Patch) -> cKDTree:
-    return cKDTree(np.mod(patch.feet, patch.side), boxsize=patch.side)
+def _trees(patch: Patch) -> Callable[[float], cKDTree]:
+    """Of the strands' axes at a height, less how far the first one has moved from its foot: `_at`'s places."""
+    apart = patch.leans - patch.leans[0]
+
+    def at(z: float) -> cKDTree:
+        return cKDTree(_wrapped(patch, patch.feet + apart * z), boxsize=patch.side)
+
+    if np.any(apart):
+        return at
+    same = at(0.0)
+    return lambda z: same
+
+
+def _wrapped(patch: Patch, place: Floats) -> Floats:
+    found = np.mod(place, patch.side)
+    return np.where(found < patch.side, found, 0.0)  # of a negative number that is next to 0, mod is the side itself
 
 
 def _heights(patch: Patch, place: Floats, strand: NDArray[np.intp], z: float, theta: float) -> Floats:
-    """Heights (n,) where rays come into strands (n,), the image nearest to places (n, 2) at a height z; or 0."""
-    away = place - np.mod(patch.feet[strand], patch.side)
+    """Heights (n,) where rays come into strands (n,), the image next to `_at`'s places (n, 2) at a height z; or 0."""
+    one = len(patch.leans) == 1
+    away = place - patch.feet[strand] - (0.0 if one else (patch.leans[strand] - patch.leans[0]) * z)
     away -= patch.side * np.round(away / patch.side)
-    rate = _rate(patch, theta)
+    rate = _rate(patch, theta)[[0] if one else strand]
     down = _first(patch, away - rate * (patch.length - z), rate)
     return np.where(np.isfinite(down), patch.length - down, 0.0)
 
 
 def _rate(patch: Patch, theta: float) -> Floats:
-    """How far a ray moves from a strand's axis a unit of height that it goes down (2,)."""
-    return np.array([patch.lean[0] - np.tan(theta), patch.lean[1]])
+    """How far a ray moves from the strands' axes a unit of height that it goes down (1 or k, 2)."""
+    return patch.leans - np.array([np.tan(theta), 0.0])
 
 
 def _at(patch: Patch, theta: float, start: Floats, z: float) -> Floats:
-    """Where rays are at a height, as seen from the foot of a strand whose axis is there: within the patch."""
-    found = start - np.array(patch.lean) * patch.length + _rate(patch, theta) * (patch.length - z)
-    return np.mod(found, patch.side)
+    """Where rays are at a height, as seen from the foot of the first strand if its axis is there: within the patch."""
+    found = start - patch.leans[0] * patch.length + _rate(patch, theta)[0] * (patch.length - z)
+    return _wrapped(patch, found)
 
 
 def _first(patch: Patch, away: Floats, rate: Floats) -> Floats:
@@ -144,11 +228,11 @@ def _first(patch: Patch, away: Floats, rate: Floats) -> Floats:
     |g + m s| = k s, k = r0 / L: the first root in [0, L].
     """
     k = patch.radius / patch.length
-    a, half, c = float(rate @ rate) - k * k, away @ rate, np.sum(away**2, axis=-1)
+    a, half, c = np.sum(rate**2, axis=-1) - k * k, np.sum(away * rate, axis=-1), np.sum(away**2, axis=-1)
     root = half**2 - a * c
     with np.errstate(divide="ignore", invalid="ignore"):
         # The stable form of both roots, of which one may be none.
         q = -(half + np.where(half >= 0, 1.0, -1.0) * np.sqrt(np.maximum(root, 0.0)))
-        both = np.stack([q / a if a else np.full_like(q, np.inf), c / q])
+        both = np.stack([q / a, c / q])
     good = (root >= 0) & np.isfinite(both) & (both >= 0) & (both <= patch.length)
     return np.asarray(np.min(np.where(good, both, np.inf), axis=0))

@@ -122,14 +122,12 @@ SURFACE = ("irradiance_map", "reflectance_map", "position_map", "normal_map")
 PLACE = "place_map"  # u, v, and 1 where a surface is
 
 
-class Targets:
-    """Float textures of one size by name, four channels each: those of `SURFACE`, and all that passes need."""
+class Maps:
+    """Float textures of one size by name, four channels each, which passes read and fill."""
 
     def __init__(self, context: moderngl.Context, size: tuple[int, int]):
         self.context, self.size = context, size
-        self._maps = {name: float_texture(context, size, 4) for name in (*SURFACE, PLACE)}
-        self._depth = context.depth_renderbuffer(size)
-        self.surface = context.framebuffer(list(self._maps.values()), self._depth)
+        self._maps: dict[str, moderngl.Texture] = {}
         self._into: dict[str, moderngl.Framebuffer] = {}
 
     def map(self, name: str) -> moderngl.Texture:
@@ -143,6 +141,21 @@ class Targets:
         if name not in self._into:
             self._into[name] = self.context.framebuffer([self.map(name)])
         return self._into[name]
+
+    def release(self) -> None:
+        for framebuffer in self._into.values():
+            framebuffer.release()
+        for texture in self._maps.values():
+            texture.release()
+
+
+class Targets(Maps):
+    """Those of a stage: the maps of `SURFACE` and `PLACE`, which parts are drawn into, and all that passes need."""
+
+    def __init__(self, context: moderngl.Context, size: tuple[int, int]):
+        super().__init__(context, size)
+        self._depth = context.depth_renderbuffer(size)
+        self.surface = context.framebuffer([self.map(name) for name in (*SURFACE, PLACE)], self._depth)
 
     def upload(self, buffers: Buffers) -> None:
         for name, array in zip(SURFACE, buffers.targets(), strict=True):
@@ -164,10 +177,8 @@ class Targets:
         )
 
     def release(self) -> None:
-        for framebuffer in (self.surface, *self._into.values()):
-            framebuffer.release()
-        for texture in self._maps.values():
-            texture.release()
+        self.surface.release()
+        super().release()
         self._depth.release()
 
 

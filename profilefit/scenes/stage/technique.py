@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.errors import ShaderError
-from profilefit.scenes.stage.buffers import Singles, Targets, float_texture
+from profilefit.scenes.stage.buffers import Maps, Singles, float_texture
 from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.world import Part, Scene, unit
 from profilefit.shader.context import check_errors, full_screen, program
@@ -227,7 +227,7 @@ class FullScreen:
         self._triangle = full_screen(context, self.program.compiled)
         self._tables: dict[str, tuple[Singles, moderngl.Texture]] = {}
 
-    def run(self, one: Pass, targets: Targets) -> None:
+    def run(self, one: Pass, targets: Maps) -> None:
         """Fill the map that the pass writes."""
         textures = {}
         for sampler, read in one.reads.items():

@@ -11,6 +11,7 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.recipes import catalogue
 from profilefit.recipes.folder import shipped
 from profilefit.recipes.inventory import find
+from profilefit.scenes.fur import law as fur
 from profilefit.scenes.sea import beam_share
 from profilefit.scenes.sea.scene import read
 from profilefit.shader.law_file import LANGUAGES, export
@@ -120,13 +121,29 @@ def test_light_in_water(command):
         assert command("export", "sea-segment", "--lang", lang)[0] == 0
 
 
-def test_what_light_in_water_does_not_take(command):
+def test_cones_of_fur(command):
+    status, text, err = command("export", "fur", "--lang", "python", "--name", "hair")
+    assert (status, err) == (0, "")
+    made: dict = {}
+    exec(text, made)
+    assert made["hair_shadow"](0.5, 10.0) == pytest.approx(fur.shadow(0.5, 10.0, np.pi / 4))
+    assert made["hair_swept"](-2.0, 0.0, 1.0, 0.0, 0.5, 0.0) == 1.5
+    for lang in LANGUAGES:
+        assert command("export", "fur", "--lang", lang)[0] == 0
+
+
+def test_what_light_in_water_and_fur_do_not_take(command):
     heart = str(SEA.with_name("heart.toml"))
     for words, told in (
         (("sea-segment", "--n", "1.3"), "--n must be left out where NAME is of light in water, got 'sea-segment'"),
         ((heart,), f"{heart}: scene must be sea, whose water has a text, got 'heart'"),
         (("nope.toml",), "nope.toml: expected a file that can be read, got: No such file or directory"),
         (("sea-segment", "--name", "fog", "--lang", "json"), "name must be left out where lang is json"),
+        (("fur", "--n", "1.3"), "--n must be left out where NAME is of fur, got 'fur'"),
+        (("fur", "--constants", "old"), "--constants must be left out where NAME is of fur, got 'fur'"),
+        (("fur", "--name", "hair", "--lang", "json"), "name must be left out where lang is json"),
+        (("fur", "--name", "gl_hair"), "name must be letters, digits and single underscores"),
+        (("fur", "--lang", "wgsl"), "lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
         ((str(SEA), "--lang", "wgsl"), "lang must be one of glsl, hlsl, glsl-es, python, json, got 'wgsl'"),
     ):
         status, out, err = command("export", *words)

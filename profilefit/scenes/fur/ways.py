@@ -1,0 +1,99 @@
+"""Ways to draw fur in layers, and what each is wrong by toward rays of one angle: the least layers to an error."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.media.checks import is_number, shown
+from profilefit.errors import InputError
+from profilefit.scenes.fur.law import LEAST_X, MOST_X, best_exponent
+from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
+
+Floats = NDArray[np.float64]
+MOST = 256  # layers of a picture
+
+
+class FurWay(NamedTuple):
+    """Shells of a threshold's exponent, or swept slabs, each of which tests so many of the nearest strands.
+
+    exponent  of shells; None is the one that is fitted to N r0 / L;  tested  0 of shells
+    """
+
+    name: str
+    exponent: float | None = None
+    tested: int = 0
+
+    def exponent_of(self, layers: int, slender: float) -> float:
+        """p of N shells, L / r0 of the strands; of fewer layers than it is fitted to that of the fewest, of more 1."""
+        if self.exponent is not None:
+            return self.exponent
+        x = layers / slender
+        return 1.0 if x > MOST_X else float(best_exponent(max(x, LEAST_X)))
+
+
+LINEAR, QUADRATIC, FITTED = FurWay("linear", 1.0), FurWay("quadratic", 2.0), FurWay("fitted")
+SWEPT, SWEPT_TWO = FurWay("swept", tested=1), FurWay("swept, two strands", tested=2)
+WAYS = (LINEAR, QUADRATIC, FITTED, SWEPT, SWEPT_TWO)
+
+
+@dataclass(frozen=True, eq=False)
+class FurTrial:
+    """Rays at one angle to the normal, start (n, 2) where they pass the tips, and the heights of their first hits."""
+
+    patch: Patch
+    theta: float
+    start: Floats
+    true: Floats = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "true", cast(self.patch, self.theta, self.start))
+
+    def heights(self, way: FurWay, layers: int) -> Floats:
+        """Of first hits (n,) by so many layers."""
+        patch = self.patch
+        if way.tested:
+            return by_slabs(patch, self.theta, self.start, layers, min(way.tested, len(patch.feet)))
+        exponent = way.exponent_of(layers, patch.length / patch.radius)
+        return by_shells(patch, self.theta, self.start, layers, exponent)
+
+    @lru_cache  # noqa: B019, a trial lives as long as what it is asked for
+    def error(self, way: FurWay, layers: int) -> float:
+        """Root mean square of the heights' errors over the length [-]."""
+        return float(np.sqrt(np.mean((self.heights(way, layers) - self.true) ** 2)) / self.patch.length)
+
+
+def trial(patch: Patch, theta: float, count: int, seed: int = 0) -> FurTrial:
+    """So many rays, anywhere on the patch."""
+    return FurTrial(patch, theta, rays(patch, count, seed))
+
+
+def error_of(trials: Sequence[FurTrial], way: FurWay, layers: int) -> float:
+    """Root mean square over trials of as many rays each [-]."""
+    return float(np.sqrt(np.mean([one.error(way, layers) ** 2 for one in trials])))
+
+
+def least_layers(trials: Sequence[FurTrial], way: FurWay, tolerance: float, most: int = MOST) -> int | None:
+    """The fewest layers whose error is within the tolerance, None if no number up to `most` is.
+
+    By doubling and halving: where an error rises again with N, as that of quadratic shells does, the first place.
+    """
+    if not (is_number(tolerance) and tolerance > 0):
+        raise InputError(f"tolerance must be a number > 0, got {shown(tolerance)}")
+    low, high = 0, 1
+    while error_of(trials, way, high) > tolerance:
+        if high >= most:
+            return None
+        low, high = high, min(2 * high, most)
+    while high - low > 1:
+        middle = (low + high) // 2
+        if error_of(trials, way, middle) > tolerance:
+            low = middle
+        else:
+            high = middle
+    return high
