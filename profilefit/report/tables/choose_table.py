@@ -20,6 +20,7 @@ from profilefit.studies.choose.response import reference_light
 
 if TYPE_CHECKING:  # it draws, which nothing else here does
     from profilefit.studies.choose.atlas import AtlasNeed
+    from profilefit.studies.choose.fur import FurNeed
     from profilefit.studies.choose.sea import SeaNeed
 
 PARTS = {"model": "law", "curvature": "curve", "pixel": "pixel", "noise": "noise"}
@@ -111,6 +112,43 @@ def sea_content(need: SeaNeed) -> dict[str, Any]:
         "steps": {"light": need.light_steps, "view": need.view_steps},
         "steepness": {"light": need.light, "view": need.view},
     }
+
+
+def fur_lines(need: FurNeed) -> list[str]:
+    """How many layers fur needs, a line an angle, and the answer."""
+    found = []
+    for angle, layers in need.layers.items():
+        told = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
+        best = need.cheapest(angle)
+        found.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
+    wanted = f"(requested: {_percent(need.tolerance)} % of the length)"
+    if need.way is None:
+        return [*found, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
+    return [*found, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
+
+
+def fur_content(need: FurNeed) -> dict[str, Any]:
+    """The same as data."""
+    return {
+        "way": None if need.way is None else need.way.name,
+        "layers": need.count,
+        "angle": need.angle,
+        "tolerance": need.tolerance,
+        "most": need.most,
+        "by_angle": [
+            {
+                "angle": angle,
+                "layers": dict(layers),
+                "cheapest": None if (best := need.cheapest(angle)) is None else best.name,
+            }
+            for angle, layers in need.layers.items()
+        ],
+    }
+
+
+def _plain(name: str) -> str:
+    """Of a way, in a list."""
+    return name.replace(",", "")
 
 
 def headline(choice: Choice) -> str:

@@ -1,0 +1,128 @@
+"""Feet that are not independent, strands that lean each by itself, and which strand a ray meets."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from profilefit.errors import InputError
+from profilefit.scenes.fur.law import shadow
+from profilefit.scenes.fur.truth import (
+    Patch,
+    by_shells,
+    by_slabs,
+    cast,
+    random_patch,
+    rays,
+    spaced_patch,
+    struck,
+    tufted_patch,
+)
+
+
+def nearest(patch):
+    return cKDTree(patch.feet, boxsize=patch.side).query(patch.feet, 2)[0][:, 1].min()
+
+
+def kappa(make, theta, patches=6, count=1500):
+    """ln of the skin that is seen over that of independent feet."""
+    found = [
+        np.mean(cast(patch, theta, rays(patch, count, seed)) == 0)
+        for seed, patch in enumerate(map(make, range(patches)))
+    ]
+    return -np.log(np.mean(found)) / (16.0 * shadow(0.05, 1.0, theta))
+
+
+def test_strands_are_apart():
+    """By no less than is said, around the edge, too; and there are as many as of independent feet."""
+    for packing in (0.2, 0.6):
+        patch = spaced_patch(64.0, 0.05, 1.0, 4.0, packing, 1)
+        assert len(patch.feet) == 1024
+        apart = (packing / 64.0) ** 0.5
+        assert apart <= nearest(patch) < 1.05 * apart
+    assert nearest(random_patch(64.0, 0.05, 1.0, 4.0, 1)) < 0.01
+    assert len(spaced_patch(64.0, 0.05, 1.0, 4.0, 0.0).feet) == 1024
+    # A single strand, and others than it when the seed is another one.
+    assert len(spaced_patch(1.0, 0.05, 1.0, 1.0, 0.6).feet) == 1
+    assert not np.allclose(patch.feet, spaced_patch(64.0, 0.05, 1.0, 4.0, 0.6, 2).feet)
+
+
+def test_strands_are_in_tufts():
+    patch = tufted_patch(64.0, 0.05, 1.0, 4.0, 8, 0.2, 1)
+    assert len(patch.feet) == 1024
+    away = patch.feet.reshape(-1, 8, 1, 2) - patch.feet.reshape(-1, 1, 8, 2)
+    away -= patch.side * np.round(away / patch.side)
+    apart = np.hypot(away[..., 0], away[..., 1])
+    assert apart.max() <= 0.4
+    # Two places of a disc are 128 / (45 pi) of its radius apart on average.
+    assert apart[apart > 0].mean() == pytest.approx(0.2 * 128.0 / (45.0 * np.pi), rel=0.03)
+
+
+def test_strands_apart_hide_more_and_tufts_less():
+    theta = np.radians(45.0)
+    apart = kappa(lambda seed: spaced_patch(16.0, 0.05, 1.0, 5.0, 0.5, seed), theta)
+    alone = kappa(lambda seed: random_patch(16.0, 0.05, 1.0, 5.0, seed), theta)
+    tufts = kappa(lambda seed: tufted_patch(16.0, 0.05, 1.0, 5.0, 8, 0.35, seed), theta)
+    print(f"kappa: apart {apart:.3f}, alone {alone:.3f}, in tufts {tufts:.3f}")
+    assert apart > 1.1
+    assert abs(alone - 1.0) < 0.08
+    assert tufts < 0.85
+
+
+@pytest.mark.parametrize("degrees", [0.0, 40.0, 75.0])
+def test_the_strand_that_is_met_is_where_it_is_met(degrees):
+    """A hit is on the strand's cone, at its height; rays that meet none come to the skin."""
+    theta, rng = np.radians(degrees), np.random.default_rng(5)
+    patch = random_patch(20.0, 0.05, 1.0, 5.0, 2)
+    patch = replace(patch, lean=rng.normal(0.0, 0.2, patch.feet.shape))
+    start = rays(patch, 2000, 2)
+    z, which = struck(patch, theta, start)
+    np.testing.assert_array_equal(z, cast(patch, theta, start))
+    np.testing.assert_array_equal(which < 0, z == 0.0)
+    hit = which >= 0
+    assert 0.05 < np.mean(hit) < 0.999
+    place = (start - np.array([np.tan(theta), 0.0]) * (1.0 - z)[:, None])[hit]
+    away = place - patch.feet[which[hit]] - patch.lean[which[hit]] * z[hit, None]
+    away -= patch.side * np.round(away / patch.side)
+    np.testing.assert_allclose(np.hypot(*away.T), 0.05 * (1.0 - z[hit]), atol=1e-9)
+
+
+@pytest.mark.parametrize("degrees", [0.0, 30.0, 70.0])
+def test_strands_that_lean_each_by_itself(degrees):
+    """What is met of two kinds of strands is the higher of what is met of each."""
+    theta, leans = np.radians(degrees), ((0.5, 0.1), (-0.2, -0.6))
+    patch = random_patch(30.0, 0.05, 1.0, 4.0, 7)
+    kind = np.arange(len(patch.feet)) % 2
+    both = replace(patch, lean=np.array(leans)[kind])
+    start = rays(patch, 800, 7)
+    each = [Patch(patch.feet[kind == i], patch.side, 0.05, 1.0, leans[i]) for i in (0, 1)]
+    true = np.max([cast(one, theta, start) for one in each], axis=0)
+    np.testing.assert_allclose(cast(both, theta, start), true, atol=1e-9)
+    shells = np.max([by_shells(one, theta, start, 12, 1.0) for one in each], axis=0)
+    assert np.mean(by_shells(both, theta, start, 12, 1.0) == shells) > 0.997  # outlines are rounded otherwise
+
+
+def test_alike_leans_are_one_lean():
+    theta = np.radians(50.0)
+    one = random_patch(30.0, 0.05, 1.0, 4.0, 7, (0.4, -0.3))
+    each = replace(one, lean=np.tile(one.lean, (len(one.feet), 1)))
+    start = rays(one, 500, 7)
+    for way in (cast, lambda *of: by_shells(*of, 9, 2.0), lambda *of: by_slabs(*of, 9)):
+        np.testing.assert_array_equal(way(one, theta, start), way(each, theta, start))
+
+
+@pytest.mark.parametrize(
+    ("call", "said"),
+    [
+        (lambda: spaced_patch(9.0, 0.1, 1.0, 1.0, 0.65), r"packing must be a number in \[0, 0.6\], got 0.65"),
+        (lambda: spaced_patch(0.0, 0.1, 1.0, 1.0, 0.5), "density must be a number > 0"),
+        (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 0, 0.1), "each must be a whole number >= 1, got 0"),
+        (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 3, -0.1), "spread must be a finite length >= 0, got -0.1"),
+        (lambda: tufted_patch(1e9, 0.1, 1.0, 1.0, 3, 0.1), "density must be a number > 0 of 1048576 strands at most"),
+        (lambda: Patch(np.zeros((3, 2)), 1.0, 0.1, 1.0, np.zeros((2, 2))), r"lean must be two numbers.*\(2, 2\)"),
+    ],
+)
+def test_what_no_feet_are(call, said):
+    with pytest.raises(InputError, match=said):
+        call()
