@@ -1,6 +1,6 @@
 """Whether the number of layers that `profilefit choose` says of fur holds for other rays, and whether fewer would.
 
-    python -m benchmarks.fur_choose                  # 50 random furs: twenty minutes on a core
+    python -m benchmarks.fur_choose                  # 50 random furs: nine minutes on a core
     python -m benchmarks.fur_choose --furs 5         # fewer of them
 
 Each has its own density, slenderness, angle and tolerance; its way is the cheapest of `choose` there. What N layers are
@@ -71,8 +71,8 @@ def furs(count: int, seed: int = SEED) -> list[Fur]:
     ]
 
 
-def judged(fur: Fur, seed: int, patches: int = PATCHES) -> Judged:
-    """By as many patches that were not looked at to choose."""
+def judged(fur: Fur, seed: int) -> Judged:
+    """By patches that were not looked at to choose."""
     theta = float(np.radians(fur.degrees))
     looked = RandomFur(fur.density, 1.0, fur.length, theta, seed)
     least = {way.name: looked.least_layers(way, fur.tolerance) for way in WAYS}
@@ -81,7 +81,7 @@ def judged(fur: Fur, seed: int, patches: int = PATCHES) -> Judged:
         return Judged(fur, None, None, None, None)
     trials = [
         trial(random_patch(fur.density, 1.0, fur.length, looked.side, OTHERS + one), theta, RAYS, OTHERS + one)
-        for one in range(patches)
+        for one in range(PATCHES)
     ]
     layers = least[way.name]
     assert layers is not None

@@ -27,7 +27,7 @@ LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
 LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
 PARTS = ("truth", "laws", "samplers", "fits")
-FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea")
+FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
 OPTIONS = {
     "constants": "--constants",

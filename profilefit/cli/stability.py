@@ -23,8 +23,8 @@ def stability(
     names: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Laws, maps, records, or exact, convert, solver, stacks, heart, sea; none: all but heart (OpenGL) "
-            "and sea.",
+            help="Laws, maps, records, or exact, convert, solver, stacks, heart, sea, fur; none: all but heart "
+            "(OpenGL), sea and fur.",
             autocompletion=options.tested,
         ),
     ] = None,

@@ -22,8 +22,8 @@ COST = {0: 1.0, 1: 1.5, 2: 2.5}
 
 STRANDS, MOST_STRANDS = 500, 1 << 15  # of a patch, at least and at most
 WIDER = 1.2  # than a ray's way over the skin: it comes by no strand twice
-PATCHES, RAYS = 40, 1000  # at most, and rays on each
-WORK = 1500  # patches times layers, at most
+PATCHES, RAYS = 24, 1000  # at most, and rays on each
+WORK = 1200  # patches times layers, at most
 FEWEST, CLEAR = 5, 4.0  # patches, and standard errors from the tolerance, after which no more are looked at
 SAFE, FINE = 2.0, 0.08  # standard errors by which the mean must be within it; a share of it that is not worth more rays
 COARSE = 20  # numbers of layers are found to one in so many
@@ -97,7 +97,7 @@ class RandomFur:
     def largest(self, way: FurWay, layers: int, goal: float) -> float:
         """What the mean square of so many layers' errors is at most, by as many patches as tell whether it is a goal's.
 
-        Of all rays with a chance of 98 %.
+        Of all rays, with a chance of some 98 %.
         """
         squares: list[float] = []
         mean, noise = 0.0, np.inf

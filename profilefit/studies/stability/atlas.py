@@ -16,6 +16,7 @@ from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
 from profilefit.studies.stability import (
     fit_cases,
+    fur,
     gradients,
     halfspace,
     heart,
@@ -32,9 +33,9 @@ from profilefit.studies.stability.fit_cases import FitCase
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, QUANTITIES, SAMPLE, TEXT16, TEXT32
 from profilefit.studies.stability.regions import Region, regions_of
 
-EXACT, CONVERT, SOLVER, STACKS, HEART, SEA = "exact", "convert", "solver", "stacks", "heart", "sea"
-FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS, HEART, SEA)
-IF_NAMED = (HEART, SEA)  # one needs OpenGL, and neither is of a law
+EXACT, CONVERT, SOLVER, STACKS, HEART, SEA, FUR = "exact", "convert", "solver", "stacks", "heart", "sea", "fur"
+FUNCTIONS = (EXACT, CONVERT, SOLVER, STACKS, HEART, SEA, FUR)
+IF_NAMED = (HEART, SEA, FUR)  # one needs OpenGL, and none is of a law
 SETTINGS = (Setting(), Setting("diffuse"))
 WORKERS = 2  # compiling and numpy leave Python's lock now and then; more would not
 # Whose derivatives are looked at, one of a class, and of which quantities: compiling them takes seconds each.
@@ -175,6 +176,7 @@ def _functions(folder: Records, quick: bool) -> dict[str, Callable[[], Findings]
         STACKS: lambda: _part(STACKS, list(stacks.cells_of(folder.folder))),
         HEART: lambda: _part(HEART, list(heart.cells_of())),
         SEA: lambda: _part(SEA, list(sea.cells_of())),
+        FUR: lambda: _part(FUR, list(fur.cells_of())),
     }
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from profilefit.studies.stability.cause import UNEXPLAINED, Cause, nowhere
+from profilefit.studies.stability.causes_of_fur import FUR
 from profilefit.studies.stability.causes_of_heart import HEART
 from profilefit.studies.stability.causes_of_liang import LIANG
 from profilefit.studies.stability.causes_of_models import FORMAT, MODELS
@@ -21,7 +22,7 @@ from profilefit.studies.stability.causes_of_stacks import STACKS
 from profilefit.studies.stability.cells import Cells, Mask, Verdict, red
 
 # The first that holds is told: what is special before what is general.
-CAUSES: tuple[Cause, ...] = (*LIANG, *MODELS, *STACKS, *HEART, *SEA, *FORMAT)
+CAUSES: tuple[Cause, ...] = (*LIANG, *MODELS, *STACKS, *HEART, *SEA, *FUR, *FORMAT)
 
 
 NOT_JUDGED = "not judged"

@@ -25,7 +25,8 @@ def test_jobs_by_name():
     )
     assert len(everything) == len(set(everything))
     assert not set(atlas.IF_NAMED) & set(everything)
-    assert [name for name, _ in atlas.jobs(["sea"], FITS, True)] == ["sea"]
+    for one in ("sea", "fur"):
+        assert [name for name, _ in atlas.jobs([one], FITS, True)] == [one]
     with pytest.raises(InputError, match=r"name must be a law, map or record .*, got 'hazzard'"):
         atlas.jobs(["hazzard"], FITS, False)
 

@@ -83,3 +83,38 @@ def test_a_sea_that_there_is_not(tmp_path):
     assert isinstance(found.exception, InputError)
     assert str(found.exception).startswith(f"{path}: ")
     assert "\n" not in str(found.exception)
+
+
+@pytest.fixture
+def fur(tmp_path, monkeypatch):
+    """A file, and the study of one angle with few rays."""
+    for name, value in {"PATCHES": 6, "RAYS": 100, "MOST": 16, "ANGLES": (75,)}.items():
+        monkeypatch.setattr(f"profilefit.studies.choose.fur.{name}", value)
+    path = tmp_path / "fur.toml"
+    path.write_text('scene = "fur"\n[fur]\nlength = 5\n[technique]\ntolerance = 0.1\n', encoding="utf-8")
+    return path
+
+
+def test_how_many_layers_fur_needs(fur):
+    made = run(fur, "--json")
+    told = json.loads(made.stdout)
+    assert (made.exit_code, told["angle"], told["tolerance"]) == (0, 75, 0.1)
+    assert told["by_angle"][0]["cheapest"] == told["way"]
+    assert told["by_angle"][0]["layers"][told["way"]] == told["layers"] < 16
+    assert told["by_angle"][0]["layers"]["linear"] is None
+    lines = " ".join(run(fur).stdout.split())
+    assert lines.startswith("75 degrees: linear none, quadratic none, fitted none, swept ")
+    assert f"{told['way'].replace(',', '')}, {told['layers']} layers: the cheapest to 75 degrees" in lines
+    refused = run(fur, "--measure").exception
+    assert str(refused) == f"{fur}: --measure must be left out of a fur's file, of which no cost is asked"
+
+
+def test_fur_that_no_way_serves(fur):
+    """Exit status 1; and one line for what rays do not tell."""
+    text = fur.read_text(encoding="utf-8")
+    fur.write_text(text.replace("length = 5", "length = 50"), encoding="utf-8")
+    found = run(fur)
+    assert found.exit_code == 1
+    assert "no way is within the tolerance at 75 degrees" in " ".join(found.stdout.split())
+    fur.write_text(text.replace("0.1", "0.001"), encoding="utf-8")
+    assert str(run(fur).exception).startswith(f"{fur}: [technique] tolerance must be at least 0.01 ")

@@ -7,11 +7,20 @@ import pytest
 from rich.console import Console
 
 from mcml_sim import Setting
-from profilefit.report.tables.choose_table import choose_table, content, headline, sea_content, sea_lines
+from profilefit.report.tables.choose_table import (
+    choose_table,
+    content,
+    fur_content,
+    fur_lines,
+    headline,
+    sea_content,
+    sea_lines,
+)
 from profilefit.studies.choose.case import NOTHING, Case, Option, Within
 from profilefit.studies.choose.choice import Predicted, chosen
 from profilefit.studies.choose.cost import Milliseconds, shipped
 from profilefit.studies.choose.error import Error
+from profilefit.studies.choose.fur import FurNeed
 from profilefit.studies.choose.layers import OneLayer
 from profilefit.studies.choose.requirements import Budget, Requirements
 from profilefit.studies.choose.sea import SeaNeed
@@ -135,3 +144,26 @@ def test_what_a_sea_needs_and_why():
         "steps": {"light": 8, "view": 0},
         "steepness": {"light": 1.2, "view": 0.25},
     }
+
+
+def test_what_fur_needs_and_which_way():
+    names = ("linear", "quadratic", "fitted", "swept", "swept, two strands")
+    layers = {
+        45: dict(zip(names, (168, None, None, 11, 8), strict=True)),
+        75: dict(zip(names, (None, None, None, 34, 20), strict=True)),
+    }
+    need = FurNeed(layers, 0.05)
+    assert fur_lines(need) == [
+        "45 degrees: linear 168, quadratic none, fitted none, swept 11, swept two strands 8; cheapest: swept",
+        "75 degrees: linear none, quadratic none, fitted none, swept 34, swept two strands 20; "
+        "cheapest: swept two strands",
+        "swept two strands, 20 layers: the cheapest to 75 degrees (requested: 5.0 % of the length)",
+    ]
+    told = fur_content(need)
+    assert (told["way"], told["layers"], told["angle"], told["most"]) == ("swept, two strands", 20, 75, 256)
+    assert told["by_angle"][0] == {"angle": 45, "layers": layers[45], "cheapest": "swept"}
+    none = FurNeed({75: dict.fromkeys(names)}, 0.05)
+    assert fur_lines(none)[-1] == (
+        "no way is within the tolerance at 75 degrees, by 256 layers (requested: 5.0 % of the length)"
+    )
+    assert fur_content(none)["way"] is None
