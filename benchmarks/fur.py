@@ -9,19 +9,13 @@ errors are over patches that are drawn anew. Patches are so wide that no ray com
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
 from functools import partial
-from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks import fur_feet as feet
 from benchmarks import fur_layers as layers
-from benchmarks.table import show
-from mcml_sim.files.text_file import as_json
-from mcml_sim.files.whole_file import write_whole
+from benchmarks.table import Listed, Rows, parser_of, show_all
 from profilefit.scenes.fur import law
 from profilefit.scenes.fur.truth import Patch, random_patch
 
@@ -29,7 +23,6 @@ DEGREES, DENSITIES, HEIGHTS = (0.0, 30.0, 60.0, 75.0, 85.0), (4.0, 16.0, 64.0), 
 LEANS = ((0.0, 0.0), (0.4, -0.3))
 PATCHES, SIDE = 64, 8.0  # as many strands as the density says, not on average, is 0.0003 at this side
 XS = (0.64, 1.0, 2.0, 4.0, 6.4)
-Rows = list[tuple[str | float, ...]]
 
 
 def closed() -> Rows:
@@ -78,14 +71,6 @@ def constants() -> Rows:
         (name, *(float(getattr(one, name)) for one in (found, error, law.FITTED, law.FITTED_ERRORS)))
         for name in law.Exponent._fields
     ]
-
-
-class Listed(NamedTuple):
-    """A table: its title, its columns with the form of their numbers, and what makes its rows."""
-
-    title: str
-    columns: dict[str, str]
-    rows: Callable[[], Rows]
 
 
 _FURS = (
@@ -137,6 +122,11 @@ TABLES = {
         {"way": "", **{f"{one:g}": "d" for one in layers.LEAST_AT}},
         layers.least,
     ),
+    "cost": Listed(
+        "Time of a layer over that of a shell, by this machine's OpenGL, and where the middle 68 % of turns lie",
+        {"way": "", "cost": ".2f", "low": ".2f", "high": ".2f"},
+        layers.cost,
+    ),
     "swept": Listed(
         f"Swept slabs: rms = c y^a (r0 sqrt(n))^b (L tan / r0)^e, y = L tan sqrt(n) / N, where it is "
         f"{layers.WITHIN[0]:g} to {layers.WITHIN[1]:g}; what is left in logarithms; {_FURS}",
@@ -184,25 +174,8 @@ TABLES = {
 
 
 def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=TABLES, metavar="TABLE", help=f"some of {', '.join(TABLES)}")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="the same in numbers, too")
-    given = parser.parse_args(arguments)
-    told = {}
-    for name in given.only or TABLES:
-        title, columns, make = TABLES[name]
-        rows = make()
-        told[name] = [dict(zip(columns, row, strict=True)) for row in rows]
-        cells = [
-            [
-                f"{one:{form}}" if not isinstance(one, str) else one
-                for one, form in zip(row, columns.values(), strict=True)
-            ]
-            for row in rows
-        ]
-        show(title, tuple(columns), cells)
-    if given.json is not None:
-        write_whole(given.json, as_json(told))
+    given = parser_of(__doc__, TABLES).parse_args(arguments)
+    show_all({name: TABLES[name] for name in given.only or TABLES}, given.json)
 
 
 if __name__ == "__main__":

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.scenes.fur.ball import FurView
 from profilefit.scenes.fur.law import MOST_LAYERS, shell_shadow
+from profilefit.scenes.fur.passes import FurPasses, FurSurface
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays
-from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, error_of, least_layers, trial
+from profilefit.scenes.fur.ways import LINEAR as SHELLS
+from profilefit.scenes.fur.ways import MOST, SWEPT, SWEPT_TWO, WAYS, FurTrial, error_of, least_layers, trial
+from profilefit.shader import opened
 
 Floats = NDArray[np.float64]
 Rows = list[tuple[str | float, ...]]
@@ -27,6 +32,7 @@ TOLERANCE, LEAST_AT = 0.02, (30.0, 45.0, 60.0)
 DENSITY, RADIUS, PATCHES, OF_WAYS = 64.0, 0.05, 4, 2500
 DEGREES = (0.0, 30.0, 45.0, 60.0, 75.0, 85.0)
 LAYERS = (8, 12, 16, 24, 32, 48, 96)
+COSTS, COST_LAYERS, TURNS = (SHELLS, SWEPT, SWEPT_TWO), (32, 128), 9
 WITHIN = (0.01, 0.1)  # rms for which swept slabs' law is fitted
 
 
@@ -178,7 +184,7 @@ def least() -> Rows:
     """The fewest layers of each way, by angle."""
     found: Rows = []
     for way in WAYS:
-        each = [least_layers(trials(degrees), way, TOLERANCE) for degrees in LEAST_AT]
+        each = [least_layers(partial(error_of, trials(degrees), way), TOLERANCE) for degrees in LEAST_AT]
         found.append((way.name, *(f"> {MOST}" if n is None else n for n in each)))
     return found
 
@@ -223,3 +229,31 @@ def _errors(made: Floats, logs: Floats, of: NDArray[np.intp]) -> Floats:
         rows = np.concatenate([own[i] for i in rng.integers(0, len(own), len(own))])
         found.append(np.linalg.lstsq(made[rows], logs[rows], rcond=None)[0])
     return np.std(found, axis=0, ddof=1)
+
+
+def cost() -> Rows:
+    """Time of a layer over that of a shell, where a ray meets next to nothing; by OpenGL, ends over the turns."""
+    patch, (few, many) = random_patch(1.0, 0.01, 1.0, 6.0), COST_LAYERS
+    toward = np.array([-(0.5**0.5), 0.0, -(0.5**0.5)])
+    half = 0.5 * patch.side
+    view = FurView(np.array([half, half, 1.0]) - 2.0 * toward, toward, *np.diag([half, half, 0.0])[:2], parallel=True)
+    taken: dict[str, list[float]] = {way.name: [] for way in COSTS}
+    with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (256, 256)) as passes:
+        for turn in range(-1, TURNS):  # the first is compiled, and not counted
+            for way in COSTS:
+                times = []
+                for layers in (few, many):
+                    one = passes.layered(view, way, layers)
+                    context.finish()
+                    start = time.perf_counter()
+                    passes.run(one)
+                    context.finish()
+                    times.append(time.perf_counter() - start)
+                if turn >= 0:
+                    taken[way.name].append((times[1] - times[0]) / (many - few))
+    shell = np.array(taken[COSTS[0].name])
+    found: Rows = []
+    for way in COSTS:
+        ratio = np.array(taken[way.name]) / shell
+        found.append((way.name, float(np.median(ratio)), *np.percentile(ratio, [16.0, 84.0]).tolist()))
+    return found

@@ -6,40 +6,33 @@
 
 Photons are those of `profilefit.scenes.sea.photons`, Petzold's phase function the three terms of its record; errors of
 closed forms are relative, those of pictures root mean squares over the mean of the light. Times are of this machine's
-OpenGL, the least of three turns.
+OpenGL, of three turns and more the least or the 16th percentile.
 """
 
 from __future__ import annotations
 
-import argparse
-from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from benchmarks import sea_chart as chart
 from benchmarks.sea_figure import cost_figure, picture
-from benchmarks.table import show
-from mcml_sim.files.text_file import as_json, read_toml
-from mcml_sim.files.whole_file import write_whole
+from benchmarks.table import Listed, Rows, parser_of, show_all
 from mcml_sim.media.phase import HenyeyGreenstein, Mixture
-from profilefit.recipes.folder import shipped
 from profilefit.scenes.sea import hits
 from profilefit.scenes.sea.bench import bench
-from profilefit.scenes.sea.caustics import Splat, caustic_map, focus
 from profilefit.scenes.sea.haze import KINDS, sunlit_haze
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral, water_gaussians
 from profilefit.scenes.sea.paths import Sunlight, followed
 from profilefit.scenes.sea.photons import trace_beam
-from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons, misfit
-from profilefit.scenes.sea.request import SeaRequest, lobes_of, read
-from profilefit.scenes.sea.shafts import Bundle, ViewRay, by_lines, by_prisms, by_quadrature, by_slices
+from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons
+from profilefit.scenes.sea.request import lobes_of
 from profilefit.scenes.sea.truth import caustic_boxes
-from profilefit.scenes.sea.waves import Waves, random_sea
+from profilefit.scenes.sea.waves import Waves
 from profilefit.scenes.sea.world import World
 from profilefit.shader import opened, renderer
+from profilefit.studies.tradeoff import sea as tradeoff
 
 FILE = "sea.toml"
 OMEGAS, DEPTHS = (0.2, 0.5, 0.8), (0.5, 1.0, 2.0, 4.0)
@@ -49,11 +42,9 @@ PATHS_OF_VIEW, DEEP = 300_000, 60.0
 VIEWS = {"horizontal": 0.0, "30 degrees up": -0.5, "30 degrees down": 0.5}  # cosine to the downward vertical
 STEEP = (0.5, 0.9, 1.5, 3.0, 5.0, 10.0)
 WAYS = ("newton_1m", "newton", "shah", 4, 8, 16)
-TILE, DEPTH, PIXELS, VERTICES = 10.0, 5.0, 256, (128, 192, 256)
-BEFORE, BEYOND = 0.32, 1.18  # F
-SAMPLES, SLICES, FINER, FACTORS = (3, 6, 12, 24, 48), (3, 12, 24), (1, 2, 4), (0.25, 1.0, 4.0)
+TILE, DEPTH, PIXELS = tradeoff.TILE, tradeoff.DEPTH, tradeoff.PIXELS
+SLICES, FINER, FACTORS = (3, 12, 24), (1, 2, 4), (0.25, 1.0, 4.0)
 PATHS, OF_WATER = 4_000_000, 1_000_000  # of a truth
-Rows = list[tuple[str | float, ...]]
 
 
 @cache
@@ -134,19 +125,8 @@ def haze() -> Rows:
 
 def shafts() -> Rows:
     """Root mean square error over twenty view rays of lines, prisms and slices of a bundle, against quadrature."""
-    bundle, one = Bundle(0.0, ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))), HenyeyGreenstein(0.924)
-    views = [
-        ViewRay(x, z, (float(np.cos(up) * np.cos(side)), float(np.cos(up) * np.sin(side)), float(np.sin(up))), length)
-        for x in (0.0, 0.37)
-        for z, up, length in ((1.0, 0.35, 2.0), (2.0, -0.35, 3.0), (0.5, 0.79, 2.0), (2.5, -1.05, 2.5), (1.5, 0.0, 3.0))
-        for side in (0.0, 0.7)
-    ]
-    true = np.array([by_quadrature(bundle, at, one) for at in views])
-    found = []
-    for count in (4, 16, 64, 256):
-        each = (np.array([way(bundle, at, one, count) for at in views]) for way in (by_lines, by_prisms, by_slices))
-        found.append((count, *(float(np.sqrt(np.mean((got / true - 1.0) ** 2))) for got in each)))
-    return found
+    found = {(one.method, int(one.label)): one.error.value for one in tradeoff.shafts().points}
+    return [(n, *(found[way, n] for way in tradeoff.SHAFTS)) for n in tradeoff.FULL.of_shafts]
 
 
 def exact() -> Rows:
@@ -172,15 +152,9 @@ def first_hits() -> Rows:
     ]
 
 
-def seas() -> list[tuple[float, Waves]]:
-    """F, and a random sea whose most curved crest has it."""
-    one = random_sea(0.15, TILE, 1)
-    return [(f, one.scaled(f / focus(one, DEPTH))) for f in (BEFORE, BEYOND)]
-
-
 def filters() -> Rows:
     """Light that the published filter makes of nothing, as it gathers, and as it spreads."""
-    lights = [(f, caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)) for f, waves in seas()]
+    lights = [(f, caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)) for f, waves in tradeoff.seas().values()]
     return [
         (f, *(float(adaptive_filter(light, spreads).mean() / light.mean() - 1.0) for spreads in (False, True)))
         for f, light in lights
@@ -189,66 +163,34 @@ def filters() -> Rows:
 
 def splats() -> Rows:
     """Caustic maps of 256 x 256 pixels against 2048 x 2048 photons: error, where it is bright and dark, and cost."""
-    found = []
     with opened() as context:
-        for f, waves in seas():
-            true = caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)
-            for splat in Splat:
-                for vertices in VERTICES:
-                    drawn = min(
-                        (caustic_map(context, waves, splat, vertices, PIXELS, DEPTH) for _ in range(3)),
-                        key=lambda got: got.milliseconds,
-                    )
-                    off = misfit(drawn.light, true)
-                    found.append(
-                        (
-                            f,
-                            splat.value,
-                            vertices,
-                            drawn.fragments,
-                            drawn.milliseconds,
-                            *off,
-                        )
-                    )
-    return found
-
-
-def request() -> SeaRequest:
-    """The shipped example."""
-    path = shipped("examples") / FILE
-    return read(str(path), read_toml(path))
-
-
-def costs() -> tuple[dict[str, list[chart.ChartPoint]], list[chart.MapPoint], str]:
-    """Of the example: each kind over samples, maps of light, and the device."""
-    with opened() as context, bench(context, request(), PATHS) as found:
-        maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
-        return chart.over_samples(found, SAMPLES), maps, renderer(context)
+        panels = tradeoff.maps(context)
+    facts = ("rms", "bright", "dark", "energy")
+    return [
+        (f, one.method, one.facts["vertices"], one.facts["fragments"], one.cost.low, *(one.facts[key] for key in facts))
+        for panel, (f, _) in zip(panels, tradeoff.seas().values(), strict=True)
+        for one in panel.points
+    ]
 
 
 def kinds() -> Rows:
-    """The example by each kind and number of samples."""
-    of_kind, maps, device = costs()
-    rows = [(kind, one.samples, one.rmse, min(one.milliseconds)) for kind, points in of_kind.items() for one in points]
+    """The example by each kind and number of samples, then by other maps of light; and the device."""
+    with opened() as context, bench(context, tradeoff.request(), PATHS) as found:
+        points = tradeoff.view(found).points
+        maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
+        device = renderer(context)
+    rows: Rows = [(one.method, one.label, one.error.value, one.cost.low) for one in points]
     return [*rows, *((one.name, "", one.rmse, one.milliseconds) for one in maps), (device, "", "", "")]
 
 
 def waters() -> Rows:
     """The example in water that scatters less and more."""
     with opened() as context:
-        told = chart.over_water(context, request(), FACTORS, OF_WATER)
+        told = chart.over_water(context, tradeoff.request(), FACTORS, OF_WATER)
     return [
         (factor, omega, *(errors[kind] for kind in KINDS))
         for factor, (omega, errors) in zip(FACTORS, told, strict=True)
     ]
-
-
-class Listed(NamedTuple):
-    """A table: its title, its columns with the form of their numbers, and what makes its rows."""
-
-    title: str
-    columns: dict[str, str]
-    rows: Callable[[], Rows]
 
 
 TABLES = {
@@ -301,31 +243,15 @@ TABLES = {
 
 
 def main(arguments: list[str] | None = None) -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--only", nargs="+", choices=TABLES, metavar="TABLE", help=f"some of {', '.join(TABLES)}")
-    parser.add_argument("--json", type=Path, metavar="FILE", help="the same in numbers, too")
+    parser = parser_of(__doc__, TABLES)
     parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures of the scene, only")
     given = parser.parse_args(arguments)
     if given.pictures is not None:
-        with opened() as context, bench(context, request(), PATHS) as found:
+        with opened() as context, bench(context, tradeoff.request(), PATHS) as found:
             picture(found, given.pictures / "render-sea.png")
-            cost_figure(chart.over_samples(found, SAMPLES), renderer(context), given.pictures / "render-sea-cost.png")
+            cost_figure(tradeoff.view(found), renderer(context), given.pictures / "render-sea-cost.png")
         return
-    told = {}
-    for name in given.only or TABLES:
-        title, columns, make = TABLES[name]
-        rows = make()
-        told[name] = [dict(zip(columns, row, strict=True)) for row in rows]
-        cells = [
-            [
-                f"{one:{form}}" if not isinstance(one, str) else one
-                for one, form in zip(row, columns.values(), strict=True)
-            ]
-            for row in rows
-        ]
-        show(title, tuple(columns), cells)
-    if given.json is not None:
-        write_whole(given.json, as_json(told))
+    show_all({name: TABLES[name] for name in given.only or TABLES}, given.json)
 
 
 if __name__ == "__main__":

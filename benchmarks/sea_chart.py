@@ -1,4 +1,4 @@
-"""What each way of drawing a sea costs, and in which water each is right: over samples, maps and scattering."""
+"""What each way of drawing a sea costs, and in which water each is right: over maps, pixels and scattering."""
 
 from __future__ import annotations
 
@@ -13,7 +13,6 @@ from profilefit.scenes.sea.caustics import Splat
 from profilefit.scenes.sea.haze import KINDS
 from profilefit.scenes.sea.passes import Passes
 from profilefit.scenes.sea.request import SeaRequest
-from profilefit.scenes.stage.picture import ChartPoint
 
 TURNS = 3
 
@@ -24,11 +23,6 @@ class MapPoint(NamedTuple):
     name: str
     rmse: float
     milliseconds: float
-
-
-def over_samples(found: SeaBench, samples: Sequence[int]) -> dict[str, list[ChartPoint]]:
-    """Error and cost of each kind with each number of samples."""
-    return {kind: [found.point(kind, one, TURNS) for one in samples] for kind in KINDS}
 
 
 def over_maps(found: SeaBench, slices: Sequence[int]) -> list[MapPoint]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +11,8 @@ from benchmarks.render_figure import save
 from profilefit.report.figures.canvas import BLUE, GREEN, VERMILION, canvas, plain_log, styled
 from profilefit.scenes.sea.bench import SeaBench
 from profilefit.scenes.sea.haze import BROADENED, KINDS, SCALED, SINGLE
-from profilefit.scenes.stage.picture import ChartPoint, to_srgb
+from profilefit.scenes.stage.picture import to_srgb
+from profilefit.studies.tradeoff.points import Panel
 
 COLOURS = {BROADENED: BLUE, SCALED: GREEN, SINGLE: VERMILION}
 LARGER = 3  # pixels of the figure that one of the picture has, along a side
@@ -30,16 +30,18 @@ def picture(found: SeaBench, path: Path) -> None:
 
 
 @styled
-def cost_figure(of_kind: Mapping[str, Sequence[ChartPoint]], device: str, path: Path) -> None:
-    """Each kind over the time of its view, bars from the least to the most, samples beside the points."""
+def cost_figure(view: Panel, device: str, path: Path) -> None:
+    """Each kind over the time of its view, bars over the middle of the turns, samples beside the points."""
     figure = canvas(3.1, 5.0)
     ax = figure.subplots()
-    for kind, points in of_kind.items():
-        least, most = (np.array([of(one.milliseconds) for one in points]) for of in (min, max))
+    for kind in KINDS:
+        points = [one for one in view.points if one.method == kind]
+        time, low, high = (np.array([getattr(one.cost, at) for one in points]) for at in ("value", "low", "high"))
+        error = [one.error.value for one in points]
         style = {"color": COLOURS[kind], "marker": "o", "markersize": 4.0, "capsize": 2, "elinewidth": 0.8}
-        ax.errorbar(least, [one.rmse for one in points], xerr=(0.0 * least, most - least), label=kind, **style)
-        for one, x in zip(points, least, strict=True):
-            ax.annotate(str(one.samples), (x, one.rmse), (0, 4), textcoords="offset points", fontsize=7.0)
+        ax.errorbar(time, error, xerr=(time - low, high - time), label=kind, **style)
+        for one, x, y in zip(points, time, error, strict=True):
+            ax.annotate(one.label, (x, y), (0, 4), textcoords="offset points", fontsize=7.0)
     ax.set(xscale="log", yscale="log", xlabel="ms of the view", ylabel="root mean square error / mean [-]")
     plain_log(ax.xaxis)
     plain_log(ax.yaxis)

@@ -48,6 +48,13 @@ class Tables:
             raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
         return float(value)
 
+    def whole(self, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
+        """A whole number from least to most."""
+        value = table.get(key, default)
+        if type(value) is not int or not least <= value <= most:
+            raise self.bad(where, key, f"a whole number in {least} ... {most}", value)
+        return value
+
     def three(
         self, where: str, key: str, table: Table, default: tuple[float, float, float], least: float, most: float
     ) -> tuple[float, float, float]:

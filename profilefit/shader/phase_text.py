@@ -12,7 +12,7 @@ from profilefit.laws.phases import FORMS, MOST_TERMS
 from profilefit.recipes.phases.record import DEFAULT, PhaseRecord
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
-from profilefit.shader.law_file import ES_HEAD, LANGUAGES, MARKS, TARGETS, TRANSLATED, commented
+from profilefit.shader.law_file import ES_HEAD, MARKS, TARGETS, TRANSLATED, commented, require_language
 
 NAMES = (
     ("pdf(off)", "density of the direction [1/sr], off = 1 - cos of the turn: 0 straight on, 2 straight back"),
@@ -38,13 +38,10 @@ def export_phase(record: PhaseRecord, lang: str = "glsl", name: str | None = Non
 
     name  what the names in it begin with, by default the record's own with underscores; InputError where that is none
     """
-    if lang not in LANGUAGES:
-        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    require_language(lang, name)
     form, how = DEFAULT
     constants, content = record.constants(form, how), record.content
     if lang == "json":
-        if name is not None:
-            raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
         kept = {key: content[key] for key in ("title", "equations", "note", "data", "data_digest", "constants")}
         body = {**kept, "made_by": f"profilefit {__version__}", "phase": as_table(record.phase(form, how))}
         return json.dumps(body, indent=1, sort_keys=True, allow_nan=False) + "\n"

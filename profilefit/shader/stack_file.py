@@ -7,11 +7,10 @@ import math
 from typing import Any
 
 from mcml_sim import __version__
-from profilefit.errors import InputError
 from profilefit.materials import CHANNELS
 from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.record import StackRecord
-from profilefit.shader.law_file import ES_HEAD, LANGUAGES, LIGHT, MARKS, TARGETS, TRANSLATED, commented
+from profilefit.shader.law_file import ES_HEAD, LIGHT, MARKS, TARGETS, TRANSLATED, commented, require_language
 from profilefit.shader.stack_text import channel_numbers, single_text, stack_text
 
 NAMES = (
@@ -31,11 +30,8 @@ def export_stack(record: StackRecord, lang: str = "glsl", name: str | None = Non
 
     name  what the names in it begin with, by default the record's own with underscores; InputError where that is none
     """
-    if lang not in LANGUAGES:
-        raise InputError(f"lang must be one of {', '.join(LANGUAGES)}, got {lang!r}")
+    require_language(lang, name)
     if lang == "json":
-        if name is not None:
-            raise InputError(f"name must be left out where lang is json, which has no functions, got {name!r}")
         return json.dumps(_plain(record), indent=1, sort_keys=True, allow_nan=False) + "\n"
     start = name or record.name.replace("-", "_")
     common = TRANSLATED.get(lang, lang)

@@ -3,9 +3,9 @@
 The CSV of a part has the machine and the meaning of its columns in comment lines before it:
 
 panel, method, label    the chart, the line there, and what distinguishes points of one line
-cost, error, worst      time, error of the middle (mean or root mean square) and the largest error, in the units that
-                        the comment of their panel says; `..._low`, `..._high` the ends of the spread of repeats, 16th
-                        and 84th percentile, equal to the value where it is known without error
+cost, error, worst      time or samples, error of the middle (mean or root mean square) and the largest error, in the
+                        units that the comment of their panel says; `..._low`, `..._high` the ends of the spread of
+                        repeats, 16th and 84th percentile, equal to the value where it is known without error
 standing                front, tied or beaten, within the panel
 times_yardstick         laws: time over normalized diffusion's in the same turn, median [-]
 constants, functions    laws: fitted constants, and transcendental functions of a point
@@ -19,6 +19,10 @@ variance                samplers: its variance over that of the exact quantile's
 standardised            fits: distance of the constants from their noise-free limit, in standard errors, median [-]
 light_seconds           fits: time of the order-resolved run, median [s]
 seeds, converged        fits: runs, and fits of them that converged
+pieces                  the sea: of a ray
+vertices, fragments     the sea: of a map's sea along a side; that were drawn of it
+rms, energy             the sea: of a map's error; of its mean, less 1 [-]
+bright, dark            the sea: relative error of a map's light where it is so [-]
 """
 
 from __future__ import annotations
@@ -56,7 +60,7 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
     if any("standardised" in p.facts for p in points):
         columns["distance"] = [significant(float(p.facts["standardised"])) for p in points]
     columns["stands"] = ["" if one == BEATEN else one for one in standings(points)]
-    caption = f"time: {panel.cost}; error: {panel.error}".replace("$", "")
+    caption = f"cost: {panel.cost}; error: {panel.error}".replace("$", "")
     if "distance" in columns:
         caption += "; distance: of the constants from their noise-free limit, in their standard errors"
     title = f"{part.name}, {panel.title}".replace("$", "")

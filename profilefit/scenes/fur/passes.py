@@ -44,7 +44,7 @@ class FurSurface(NamedTuple):
         """A texel is a strand's radius over `FINE` on average, up to `MOST_TEXELS` of a side."""
         texels = min(int(np.ceil(FINE * np.sqrt(4.0 * np.pi) * ball.ball / ball.radius)), MOST_TEXELS)
         maps, given = nearest_feet(ball.feet, texels), {"ball": ball.ball}
-        return cls(strand_text("ball.glsl"), maps, given, ball.radius, ball.length, ball.force)
+        return cls(strand_text("surface.glsl", "ball.glsl"), maps, given, ball.radius, ball.length, ball.force)
 
     @classmethod
     def of_patch(cls, patch: Patch, fine: float = FINE) -> Self:
@@ -52,7 +52,9 @@ class FurSurface(NamedTuple):
         texels = min(int(np.ceil(fine * patch.side / patch.radius)), MOST_TEXELS)
         given = {"side": patch.side}
         maps = nearest_ways(patch, texels)
-        return cls(strand_text("plane.glsl"), maps, given, patch.radius, patch.length, (*patch.lean, 0.0))
+        return cls(
+            strand_text("surface.glsl", "plane.glsl"), maps, given, patch.radius, patch.length, (*patch.lean, 0.0)
+        )
 
 
 class FurPasses:

@@ -97,11 +97,11 @@ def read(file: str, content: Table) -> FurRequest:
         ball=tables.number("fur", "ball", fur, BALL, LARGEST),
         colour=tables.three("fur", "colour", fur, COLOUR, 0.0, 1.0),
         skin=tables.three("fur", "skin", fur, SKIN, 0.0, 1.0),
-        seed=_whole(tables, "fur", "seed", fur, SEED, 0, 2**31),
+        seed=tables.whole("fur", "seed", fur, SEED, 0, 2**31),
         way=_way(tables, named),
         tolerance=tables.number("technique", "tolerance", named, TOLERANCE, 1.0),
         shading=_shading(tables, shaded),
-        supersampling=_whole(tables, "technique", "supersampling", named, SUPERSAMPLING, 1, 8),
+        supersampling=tables.whole("technique", "supersampling", named, SUPERSAMPLING, 1, 8),
     )
     _require_fur(tables, found)
     return found
@@ -113,7 +113,7 @@ def _way(tables: Tables, named: Table) -> FurWay:
     if (other := "exponent" if swept else "strands") in named:
         raise tables.bad("technique", other, f"left out where kind is {kind}", named[other])
     if swept:
-        return (SWEPT, SWEPT_TWO)[_whole(tables, "technique", "strands", named, 1, 1, 2) - 1]
+        return (SWEPT, SWEPT_TWO)[tables.whole("technique", "strands", named, 1, 1, 2) - 1]
     exponent: Any = named.get("exponent", FITTED.name)
     if exponent == FITTED.name:
         return FITTED
@@ -145,13 +145,6 @@ def _two(
             "shading", key, f"two numbers in {least:g} ... {most:g}, of the first lobe and the other", value
         )
     return float(numbers[0]), float(numbers[1])
-
-
-def _whole(tables: Tables, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
-    value = table.get(key, default)
-    if type(value) is not int or not least <= value <= most:
-        raise tables.bad(where, key, f"a whole number in {least} ... {most}", value)
-    return value
 
 
 def _require_fur(tables: Tables, of: FurRequest) -> None:

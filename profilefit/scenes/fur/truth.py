@@ -155,8 +155,9 @@ def by_shells(patch: Patch, theta: float, start: Floats, layers: int, exponent: 
     for layer in reversed(range(count)):
         t = layer / count
         z = t * patch.length
-        distance, _ = trees(z).query(_at(patch, theta, start[left], z))
-        hit = distance < patch.radius * (1.0 - t**exponent)
+        radius = patch.radius * (1.0 - t**exponent)
+        distance, _ = trees(z).query(_at(patch, theta, start[left], z), distance_upper_bound=radius)
+        hit = distance < radius
         found[left[hit]] = z
         left = left[~hit]
     return found

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from typing import NamedTuple
@@ -17,6 +17,7 @@ from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, rays
 
 Floats = NDArray[np.float64]
 MOST = 256  # layers of a picture
+LEAST_SHARE = 1e-3  # of a goal, that an error of 0 is taken for
 
 
 class FurWay(NamedTuple):
@@ -78,22 +79,24 @@ def error_of(trials: Sequence[FurTrial], way: FurWay, layers: int) -> float:
     return float(np.sqrt(np.mean([one.error(way, layers) ** 2 for one in trials])))
 
 
-def least_layers(trials: Sequence[FurTrial], way: FurWay, tolerance: float, most: int = MOST) -> int | None:
-    """The fewest layers whose error is within the tolerance, None if no number up to `most` is.
+def least_layers(error: Callable[[int], float], goal: float, most: int = MOST, coarse: int = MOST + 1) -> int | None:
+    """The fewest layers whose error is within a goal, to one in `coarse`; None if no number up to `most` is.
 
-    By doubling and halving: where an error rises again with N, as that of quadratic shells does, the first place.
+    By doubling, and then where a power of N through both ends has it: where an error rises again with N, as that of
+    quadratic shells does, the first place. InputError on a goal that is not > 0.
     """
-    if not (is_number(tolerance) and tolerance > 0):
-        raise InputError(f"tolerance must be a number > 0, got {shown(tolerance)}")
+    if not (is_number(goal) and goal > 0):
+        raise InputError(f"goal must be a number > 0, got {shown(goal)}")
     low, high = 0, 1
-    while error_of(trials, way, high) > tolerance:
+    before, after = np.inf, error(high)
+    while after > goal:
         if high >= most:
             return None
-        low, high = high, min(2 * high, most)
-    while high - low > 1:
-        middle = (low + high) // 2
-        if error_of(trials, way, middle) > tolerance:
-            low = middle
-        else:
-            high = middle
+        low, high, before = high, min(2 * high, most), after
+        after = error(high)
+    while high - low > (step := 1 + high // coarse):
+        share = np.log(before / goal) / np.log(before / max(after, LEAST_SHARE * goal))
+        middle = min(max(int(np.ceil(low * (high / low) ** share)), low + step), high - step)
+        found = error(middle)
+        low, high, before, after = (low, middle, before, found) if found <= goal else (middle, high, found, after)
     return high

@@ -160,15 +160,15 @@ def read(file: str, content: Table) -> SeaRequest:
         tile=tables.number("sea", "tile", sea, TILE, LARGEST),
         slope=_slope(tables, "sea", sea, SLOPE),
         wind=_wind(tables, sea),
-        sea_seed=_whole(tables, "sea", "seed", sea, SEA_SEED, 0, 2**31),
+        sea_seed=tables.whole("sea", "seed", sea, SEA_SEED, 0, 2**31),
         depth=tables.number("floor", "depth", floor, DEPTH, LARGEST),
         floor_slope=_slope(tables, "floor", floor, FLOOR_SLOPE),
-        floor_seed=_whole(tables, "floor", "seed", floor, FLOOR_SEED, 0, 2**31),
+        floor_seed=tables.whole("floor", "seed", floor, FLOOR_SEED, 0, 2**31),
         reflectance=tables.three("floor", "reflectance", floor, REFLECTANCE, 0.0, 1.0),
         kind=tables.text("technique", "kind", named, KINDS[0], KINDS),
         splat=tables.text("technique", "splat", named, AUTO, (AUTO, *SPLATS)),
         **{
-            key: _whole(tables, "technique", key, named, default, least, most)
+            key: tables.whole("technique", key, named, default, least, most)
             for key, (least, most, default) in RANGES.items()
         },
     )
@@ -230,13 +230,6 @@ def _wind(tables: Tables, sea: Table) -> tuple[float, float]:
     if len(numbers) != 2 or not all(is_number(one) and abs(one) <= 100 for one in numbers) or not any(numbers):
         raise tables.bad("sea", "wind", "two speeds in -100 ... 100 [m/s], not both 0", value)
     return float(numbers[0]), float(numbers[1])
-
-
-def _whole(tables: Tables, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
-    value = table.get(key, default)
-    if type(value) is not int or not least <= value <= most:
-        raise tables.bad(where, key, f"a whole number in {least} ... {most}", value)
-    return value
 
 
 def _require_sight(tables: Tables, of: SeaRequest, world: World) -> None:

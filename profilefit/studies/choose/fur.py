@@ -13,12 +13,12 @@ import numpy as np
 from profilefit.errors import InputError
 from profilefit.scenes.fur.request import FurRequest
 from profilefit.scenes.fur.truth import random_patch
-from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, FurWay, trial
+from profilefit.scenes.fur.ways import MOST, WAYS, FurTrial, FurWay, least_layers, trial
 
 ANGLES = (0, 30, 45, 60, 75, 85)  # of the view to the normal [degrees]
 WORST = 75  # the layers of a picture are those of this angle: what a ball shows beyond is a rim of 3 % of its radius
-# Of a layer, over that of shells, by the strands that it tests; `python -m benchmarks.fur` measures them.
-COST = {0: 1.0, 1: 1.5, 2: 2.5}
+# Of a layer, over that of shells, by the strands that it tests: `python -m benchmarks.fur --only cost`, in software.
+COST = {0: 1.0, 1: 1.5, 2: 2.0}
 
 STRANDS, MOST_STRANDS = 500, 1 << 15  # of a patch, at least and at most
 WIDER = 1.2  # than a ray's way over the skin: it comes by no strand twice
@@ -27,7 +27,6 @@ WORK = 1200  # patches times layers, at most
 FEWEST, CLEAR = 5, 4.0  # patches, and standard errors from the tolerance, after which no more are looked at
 SAFE, FINE = 2.0, 0.08  # standard errors by which the mean must be within it; a share of it that is not worth more rays
 COARSE = 20  # numbers of layers are found to one in so many
-LEAST_SHARE = 1e-3  # of the goal, that a mean square of 0 is taken for
 LEAST_TOLERANCE = 0.01  # of less, too few of the rays are wrong to tell how many
 SLENDEREST = 100.0  # L / r0: rays are followed in steps of r0
 
@@ -110,24 +109,9 @@ class RandomFur:
         return mean + SAFE * noise
 
     def least_layers(self, way: FurWay, tolerance: float) -> int | None:
-        """The fewest layers that hold, to one in `COARSE`; None if no number up to `MOST` does.
-
-        By doubling, and then where a power of N through both ends has it; the first place, as `ways.least_layers`.
-        """
+        """The fewest layers that hold, to one in `COARSE`; None if no number up to `MOST` does."""
         goal = tolerance**2
-        low, high = 0, 1
-        before, after = np.inf, self.largest(way, high, goal)
-        while after > goal:
-            if high >= MOST:
-                return None
-            low, high, before = high, min(2 * high, MOST), after
-            after = self.largest(way, high, goal)
-        while high - low > (step := 1 + high // COARSE):
-            share = np.log(before / goal) / np.log(before / max(after, LEAST_SHARE * goal))
-            middle = min(max(int(np.ceil(low * (high / low) ** share)), low + step), high - step)
-            found = self.largest(way, middle, goal)
-            low, high, before, after = (low, middle, before, found) if found <= goal else (middle, high, found, after)
-        return high
+        return least_layers(lambda layers: self.largest(way, layers, goal), goal, MOST, COARSE)
 
 
 def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:

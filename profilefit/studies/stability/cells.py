@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
 from profilefit.shader import emit
-from profilefit.studies.stability.layout import ArgumentAxis
+from profilefit.studies.stability.layout import FLOAT64, ArgumentAxis
 
 Codes = NDArray[np.int8]
 Mask = NDArray[np.bool_]
@@ -169,6 +169,24 @@ def judged(
         codes[value < 0] = Verdict.NEGATIVE
         codes[np.isnan(value) | (np.isinf(value) & ~large & ~lost & ~np.isinf(reference) & inside)] = Verdict.NOT_FINITE
     return codes
+
+
+def judged_cells(
+    subject: str,
+    own: bool,
+    quantity: str,
+    arithmetic: str,
+    axes: tuple[ArgumentAxis, ...],
+    value: Floats,
+    reference: Floats,
+    error: Floats,
+    bound: float,
+    inside: Mask,
+) -> Cells:
+    """Cells that are judged everywhere, in the format of their arithmetic."""
+    dtype = np.float64 if arithmetic == FLOAT64 else np.float32
+    codes = judged(value, reference, error, bound, np.ones(value.shape, bool), dtype)
+    return Cells(subject, own, quantity, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)
 
 
 def steps_down(value: Floats, axis: int, dtype: type, scale: Floats | float = 0.0) -> Mask:

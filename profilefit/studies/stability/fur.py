@@ -30,7 +30,7 @@ from profilefit.studies.stability.causes_of_fur import (
     filled,
     moved,
 )
-from profilefit.studies.stability.cells import NAME, Cells, RoundedText, absolute, judged, relative
+from profilefit.studies.stability.cells import NAME, Cells, RoundedText, absolute, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
@@ -73,7 +73,7 @@ def of_shells() -> Iterator[Cells]:
         inside = np.array([filled(way, np.array(DEGREES)[:, None], np.array(OF_SHELLS)) for way in ways])
         right = np.ones_like(value)
         name = "shells" if own else "shells, as published"
-        yield _cells(name, own, UNION, FLOAT64, axes, value, right, relative(value, right), OFF, inside)
+        yield judged_cells(name, own, UNION, FLOAT64, axes, value, right, relative(value, right), OFF, inside)
 
 
 def of_slabs() -> Cells:
@@ -87,7 +87,7 @@ def of_slabs() -> Cells:
     limits = np.array([LIMITS[way] for way in SLABS])[:, None, None]
     inside = moved(np.array(DEGREES)[:, None], np.array(OF_SLABS)) < limits
     right = np.zeros_like(value)
-    return _cells("slabs", True, HITS, FLOAT64, axes, value, right, absolute(value, right), RMS, inside)
+    return judged_cells("slabs", True, HITS, FLOAT64, axes, value, right, absolute(value, right), RMS, inside)
 
 
 def of_shadow() -> Iterator[Cells]:
@@ -119,7 +119,7 @@ def _shadow(name: str, own: bool, arithmetic: str, function: Callable[..., Float
     # A tip that leans by the length is seen that far aside from above, to the last digit.
     right = np.asarray(shadow(root.astype(float), away.astype(float), 0.0, (1.0, 0.0)))
     everywhere = np.ones(value.shape, bool)
-    return _cells(name, own, SHADOW, arithmetic, axes, value, right, relative(value, right), DIGITS, everywhere)
+    return judged_cells(name, own, SHADOW, arithmetic, axes, value, right, relative(value, right), DIGITS, everywhere)
 
 
 def _axes(places: NDArray[np.intp], names: tuple[str, ...], layers: tuple[int, ...]) -> tuple[ArgumentAxis, ...]:
@@ -128,20 +128,3 @@ def _axes(places: NDArray[np.intp], names: tuple[str, ...], layers: tuple[int, .
         ArgumentAxis(ANGLE, "degrees", np.array(DEGREES)),
         ArgumentAxis(LAYERS, "-", np.array(layers, float)),
     )
-
-
-def _cells(
-    subject: str,
-    own: bool,
-    quantity: str,
-    arithmetic: str,
-    axes: tuple[ArgumentAxis, ...],
-    value: Floats,
-    reference: Floats,
-    error: Floats,
-    bound: float,
-    inside: NDArray[np.bool_],
-) -> Cells:
-    dtype = np.float64 if arithmetic == FLOAT64 else np.float32
-    codes = judged(value, reference, error, bound, np.ones(value.shape, bool), dtype)
-    return Cells(subject, own, quantity, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)

@@ -26,7 +26,7 @@ from profilefit.studies.stability.causes_of_sea import (
     WAYS,
     holds_to,
 )
-from profilefit.studies.stability.cells import NAME, Cells, RoundedText, absolute, judged, relative
+from profilefit.studies.stability.cells import NAME, Cells, RoundedText, absolute, judged_cells, relative
 from profilefit.studies.stability.layout import FLOAT32, FLOAT64, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
@@ -62,7 +62,7 @@ def of_hits() -> Iterator[Cells]:
         right = np.zeros_like(value)
         inside = np.array(STEEPNESSES) < holds_to(places)[:, None]
         name = "hits" if own else "hits, as published"
-        yield _cells(name, own, SHARE, FLOAT64, axes, value, right, absolute(value, right), WRONG, inside)
+        yield judged_cells(name, own, SHARE, FLOAT64, axes, value, right, absolute(value, right), WRONG, inside)
 
 
 def of_beam() -> Cells:
@@ -74,7 +74,7 @@ def of_beam() -> Cells:
     inside = albedo * depth < failing_depth(albedo, RADIUS, lobes, DARKER)
     axes = ArgumentAxis(ALBEDO, "-", np.array(ALBEDOS)), ArgumentAxis(DEPTH, "-", np.array(DEPTHS))
     bound = DARKER / (1.0 + DARKER)  # of all that is there
-    return _cells("e^-ct", True, BEAM, FLOAT64, axes, value, right, relative(value, right), bound, inside)
+    return judged_cells("e^-ct", True, BEAM, FLOAT64, axes, value, right, relative(value, right), bound, inside)
 
 
 def of_segment() -> Iterator[Cells]:
@@ -103,21 +103,4 @@ def _segment(name: str, own: bool, arithmetic: str, function: Callable[..., Floa
     value = np.asarray(function(*given), float)
     right = segment_integral(*(one.astype(float) for one in given))
     everywhere = np.ones(value.shape, bool)
-    return _cells(name, own, SEGMENT, arithmetic, axes, value, right, relative(value, right), DIGITS, everywhere)
-
-
-def _cells(
-    subject: str,
-    own: bool,
-    quantity: str,
-    arithmetic: str,
-    axes: tuple[ArgumentAxis, ...],
-    value: Floats,
-    reference: Floats,
-    error: Floats,
-    bound: float,
-    inside: NDArray[np.bool_],
-) -> Cells:
-    dtype = np.float64 if arithmetic == FLOAT64 else np.float32
-    codes = judged(value, reference, error, bound, np.ones(value.shape, bool), dtype)
-    return Cells(subject, own, quantity, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)
+    return judged_cells(name, own, SEGMENT, arithmetic, axes, value, right, relative(value, right), DIGITS, everywhere)

@@ -9,7 +9,7 @@ from typing import Any
 from mcml_sim.files.text_file import as_json, read_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
-from profilefit.studies.tradeoff import fits, laws, samplers, truth
+from profilefit.studies.tradeoff import fits, laws, samplers, sea, truth
 from profilefit.studies.tradeoff.points import TradeoffPart
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
@@ -37,14 +37,21 @@ def _fits(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
     return fits.measure(fits.QUICK if quick else fits.FULL, track)
 
 
-PARTS: dict[str, Measure] = {"truth": _truth, "laws": _laws, "samplers": _samplers, "fits": _fits}
+def _sea(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
+    del folder
+    return sea.measure(sea.QUICK if quick else sea.FULL, track)
+
+
+SEA = "sea"
+PARTS: dict[str, Measure] = {"truth": _truth, "laws": _laws, "samplers": _samplers, "fits": _fits, SEA: _sea}
+IF_NAMED = (SEA,)  # it needs OpenGL, and is of no law
 
 
 def chosen(names: list[str]) -> list[str]:
-    """The parts named, each once and in their own order; all of them if none is. InputError on an unknown one."""
+    """The parts named, each once and in order; if none is, all but `IF_NAMED`. InputError on an unknown one."""
     if unknown := [name for name in names if name not in PARTS]:
         raise InputError(f"part must be one of {', '.join(PARTS)}, got {unknown[0]!r}")
-    return [name for name in PARTS if not names or name in names]
+    return [name for name in PARTS if name in (names or PARTS.keys() - set(IF_NAMED))]
 
 
 def measured(name: str, quick: bool = False, folder: Path | None = None, track: Track = silent) -> TradeoffPart:

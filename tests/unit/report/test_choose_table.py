@@ -149,12 +149,12 @@ def test_what_a_sea_needs_and_why():
 def test_what_fur_needs_and_which_way():
     names = ("linear", "quadratic", "fitted", "swept", "swept, two strands")
     layers = {
-        45: dict(zip(names, (168, None, None, 11, 8), strict=True)),
+        45: dict(zip(names, (168, None, None, 11, 9), strict=True)),
         75: dict(zip(names, (None, None, None, 34, 20), strict=True)),
     }
     need = FurNeed(layers, 0.05)
     assert fur_lines(need) == [
-        "45 degrees: linear 168, quadratic none, fitted none, swept 11, swept two strands 8; cheapest: swept",
+        "45 degrees: linear 168, quadratic none, fitted none, swept 11, swept two strands 9; cheapest: swept",
         "75 degrees: linear none, quadratic none, fitted none, swept 34, swept two strands 20; "
         "cheapest: swept two strands",
         "swept two strands, 20 layers: the cheapest to 75 degrees (requested: 5.0 % of the length)",

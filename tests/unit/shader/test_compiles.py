@@ -55,13 +55,18 @@ def test_glsl_takes_two_laws_and_each_twice_but_no_prefix_for_two(context, head)
         program(context, "mixed", HEADS[head] + other + both, vertex)
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_hlsl(tmp_path, name):
+def require_hlsl(folder, source, calls):
+    """The text compiles, and all that is called; skipped where there is no compiler."""
     compiler = shutil.which(HLSL_COMPILER)
     if compiler is None:
         pytest.skip(f"{HLSL_COMPILER} is missing, which compiles HLSL; on Debian apt-get install glslang-tools")
-    source = tmp_path / f"{name}.hlsl"
-    source.write_text(2 * text(name, "hlsl") + HLSL_MAIN.format(calls=calls(name)))
-    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(tmp_path / "made.spv"), str(source)]
+    file = folder / "made.hlsl"
+    file.write_text(source + HLSL_MAIN.format(calls=calls), encoding="utf-8")
+    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(folder / "made.spv"), str(file)]
     ran = subprocess.run(command, capture_output=True, text=True, check=False)
     assert ran.returncode == 0, ran.stdout
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_hlsl(tmp_path, name):
+    require_hlsl(tmp_path, 2 * text(name, "hlsl"), calls(name))

@@ -1,8 +1,6 @@
 """The texts of cones of fur are the library's functions: in float64, in float32, on OpenGL, and compile everywhere."""
 
 import json
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -15,7 +13,7 @@ from profilefit.shader.emit import text_beside
 from profilefit.shader.fur_file import export_strand, strand_text
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.studies.stability.cells import RoundedText
-from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
+from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 SOURCE = text_beside(law.__name__, "glsl/strand.glsl")
 TEXT = strand_text(SOURCE, "python", "law")
@@ -226,16 +224,7 @@ def test_glsl(context, head):
 
 
 def test_hlsl(tmp_path):
-    compiler = shutil.which(HLSL_COMPILER)
-    if compiler is None:
-        pytest.skip(f"needs {HLSL_COMPILER}")
-    source = tmp_path / "fur.frag"
-    source.write_text(2 * strand_text(SOURCE, "hlsl") + HLSL_MAIN.format(calls=CALLS), encoding="utf-8")
-    done = subprocess.run(
-        [compiler, "-D", "-e", "main", "-S", "frag", "-V", "-o", str(tmp_path / "out"), str(source)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
+    require_hlsl(tmp_path, 2 * strand_text(SOURCE, "hlsl"), CALLS)
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)

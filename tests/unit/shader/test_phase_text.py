@@ -1,8 +1,6 @@
 """The text of a phase function is that phase function: in float64, in float32 by OpenGL, and it compiles everywhere."""
 
 import json
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -13,7 +11,7 @@ from profilefit.recipes.phases.record import find
 from profilefit.shader.context import program
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.phase_text import export_phase, phase_text
-from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
+from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 RECORD = find("petzold")
 SEA = RECORD.phase()
@@ -70,17 +68,7 @@ def test_glsl(context, head):
 
 
 def test_hlsl(tmp_path):
-    compiler = shutil.which(HLSL_COMPILER)
-    if compiler is None:
-        pytest.skip(f"needs {HLSL_COMPILER}")
-    source = tmp_path / "phase.frag"
-    main = HLSL_MAIN.format(calls="phase_pdf(u.x) + phase_sample(u.y)")
-    source.write_text(phase_text(SEA, "hlsl") + main, encoding="utf-8")
-    done = subprocess.run(
-        [compiler, "-D", "-e", "main", "-S", "frag", "-V", "-o", str(tmp_path / "out"), str(source)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
+    require_hlsl(tmp_path, phase_text(SEA, "hlsl"), "phase_pdf(u.x) + phase_sample(u.y)")
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)

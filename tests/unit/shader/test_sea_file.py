@@ -1,8 +1,6 @@
 """The texts of light in water are the library's functions: in float64, on OpenGL, and they compile everywhere."""
 
 import json
-import shutil
-import subprocess
 
 import numpy as np
 import pytest
@@ -14,7 +12,7 @@ from profilefit.shader.context import program
 from profilefit.shader.emit import text_beside
 from profilefit.shader.law_file import LANGUAGES
 from profilefit.shader.sea_file import blur_text, export_blur, export_segment, segment_text
-from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
+from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 SOURCE = text_beside(law.__name__, "glsl/segment.glsl")
 LOBES = ((0.7, 0.95), (0.3, 0.6))
@@ -91,16 +89,7 @@ def test_glsl(context, which, head):
 
 @pytest.mark.parametrize("which", TEXTS)
 def test_hlsl(tmp_path, which):
-    compiler = shutil.which(HLSL_COMPILER)
-    if compiler is None:
-        pytest.skip(f"needs {HLSL_COMPILER}")
-    source = tmp_path / "sea.frag"
-    source.write_text(TEXTS[which]("hlsl") + HLSL_MAIN.format(calls=CALLS[which]), encoding="utf-8")
-    done = subprocess.run(
-        [compiler, "-D", "-e", "main", "-S", "frag", "-V", "-o", str(tmp_path / "out"), str(source)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stdout
+    require_hlsl(tmp_path, TEXTS[which]("hlsl"), CALLS[which])
 
 
 @pytest.mark.parametrize("lang", LANGUAGES)

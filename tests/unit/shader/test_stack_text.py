@@ -1,8 +1,6 @@
 """The text of a stack is its three laws: in float64 line by line, in float32 by OpenGL; and it compiles everywhere."""
 
 import re
-import shutil
-import subprocess
 from dataclasses import replace
 
 import jax
@@ -19,7 +17,7 @@ from profilefit.shader.check.shader_law import PROFILE, _Pass
 from profilefit.shader.context import program
 from profilefit.shader.emit import law_text
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
-from tests.unit.shader.test_compiles import HEADS, HLSL_COMPILER, HLSL_MAIN, MAIN, VERTEX
+from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 NAMES = StackLaw.constant_names()
 # Of each channel alpha and mfp of its layers, and near what fits of heart muscle and of skin give for its interfaces.
@@ -250,14 +248,7 @@ def test_glsl_takes_two_stacks_and_each_twice_but_no_prefix_for_two(context, hea
 
 @every
 def test_hlsl(tmp_path, label):
-    compiler = shutil.which(HLSL_COMPILER)
-    if compiler is None:
-        pytest.skip(f"{HLSL_COMPILER} is missing, which compiles HLSL; on Debian apt-get install glslang-tools")
-    source = tmp_path / "stack.hlsl"
-    source.write_text(2 * whole(label, "hlsl") + HLSL_MAIN.format(calls=ALL.format(name="stack")))
-    command = [compiler, "-D", "-S", "frag", "-e", "main", "-V", "-o", str(tmp_path / "made.spv"), str(source)]
-    ran = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert ran.returncode == 0, ran.stdout
+    require_hlsl(tmp_path, 2 * whole(label, "hlsl"), ALL.format(name="stack"))
 
 
 # mu_a and mu_s (1 - g) [1/mm] of skin's layers in red, green and blue, and thickness [mm].

@@ -1,12 +1,5 @@
 // Fur of a ball about the origin.
-uniform sampler2D nearest_map, next_map;
-uniform vec3 force;
-uniform float tall;
 uniform float ball;
-
-const float NONE = 1e8;
-
-struct Strand { vec3 foot; vec3 up; };
 
 // The t of the shell that p is on: |p - t tall force| = ball + t tall.
 float height_of(vec3 p) {

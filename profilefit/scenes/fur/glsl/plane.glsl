@@ -1,12 +1,5 @@
 // Fur of a plane that repeats: z is up, and the force has no part along it.
-uniform sampler2D nearest_map, next_map;
-uniform vec3 force;
-uniform float tall;
 uniform float side;
-
-const float NONE = 1e8;
-
-struct Strand { vec3 foot; vec3 up; };
 
 float height_of(vec3 p) {
     return p.z / tall;

@@ -100,7 +100,11 @@ def test_strands_that_lean_each_by_itself(degrees):
     true = np.max([cast(one, theta, start) for one in each], axis=0)
     np.testing.assert_allclose(cast(both, theta, start), true, atol=1e-9)
     shells = np.max([by_shells(one, theta, start, 12, 1.0) for one in each], axis=0)
-    assert np.mean(by_shells(both, theta, start, 12, 1.0) == shells) > 0.997  # outlines are rounded otherwise
+    # Rounding decides of rays on an outline: of those that strands a little wider and thinner see otherwise.
+    wider, thinner = (by_shells(replace(both, radius=r), theta, start, 12, 1.0) for r in (0.05 + 1e-9, 0.05 - 1e-9))
+    off = wider == thinner
+    assert off.mean() > 0.99
+    np.testing.assert_array_equal(by_shells(both, theta, start, 12, 1.0)[off], shells[off])
 
 
 def test_alike_leans_are_one_lean():
