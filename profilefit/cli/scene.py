@@ -18,7 +18,7 @@ def scene(
         str,
         typer.Argument(
             metavar="FILE.toml",
-            help="What is drawn, and how; with --example the name of a scene: skin, layers, heart, sea.",
+            help="What is drawn, and how; with --example the name of a scene: skin, layers, heart, sea, fur.",
         ),
     ],
     out: Annotated[Path, typer.Option(help="Folder for the pictures (PNG) and their numbers (JSON).")] = OUT,

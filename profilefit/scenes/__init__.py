@@ -49,6 +49,7 @@ SCENES = {
     "layers": ("profilefit.scenes.layers.scene", "layers-head.toml"),
     "heart": ("profilefit.scenes.heart.scene", "heart.toml"),
     "sea": ("profilefit.scenes.sea.scene", "sea.toml"),
+    "fur": ("profilefit.scenes.fur.scene", "fur.toml"),
 }
 
 __all__ = [

@@ -27,8 +27,9 @@ FORCE, COLOUR, SKIN, SEED = (0.0, -0.4, 0.0), (0.55, 0.38, 0.22), (0.35, 0.22, 0
 KINDS = ("swept", "shells")
 TOLERANCE = 0.05
 SAMPLES = 16
+STRANDS = 2
 SUPERSAMPLING = 4
-EXPONENTS, SHIFTS, STRENGTHS, RIM = (60.0, 12.0), (-0.1, 0.2), (0.3, 0.5), (0.0, 0.5, 4.0)
+EXPONENTS, SHIFTS, STRENGTHS, RIM = (60.0, 12.0), (-0.1, 0.2), (0.1, 0.15), (0.0, 0.5, 4.0)
 VIEW = Viewpoint((0.0, 0.0, 0.0), 650.0, (0.0, 0.0, 1.0), 95.0)
 LARGEST = 150.0  # of the ball, and of strands [mm]
 SLENDEREST = 140.0  # the ball's radius over a strand's: what a map of them resolves
@@ -113,7 +114,7 @@ def _way(tables: Tables, named: Table) -> FurWay:
     if (other := "exponent" if swept else "strands") in named:
         raise tables.bad("technique", other, f"left out where kind is {kind}", named[other])
     if swept:
-        return (SWEPT, SWEPT_TWO)[tables.whole("technique", "strands", named, 1, 1, 2) - 1]
+        return (SWEPT, SWEPT_TWO)[tables.whole("technique", "strands", named, STRANDS, 1, 2) - 1]
     exponent: Any = named.get("exponent", FITTED.name)
     if exponent == FITTED.name:
         return FITTED

@@ -22,7 +22,7 @@ from profilefit.scenes.stage.picture import ChartPoint, Drawn, TruthError, to_sr
 from profilefit.scenes.stage.technique import Pass
 
 Floats = NDArray[np.float64]
-EXPOSURE = 1.1
+WHITE = 0.99  # of the ball's pixels, the brightest of which becomes white
 
 
 class FurBench(NamedTuple):
@@ -42,6 +42,11 @@ class FurBench(NamedTuple):
     def truth(self) -> Floats:
         """Radiance of pixels, the mean of their rays'."""
         return self.averaged(self.fine)
+
+    @property
+    def exposure(self) -> float:
+        """By which the brightest of the truth becomes white."""
+        return float(1.0 / max(np.quantile(self.truth[self.mask].max(axis=-1), WHITE), 1e-30))
 
     def averaged(self, fine: Floats) -> Floats:
         """Means over the rays of pixels, in linear light."""
@@ -122,8 +127,8 @@ def draw(context: moderngl.Context, of: FurRequest) -> Drawn:
         point = chart[numbers.index(of.sampling.samples)]
         radiance = found.averaged(found.rays(of.way, of.sampling.samples)[0])
         return Drawn(
-            picture=to_srgb(radiance[::-1], EXPOSURE),
-            truth=to_srgb(found.truth[::-1], EXPOSURE),
+            picture=to_srgb(radiance[::-1], found.exposure),
+            truth=to_srgb(found.truth[::-1], found.exposure),
             error=found.error(radiance)[::-1],
             point=point,
             chart=chart,

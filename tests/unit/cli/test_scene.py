@@ -17,7 +17,7 @@ from profilefit.scenes import SCENES
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
-NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",)}
+NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",), "fur": ()}
 OWN = {
     "skin": ("label", "material"),
     "layers": ("kind", "pose", "single", "least", "most"),
@@ -25,6 +25,10 @@ OWN = {
     "sea": (
         *("lobes", "n", "tile", "slope", "wind", "sea_seed", "depth", "floor_slope", "floor_seed", "reflectance"),
         *("kind", "splat", "vertices", "texels", "slices", "steps", "supersampling"),
+    ),
+    "fur": (
+        *("density", "radius", "length", "force", "ball", "colour", "skin", "seed", "shading"),
+        *("way", "tolerance", "supersampling"),
     ),
 }
 SMALL = """\
@@ -86,8 +90,8 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, got 'fog'"),
-        ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, got nothing"),
+        ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
+        ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
         ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
         ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
         ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
@@ -178,6 +182,50 @@ def test_a_mistake_in_a_sea_is_one_line(command, small, old, new, said):
     assert not Path("drawn").exists()
 
 
+FUR = """\
+scene = "fur"
+[fur]
+density = 0.5
+radius = 0.4
+length = 8.0
+[technique]
+kind = "swept"
+samples = 8
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ("0.5", "0", "[fur] density must be a number > 0"),
+        ("0.5", "5.8", "[fur] density must be so many strands [1/mm^2] that the ball has 65536 at most, 5.795"),
+        ("radius = 0.4", "radius = 1.5", "[fur] radius must be at most the strands' mean distance, 1 / sqrt(density)"),
+        ("radius = 0.4", "radius = 0.01", "[fur] ball must be at most 140 times the strands' radius, got 30"),
+        ("8.0", "-8.0", "[fur] length must be a number > 0 and <= 150, got -8"),
+        ("8.0", "8.0\nforce = [0, -2, 0]", "[fur] force must be three numbers in -0.9 ... 0.9, got [0, -2, 0]"),
+        ("samples = 8", "samples = 0", "[technique] samples must be a whole number >= 1 and <= 256, got 0"),
+        ("samples = 8", "samples = 1000000000", "[technique] samples must be a whole number >= 1 and <= 256, got"),
+        ("samples = 8", "exponent = 2", "[technique] exponent must be left out where kind is swept, got 2"),
+        ('"swept"', '"shells"\nstrands = 2', "[technique] strands must be left out where kind is shells, got 2"),
+        ('"swept"', '"shells"\nexponent = 0', "[technique] exponent must be a number > 0 and <= 100, or"),
+        ("samples = 8", "strands = 3", "[technique] strands must be a whole number in 1 ... 2, got 3"),
+        ("[technique]", "[shading]\nexponents = [1]\n[technique]", "[shading] exponents must be two numbers in 0 ..."),
+        (
+            "8.0",
+            "150.0\n[camera]\ntarget = [0, 0, 150]\ndistance = 300\ndirection = [0, 0, -1]",
+            "[camera] distance must be so long that the eye is ",
+        ),
+    ],
+)
+def test_a_mistake_in_a_fur_is_one_line(command, small, old, new, said):
+    assert old in FUR
+    small.write_text(FUR.replace(old, new, 1), encoding="utf-8")
+    status, out, err = command("scene", str(small), "--out", "drawn")
+    assert (status, out, err.count("\n")) == (2, "", 1)
+    assert err.startswith(f"profilefit: {small}: {said}")
+    assert not Path("drawn").exists()
+
+
 @pytest.mark.slow
 def test_nothing_to_see_is_one_line(command, small, opengl):
     dark = "[light]\nirradiance = [0, 0, 0]\nambient = [0, 0, 0]\n"
@@ -192,7 +240,7 @@ def test_names_and_places(command, small):
     assert command("scene", "fog", "--example") == (
         2,
         "",
-        "profilefit: NAME must be one of skin, layers, heart, sea with --example, got 'fog'\n",
+        "profilefit: NAME must be one of skin, layers, heart, sea, fur with --example, got 'fog'\n",
     )
     assert command("scene", "nowhere.toml")[0] == 2
     Path("file").write_text("")
