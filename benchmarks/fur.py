@@ -22,7 +22,7 @@ from profilefit.scenes.fur.truth import Patch, random_patch
 DEGREES, DENSITIES, HEIGHTS = (0.0, 30.0, 60.0, 75.0, 85.0), (4.0, 16.0, 64.0), (0.0, 0.3, 0.6, 0.9)
 LEANS = ((0.0, 0.0), (0.4, -0.3))
 PATCHES, SIDE = 64, 8.0  # as many strands as the density says, not on average, is 0.0003 at this side
-XS = (0.64, 1.0, 2.0, 4.0, 6.4)
+XS = (0.7, 1.0, 2.0, 4.0, 6.4)
 
 
 def closed() -> Rows:

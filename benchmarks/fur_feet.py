@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from profilefit.scenes.fur.law import shadow, visibility
+from profilefit.scenes.fur.law import shadow, shared_shadow, visibility
 from profilefit.scenes.fur.truth import Patch, cast, random_patch, spaced_patch, struck, tufted_patch
 
 Floats = NDArray[np.float64]
@@ -174,19 +174,6 @@ def leans() -> Rows:
             pairs = np.column_stack([-np.log(share) / strands, error / share / strands]).ravel().tolist()
             found.append((lean, degrees, mean / float(shadow(RADIUS, 1.0, theta)), *pairs))
     return found
-
-
-def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: float = 0.0) -> float:
-    """Area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
-
-    eye, lamp  angles to the normal in [0, pi / 2);  turn  between them about the normal in [0, pi] [rad]
-
-    r0^2 (pi + tan a - a), a = max(0, min(a1, a2, (a1 + a2 - turn) / 2)), cos a_i = r0 / d_i: both are a disc and a
-    spike, which shrinks as secants of the angle about the disc's middle. Turned by 0 the shorter is within the longer.
-    """
-    first, second = (float(np.arccos(min(radius / max(length * np.tan(at), radius), 1.0))) for at in (eye, lamp))
-    a = max(min(first, second, 0.5 * (first + second - turn)), 0.0)
-    return float(radius**2 * (np.pi + np.tan(a) - a))
 
 
 def lamps() -> Rows:

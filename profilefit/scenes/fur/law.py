@@ -45,6 +45,24 @@ FITTED = Exponent(size=1.162, power=-1.803)
 FITTED_ERRORS = Exponent(size=0.057, power=0.020)
 
 
+class Feet(NamedTuple):
+    """Feet that are not independent: what is seen is exp(-kappa n (1 - z / L)^2 A), kappa = (1 + size q^power)^sign.
+
+    q = r0 sqrt(n) (1 - z / L), the strands' radius at their height over their distance. Fitted to rays, 30 to 75
+    degrees, r0 sqrt(n) 0.2 to 0.6 (`python -m benchmarks.fur --only feet-laws`); seen head on kappa is nearer 1.
+    """
+
+    size: float
+    power: float
+    sign: int
+    size_error: float
+    power_error: float
+
+
+# Feet that are at least sqrt(0.5 / n) apart; and tufts of 8 over discs of half the tufts' mean distance.
+FEET = {"apart": Feet(2.06, 1.49, 1, 0.12, 0.04), "tufts": Feet(2.16, 1.23, -1, 0.20, 0.07)}
+
+
 def shadow(radius: ArrayLike, length: ArrayLike, theta: ArrayLike, lean: tuple[float, float] = (0.0, 0.0)) -> Any:
     """Area A that a cone hides of the skin [length^2].
 
@@ -85,6 +103,39 @@ def visibility(
     if not np.all(height <= tall):
         raise InputError(f"z must be at most the length, {shown(length)}, got {shown(z)}")
     return np.exp(-count * (1.0 - height / tall) ** 2 * area)[()]
+
+
+def feet_factor(feet: str, thick: ArrayLike) -> Any:
+    """kappa [-] of `Feet`, by which the density in `visibility` is multiplied.
+
+    feet  "apart" or "tufts";  thick  r0 sqrt(n) (1 - z / L) in [0, 1]
+    """
+    if feet not in FEET:
+        raise InputError(f"feet must be one of {', '.join(FEET)}, got {shown(feet)}")
+    q = checked_numbers("thick", thick, "a number in [0, 1]")
+    if not np.all((q >= 0) & (q <= 1)):
+        raise InputError(f"thick must be a number in [0, 1], got {shown(thick)}")
+    of = FEET[feet]
+    return ((1.0 + of.size * q**of.power) ** of.sign)[()]
+
+
+def shared_shadow(radius: float, length: float, eye: float, lamp: float, turn: float = 0.0) -> float:
+    """Area that an upright cone hides of the skin from an eye and from a lamp at once [length^2].
+
+    eye, lamp  angles to the normal in [0, pi / 2);  turn  between them about the normal in [0, pi] [rad]
+
+    r0^2 (pi + tan a - a), a = max(0, min(a1, a2, (a1 + a2 - turn) / 2)), cos a_i = r0 / d_i: both are a disc and a
+    spike, which shrinks as secants of the angle about the disc's middle. Turned by 0 the shorter is within the longer.
+    What an eye sees is lit by exp(-n (1 - z / L)^2 (A(lamp) - shared)), more than `visibility` says: the hot spot.
+    """
+    if not (is_number(turn) and 0 <= turn <= np.pi):
+        raise InputError(f"turn must be an angle in [0, pi] radians, got {shown(turn)}")
+    ends = []
+    for at in (eye, lamp):
+        root, tall, angle = (float(one) for one in _checked(radius=radius, length=length, theta=at))
+        ends.append(float(np.arccos(min(root / max(tall * np.tan(angle), root), 1.0))))
+    a = max(min(*ends, 0.5 * (sum(ends) - turn)), 0.0)
+    return float(radius**2 * (np.pi + np.tan(a) - a))
 
 
 def shell_shadow(

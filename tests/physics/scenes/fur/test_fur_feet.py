@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from profilefit.errors import InputError
-from profilefit.scenes.fur.law import shadow
+from profilefit.scenes.fur.law import feet_factor, shadow, shared_shadow, visibility
 from profilefit.scenes.fur.truth import (
     Patch,
     by_shells,
@@ -70,6 +70,43 @@ def test_strands_apart_hide_more_and_tufts_less():
     assert tufts < 0.85
 
 
+def test_a_shadow_that_two_share():
+    """All of it where both look the same way, the shorter where one looks over the other, else the root at least."""
+    for eye in (0.0, 0.02, 0.4, 1.2):
+        assert shared_shadow(0.05, 1.0, eye, eye) == pytest.approx(shadow(0.05, 1.0, eye))
+        assert shared_shadow(0.05, 1.0, eye, 1.3) == pytest.approx(shadow(0.05, 1.0, eye))
+        assert shared_shadow(0.05, 1.0, eye, 1.3, np.pi) == pytest.approx(np.pi * 0.05**2)
+    # Against places that are tried, turned by 20 degrees.
+    turn, rng = np.radians(20.0), np.random.default_rng(1)
+    place = rng.uniform([-0.05, -0.05], [1.0, 0.5], (400_000, 2))
+
+    def within(long, turned):
+        along = place @ np.array([np.cos(turned), np.sin(turned)])
+        aside = place @ np.array([-np.sin(turned), np.cos(turned)])
+        # The hull of the disc and the tip: the discs of the cone at each height, between its tangents.
+        sine = 0.05 / long
+        beyond = along > 0.05 * sine
+        spike = beyond & (along <= long) & (np.abs(aside) <= (long - along) * sine / np.sqrt(1.0 - sine**2))
+        return spike | (along**2 + aside**2 <= 0.05**2)
+
+    both = np.mean(within(0.5, 0.0) & within(0.8, turn)) * 1.05 * 0.55
+    assert shared_shadow(0.05, 1.0, np.arctan(0.5), np.arctan(0.8), turn) == pytest.approx(both, rel=0.03)
+
+
+def test_factors_of_feet_are_those_of_rays():
+    """On patches that they were not fitted to, within 8 %: the law's own 3 %, and noise of 6 patches."""
+    theta = np.radians(45.0)
+    for feet, make in (
+        ("apart", lambda seed: spaced_patch(64.0, 0.05, 1.0, 3.0, 0.5, seed + 100)),
+        ("tufts", lambda seed: tufted_patch(64.0, 0.05, 1.0, 3.0, 8, 0.5 * (8 / 64.0) ** 0.5, seed + 100)),
+    ):
+        z = 0.6
+        seen = np.mean([cast(p, theta, rays(p, 1500, i)) <= z for i, p in enumerate(map(make, range(8)))])
+        factor = feet_factor(feet, 0.05 * 8.0 * (1.0 - z))
+        assert -np.log(seen) == pytest.approx(-np.log(visibility(64.0 * factor, 0.05, 1.0, theta, z)), rel=0.08)
+        assert abs(factor - 1.0) > 0.1
+
+
 @pytest.mark.parametrize("degrees", [0.0, 40.0, 75.0])
 def test_the_strand_that_is_met_is_where_it_is_met(degrees):
     """A hit is on the strand's cone, at its height; rays that meet none come to the skin."""
@@ -124,6 +161,10 @@ def test_alike_leans_are_one_lean():
         (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 0, 0.1), "each must be a whole number >= 1, got 0"),
         (lambda: tufted_patch(9.0, 0.1, 1.0, 1.0, 3, -0.1), "spread must be a finite length >= 0, got -0.1"),
         (lambda: tufted_patch(1e9, 0.1, 1.0, 1.0, 3, 0.1), "density must be a number > 0 of 1048576 strands at most"),
+        (lambda: feet_factor("fog", 0.2), "feet must be one of apart, tufts, got 'fog'"),
+        (lambda: feet_factor("apart", 2.0), r"thick must be a number in \[0, 1\], got 2"),
+        (lambda: shared_shadow(0.05, 1.0, 0.3, 0.3, 4.0), r"turn must be an angle in \[0, pi\] radians, got 4"),
+        (lambda: shared_shadow(0.05, 1.0, 0.3, 2.0), r"theta must be an angle in \[0, pi / 2\) radians, got 2"),
         (lambda: Patch(np.zeros((3, 2)), 1.0, 0.1, 1.0, np.zeros((2, 2))), r"lean must be two numbers.*\(2, 2\)"),
     ],
 )
