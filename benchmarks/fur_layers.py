@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.scenes.fur.ball import FurView
+from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.law import MOST_LAYERS, shell_shadow
 from profilefit.scenes.fur.passes import FurPasses, FurSurface
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random_patch, rays
@@ -234,9 +234,7 @@ def _errors(made: Floats, logs: Floats, of: NDArray[np.intp]) -> Floats:
 def cost() -> Rows:
     """Time of a layer over that of a shell, where a ray meets next to nothing; by OpenGL, ends over the turns."""
     patch, (few, many) = random_patch(1.0, 0.01, 1.0, 6.0), COST_LAYERS
-    toward = np.array([-(0.5**0.5), 0.0, -(0.5**0.5)])
-    half = 0.5 * patch.side
-    view = FurView(np.array([half, half, 1.0]) - 2.0 * toward, toward, *np.diag([half, half, 0.0])[:2], parallel=True)
+    view, _ = patch_view(patch, 0.25 * np.pi, (256, 256))
     taken: dict[str, list[float]] = {way.name: [] for way in COSTS}
     with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (256, 256)) as passes:
         for turn in range(-1, TURNS):  # the first is compiled, and not counted

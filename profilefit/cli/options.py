@@ -26,7 +26,7 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no n
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
 LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
-PARTS = ("truth", "laws", "samplers", "fits", "sea")
+PARTS = ("truth", "laws", "samplers", "fits", "sea", "fur")
 FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
 OPTIONS = {

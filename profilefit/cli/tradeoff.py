@@ -25,7 +25,7 @@ def tradeoff(
         list[str] | None,
         typer.Argument(
             metavar="PART",
-            help=f"{', '.join(options.PARTS)}; none: all but sea (OpenGL).",
+            help=f"{', '.join(options.PARTS)}; none: all but sea and fur (OpenGL).",
             autocompletion=options.parts,
         ),
     ] = None,
@@ -40,10 +40,10 @@ def tradeoff(
 ) -> None:
     """Measure and chart speed against accuracy (5 minutes).
 
-    Truths, laws, samplers and fits, and light under the sea, with the spread of both and the Pareto front; all on one
-    core, in turns. Times are meaningful on an idle machine only; each CSV says how idle it was. Every part is written
-    as soon as it is measured; tradeoff.json keeps those it has of the same records, version and machine. --json prints
-    what was measured now.
+    Truths, laws, samplers and fits, light under the sea, and layers of fur, with the spread of both and the Pareto
+    front; all on one core, in turns. Times are meaningful on an idle machine only; each CSV says how idle it was. Every
+    part is written as soon as it is measured; tradeoff.json keeps those it has of the same records, version and
+    machine. --json prints what was measured now.
 
     \b
     Example:

@@ -21,6 +21,7 @@ light_seconds           fits: time of the order-resolved run, median [s]
 seeds, converged        fits: runs, and fits of them that converged
 pieces                  the sea: of a ray
 vertices, fragments     the sea: of a map's sea along a side; that were drawn of it
+layers                  fur: of the way that draws it
 rms, energy             the sea: of a map's error; of its mean, less 1 [-]
 bright, dark            the sea: relative error of a map's light where it is so [-]
 """

@@ -9,7 +9,7 @@ from typing import Any
 from mcml_sim.files.text_file import as_json, read_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
-from profilefit.studies.tradeoff import fits, laws, samplers, sea, truth
+from profilefit.studies.tradeoff import fits, fur, laws, samplers, sea, truth
 from profilefit.studies.tradeoff.points import TradeoffPart
 from profilefit.studies.tradeoff.stopwatch import Track, silent
 
@@ -42,9 +42,16 @@ def _sea(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
     return sea.measure(sea.QUICK if quick else sea.FULL, track)
 
 
-SEA = "sea"
-PARTS: dict[str, Measure] = {"truth": _truth, "laws": _laws, "samplers": _samplers, "fits": _fits, SEA: _sea}
-IF_NAMED = (SEA,)  # it needs OpenGL, and is of no law
+def _fur(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
+    del folder
+    return fur.measure(fur.QUICK if quick else fur.FULL, track)
+
+
+IF_NAMED = ("sea", "fur")  # they need OpenGL, and are of no law
+PARTS: dict[str, Measure] = {
+    **{"truth": _truth, "laws": _laws, "samplers": _samplers, "fits": _fits},
+    **{"sea": _sea, "fur": _fur},
+}
 
 
 def chosen(names: list[str]) -> list[str]:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.fur.ball import NOTHING, SKIN, Ball, FurView, random_ball
+from profilefit.scenes.fur.chart import patch_view
 from profilefit.scenes.fur.law import occlusion, shadow, shell_shadow, visibility
 from profilefit.scenes.fur.passes import FurPasses, FurSurface
 from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, random_patch
@@ -13,21 +14,12 @@ from profilefit.scenes.stage.world import Camera
 SIZE = 64, 64
 
 
-def over(patch, theta):
-    """A view of the whole patch along rays toward -x, which pass the level of the tips at the middles of pixels."""
-    toward = np.array([-np.sin(theta), 0.0, -np.cos(theta)])
-    half, tips = 0.5 * patch.side, np.array([0.5 * patch.side, 0.5 * patch.side, patch.length])
-    view = FurView(tips - 3.0 * toward, toward, np.array([half, 0.0, 0.0]), np.array([0.0, half, 0.0]), parallel=True)
-    start, _ = view.rays(SIZE)
-    return view, (start + 3.0 * toward)[..., :2].reshape(-1, 2)
-
-
 @pytest.mark.parametrize("lean", [(0.0, 0.0), (0.3, -0.2)])
 @pytest.mark.parametrize("degrees", [5.0, 45.0, 70.0])
 def test_layers_in_opengl_are_those_of_rays(context, degrees, lean):
     """But for rays that pass an outline, or a border between two strands, by less than a texel of the map."""
     patch, theta = random_patch(16.0, 0.1, 1.0, 3.0, 5, lean), np.radians(degrees)
-    view, start = over(patch, theta)
+    view, start = patch_view(patch, theta, SIZE)
     with FurPasses(context, FurSurface.of_patch(patch, 16.0), SIZE) as passes:
         for way, layers in ((LINEAR, 12), (QUADRATIC, 12), (FITTED, 12), (SWEPT, 6), (SWEPT_TWO, 6)):
             found = np.maximum(passes.hits(view, way, layers)[..., 3].ravel(), 0.0)
@@ -51,7 +43,7 @@ def test_discs_drawn_cover_what_the_union_says(context, exponent):
     surface = FurSurface.of_patch(patch)
     for degrees, layers in ((20.0, 8), (45.0, 8), (45.0, 24), (58.0, 16)):
         theta = np.radians(degrees)
-        view, _ = over(patch, theta)
+        view, _ = patch_view(patch, theta, SIZE)
         with FurPasses(context, surface, size) as passes:
             share = np.mean(passes.hits(view, exponent, layers)[..., 3] >= 0.0)
         drawn = share * patch.side**2 / shadow(0.1, 1.0, theta)
