@@ -1,7 +1,8 @@
 """Fur in layers: random cones in closed form against rays, and what shells and swept slabs make of them.
 
-    python -m benchmarks.fur                        # all tables: eight minutes on one core
-    python -m benchmarks.fur --only closed third    # some of them, by their names
+    python -m benchmarks.fur                             # all tables: eight minutes on one core
+    python -m benchmarks.fur --only closed third         # some of them, by their names
+    python -m benchmarks.fur --pictures fits/evidence    # the figures, only: a minute
 
 Heights and errors of heights are over a strand's length, n strands a unit of area, theta from the normal; standard
 errors are over patches that are drawn anew. Patches are so wide that no ray comes by a strand twice.
@@ -10,14 +11,19 @@ errors are over patches that are drawn anew. Patches are so wide that no ray com
 from __future__ import annotations
 
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from benchmarks import fur_feet as feet
 from benchmarks import fur_layers as layers
+from benchmarks import fur_scene as drawn
 from benchmarks.table import Listed, Rows, parser_of, show_all
 from profilefit.scenes.fur import law
 from profilefit.scenes.fur.truth import Patch, random_patch
+from profilefit.shader import opened
+from profilefit.shader.context import renderer
+from profilefit.studies.tradeoff import fur as tradeoff
 
 DEGREES, DENSITIES, HEIGHTS = (0.0, 30.0, 60.0, 75.0, 85.0), (4.0, 16.0, 64.0), (0.0, 0.3, 0.6, 0.9)
 LEANS = ((0.0, 0.0), (0.4, -0.3))
@@ -170,11 +176,38 @@ TABLES = {
         },
         feet.lamps,
     ),
+    "union": Listed(
+        f"Discs of one strand as drawn, {drawn.RAYS} x {drawn.RAYS} rays, and their union, over the cone's shadow",
+        {"shells": "", "theta": "g", "N": "d", "drawn": ".4f", "union": ".4f", "off": "+.2%"},
+        drawn.unions,
+    ),
+    "scene": Listed(
+        "examples/fur.toml, rms error over the mean of its light, by layers",
+        {"way": "", **{str(n): ".3f" for n in drawn.LAYERS}},
+        drawn.pictures,
+    ),
+    "gamma": Listed(
+        "examples/fur.toml: rays encoded, then averaged, less the average encoded [8-bit steps]; 99 % are less darker",
+        {"rays of a pixel": "d", "mean": "+.1f", "rms": ".1f", "99 %": ".1f"},
+        drawn.gamma,
+    ),
+    "lobes": Listed(
+        "Mean of a lobe of Kajiya and Kay's over all directions, by its exponent",
+        {"exponent": "g", "as published": ".3f", "normalised": ".0f"},
+        drawn.lobes,
+    ),
 }
 
 
 def main(arguments: list[str] | None = None) -> None:
-    given = parser_of(__doc__, TABLES).parse_args(arguments)
+    parser = parser_of(__doc__, TABLES)
+    parser.add_argument("--pictures", type=Path, metavar="FOLDER", help="figures, only")
+    given = parser.parse_args(arguments)
+    if given.pictures is not None:
+        with opened() as context:
+            panels = [tradeoff.angle(context, one) for one in tradeoff.DEGREES]
+            drawn.figures(context, given.pictures, panels, renderer(context))
+        return
     show_all({name: TABLES[name] for name in given.only or TABLES}, given.json)
 
 

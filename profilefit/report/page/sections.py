@@ -26,7 +26,7 @@ RENDERS = {
     "render-choices.png": "The same head by each way to sample.",
     "render-17-samples.png": "Seventeen samples a pixel, as in Figure 14 of Liang et al.",
 }
-# `python -m benchmarks.layers --pictures`, `... heart --pictures` and `... sea --pictures` make them.
+# `python -m benchmarks.layers --pictures`, and those of heart, sea and fur, make them.
 OF_LAYERS = {
     "render-layers.png": "A head of layered skin: its truth, the law of the stack, the first layer's dipole (Zhao et "
     "al.), the nearest half space.",
@@ -38,6 +38,9 @@ OF_LAYERS = {
     "render-sea.png": "Under the sea, from the top left: all light, light broadened on its way, the forward peak kept, "
     "single scattering.",
     "render-sea-cost.png": "The sea's error over the time of its view, by each kind.",
+    "render-fur.png": "A ball of fur, from the top left: rays against each strand; sixteen shells, linear, quadratic and of "
+    "the fitted exponent; sixteen swept slabs that test one strand, and two.",
+    "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),

@@ -20,8 +20,9 @@ void main() {
     float stretch = 1.0 + dot(force, n);
     vec3 lean = (force - n * dot(force, n)) / stretch;
     float onto = dot(n, to_light);
-    vec3 aslant = (to_light - n * onto) / max(onto, 1e-3);
+    vec3 aslant = (to_light - n * onto) / max(onto, 1e-4);
     float lit = strand_visibility(density, strand_shadow(radius, tall * stretch * length(aslant - lean)), z);
+    if (onto <= 0.0) lit = 0.0;  // as of a plane, whose fur hides all that is under its horizon
     vec2 rows = vec2(textureSize(occlusion_map, 0));
     vec2 place = vec2(z * (rows.x - 1.0), length(lean) / widest * (rows.y - 1.0));
     float open = texture(occlusion_map, (place + 0.5) / rows).r;
