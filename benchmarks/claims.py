@@ -71,6 +71,16 @@ def splat_of(f: float, fragments: int, key: str) -> Callable[[Any], float]:
     return found
 
 
+def factor_of(numbers: Any, truth: str) -> Any:
+    """The row of all numbers of layers."""
+    return next(one for one in numbers["third"] if one["error, truth"] == truth and one["N"] == "all")
+
+
+def least_of(way: str) -> Callable[[Any], float]:
+    """Layers at 45 degrees."""
+    return lambda numbers: next(one["45"] for one in numbers["least"] if one["way"] == way)
+
+
 def worst(place: str, scale: float = 1.0):
     """The largest of the list there, over what a unit is."""
     return lambda numbers: max(at(numbers, place)) / scale
@@ -350,6 +360,23 @@ RUNS = (
         ("caustics-bias", "≤ 0.5 %", lambda n: 100 * max(splat_of(1.18, 300_000, key)(n) for key in ("bright", "dark")),
          "bias of that map where it is bright, and where it is dark"),
         ("caustics-energy", "≤ 1e-06", splat_of(1.18, 300_000, "energy"), "energy that it gains or loses"),
+    )),
+    Run("python -m benchmarks.fur --only closed third exponent least union", "",
+        "rays against cones; each fur's own best; the union of discs in closed form", EXACT, (
+        ("fur-seen", "≤ 0.01", lambda n: max(abs(one["difference"]) for one in n["closed"]),
+         "visibility of random cones, largest error, 0 to 85 degrees, upright and leaning", "160000 rays each"),
+        ("fur-discs", "≤ 0.2 %", lambda n: 100 * max(abs(one["off"]) for one in n["union"]),
+         "discs of a strand drawn by OpenGL, largest error of their shadow"),
+        ("fur-third", "≤ 15 %", lambda n: 100 * factor_of(n, "heights, to the cone")["+-"],
+         "linear shells for a quadratic one at equal error, half its 95 % interval", "63 furs and angles"),
+        ("fur-exponent", "≤ 10 %", lambda n: 100 * max(one["worst"] for one in n["exponent"]),
+         "the threshold's exponent against the best of each L / r0, 10 to 50"),
+        ("fur-swept", "≤ 16", least_of("swept"), "swept slabs for an rms of 0.02 at 45 degrees", "10000 rays"),
+        ("fur-swept-two", "≤ 12", least_of("swept, two strands"), "the same, two strands tested", "10000 rays"),
+    )),
+    Run("python -m benchmarks.fur_choose", "", "fresh rays of 50 random furs", EXACT, (
+        ("fur-chosen", "≥ 90 %", lambda n: 100 * n["summary"]["within"], "furs whose chosen number of layers meets the tolerance", "50 furs"),
+        ("fur-over", "≤ 1.25", "summary.mean ratio", "that number over the least that meets it, mean", "50 furs"),
     )),
     Run("python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",
         "constants of the law, or of the exact half space, in runs drawn anew", EXACT, (

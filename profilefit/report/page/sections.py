@@ -38,8 +38,8 @@ OF_LAYERS = {
     "render-sea.png": "Under the sea, from the top left: all light, light broadened on its way, the forward peak kept, "
     "single scattering.",
     "render-sea-cost.png": "The sea's error over the time of its view, by each kind.",
-    "render-fur.png": "A ball of fur, from the top left: rays against each strand; sixteen shells, linear, quadratic and of "
-    "the fitted exponent; sixteen swept slabs that test one strand, and two.",
+    "render-fur.png": "A ball of fur, from the top left: rays against each strand; sixteen shells, linear, quadratic "
+    "and of the fitted exponent; sixteen swept slabs that test one strand, and two.",
     "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
 }
 GROUPS = {
