@@ -375,7 +375,8 @@ RUNS = (
         ("fur-swept-two", "≤ 12", least_of("swept, two strands"), "the same, two strands tested", "10000 rays"),
     )),
     Run("python -m benchmarks.fur_choose", "", "fresh rays of 50 random furs", EXACT, (
-        ("fur-chosen", "≥ 90 %", lambda n: 100 * n["summary"]["within"], "furs whose chosen number of layers meets the tolerance", "50 furs"),
+        ("fur-chosen", "≥ 90 %", lambda n: 100 * n["summary"]["within"],
+         "furs whose chosen number of layers meets the tolerance", "50 furs"),
         ("fur-over", "≤ 1.25", "summary.mean ratio", "that number over the least that meets it, mean", "50 furs"),
     )),
     Run("python -m benchmarks.interval_coverage albedo-rational burley-whole quantile", "--replicates 400",

@@ -18,7 +18,7 @@ from profilefit.shader.context import opened
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SECONDS = 120  # of a cell, which takes a tenth of that: what hangs is ended
-NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen", "09-under-the-sea")
+NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen", "09-under-the-sea", "10-how-many-layers")
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
@@ -278,3 +278,15 @@ def test_light_of_the_sea_is_turned_more_than_once():
     assert wrong < -20.0
     broadened, scaled, single = numbers(r"error (\S+)", text)
     assert broadened < 0.6 * scaled < 0.6 * single
+
+
+@pytest.mark.slow
+def test_swept_slabs_need_the_fewest_layers():
+    text = printed("10-how-many-layers")
+    assert max(numbers(r"off by (\S+) at most", text)) < 0.03
+    linear, quadratic, _, swept, two = numbers(r"16 layers: (\S+)", text)
+    assert two < 0.5 * swept < 0.1 * quadratic < 0.1 * linear
+    one, other = map(int, re.search(r"(\d+) swept slabs, or (\d+) with", text).groups())
+    assert other < one <= 16
+    linear, quadratic, two = numbers(r"error (\S+) of the mean", text)
+    assert two < 0.5 * quadratic < 0.5 * linear
