@@ -18,8 +18,9 @@ from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 SOURCE = text_beside(law.__name__, "glsl/strand.glsl")
 TEXT = strand_text(SOURCE, "python", "law")
 SINGLE, DOUBLE = RoundedText(TEXT, np.float32), RoundedText(TEXT, np.float64)
-CALLS = "fur_shadow(u.x, u.y) + fur_visibility(u.x, u.y, u.z) + fur_slice(u.x, u.y) + fur_swept({six})".format(
-    six="u.x, u.y, u.z, u.x, u.y, u.z"
+CALLS = (
+    "fur_shadow(u.x, u.y) + fur_shared(u.x, u.y, u.z, u.x) + fur_visibility(u.x, u.y, u.z) + fur_slice(u.x, u.y)"
+    " + fur_swept(u.x, u.y, u.z, u.x, u.y, u.z)"
 )
 DRAW = """#version 330
 {text}
@@ -149,6 +150,33 @@ def test_a_cast_ray_is_the_nearest_root():
     np.testing.assert_allclose(4.0 - nearest, truth.cast(patch, theta, start), atol=1e-7)
 
 
+def shares():
+    """radius, first, second, turn: tips over the root's edge, and any to 89.9 degrees."""
+    random = np.random.default_rng(8)
+    slender, theta = random.uniform(5.0, 140.0, (4000, 1)), random.choice(ANGLES, (4000, 2))
+    asides = slender * np.tan(theta)
+    asides[:1000] = random.choice(AROUND, (1000, 2))
+    turn = random.choice([0.0, 1e-4, 0.3, 2.0, 3.14], 4000)
+    radius = random.choice(RADII, 4000)
+    return rounded(radius, *(radius * asides.T), turn)
+
+
+def test_what_an_eye_and_a_lamp_share(context):
+    """The library's function in float64; in float32, in numpy and on OpenGL; never more than either's own shadow."""
+    given = radius, first, second, turn = shares()
+    exact = DOUBLE.call("shared", *given)
+    some = slice(0, None, 40)
+    angles = (np.arctan(one[some] / radius[some]) for one in (first, second))
+    library = [law.shared_shadow(1.0, 1.0, *each) for each in zip(*angles, turn[some], strict=True)]
+    np.testing.assert_allclose(exact[some] / radius[some] ** 2, library, rtol=1e-7)
+    for one in (first, second):
+        assert np.all(exact <= DOUBLE.call("shadow", radius, one) * (1.0 + 1e-9))
+    np.testing.assert_allclose(SINGLE.call("shared", *given), exact, rtol=1e-6)
+    calls = "found = vec4(fur_shared(q.x, q.y, q.z, q.w), 0.0, 0.0, 0.0);"
+    drawn = _Pass(context, "fur", DRAW.format(text=strand_text(SOURCE), calls=calls), "f4")(*given)[0]
+    np.testing.assert_allclose(drawn, exact, rtol=3e-6)
+
+
 def test_the_shadow_in_float32():
     """The textbook's form is no number where the tip is within the root's edge, and has lost digits outside it."""
     radius, aside = covers()
@@ -235,7 +263,13 @@ def test_whole_files(lang):
         assert told["law"] == "fur"
         assert "shadow(radius, aside)" in told["functions"]
         return
-    for called in ("shadow(radius, aside)", "visibility(density, shadow, z)", "slice(t, exponent)", "swept(qx, qy, "):
+    for called in (
+        "shadow(radius, aside)",
+        "shared(radius, first, second, turn)",
+        "visibility(density, shadow, z)",
+        "slice(t, exponent)",
+        "swept(qx, qy, ",
+    ):
         assert f"fur_{called}" in text
     assert "strand_" not in text
     assert "fur_" not in export_strand(SOURCE, lang, "hair")

@@ -8,6 +8,12 @@ out vec4 radiance;
 
 const float PI = 3.14159265;
 
+// A direction's part along the skin, over that along the normal.
+vec3 aslant(vec3 toward, vec3 n) {
+    float onto = dot(toward, n);
+    return (toward - n * onto) / max(onto, 1e-4);
+}
+
 void main() {
     vec4 hit = texelFetch(hit_map, ivec2(gl_FragCoord.xy), 0);
     radiance = vec4(background, 1.0);
@@ -20,9 +26,12 @@ void main() {
     float stretch = 1.0 + dot(force, n);
     vec3 lean = (force - n * dot(force, n)) / stretch;
     float onto = dot(n, to_light);
-    vec3 aslant = (to_light - n * onto) / max(onto, 1e-4);
-    float lit = strand_visibility(density, strand_shadow(radius, tall * stretch * length(aslant - lean)), z);
-    if (onto <= 0.0) lit = 0.0;  // as of a plane, whose fur hides all that is under its horizon
+    // What is seen is in a gap toward the eye, through which the lamp may shine, too.
+    vec3 from_lamp = tall * stretch * (aslant(to_light, n) - lean), from_eye = tall * stretch * (aslant(to_eye, n) - lean);
+    float turn = atan(length(cross(from_lamp, from_eye)), dot(from_lamp, from_eye) + 1e-12);
+    float area = strand_shadow(radius, length(from_lamp));
+    area = max(area - strand_shared(radius, length(from_lamp), length(from_eye), turn), 0.0);
+    float lit = onto > 0.0 ? strand_visibility(density, area, z) : 0.0;  // a plane's fur hides what is under its horizon
     vec2 rows = vec2(textureSize(occlusion_map, 0));
     vec2 place = vec2(z * (rows.x - 1.0), length(lean) / widest * (rows.y - 1.0));
     float open = texture(occlusion_map, (place + 0.5) / rows).r;

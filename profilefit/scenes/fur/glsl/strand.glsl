@@ -7,6 +7,19 @@ float strand_shadow(float radius, float aside) {
     return radius * radius * (0.5 * PF_TWO_PI + u - atan(u));
 }
 
+// Area that one hides from an eye and from a lamp at once [length^2]; `turn` is the angle between the ways in which both
+// see its tip aside, 0 to pi. Less it, a lamp's shadow is that on what an eye sees.
+float strand_shared(float radius, float first, float second, float turn) {
+    float one = sqrt(max((first - radius) * (first + radius), 0.0)) / radius;
+    float two = sqrt(max((second - radius) * (second + radius), 0.0)) / radius;
+    float t1 = 1.0 / (max(first / radius, 1.0) + one); // of half the angle at the tip, 1 within the disc
+    float t2 = 1.0 / (max(second / radius, 1.0) + two);
+    float across = (1.0 - t1 * t2) * sin(0.5 * turn) + (t1 + t2) * cos(0.5 * turn);
+    float along = (1.0 - t1 * t2) * cos(0.5 * turn) - (t1 + t2) * sin(0.5 * turn);
+    float u = clamp(along / across, 0.0, min(one, two));
+    return radius * radius * (0.5 * PF_TWO_PI + u - atan(u));
+}
+
 // Chance that a ray meets none above z: toward the eye what is seen, toward the lamp the fur's shadow on itself.
 float strand_visibility(float density, float shadow, float z) {
     float above = 1.0 - z;

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from profilefit.scenes.fur.ball import NOTHING, SKIN, FurView, random_ball
-from profilefit.scenes.fur.law import lobe_mean, occlusion, visibility
+from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow, shared_shadow
 from profilefit.scenes.fur.passes import BACKGROUND, Coat, FurPasses, FurSurface
 from profilefit.scenes.fur.request import Shading
 from profilefit.scenes.stage.world import Camera, Light
@@ -33,8 +33,11 @@ def written_out(shading, hit, to_eye):
     onto = n @ to_light
     lit = 0.0
     if onto > 0:
-        aside = (to_light - n * onto) / onto - lean
-        lit = visibility(DENSITY, RADIUS, tall, np.arctan(np.linalg.norm(aside)), z * tall)
+        lamp, eye = ((one - n * (n @ one)) / max(n @ one, 1e-4) - lean for one in (to_light, to_eye))
+        turn = np.arccos(np.clip(lamp @ eye / np.linalg.norm(lamp) / np.linalg.norm(eye), -1.0, 1.0))
+        angles = (float(np.arctan(np.linalg.norm(one))) for one in (eye, lamp))
+        own = shadow(RADIUS, tall, np.arctan(np.linalg.norm(lamp)))
+        lit = np.exp(-DENSITY * (1.0 - z) ** 2 * (own - shared_shadow(RADIUS, tall, *angles, float(turn))))
     open_ = occlusion(DENSITY, RADIUS, LENGTH, z * LENGTH, float(np.linalg.norm(lean)))
     colour = np.array(BARE if hit[3] == SKIN else COLOUR)
     bias, scale, power = shading.rim
