@@ -85,8 +85,8 @@ def definitions(source: str) -> Iterator[list[str]]:
         yield block.rstrip().splitlines()
 
 
-def test_there_are_nine_and_a_table_of_them():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08", "09"]
+def test_there_are_ten_and_a_table_of_them():
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08", "09", "10"]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
 
 

@@ -64,5 +64,5 @@ def test_machine_is_named():
 def test_parts_come_in_their_own_order():
     assert parts.chosen([]) == ["truth", "laws", "samplers", "fits"]
     assert parts.chosen(["fits", "truth", "fits"]) == ["truth", "fits"]
-    with pytest.raises(InputError, match="part must be one of truth, laws, samplers, fits, sea, got 'light'"):
+    with pytest.raises(InputError, match="part must be one of truth, laws, samplers, fits, sea, fur, got 'light'"):
         parts.chosen(["laws", "light"])
