@@ -1,6 +1,6 @@
 """Fur in layers: random cones in closed form against rays, and what shells and swept slabs make of them.
 
-    python -m benchmarks.fur                             # all tables: eight minutes on one core
+    python -m benchmarks.fur                             # all tables: ten minutes on one core
     python -m benchmarks.fur --only closed third         # some of them, by their names
     python -m benchmarks.fur --pictures fits/evidence    # the figures, only: a minute
 
@@ -193,7 +193,7 @@ TABLES = {
     ),
     "lobes": Listed(
         "Mean of a lobe of Kajiya and Kay's over all directions, by its exponent",
-        {"exponent": "g", "as published": ".3f", "normalised": ".0f"},
+        {"exponent": "g", "as published": ".3f", "normalised": ".6f"},
         drawn.lobes,
     ),
 }

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable, Sequence
 from functools import cache, partial
 from typing import NamedTuple
@@ -17,6 +16,7 @@ from profilefit.scenes.fur.truth import Patch, by_shells, by_slabs, cast, random
 from profilefit.scenes.fur.ways import LINEAR as SHELLS
 from profilefit.scenes.fur.ways import MOST, SWEPT, SWEPT_TWO, WAYS, FurTrial, error_of, least_layers, trial
 from profilefit.shader import opened
+from profilefit.studies.tradeoff.fur import DEGREES, DENSITY, RADIUS
 
 Floats = NDArray[np.float64]
 Rows = list[tuple[str | float, ...]]
@@ -29,8 +29,7 @@ RAYS, STRANDS = 1500, 400
 FLATTENED = 0.05  # twice the layers take no more off the error: the floor
 DRAWS = 2000
 TOLERANCE, LEAST_AT = 0.02, (30.0, 45.0, 60.0)
-DENSITY, RADIUS, PATCHES, OF_WAYS = 64.0, 0.05, 4, 2500
-DEGREES = (0.0, 30.0, 45.0, 60.0, 75.0, 85.0)
+PATCHES, OF_WAYS = 4, 2500
 LAYERS = (8, 12, 16, 24, 32, 48, 96)
 COSTS, COST_LAYERS, TURNS = (SHELLS, SWEPT, SWEPT_TWO), (32, 128), 9
 WITHIN = (0.01, 0.1)  # rms for which swept slabs' law is fitted
@@ -239,14 +238,7 @@ def cost() -> Rows:
     with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (256, 256)) as passes:
         for turn in range(-1, TURNS):  # the first is compiled, and not counted
             for way in COSTS:
-                times = []
-                for layers in (few, many):
-                    one = passes.layered(view, way, layers)
-                    context.finish()
-                    start = time.perf_counter()
-                    passes.run(one)
-                    context.finish()
-                    times.append(time.perf_counter() - start)
+                times = [passes.milliseconds(passes.layered(view, way, layers)) for layers in (few, many)]
                 if turn >= 0:
                     taken[way.name].append((times[1] - times[0]) / (many - few))
     shell = np.array(taken[COSTS[0].name])

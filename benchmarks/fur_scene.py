@@ -69,8 +69,10 @@ def gamma() -> Rows:
 
 
 def lobes() -> Rows:
-    """Mean of a lobe over all directions, as published and normalised, by its exponent."""
-    return [(p, float(law.lobe_mean(p)), 1.0) for p in EXPONENTS]
+    """Mean of a lobe over all directions by quadrature over the cosine, as published and normalised."""
+    cosine, weight = np.polynomial.legendre.leggauss(256)
+    means = [(p, float(0.5 * weight @ (1.0 - cosine**2) ** (0.5 * p))) for p in EXPONENTS]
+    return [(p, mean, mean / float(law.lobe_mean(p))) for p, mean in means]
 
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
@@ -91,7 +93,7 @@ def _charts(panels: Sequence[Panel], device: str, path: Path) -> None:
         for way in WAYS:
             points = [one for one in panel.points if one.method == way.name]
             time, low, high = (np.array([getattr(one.cost, at) for one in points]) for at in ("value", "low", "high"))
-            error = [max(one.error.value, 3e-4) for one in points]
+            error = [one.error.value for one in points]
             style = {"color": COLOURS[way.name], "marker": "o", "markersize": 3.0, "elinewidth": 0.6, "linewidth": 1.0}
             ax.errorbar(time, error, xerr=(time - low, high - time), label=way.name, **style)
             for one, x, y in zip(points, time, error, strict=True):

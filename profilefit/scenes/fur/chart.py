@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Sequence
 
 import moderngl
@@ -53,12 +52,7 @@ def over_layers(
             errors.append(float(np.sqrt(np.mean((found - true) ** 2))))
         for _ in range(turns):
             for (way, one), taken in zip(each, times, strict=True):
-                layered = passes.layered(view, way, one)
-                context.finish()
-                begin = time.perf_counter()
-                passes.run(layered)
-                context.finish()
-                taken.append(1e3 * (time.perf_counter() - begin))
+                taken.append(passes.milliseconds(passes.layered(view, way, one)))
     return [
         ChartPoint(way.name, one, error, tuple(taken))
         for (way, one), error, taken in zip(each, errors, times, strict=True)

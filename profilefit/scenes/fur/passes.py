@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from typing import Any, NamedTuple, Self
 
 import moderngl
@@ -93,6 +94,15 @@ class FurPasses:
         if one.name not in self._compiled:
             self._compiled[one.name] = FullScreen(self.context, one)
         self._compiled[one.name].run(one, self.maps)
+
+    def milliseconds(self, *of: Pass) -> float:
+        """Time of passes that were run before, one after the other."""
+        self.context.finish()
+        start = time.perf_counter()
+        for one in of:
+            self.run(one)
+        self.context.finish()
+        return 1e3 * (time.perf_counter() - start)
 
     def radiance(self, one: Pass, hits: NDArray[np.floating] | None = None) -> Floats:
         """(rows, columns, 3) by `Shade.of`, of hits in place of those that were drawn last if some are given."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import NamedTuple
@@ -59,13 +58,7 @@ class FurBench(NamedTuple):
         layered = self.passes.layered(self.view, way, layers)
         for one in (layered, self.shade):
             self.passes.run(one)  # compiled
-        context = self.passes.context
-        context.finish()
-        start = time.perf_counter()
-        self.passes.run(layered)
-        self.passes.run(self.shade)
-        context.finish()
-        milliseconds = 1e3 * (time.perf_counter() - start)
+        milliseconds = self.passes.milliseconds(layered, self.shade)
         return self.passes.radiance(self.shade), milliseconds
 
     def error(self, radiance: Floats) -> Floats:
