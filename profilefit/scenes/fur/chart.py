@@ -10,12 +10,18 @@ from numpy.typing import NDArray
 
 from profilefit.scenes.fur.ball import FurView
 from profilefit.scenes.fur.passes import FurPasses, FurSurface
-from profilefit.scenes.fur.truth import Patch, cast
+from profilefit.scenes.fur.truth import Patch, cast, random_patch
 from profilefit.scenes.fur.ways import WAYS, FurWay
 from profilefit.scenes.stage.picture import ChartPoint
 
 Floats = NDArray[np.float64]
+WIDER = 1.3  # than a ray's way over the skin
 AWAY = 3.0  # lengths of a strand, from the tips to where rays start
+
+
+def wide_patch(density: float, radius: float, length: float, theta: float, least: float, seed: int) -> Patch:
+    """A random patch so wide that no ray at an angle comes by a strand twice; least  its side at least [length]."""
+    return random_patch(density, radius, length, max(least, WIDER * float(np.tan(theta)) * length), seed)
 
 
 def patch_view(patch: Patch, theta: float, size: tuple[int, int]) -> tuple[FurView, Floats]:

@@ -13,10 +13,9 @@ import numpy as np
 
 from mcml_sim.files.text_file import read_toml
 from profilefit.recipes.folder import shipped
-from profilefit.scenes.fur.chart import over_layers
+from profilefit.scenes.fur.chart import over_layers, wide_patch
 from profilefit.scenes.fur.request import FurRequest, read
 from profilefit.scenes.fur.scene import bench
-from profilefit.scenes.fur.truth import random_patch
 from profilefit.scenes.fur.ways import WAYS
 from profilefit.scenes.stage.picture import ChartPoint
 from profilefit.shader.context import opened, renderer
@@ -57,9 +56,9 @@ def request() -> FurRequest:
 
 
 def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FULL) -> Panel:
-    """A patch so wide that no ray comes by a strand twice."""
+    """Every way and number of layers toward one angle."""
     theta = float(np.radians(degrees))
-    patch = random_patch(DENSITY, RADIUS, LENGTH, max(LEAST_SIDE, 1.3 * float(np.tan(theta)) * LENGTH), SEED)
+    patch = wide_patch(DENSITY, RADIUS, LENGTH, theta, LEAST_SIDE, SEED)
     found = over_layers(context, patch, theta, sizes.layers, (sizes.rays, sizes.rays), sizes.turns)
     name = f"angle-{degrees:g}"
     return Panel(
