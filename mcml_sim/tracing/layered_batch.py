@@ -37,7 +37,6 @@ from mcml_sim.tracing.layered_event import (
 Floats = NDArray[np.float64]
 
 BATCH_PHOTONS = 2**18
-LANES = 4096
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same
 GROUPS = 32  # of photons at most, whose spread gives the errors of what is absorbed by ring and depth
 # Sums on the way are int64 multiples of 2^-42, or of less if all layers absorb weakly: 2^18 photons of weight 1, each
@@ -70,15 +69,15 @@ class KernelShape(NamedTuple):
 
 
 class PhotonFates(NamedTuple):
-    """What became of the photons of a batch; by photon, with one more place for what is not needed."""
+    """What became of the photons of a batch; by photon, then by lane for what is not needed."""
 
     exits: Array
     """rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 if roulette ended it,
-    complex64 (BATCH_PHOTONS + 1,)."""
+    complex64 (BATCH_PHOTONS + lanes,)."""
     cosines: Array
     """Of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
     absorbed: tuple[Array, ...]
-    """What it left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + 1,) each."""
+    """What it left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
     by_layer: Array
     """What each group left in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
     by_cell: Array
@@ -91,10 +90,10 @@ def trace_batch(
     seed: int,
     batch: int,
     photons: int,
-    lanes: int = LANES,
+    lanes: int | None = None,
     illumination: str = "searchlight",
 ) -> Deposits:
-    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 512.
+    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 512 (`pool.lanes`).
 
     Photons enter with weight 1, below all specular reflection. Where they are a beam a first layer of clear glass is
     behind them then: `fresnel.specular_reflectance` has counted what it sends back.
@@ -105,7 +104,7 @@ def trace_batch(
     if first > len(medium.layers):
         return _all_ballistic(grid, photons)
     unit = _unit(medium)
-    bins, shape = _bins(medium, grid, unit, photons, lanes)
+    bins, shape = _bins(medium, grid, unit, photons, lanes or pool.lanes())
     key = jnp.asarray(rng.batch_key(seed, batch))
     entry = jnp.asarray(half_space_event.entry_cosines(light) if diffuse else np.zeros(0, np.float32))
     with jax.enable_x64(True):
@@ -127,10 +126,11 @@ def trace(
     angles = len(bins.cosines) > 0
     followed = stack.layers if stack.layers <= SELECTED_LAYERS else 1
     cells = (bins.r.bins + 1) * (bins.z.bins + 1) if shape.depths else 0
+    places = BATCH_PHOTONS + shape.lanes
     results = PhotonFates(
-        exits=jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64),
-        cosines=jnp.zeros(BATCH_PHOTONS + 1 if angles else 1, jnp.float32),
-        absorbed=(jnp.zeros(BATCH_PHOTONS + 1, jnp.float32),) * followed,
+        exits=jnp.zeros(places, jnp.complex64),
+        cosines=jnp.zeros(places if angles else 1, jnp.float32),
+        absorbed=(jnp.zeros(places, jnp.float32),) * followed,
         by_layer=jnp.zeros(0 if followed == stack.layers else shape.groups * stack.layers, jnp.int64),
         by_cell=jnp.zeros(shape.groups * cells, jnp.int64),
     )
@@ -205,12 +205,8 @@ def _units(left: Array, bins: LayeredBins) -> Array:
 
 
 def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layers: int, angles: bool) -> PhotonFates:
-    """Keep what became of the photons that have ended since the last time.
-
-    The others write too, beyond the last photon: a branch that no processor can foresee costs more.
-    """
-    counts = lanes.ended & (lanes.photon < BATCH_PHOTONS)
-    number = jnp.where(counts, lanes.photon, BATCH_PHOTONS).astype(jnp.int32)
+    """Keep what became of the photons that have ended since the last time."""
+    number = pool.places(lanes, BATCH_PHOTONS)
     transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
     rho = jnp.where(transmitted & ~scattered, BALLISTIC, rho)
@@ -227,18 +223,20 @@ def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layer
 
 
 def _written(values: Array, number: Array, new: Array) -> Array:
-    return values.at[number].set(new, mode="promise_in_bounds")
+    return values.at[number].set(new, mode="promise_in_bounds", unique_indices=True)
 
 
 def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
     """Weights and squared weights by side (above, below), ring and angle, float64 (2, rings + 1, angles or 1, 2)."""
-    rho, signed = results.exits.real[:-1], results.exits.imag[:-1]
+    rho, signed = results.exits.real[:BATCH_PHOTONS], results.exits.imag[:BATCH_PHOTONS]
     weight = jnp.where(rho >= 0, jnp.abs(signed), 0).astype(jnp.float64)
     cell = jnp.where(signed < 0, 1, 0) * (bins.r.bins + 1) + bins.r.index(rho)
     angles = len(bins.cosines) or 1
     if len(bins.cosines):
         # Edges fall from 1, so those above the cosine are counted.
-        angle = jnp.searchsorted(-bins.cosines[1:], -results.cosines[:-1], side="right", method="scan_unrolled")
+        angle = jnp.searchsorted(
+            -bins.cosines[1:], -results.cosines[:BATCH_PHOTONS], side="right", method="scan_unrolled"
+        )
         cell = cell * angles + angle.astype(jnp.int32)
     size = 2 * (bins.r.bins + 1) * angles
     sums = [jnp.zeros(size, jnp.float64).at[cell].add(w, mode="promise_in_bounds") for w in (weight, weight * weight)]
@@ -250,8 +248,8 @@ def _summed(results: PhotonFates) -> Array:
 
     Quantities: what was left in layers, in all of them, what is accounted for, ballistic, cut.
     """
-    rho, weight = results.exits.real[:-1], jnp.abs(results.exits.imag[:-1]).astype(jnp.float64)
-    by_layer = [values[:-1].astype(jnp.float64) for values in results.absorbed]
+    rho, weight = results.exits.real[:BATCH_PHOTONS], jnp.abs(results.exits.imag[:BATCH_PHOTONS]).astype(jnp.float64)
+    by_layer = [values[:BATCH_PHOTONS].astype(jnp.float64) for values in results.absorbed]
     absorbed = sum(by_layer[1:], start=by_layer[0])
     ballistic, cut = (jnp.where(rho == where, weight, 0) for where in (BALLISTIC, INSIDE))
     quantities = jnp.stack([*by_layer, absorbed, absorbed + weight, ballistic, cut])

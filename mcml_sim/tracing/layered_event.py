@@ -24,7 +24,7 @@ from jax import Array, lax
 from mcml_sim.media import fresnel
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
-from mcml_sim.tracing import rng
+from mcml_sim.tracing import pool, rng
 from mcml_sim.tracing.half_space_event import entering_cosine
 
 FLIGHTS = 5  # measured on the three-layer sample: from 4 to 7 it is the same within 3 %
@@ -163,7 +163,7 @@ def is_scattered(lanes: LayeredLanes, entry: Array) -> Array:
 
 def staged(go: Array, make: Callable[..., Any], *arrays: Any) -> Any:
     """make(*arrays), computed once and kept: `go` is True, which XLA cannot know when it compiles."""
-    if jax.default_backend() != "cpu":
+    if not pool.on_cpu():
         return make(*arrays)
     shapes = jax.eval_shape(make, *arrays)
     return lax.cond(go, make, lambda *_: jax.tree.map(lambda s: jnp.zeros(s.shape, s.dtype), shapes), *arrays)

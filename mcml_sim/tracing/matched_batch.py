@@ -30,7 +30,6 @@ from mcml_sim.tracing.bins import Axis, axis, groups
 from mcml_sim.tracing.deposits import Deposits
 from mcml_sim.tracing.isotropic_event import IsotropicLanes
 from mcml_sim.tracing.orders_batch import Ends
-from mcml_sim.tracing.pool import LANES
 
 Floats = NDArray[np.float64]
 
@@ -88,14 +87,15 @@ def _stops(survival: Floats) -> NDArray[np.int32]:
     return np.concatenate([tosses, np.full(STOPS - len(tosses), last)]).astype(np.int32)
 
 
-def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES) -> Deposits:
-    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64.
+def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None) -> Deposits:
+    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64 (`pool.lanes`).
 
     The medium's `is_matched_isotropic_half_space` must be true; its light comes straight down. Light that is absorbed
     gets its errors from groups of consecutive photons: 16 of them, or fewer where their tables would take more than
     64 MiB together, but no fewer than 8.
     """
     (layer,) = medium.layers
+    lanes = lanes or pool.lanes()
     values, bins = weights(layer.alpha), _bins(grid, layer.mfp)
     key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(values.stops)
     if grid.depths:
@@ -164,7 +164,7 @@ def _trace_visits(
         flying = isotropic_event.landed(flying, place, VISITS_PER_TURN)
         return flying, (table, orders_batch.recorded(ends, flying))
 
-    state = jnp.zeros(size, jnp.int64), orders_batch.no_ends()
+    state = jnp.zeros(size, jnp.int64), orders_batch.no_ends(lanes)
     table, ends = pool.follow(lambda photon: isotropic_event.enter(key, photon, stops), turn, state, photons, lanes)
     by_group = table.reshape(shape) * UNIT
     return orders_batch.as_ends(ends), Visits(*_summed(by_group), *_summed(by_group.sum(axis=1)))

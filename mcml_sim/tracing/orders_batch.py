@@ -20,7 +20,7 @@ from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool
 from mcml_sim.tracing.bins import rounded_up
 from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.isotropic_event import DOUBLINGS, MAX_ORDER, IsotropicLanes
-from mcml_sim.tracing.pool import BATCH_PHOTONS, LANES
+from mcml_sim.tracing.pool import BATCH_PHOTONS
 
 OrderLanes = IsotropicLanes | half_space_event.HalfSpaceLanes
 MATCHED = Setting()
@@ -40,9 +40,9 @@ class Ends(NamedTuple):
 
 
 def trace_batch(
-    grid: Grid, seed: int, batch: int, photons: int, lanes: int = LANES, setting: Setting = MATCHED
+    grid: Grid, seed: int, batch: int, photons: int, lanes: int | None = None, setting: Setting = MATCHED
 ) -> Counts:
-    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64.
+    """Trace the first `photons` (<= BATCH_PHOTONS) photons of a batch; `lanes` is a multiple of 64 (`pool.lanes`).
 
     Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
     kernel is the one that needs no directions.
@@ -70,7 +70,7 @@ def trace(
     photons: Array,
     stops: Array,
     where: half_space_event.HalfSpace | None = None,
-    lanes: int = LANES,
+    lanes: int | None = None,
     events: int = EVENTS_PER_TURN,
     illumination: str = "searchlight",
 ) -> Ends:
@@ -80,6 +80,8 @@ def trace(
     `isotropic_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
     nothing but the speed.
     """
+
+    lanes = lanes or pool.lanes()
 
     def enter(photon: Array) -> OrderLanes:
         if where is None:
@@ -93,27 +95,26 @@ def trace(
             flying = half_space_event.fly(key, flying, events, where)
         return flying, recorded(ends, flying)
 
-    return as_ends(pool.follow(enter, turn, no_ends(), photons, lanes))
+    return as_ends(pool.follow(enter, turn, no_ends(lanes), photons, lanes))
 
 
-def no_ends() -> Array:
-    """rho + i order of photons that were never started, and of nobody at last, complex64 (BATCH_PHOTONS + 1,)."""
-    return jnp.zeros(BATCH_PHOTONS + 1, jnp.complex64)
+def no_ends(lanes: int) -> Array:
+    """rho + i order of photons that were never started, and of idle lanes, complex64 (BATCH_PHOTONS + lanes,)."""
+    return jnp.zeros(BATCH_PHOTONS + lanes, jnp.complex64)
 
 
 def as_ends(ends: Array) -> Ends:
     """The parts of rho + i order of all photons."""
-    return Ends(ends.real[:-1], ends.imag[:-1].astype(jnp.int32))
+    ends = ends[:BATCH_PHOTONS]
+    return Ends(ends.real, ends.imag.astype(jnp.int32))
 
 
 def recorded(ends: Array, lanes: OrderLanes) -> Array:
-    """Write the lanes that ended to their photons' places, rho + i order.
-
-    The others write too, beyond the last photon: a branch that no processor can foresee costs more.
-    """
-    place = jnp.where(lanes.ended, lanes.photon.astype(jnp.int32), BATCH_PHOTONS)
+    """Write the lanes that ended to their photons' places, rho + i order."""
+    place = pool.places(lanes, BATCH_PHOTONS)
     order = jnp.where(lanes.stopped, -lanes.order, lanes.order)
-    return ends.at[place].set(lax.complex(lanes.place.real, order.astype(jnp.float32)), mode="promise_in_bounds")
+    end = lax.complex(lanes.place.real, order.astype(jnp.float32))
+    return ends.at[place].set(end, mode="promise_in_bounds", unique_indices=True)
 
 
 @jax.jit

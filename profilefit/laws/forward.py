@@ -40,7 +40,9 @@ class ForwardHalfSpace(ProfileLaw):
     a: float
     b: float
     c: float
-    entry = Entry("forward", text=Text("refracting_hazard", ("rational", "decay", "survival"), prefix="hazard"))
+    entry = Entry(
+        "forward", text=Text("refracting_hazard", ("rational", "decay", "near_zero", "survival"), prefix="hazard")
+    )
     own_reflectance = True
 
     @property

@@ -220,7 +220,7 @@ class Hazard(EscapeLaw):
             **{"a0": 0.5, "a1": -0.25, "a2": 0.04, "b0": 0.17, "b1": -0.2, "b2": 0.06, "b3": 0.01},
         },
         own=True,
-        text=Text("hazard", ("rational", "decay", "survival"), clamps=CLAMPS),
+        text=Text("hazard", ("rational", "decay", "near_zero", "survival"), clamps=CLAMPS),
     )
 
     def shape(self, alpha) -> Shape:

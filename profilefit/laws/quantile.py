@@ -81,7 +81,7 @@ class Quantile(EscapeLaw):
         },
         profile=Range(high=0.9999),
         own=True,
-        text=Text("quantile", ("rational", "decay"), clamps=CLAMPS),
+        text=Text("quantile", ("rational", "decay", "near_zero"), clamps=CLAMPS),
     )
 
     @classmethod

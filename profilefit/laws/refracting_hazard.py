@@ -171,7 +171,7 @@ class RefractingHazard(EscapeLaw):
         },
         n=REFRACTING,
         own=True,
-        text=Text("refracting_hazard", ("rational", "decay", "survival"), prefix="hazard", clamps=CLAMPS),
+        text=Text("refracting_hazard", ("rational", "decay", "near_zero", "survival"), prefix="hazard", clamps=CLAMPS),
     )
 
     @classmethod

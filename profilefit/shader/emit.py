@@ -33,7 +33,7 @@ NORMALISED = "rational"  # the part that stands for the text of the map which no
 BLOCK = re.compile(r"^[ ]*//% for (\d+)\n(.*?)^[ ]*//% end\n", re.MULTILINE | re.DOTALL)
 # The function that makes a shape of an albedo: a text that has its shapes as numbers leaves it out.
 SHAPE = re.compile(r"^//% shape\n(.*?)^//% end shape\n", re.MULTILINE | re.DOTALL)
-ON_SHAPES = ("survival",)  # parts that work on shapes, however these were made
+ON_SHAPES = ("near_zero", "survival")  # parts that work on shapes, however these were made
 # A prefix becomes part of names: GLSL keeps double underscores and gl_ for itself.
 PREFIX = re.compile(r"(?!gl_|PF_|pf_|LAW\b)[A-Za-z][A-Za-z0-9]*(?:_[A-Za-z0-9]+)*")
 # A second include of the same text is skipped; one of other constants under the same names would be so in silence.

@@ -48,7 +48,7 @@ float LAW_cumulated(float x, LAW_Shape s) {
 // x for a uniform number xi: a guess that is right at both ends, and steps that follow the hazard.
 float LAW_radius(float xi, LAW_Shape s) {
     float share = clamp(xi, 0.0, PF_MOST_XI);
-    float t = -log(1.0 - share);
+    float t = -pf_log1p(-share);
     float rise = s.curve.source - s.curve.kappa;
     float white = 0.27 * (rise / s.curve.source) * (rise / s.curve.source);
     float odds = share / ((1.0 - share) * max(t, PF_NEAREST));
@@ -58,7 +58,7 @@ float LAW_radius(float xi, LAW_Shape s) {
         float start = clamp(x, PF_NEAREST, PF_FARTHEST);
         PfLocal here = pf_local(start, s.curve);
         float flight = 1.0 / here.hazard;
-        float move = (t - here.exponent + log(here.ratio)) * flight;
+        float move = (t - here.exponent + pf_log_near_one(here.over_one, here.ratio)) * flight;
         float y = -here.bend * flight * move;
         x = max(start + move * (1.0 + y * (0.5 + y * 0.16666666666666667)), 0.0);
     }

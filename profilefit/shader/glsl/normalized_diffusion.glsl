@@ -21,7 +21,7 @@ float LAW_radius(float xi, LAW_Shape s) {
     float u = 1.0 - clamp(xi, 0.0, PF_MOST_XI);
     float g = 1.0 + 4.0 * u * (2.0 * u + sqrt(1.0 + 4.0 * u * u));
     float root = exp(log(g) / 3.0); // a cube root
-    return 3.0 * log((1.0 + 1.0 / root + root) / (4.0 * u)) / s.rate;
+    return 3.0 * max(log((1.0 + 1.0 / root + root) / (4.0 * u)), 0.0) / s.rate;
 }
 
 // Density in x of LAW_radius [1/mfp]

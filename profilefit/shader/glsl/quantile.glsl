@@ -80,7 +80,7 @@ float LAW_cumulated(float x, LAW_Shape s) {
 
 // x for a uniform number xi: the law itself
 float LAW_radius(float xi, LAW_Shape s) {
-    LAW_Local here = LAW_local(-log(1.0 - clamp(xi, 0.0, PF_MOST_XI)), s);
+    LAW_Local here = LAW_local(-pf_log1p(-clamp(xi, 0.0, PF_MOST_XI)), s);
     return here.radius;
 }
 

@@ -85,8 +85,9 @@ float LAW_radius(float xi, LAW_Shape s) {
     curve.b = PF_SELECT(share < s.share, s.once.b, s.again.b);
     curve.c = PF_SELECT(share < s.share, s.once.c, s.again.c);
     float inner = PF_SELECT(share < s.share, share / s.share, (share - s.share) / max(s.rest, PF_NEAREST));
-    float left = clamp(1.0 - inner, 1.0 - PF_MOST_XI, 1.0);
-    float t = -log(left);
+    inner = clamp(inner, 0.0, PF_MOST_XI);
+    float left = 1.0 - inner;
+    float t = -pf_log1p(-inner);
     float t_first = 1.0 + 0.535 * t;
     float first = t * t_first / (s.once.kappa * t_first + max(s.once.source - s.once.kappa, PF_NEAREST));
     float growth = PF_SELECT(t < 0.01, 1.0 + 0.5 * t, (1.0 - left) / (left * max(t, 0.01)));
@@ -97,7 +98,7 @@ float LAW_radius(float xi, LAW_Shape s) {
     for (int i = 0; i < HAZARD_STEPS; ++i) {
         float start = clamp(x, PF_NEAREST, PF_FARTHEST);
         PfLocal here = pf_local(start, curve);
-        float spent = max(here.exponent - log(here.ratio), PF_NEAREST);
+        float spent = max(here.exponent - pf_log_near_one(here.over_one, here.ratio), PF_NEAREST);
         float flight = 1.0 / max(here.hazard, PF_NEAREST);
         float beyond = sqrt(t / spent) - 1.0;
         float move = 2.0 * spent * beyond * flight;

@@ -15,6 +15,7 @@ struct PfCurve {
 struct PfLocal {
     float exponent; // S = exp(-exponent) ratio
     float ratio;
+    float over_one; // ratio - 1
     float hazard; // lambda [1/mfp]
     float bend; // d lambda / dx [1/mfp^2]
 };
@@ -35,13 +36,16 @@ PfLocal pf_local(float radius, PfCurve s) {
     float slope = p * p * (0.3333333333333333 - p * (0.5 - p * (0.6 - p * (0.6666666666666667 - p * 0.7142857142857143))));
     float early = PF_SELECT(q < 0.1, series, z * (1.0 - log_term));
     float spent = PF_SELECT(q < 0.1, slope, 1.0 - 2.0 * log_term + rest);
+    // spent - (q rest)^2, which vanishes at both ends: times q, a last digit of q rest would be without bound.
+    float turn = PF_SELECT(q < 0.1, slope - p * rest * p * rest, rest * (3.0 - rest) - 2.0 * log_term);
     float up = (s.a + 2.0 * s.b * x) * over_n;
     float down = s.c * over_d;
     PfLocal here;
     here.exponent = s.kappa * x + s.w * s.h * early;
     here.ratio = denominator * over_n;
+    here.over_one = x * (s.c - s.a - s.b * x) * over_n;
     here.hazard = s.kappa + s.w * spent + up - down;
-    here.bend = s.w * q * (spent - q * rest * q * rest) / s.h + 2.0 * s.b * over_n - up * up + down * down;
+    here.bend = s.w * q * turn / s.h + 2.0 * s.b * over_n - up * up + down * down;
     return here;
 }
 #endif

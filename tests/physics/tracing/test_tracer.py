@@ -7,11 +7,11 @@ import pytest
 
 from mcml_sim import Grid, Setting, exact
 from mcml_sim.results.estimate import estimate
-from mcml_sim.tracing import half_space_event, order_bins, orders_batch, rng
+from mcml_sim.tracing import half_space_event, order_bins, orders_batch, pool, rng
 from mcml_sim.tracing.isotropic_event import DOUBLINGS, FIRST_ROULETTE, MAX_ORDER
 
 PHOTONS = 200_000
-LANES = orders_batch.LANES
+LANES = pool.LANES
 
 
 def traced(photons, lanes=LANES):

@@ -46,9 +46,20 @@ class Rounded:
         return call
 
 
-def twin(text, rounded=False):
+class CoarseLog(Rounded):
+    """The same with a logarithm that is off by `most` next to 0: OpenGL allows 2^-21, NVIDIA's takes 2^-22."""
+
+    def __init__(self, most):
+        self.most = most
+
+    def log(self, x):
+        right = np.log(np.asarray(x, np.float32))
+        return np.where((x >= 0.5) & (x <= 2.0), right + np.float32(self.most), right).astype(np.float32)
+
+
+def twin(text, rounded=False, coarse=0.0):
     """The functions of a text in Python, by name."""
-    names = {"np": Rounded()} if rounded else {}
+    names = {"np": CoarseLog(coarse) if coarse else Rounded()} if rounded else {}
     exec(text.replace("import numpy as np\n", "") if rounded else text, names)
     return names
 
@@ -167,6 +178,35 @@ def test_float32_is_finite_everywhere_and_right_to_rounding(label):
     error = np.abs(rounded["law_pdf"](x, alpha, mfp)[inner] / np.maximum(density, 1e-30) - 1.0)
     # 1e-3 where the inverse of Liang et al. turns: its density has no end there.
     assert np.max(error[density > 1e-9]) < (2e-3 if isinstance(law, Liang) else 1e-4)
+
+
+@pytest.mark.parametrize("off", [2.0**-22, -(2.0**-22)])
+@pytest.mark.parametrize(
+    "label", [label for label, law in LAWS.items() if not isinstance(law, Liang)]
+)  # whose inverse turns back
+def test_radii_where_the_logarithm_is_coarse(label, off):
+    law = LAWS[label]
+    coarse, exact = twin(text_of(law), rounded=True, coarse=off), twin(text_of(law))
+    xi = np.concatenate([[0.0], np.geomspace(2.0**-24, 1e-3, 60), np.linspace(0.002, 0.99, 50)]).astype(np.float32)
+    alpha = ALPHA_32[ALPHA_32[:, 0] > 0.05].astype(np.float32)
+    drawn = coarse["law_sample"](xi, alpha, np.float32(1.0)).astype(float)
+    assert np.all(np.isfinite(drawn) & (drawn >= 0.0))
+    right = exact["law_sample"](xi.astype(float), alpha.astype(float), 1.0)
+    shares = [exact["law_cdf"](radius, alpha.astype(float), 1.0) for radius in (drawn, right)]
+    assert np.max(np.abs(shares[0] - shares[1])) < 5e-6
+    if isinstance(law, Hazard | Quantile):  # radii by which a stratified sampler orders its samples
+        assert np.all(np.diff(drawn) >= 0.0)
+
+
+@pytest.mark.parametrize("label", [label for label, law in LAWS.items() if isinstance(law, Hazard)])
+def test_the_hazard_turns_as_steeply_in_float32_next_to_the_source(label):
+    rounded, exact = twin(text_of(LAWS[label]), rounded=True), twin(text_of(LAWS[label]))
+    x, alpha = np.geomspace(1e-25, 30.0, 400).astype(np.float32), np.array([[0.036], [0.5], [0.95]], np.float32)
+    made, right = (
+        names["pf_local"](x.astype(kind), names["law_shape"](alpha.astype(kind)).curve).bend
+        for names, kind in ((rounded, np.float32), (exact, float))
+    )
+    assert np.max(np.abs(made - right) / (np.abs(right) + 1.0)) < 1e-5
 
 
 @pytest.mark.parametrize("label", MAPS)

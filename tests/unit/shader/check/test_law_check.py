@@ -57,9 +57,9 @@ def test_the_gpus_numbers_have_the_records_errors(context):
     [
         ("s.h = exp(hazard_h0", "s.h = exp(1.02 * hazard_h0", "float32 rel"),
         ("s.w = s.source - s.kappa", "s.w = s.source + s.kappa", "float32 ks"),
-        ("float t = -log(1.0 - share);", "float t = -log(share - 1.0);", "float32 inversion_error"),
+        ("float t = -pf_log1p(-share);", "float t = -log(share - 1.0);", "float32 inversion_error"),
         ("return exp(-here.exponent) * here.ratio * here.hazard;", "return sqrt(-1.0 - x);", "bad numbers"),
-        ("here.exponent + log(here.ratio)) * flight", "here.exponent) * flight", "float32 inversion_error"),
+        ("here.exponent + pf_log_near_one(", "here.exponent + 0.0 * pf_log_near_one(", "float32 inversion_error"),
         ("return hazard_density(x, s);", "return 1.01 * hazard_density(x, s);", f"{OWN}, 99 % of it"),
     ],
 )
