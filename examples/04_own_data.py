@@ -9,7 +9,7 @@ from pathlib import Path
 from profilefit.measured import fit
 
 data = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).parent / "phantom.csv"
-result = fit(data, law="hazard", seed=0)
+result = fit(data, seed=0)
 
 for name in ("A", "alpha", "l", "mu_s'", "mu_a"):
     interval = result.interval(name)

@@ -20,11 +20,13 @@ from profilefit.laws import PROFILES
 if TYPE_CHECKING:
     from mcml_sim import Setting
     from profilefit.measured import Answer, Known, Measured
+    from profilefit.measured.instrument import Instrument
 
 FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
 WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
+EXACT = "exact"
 PROFILE, PHASE = KINDS = ("profile", "phase")
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
@@ -33,7 +35,9 @@ def fit(
     context: typer.Context,
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
     kind: Annotated[str, typer.Option(help="profile, or phase: a phase function.")] = PROFILE,
-    law: Annotated[str, typer.Option(help=f"One of {', '.join(PROFILES)}.", autocompletion=options.laws)] = "hazard",
+    law: Annotated[
+        str, typer.Option(help=f"exact, or one of {', '.join(PROFILES)}.", autocompletion=options.laws)
+    ] = EXACT,
     constants: Annotated[
         str,
         typer.Option(
@@ -54,6 +58,14 @@ def fit(
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
     ] = None,
     light: Annotated[str, typer.Option(help=f"{options.LIGHTS_HELP}.")] = options.LIGHTS[0],
+    beam: Annotated[
+        str | None,
+        typer.Option(
+            help="1/e² radius of a Gaussian beam (0.5mm), tophat:0.5mm, or a .csv of radius and irradiance.",
+            show_default="a pencil beam",
+        ),
+    ] = None,
+    fibre: Annotated[str | None, typer.Option(help="Core radius of the fibre that a point is seen by.")] = None,
     n: Annotated[
         float | None, typer.Option(help="Refractive index of the medium.", show_default="the file's, else 1")
     ] = None,
@@ -109,11 +121,12 @@ def fit(
     held = _held(fix or [], measured.unit)
     known = None if total is None else _total(total)
     factor = _scale(scale)
+    instrument = _instrument(measured, beam, fibre)
     if out is not None:
         require_folder(out)
     try:
         with working("fitting", quiet):
-            result = fitted(measured, law, constants, setting, held, known, factor, seed, folder=folder)
+            result = fitted(measured, law, constants, setting, held, known, factor, instrument, seed, folder=folder)
     except SettingError as error:
         raise SettingError(f"{error}; --n and --light choose one of these") from None
     body = options.in_options(content(result, law, constants))
@@ -123,7 +136,8 @@ def fit(
         print_json(body)
     else:
         points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
-        _show(result, f"{one_line(data.name)}: {points}, law {law}, {result.found.question.law.setting}")
+        model = "exact light" if law == EXACT else f"law {law}"
+        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.found.question.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
 
@@ -215,6 +229,20 @@ def _setting(measured: Measured, light: str, n: float | None) -> Setting:
             f"--light must be {measured.illumination} for {measured.source}, which was simulated so, got {light!r}"
         )
     return Setting(light, measured.n or 1.0 if n is None else n)
+
+
+def _instrument(measured: Measured, beam: str | None, fibre: str | None) -> Instrument:
+    """The beam, and the fibre's core."""
+    with interruptible(__name__):
+        from profilefit.measured.beam import beam_of
+        from profilefit.measured.instrument import Instrument
+
+    if fibre is not None and measured.rings:
+        raise InputError("--fibre must be left out where rows are averages over annuli")
+    seen = _radius("--fibre", fibre, measured.unit) or 0.0
+    if seen and measured.inner[0] < seen:
+        raise InputError(f"--fibre must be at most the first r {measured.inner[0]:g}, got {fibre!r}")
+    return Instrument(None if beam is None else beam_of("--beam", beam, measured.unit), seen)
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:

@@ -13,16 +13,20 @@ from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import law_error, model
 from profilefit.measured.data import Measured, require_workable
+from profilefit.measured.exact_light import ExactLight
 from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
-from profilefit.measured.noise import noise
+from profilefit.measured.noise import Noise, noise
 from profilefit.measured.problem import Question
 from profilefit.measured.replicates import widening
-from profilefit.measured.solving import Minimum, Problem, descended, minimised
+from profilefit.measured.solving import Minimum, Problem, are_apart, descended, minimised
 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
+# A law's error is that at the albedo of the fit, which it decides: the second round changes nothing that is printed.
+ROUNDS = 2
+SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search allows for
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
 LEAST_EXPECTED = 0.01
 LEVEL = 0.95  # of every interval
@@ -33,6 +37,7 @@ class MediumFit:
     """Where a fit ended. `source` is the record of the law's constants, `rel` its own relative error there.
 
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
+    rivals      other minima whose chi-square is no more above it than where the 95 % interval ends
     """
 
     problem: Problem
@@ -40,6 +45,7 @@ class MediumFit:
     source: law_error.Origin | None
     rel: float | None
     widening: float = 1.0
+    rivals: tuple[Minimum, ...] = ()
 
     @property
     def data(self) -> Measured:
@@ -93,30 +99,43 @@ class MediumFit:
     @property
     def statistical(self) -> Floats:
         """Covariance (3, 3) of the coordinates from the data's own errors."""
+        rows = np.eye(self.minimum.residuals.size) - self.law_rows  # of all errors, the rows' covariance is 1
+        return self.gain @ rows @ self.gain.T
+
+    @property
+    def likely(self) -> Floats:
+        """Covariance (3, 3) of the coordinates by the likelihood: the data's own errors, and the law's."""
         return self.gain @ self.gain.T
 
     @cached_property
     def law_rows(self) -> Floats:
         """Covariance (m, m) of the rows, in standard errors, from the law's own error; zero if that is unknown."""
-        return self._rows_of(law_error.waves(self.data.r), self.law_size)
+        return self._law_rows(self.problem.noise)
+
+    def _law_rows(self, noise: Noise) -> Floats:
+        model = self.problem.noise.model
+        return self._rows_of(np.zeros((self.rows,) * 2) if model is None else model, np.ones(self.rows), noise)
 
     @property
     def law_size(self) -> Floats:
         """(n,) standard deviation of the law's own error in the light of each row; zero if that is unknown."""
-        return law_error.RMS * (self.rel or 0.0) * np.where(self.beyond, law_error.BEYOND, 1.0) * self.light
+        model = self.problem.noise.model
+        return np.zeros(self.rows) if model is None else np.sqrt(np.diag(model))
 
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
         """(n,) rows farther out than the radii that `rel` covers."""
+        if isinstance(self.question.law, ExactLight):
+            return np.zeros(self.rows, bool)
         return self.problem.model.shares(self.point, self.data.inner) > law_error.WITHIN
 
     @cached_property
     def wave_rows(self) -> Floats:
         """The same of a relative error 1 in waves."""
-        return self._rows_of(law_error.waves(self.data.r), self.light)
+        return self._rows_of(law_error.waves(self.data.r), self.light, self.problem.noise)
 
-    def _rows_of(self, shape: Floats, size: Floats) -> Floats:
-        return law_error.whitened(shape, size, self.problem.noise, self.minimum.residuals.size)
+    def _rows_of(self, shape: Floats, size: Floats, noise: Noise) -> Floats:
+        return law_error.whitened(shape, size, noise, self.minimum.residuals.size)
 
     @property
     def of_law(self) -> Floats:
@@ -133,13 +152,15 @@ class MediumFit:
         """Judged by the errors of the data as they are: what widens those of the coordinates is no noise in a row."""
         times = np.ones(self.minimum.residuals.size)
         times[: self.rows] = np.sqrt(self.widening)
-        rows, both = times * self.minimum.residuals, np.outer(times, times)
+        own = self.problem.noise.alone
+        rows, slopes = replace(self.problem, noise=own).residuals(self.point)
+        rows, both = times * rows, np.outer(times, times)
         rows[: self.rows] = gaussianised(rows[: self.rows], alone(self.data.freedom, self.data.pooled))
-        uneven = self._rows_of(np.eye(self.rows), self.light)
-        return misfit(
-            rows, times[:, None] * self.jacobian, both * self.law_rows, both * self.wave_rows, self.rows,
-            both * uneven, self.data.pooled,
-        )  # fmt: skip
+        waves, uneven = (
+            both * self._rows_of(shape, self.light, own) for shape in (law_error.waves(self.data.r), np.eye(self.rows))
+        )
+        jacobian = times[:, None] * slopes[:, list(self.question.free)]
+        return misfit(rows, jacobian, both * self._law_rows(own), waves, self.rows, uneven, self.data.pooled)
 
     @property
     def sigma(self) -> Floats:
@@ -168,14 +189,33 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
         raise InputError(f"{data.source}: expected more than {free} rows, one more than is free, got {data.value.size}")
     require_workable(data)
     wider = widening(data.freedom, free)
-    problem = Problem(data, question, noise(data, widening=wider))
-    minimum = minimised(problem)
-    for _ in range(REWEIGHTED if data.counted else 0):
+    each = [law_error.relative_error(question.law, alpha, source) or 0.0 for alpha in SEARCHED]
+    model = law_error.covariance(data, max(each), np.zeros(data.value.size, bool))
+    problem = Problem(data, question, noise(data, widening=wider, model=model))
+    minimum = first = minimised(problem)
+    found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
+    for _ in range(max(REWEIGHTED if data.counted else 0, ROUNDS if model is not None else 0)):
         light = problem.model.linearised(minimum.point, data.inner, data.outer)[0][:-1]
         if not np.all(np.isfinite(light)):
             break
         expected = np.maximum(light, LEAST_EXPECTED * data.value)
-        problem = replace(problem, noise=noise(data, expected, wider))
+        model = law_error.covariance(data, found.rel, found.beyond)
+        problem = replace(problem, noise=noise(data, expected, wider, model))
         minimum = descended(problem, minimum.point, question.free)
-    alpha = float(alpha_of(minimum.point[0]))
-    return MediumFit(problem, minimum, source, law_error.relative_error(question.law, alpha, source), wider)
+        found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
+    return replace(found, rivals=_rivals(found, first.others))
+
+
+def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:
+    """Of other minima of the search those that fit as well within the interval's level, under the final errors."""
+    rivals: list[Minimum] = []
+    for one in others:
+        there = descended(found.problem, one.point, found.question.free)
+        near = there.cost - found.minimum.cost < found.quantile**2
+        if near and all(are_apart(there, other) for other in (found.minimum, *rivals)):
+            rivals.append(there)
+    return tuple(rivals)
+
+
+def _rel(question: Question, minimum: Minimum, source: law_error.Origin | None) -> float | None:
+    return law_error.relative_error(question.law, float(alpha_of(minimum.point[0])), source)

@@ -61,7 +61,7 @@ class Identifiability:
 def identifiability(found: MediumFit) -> Identifiability:
     """Identifiability by profile likelihood: chi-square as one coordinate is moved and the others are fitted again."""
     intervals = tuple(_interval(found, at) for at in found.question.free)
-    relative = relative_errors(found, found.statistical)
+    relative = relative_errors(found, found.likely)
     if found.minimum.at_edge:  # mu_a is anything down to, or up to, where alpha ends
         relative["mu_a"] = np.inf
     loose = {name: value for name, value in relative.items() if not value < LOOSE}
@@ -80,7 +80,7 @@ def _pair(found: MediumFit) -> tuple[tuple[str, str] | None, float]:
     free = list(found.question.free)
     if len(free) < 2:
         return None, 0.0
-    joint = found.statistical[np.ix_(free, free)]
+    joint = found.likely[np.ix_(free, free)]
     spread = np.sqrt(np.maximum(np.diag(joint), np.finfo(float).tiny))
     upper = np.triu(joint / np.outer(spread, spread), 1)
     i, j = np.unravel_index(np.argmax(np.abs(upper)), upper.shape)
@@ -113,7 +113,7 @@ def _end(found: MediumFit, at: int, side: float) -> tuple[float, bool]:
         last.append(there.point)
         return there.cost - best.cost - found.quantile**2
 
-    step = max(float(np.sqrt(found.statistical[at, at])), 1e-6)
+    step = max(float(np.sqrt(found.likely[at, at])), 1e-6)
     inside = outside = best.point[at]
     for _ in range(STRIDES):
         outside = best.point[at] + side * min(step, side * (limit - best.point[at]))

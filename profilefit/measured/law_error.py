@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws import profile_classes
-from profilefit.laws.base import ProfileLaw
-from profilefit.measured.model import u_of
+from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import EXACT, ExactLight
+from profilefit.measured.model import Light, u_of
 from profilefit.measured.noise import Noise
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
@@ -45,7 +46,9 @@ class Origin:
 
 
 def origin(name: str, constants: str, setting: Setting, folder: Folder) -> Origin | None:
-    """The record behind a law of this name; None of printed constants and of laws without any."""
+    """The record behind a law of this name; None of printed constants, of laws without any, and of exact light."""
+    if name == EXACT:
+        return None
     records, bases = Records.of(folder), profile_classes()[name].entry.records
     if constants.endswith(".json"):
         path = Path(constants)
@@ -58,8 +61,13 @@ def origin(name: str, constants: str, setting: Setting, folder: Folder) -> Origi
     return Origin(path, hashlib.sha256(path.read_bytes()).hexdigest(), quality)
 
 
-def relative_error(law: ProfileLaw, alpha: float, source: Origin | None) -> float | None:
-    """`rel` of the law at alpha [-]: its record's, or measured against the exact profile; None where neither can be."""
+def relative_error(law: Light, alpha: float, source: Origin | None) -> float | None:
+    """`rel` of the law at alpha [-]: its record's, or measured against the exact profile; None where neither can be.
+
+    0 of exact light.
+    """
+    if isinstance(law, ExactLight):
+        return 0.0
     measured = (source.quality.get("regenerated") or {}).get("rel") if source else None
     if source is not None and measured:
         known = np.array(measured, float)
@@ -68,6 +76,15 @@ def relative_error(law: ProfileLaw, alpha: float, source: Origin | None) -> floa
     if not law.setting.is_solved:
         return None
     return float(profile_quality(law, [min(max(alpha, DARKEST), WHITEST)]).rel[0])
+
+
+def covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_]) -> Floats | None:
+    """(n, n) of the law's own error in the rows of data, relative to their values; None where it has none."""
+    if not rel:
+        return None
+    size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)
+    found: Floats = waves(data.r) * np.outer(size, size)
+    return found
 
 
 def waves(r: Floats) -> Floats:

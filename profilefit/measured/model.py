@@ -1,4 +1,4 @@
-"""What a law predicts of a measurement: reflectance at radii or over annuli, given alpha, a length and a scale.
+"""What exact light, or a law, predicts of a measurement, given alpha, a length and a scale: at radii or over annuli.
 
 Three coordinates without bounds describe the medium and the instrument, in this order:
 
@@ -6,7 +6,8 @@ u     s = sqrt(1 - alpha) = 1 / (1 + e^-u): laws are smooth in s, and both ends 
 ln l  of the transport mean free path [ln unit]
 ln k  of the scale: the value column is k times the reflectance per area
 
-Radii are evaluated in blocks of one size, so that data of any length share one compiled function.
+The light of a row is a sum over the radii that its instrument gathers (`instrument`). Rows are evaluated in blocks of
+one size, so that data of any length share one compiled function.
 
 The quantities A, alpha, l, mu_s' and mu_a follow from the coordinates, with errors.
 """
@@ -15,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 import equinox as eqx
 import jax
@@ -26,6 +27,9 @@ from scipy.special import expit
 
 from mcml_sim.exact.by_albedo import blocks
 from profilefit.laws.base import ProfileLaw
+from profilefit.measured.beam import Nodes
+from profilefit.measured.exact_light import ExactLight
+from profilefit.measured.instrument import PENCIL, Instrument
 
 Floats = NDArray[np.float64]
 NAMES = ("alpha", "l", "scale")
@@ -34,16 +38,19 @@ BLOCK = 32  # radii
 FLOCK = 32  # points of the three coordinates that are evaluated at once
 
 
+Light = ProfileLaw | ExactLight
+
+
 @dataclass(frozen=True)
 class Model:
-    """A law with fixed constants; rings says whether it is averaged over annuli."""
+    """Exact light, or a law with fixed constants, as an instrument sees it."""
 
-    law: ProfileLaw
-    rings: bool
+    law: Light
+    instrument: Instrument = PENCIL
 
     def linearised(self, point: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
         """Predictions (n + 1,) at one point (3,), the last being A, and their derivatives (n + 1, 3)."""
-        parts = [_linearised(self.law, self.rings, point, *block) for block in _blocks(inner, outer)]
+        parts = [_linearised(self.law, point, *block) for block in self._blocks(inner, outer)]
         light = np.concatenate([np.asarray(value)[:-1] for value, _ in parts])[: inner.size]
         slopes = np.concatenate([np.asarray(slope)[:, :-1] for _, slope in parts], axis=1)[:, : inner.size]
         value, slope = parts[0]
@@ -55,16 +62,18 @@ class Model:
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
         rows = []
         for flock in np.split(filled, flocks):
-            parts = [np.asarray(_predicted(self.law, self.rings, flock, *block)) for block in _blocks(inner, outer)]
+            parts = [np.asarray(_predicted(self.law, flock, *block)) for block in self._blocks(inner, outer)]
             light = np.concatenate([part[:, :-1] for part in parts], axis=1)[:, : inner.size]
             rows.append(np.column_stack([light, parts[0][:, -1]]))
         return np.concatenate(rows)[: len(points)]
 
     def shares(self, point: Floats, r: Floats) -> Floats:
         """Shares of the reflected energy within radii (n,) [-]."""
-        return np.concatenate([np.asarray(_shares(self.law, self.rings, point, one)) for one, _ in _blocks(r, r)])[
-            : r.size
-        ]
+        return np.concatenate([np.asarray(_shares(self.law, point, one)) for one in blocks(r, BLOCK)])[: r.size]
+
+    def _blocks(self, inner: Floats, outer: Floats) -> list[Nodes]:
+        """The nodes and weights of blocks of rows."""
+        return _nodes(self.instrument, inner.tobytes(), outer.tobytes())
 
 
 def alpha_of(u) -> Floats:
@@ -78,19 +87,20 @@ def u_of(alpha: float) -> float:
     return float(np.log(s) - np.log(alpha / (1.0 + s)))
 
 
-def _blocks(inner: Floats, outer: Floats):
-    return zip(blocks(inner, BLOCK), blocks(outer, BLOCK), strict=True)
+@lru_cache(maxsize=32)
+def _nodes(instrument: Instrument, inner: bytes, outer: bytes) -> list[Nodes]:
+    ends = zip(*(blocks(np.frombuffer(one), BLOCK) for one in (inner, outer)), strict=True)
+    if instrument.beam is None:
+        return [instrument.nodes(*block) for block in ends]
+    return [instrument.nodes(np.frombuffer(inner), np.frombuffer(outer))]
 
 
-def _light(law: ProfileLaw, rings: bool, point, inner, outer):
+def _light(law: Light, point, rho, weight):
     alpha = _alpha(point[U])
-    mfp, scale, reflected = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE]), law.total(alpha)
-    if rings:
-        within = law.scaled_cdf(jnp.stack([inner, outer]) / mfp, alpha)
-        light = reflected * (within[1] - within[0]) / (jnp.pi * (outer - inner) * (outer + inner))
-    else:
-        light = law.scaled_profile(inner / mfp, alpha) / mfp**2
-    return jnp.append(scale * light, reflected)
+    mfp, scale = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE])
+    x = rho / mfp
+    light = jnp.sum(weight * (2.0 * jnp.pi * x * law.scaled_profile(x, alpha)), axis=-1) / mfp
+    return jnp.append(scale * light, law.total(alpha))
 
 
 def _alpha(u):
@@ -99,32 +109,31 @@ def _alpha(u):
 
 
 def _double(function):
-    """Compile a function of numpy arrays in double precision; the law's class, its setting and `rings` select it."""
+    """Compile a function of numpy arrays in double precision; the law's class and its setting select it."""
     compiled = eqx.filter_jit(function)
 
-    def call(law, rings, *arrays):
+    def call(law, *arrays):
         with jax.enable_x64(True):
             doubles = jax.tree.map(jnp.asarray, (law, arrays))
-            return compiled(doubles[0], rings, *doubles[1])
+            return compiled(doubles[0], *doubles[1])
 
     return call
 
 
 @_double
-def _linearised(law, rings, point, inner, outer):
-    light = partial(_light, law, rings, inner=inner, outer=outer)
+def _linearised(law, point, rho, weight):
+    light = partial(_light, law, rho=rho, weight=weight)
     values, slopes = jax.vmap(lambda way: jax.jvp(light, (point,), (way,)), out_axes=(None, 0))(jnp.eye(len(NAMES)))
     return values, slopes
 
 
 @_double
-def _predicted(law, rings, points, inner, outer):
-    return jax.vmap(lambda point: _light(law, rings, point, inner, outer))(points)
+def _predicted(law, points, rho, weight):
+    return jax.vmap(lambda point: _light(law, point, rho, weight))(points)
 
 
 @_double
-def _shares(law, rings, point, r):
-    del rings
+def _shares(law, point, r):
     return law.scaled_cdf(r / jnp.exp(point[LENGTH]), _alpha(point[U]))
 
 

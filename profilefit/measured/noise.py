@@ -7,15 +7,18 @@ b = S^-1 v / sqrt(N - 1) this is S (1 - b b^T) S, whose inverse root is (Sherman
 
     C^-1/2 = (1 + c b b^T) S^-1,   c = (1 / sqrt(1 - b^T b) - 1) / b^T b.
 
-Without photons to share b is zero, and this divides by sigma.
+Without photons to share b is zero, and this divides by sigma. Where a law stands for the light its own error is a
+covariance of the rows, too; both together are whitened by the root of their sum.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import solve_triangular
 
 from profilefit.measured.data import Measured
 
@@ -26,14 +29,35 @@ LARGEST_SHARE = 1.0 - 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Noise:
-    """The covariance of n rows: root (n,) is the diagonal S [of the values], common (n,) the vector b [-]."""
+    """The covariance of n rows: root (n,) is the diagonal S [of the values], common (n,) the vector b [-].
+
+    model (n, n) is that of the error of what the rows are held against, None where it has none.
+    """
 
     root: Floats
     common: Floats
+    model: Floats | None = None
 
     @property
     def share(self) -> float:
         return float(self.common @ self.common)
+
+    @property
+    def alone(self) -> Noise:
+        """The errors of the data only."""
+        return replace(self, model=None)
+
+    @property
+    def data(self) -> Floats:
+        """(n, n) covariance of the data's own errors."""
+        inner = np.eye(self.root.size) - np.outer(self.common, self.common)
+        return inner * np.outer(self.root, self.root)
+
+    @cached_property
+    def _whole(self) -> Floats:
+        """Root of the data's covariance and the model's, lower triangle, over the data's errors."""
+        model = np.zeros((self.root.size,) * 2) if self.model is None else self.model
+        return np.asarray(np.linalg.cholesky((self.data + model) / np.outer(self.root, self.root)), float)
 
     @property
     def sigma(self) -> Floats:
@@ -43,16 +67,19 @@ class Noise:
     def whitened(self, rows: Floats) -> Floats:
         """Rows (n,) or (n, k) in standard errors, independent of each other."""
         alone = (rows.T / self.root).T
+        if self.model is not None:
+            whitened: Floats = solve_triangular(self._whole, alone, lower=True, check_finite=False)
+            return whitened
         if self.share == 0.0:
             return alone
         growth = (1.0 / np.sqrt(1.0 - self.share) - 1.0) / self.share
         return alone + growth * np.multiply.outer(self.common, self.common @ alone)
 
 
-def noise(data: Measured, light: Floats | None = None, widening: float = 1.0) -> Noise:
+def noise(data: Measured, light: Floats | None = None, widening: float = 1.0, model: Floats | None = None) -> Noise:
     """The errors of the data; of counts those of `light` (n,), where a fit predicts it better than the counts.
 
-    widening    factor on every variance
+    widening    factor on every variance; model (n, n) covariance of the error of what the rows are held against
     """
     expected = data.value if light is None or not data.counted else light
     others = data.photons - 1.0
@@ -60,4 +87,4 @@ def noise(data: Measured, light: Floats | None = None, widening: float = 1.0) ->
     root = np.sqrt(widening * variance)
     common = expected / (np.sqrt(others) * root)
     share = float(common @ common)
-    return Noise(root, common * np.sqrt(min(1.0, LARGEST_SHARE / share)) if share > 0 else common)
+    return Noise(root, common * np.sqrt(min(1.0, LARGEST_SHARE / share)) if share > 0 else common, model)

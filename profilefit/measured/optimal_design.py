@@ -55,7 +55,7 @@ class Advice:
 
 def advised(found: MediumFit) -> Advice:
     """Rank additional measurements by the largest relative error that would remain."""
-    now = relative_errors(found, found.statistical)
+    now = relative_errors(found, found.likely)
     name = max(now, key=lambda one: now[one])
     best: dict[str, Candidate] = {}
     for one in [*_points(found), *_others(found)]:
@@ -80,7 +80,7 @@ def _points(found: MediumFit) -> list[Candidate]:
 def _others(found: MediumFit) -> list[Candidate]:
     (*_, reflectance), slopes = found.predicted[0], found.predicted[1]
     scale = found.values["scale"]
-    four = {name: one / np.sqrt(REPEATS) for name, one in relative_errors(found, found.statistical).items()}
+    four = relative_errors(found, _repeated(found))
     out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
     if found.question.total is None and found.data.medium is None:  # a simulation states it already
         error = REFERENCE_ERROR * reflectance
@@ -89,6 +89,16 @@ def _others(found: MediumFit) -> list[Candidate]:
         slope = scale * np.eye(len(NAMES))[SCALE]
         out.append(_candidate(found, "scale", np.nan, np.nan, scale, REFERENCE_ERROR * scale, slope))
     return out
+
+
+def _repeated(found: MediumFit) -> Floats:
+    """Covariance of the coordinates where the data's errors are those of REPEATS profiles, and the law's stay."""
+    law, free = found.law_rows, list(found.question.free)
+    rows = law + (np.eye(len(law)) - law) / REPEATS
+    gain = np.linalg.pinv(np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
+    covariance = np.zeros((len(NAMES), len(NAMES)))
+    covariance[np.ix_(free, free)] = gain @ gain.T
+    return covariance
 
 
 def _candidate(

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw
-from profilefit.measured.model import NAMES, u_of
+from profilefit.measured.instrument import PENCIL, Instrument
+from profilefit.measured.model import NAMES, Light, u_of
 
 Floats = NDArray[np.float64]
 LEAST, MOST = 1e-9, 1.0 - 1e-9  # albedos that can be held
@@ -26,16 +28,18 @@ class Known:
 
 @dataclass(frozen=True)
 class Question:
-    """A law to fit, by the medium's albedo, its transport mean free path and the scale of the values.
+    """What to fit: exact light or a law, by the albedo, the transport mean free path and the scale of the values.
 
+    instrument  the beam, and what a row is averaged over
     held    coordinates that stay where they are, by name: alpha, l, scale, as values (not logarithms)
     total   the total reflectance A [-], if that was measured as well; scale known to within an error
     """
 
-    law: ProfileLaw
+    law: Light
     held: dict[str, float] = field(default_factory=dict)
     total: Known | None = None
     scale: Known | None = None
+    instrument: Instrument = PENCIL
 
     @property
     def free(self) -> tuple[int, ...]:
@@ -52,16 +56,20 @@ class Question:
         return point
 
 
-def held_albedo(law: ProfileLaw, name: str, value: float) -> float:
+def held_albedo(law: Light, name: str, value: float) -> float:
     """The albedo at which `alpha` or `A` is `value`; InputError where the law has none."""
     if name == "alpha":
         if not LEAST <= value <= MOST:
             raise InputError(f"held alpha must be a single-scattering albedo in (0, 1), got {value:g}")
         return value
-    with np.errstate(all="ignore"):
-        low, high = (float(np.asarray(law.total(np.float64(end)))) for end in (LEAST, MOST))
+
+    def total(alpha: float) -> float:
+        with jax.enable_x64(True), np.errstate(all="ignore"):
+            return float(law.total(jnp.float64(alpha)))
+
+    low, high = (total(end) for end in (LEAST, MOST))
     if not low <= value <= high:
         raise InputError(
             f"held A must be a total reflectance in [{low:.3g}, {high:.5g}] of this light and surface, got {value:g}"
         )
-    return float(brentq(lambda alpha: float(np.asarray(law.total(np.float64(alpha)))) - value, LEAST, MOST, xtol=1e-14))
+    return float(brentq(lambda alpha: total(alpha) - value, LEAST, MOST, xtol=1e-14))

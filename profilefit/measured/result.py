@@ -16,12 +16,13 @@ from numpy.typing import NDArray
 
 from profilefit.fitting.chains import Walk, walk
 from profilefit.measured import model
+from profilefit.measured.beam_width import BeamWidth, beam_width
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit
 from profilefit.measured.identifiability import Identifiability, Interval, identifiability
 from profilefit.measured.model import FLOCK, NAMES, U, u_of
 from profilefit.measured.optimal_design import Advice, advised
-from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, descended
+from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended
 from profilefit.recipes import record
 
 Floats = NDArray[np.float64]
@@ -48,7 +49,7 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
             value = value - np.logaddexp(0.0, full[:, U]) - np.logaddexp(0.0, -full[:, U])
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
-    spread = np.minimum(np.sqrt(np.diag(found.statistical)[free]), WIDEST)
+    spread = np.minimum(np.sqrt(np.diag(found.likely)[free]), WIDEST)
     start = centre[free] + spread * np.random.default_rng(seed).standard_normal((FLOCK, len(free)))
     return walk(log_density, start, centre[free], seed, max_steps, KEPT)
 
@@ -76,7 +77,8 @@ GREY = 0.9  # albedo assumed for the advice where the data do not bound it at al
 class Answer:
     """A judged fit: how identifiable its quantities are, the most informative additional measurements, the chain.
 
-    The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded.
+    The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded. `width` is
+    None of a simulation, whose beam is known, and where a beam is given.
 
     Where the data do not exclude the end of a coordinate's range (alpha = 1, say: chi-square there is within the
     square of the 95 % quantile, 3.84 of known errors, of the minimum), the optimum is no estimate and the derivatives
@@ -91,6 +93,7 @@ class Answer:
     identifiability: Identifiability | None
     advice: Advice | None
     walk: Walk | None
+    width: BeamWidth | None = None
 
     @cached_property
     def draws(self) -> dict[str, Floats]:
@@ -101,18 +104,19 @@ class Answer:
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """The same, each moved by a model error and, where a misfit is detected, by a lack-of-fit error.
+        """The same, each moved by a lack-of-fit error where a misfit is detected.
 
-        Empty if neither is known, or at an end, where derivatives, which propagate them, give no errors.
+        Empty at an end, where derivatives, which propagate it, give no errors.
         """
         found = self.found
         if self.walk is None or not self.identified or not (found.misfit.detected or found.rel is not None):
             return {}
+        if not found.misfit.detected:
+            return self.draws
         free = list(found.question.free)
-        others = found.of_law + (found.of_misfit if found.misfit.detected else 0.0)
         moved = points(found, self.walk.samples)
         generator = np.random.default_rng(len(moved))
-        zero, joint = np.zeros(len(free)), others[np.ix_(free, free)]
+        zero, joint = np.zeros(len(free)), found.of_misfit[np.ix_(free, free)]
         moved[:, free] += generator.multivariate_normal(zero, joint, len(moved), method="eigh")
         return self._quantities(moved)
 
@@ -160,7 +164,7 @@ class Answer:
         return value if inside else None
 
     def interval(self, name: str) -> Ends | None:
-        """95 % by the data's errors alone: of the posterior draws; without a chain, of the profile likelihood.
+        """95 % by the data's errors and the law's: of the posterior draws; without a chain, of the profile likelihood.
 
         Both ends, or one and None: a one-sided limit.
         """
@@ -205,7 +209,8 @@ def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
     # The prior ends at alpha = 1; with any other open end the posterior is unbounded.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
     walked = posterior(found, seed) if walk and found.question.free and not endless else None
-    result = Answer(found, judgement, advised(_inside(found, judgement)), walked)
+    width = None if found.data.medium is not None else beam_width(found)
+    result = Answer(found, judgement, advised(_inside(found, judgement)), walked, width)
     _ = found.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
     return result
 
@@ -229,6 +234,13 @@ def known_medium(data: Measured) -> dict[str, float]:
         return {}
     layer = data.medium.layers[0].similar
     return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
+
+
+def rival_values(found: MediumFit, rival: Minimum) -> dict[str, float]:
+    """The quantities at another minimum."""
+    data = found.data
+    reflectance = found.problem.model.predicted(rival.point[None], data.inner[:1], data.outer[:1])[:, -1]
+    return {name: float(value[0]) for name, value in model.quantities(rival.point[None], reflectance).items()}
 
 
 def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
@@ -264,6 +276,8 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
             "record_sha256": None if found.source is None else found.source.digest,
             "rel": found.rel,
         },
+        "beam": None if question.instrument.beam is None else question.instrument.beam.words,
+        "fibre": question.instrument.fibre,
         "free": [NAMES[at] for at in question.free],
         "held": question.held,
         "known": {"A": question.total, "scale": question.scale},
@@ -285,6 +299,8 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         }
         body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
         body["advice"] = result.advice
+        body["beam_width"] = result.width
+        body["rivals"] = [rival_values(found, one) | {"chi2": one.cost} for one in found.rivals]
         body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
     if result.walk is not None:
         body["posterior"] = {k: v for k, v in vars(result.walk).items() if k not in ("samples", "log_density")}

@@ -7,7 +7,7 @@ A failure is a result: `Minimum.result` is "converged" or says what happened and
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -27,7 +27,8 @@ MAX_STEPS = 1000  # along a ridge, where alpha and scale run away together, hund
 # Albedos and lengths where the search begins; lengths from a twentieth of the first radius to twice the last.
 ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
 LENGTHS, SHORTEST, LONGEST = 20, 1 / 20, 2.0
-STARTS = 4  # the best of them, no two neighbours, that are followed to their minimum
+APART = 0.05  # in a coordinate: minima nearer to each other than that are one
+STARTS = 6  # the best of them, no two neighbours, that are followed to their minimum
 # How far the coordinates may go: beyond, laws have reached their limits. ln l: from the range of the search; ln k: from
 # where it starts, as far as l may go.
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
@@ -49,7 +50,7 @@ class Problem:
 
     @property
     def model(self) -> Model:
-        return Model(self.question.law, self.data.rings)
+        return Model(self.question.law, self.question.instrument)
 
     def residuals(self, point: Floats) -> tuple[Floats, Floats]:
         """Residuals in standard errors (m,) and their derivatives (m, 3): the n rows, then A and scale where known."""
@@ -123,6 +124,8 @@ class Minimum:
     jacobian: Floats
     steps: int
     result: str
+    others: tuple[Minimum, ...] = ()
+    """Other minima that a search found, the lowest first."""
 
     @property
     def cost(self) -> float:
@@ -140,9 +143,19 @@ class Minimum:
 
 
 def minimised(problem: Problem) -> Minimum:
-    """The lowest of the minima that several starts lead to."""
-    found = [descended(problem, start, problem.question.free) for start in problem.starts]
-    return min(found, key=lambda one: (not np.isfinite(one.cost), one.cost))
+    """The lowest of the minima that several starts lead to, and the others."""
+    ends = (descended(problem, start, problem.question.free) for start in problem.starts)
+    lowest, *others = sorted(ends, key=lambda one: (not np.isfinite(one.cost), one.cost))
+    apart: list[Minimum] = []
+    for one in others:
+        if np.isfinite(one.cost) and all(are_apart(one, other) for other in (lowest, *apart)):
+            apart.append(one)
+    return replace(lowest, others=tuple(apart))
+
+
+def are_apart(one: Minimum, other: Minimum) -> bool:
+    """Whether two ends of descents are two minima: their coordinates differ by more than a search leaves open."""
+    return bool(np.max(np.abs(one.point - other.point)) > APART)
 
 
 def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum:

@@ -9,10 +9,12 @@ from pathlib import Path
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.laws.base import ProfileLaw
 from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import EXACT, exact_light
 from profilefit.measured.fitting import fitted
+from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.law_error import origin
+from profilefit.measured.model import Light
 from profilefit.measured.problem import Known, Question, held_albedo
 from profilefit.measured.reading import read
 from profilefit.measured.result import Answer, judged
@@ -23,12 +25,13 @@ HOLDABLE = ("alpha", "A", "l")
 
 def fit(
     data: Measured | Path | str,
-    law: str = "hazard",
+    law: str = EXACT,
     constants: str = "regenerated",
     setting: Setting | None = None,
     held: Mapping[str, float] | None = None,
     total: Known | None = None,
     scale: float | Known | None = 1.0,
+    instrument: Instrument = PENCIL,
     seed: int = 0,
     walk: bool = True,
     folder: Path | None = None,
@@ -36,12 +39,13 @@ def fit(
     """Fit a medium to a measured or simulated profile, and judge the fit.
 
     data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
-    law        its name, and which constants, as for `catalogue.load`
+    law        "exact": light solved exactly; or a law's name, and which constants, as for `catalogue.load`
     setting    illumination and surface; by default the light and the surface that were simulated, else "searchlight"
                (a pencil beam, normal, collimated) and n = 1
     held       fixed quantities: alpha or A [-], l [unit of the data]
     total      the total reflectance A [-], if that was measured too
     scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
+    instrument the beam, and what a row is averaged over
     seed       of the posterior's walkers; walk whether to sample it: else intervals are of the statistical error alone
     folder     of the records, by default the ones shipped
 
@@ -54,8 +58,9 @@ def fit(
         got = f"{measured.illumination} light, got {where.illumination} light to fit"
         raise InputError(f"{measured.source}: a simulation of {got}")
     measured = _noted(measured, where)
-    chosen = catalogue.load(law, constants, where, records)
-    question = Question(chosen, _held(chosen, held or {}, scale), total, scale if isinstance(scale, Known) else None)
+    chosen = exact_light(where) if law == EXACT else catalogue.load(law, constants, where, records)
+    known = scale if isinstance(scale, Known) else None
+    question = Question(chosen, _held(chosen, held or {}, scale), total, known, instrument)
     return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 
 
@@ -66,7 +71,7 @@ def _noted(measured: Measured, setting: Setting) -> Measured:
     return replace(measured, notes=(*measured.notes, f"the file's n is {measured.n:g}, fitted as n = {setting.n:g}"))
 
 
-def _held(law: ProfileLaw, held: Mapping[str, float], scale: float | Known | None) -> dict[str, float]:
+def _held(law: Light, held: Mapping[str, float], scale: float | Known | None) -> dict[str, float]:
     """The coordinates that stay, by name."""
     if unknown := [name for name in held if name not in HOLDABLE]:
         raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
@@ -78,7 +83,7 @@ def _held(law: ProfileLaw, held: Mapping[str, float], scale: float | Known | Non
     return {**values, "scale": _positive("scale", scale)}
 
 
-def _value(law: ProfileLaw, name: str, value: float) -> float:
+def _value(law: Light, name: str, value: float) -> float:
     return _positive("held l", value) if name == "l" else held_albedo(law, name, value)
 
 

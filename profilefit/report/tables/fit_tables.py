@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
-from profilefit.measured.result import Answer, known_medium
+from profilefit.measured.result import Answer, known_medium, rival_values
 from profilefit.report.tables.cells import (
     ABSENT,
     SEARCHLIGHT,
@@ -27,11 +27,12 @@ HELD, EDGE = "held", "edge"
 SHARES = ("A", "alpha")  # which end at 1
 # tests/physics/measured/test_replicates.py: 3 to 10 replicates of 8 to 40 rows, of equal or uneven scatter.
 HELD_IN = "checked on simulated replicates, such intervals cover the truth in 93 to 98 %"
+RIVALLED = ("mu_s'", "mu_a", "scale")
+ODD = (0.5, 2.0)  # scales between these are a calibration's
+REACHED = 0.1  # of the first radius
 TINIEST = 1e-16  # p-value that is worth printing
-CAPTION = (
-    "± statistical: from the errors of the data; ± model: from the law's own error, taken for a Gaussian process along "
-    "ln r"
-)
+CAPTION = "± statistical: from the errors of the data"
+OF_LAW = "; ± model: from the law's own error, taken for a Gaussian process along ln r"
 
 
 def fit_tables(result: Answer, title: str) -> list[RenderableType]:
@@ -59,9 +60,11 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         "": list(names),
         "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
         "± statistical": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
-        "± model": [significant(law[name]) if name in law and name in moving else ABSENT for name in names],
     }
     caption = CAPTION
+    if found.rel != 0:  # exact light has no error of its own
+        columns["± model"] = [significant(law[name]) if name in law and name in moving else ABSENT for name in names]
+        caption += OF_LAW
     if result.identifiability is not None and found.misfit.detected:
         misfit = found.errors(found.of_misfit) if moving else {}
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
@@ -142,6 +145,9 @@ def _lines(result: Answer) -> Iterator[str]:
     if np.isfinite(found.data.pooled):
         yield from _estimated(result)
     yield from _goodness(result)
+    yield from _rivals(result)
+    yield from _beam(result)
+    yield from _scale(result)
     yield from _identifiability(result)
     if (g := _forward(result)) is not None:
         yield (
@@ -195,6 +201,54 @@ def _goodness(result: Answer) -> Iterator[str]:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
         yield "no misfit is detected: one layer explains the data"
+
+
+def _rivals(result: Answer) -> Iterator[str]:
+    """Other media that explain the data as well."""
+    found, unit = result.found, result.found.data.unit
+    for one in found.rivals:
+        values = rival_values(found, one)
+        told = ", ".join(f"{name} {values[name]:.3g} {unit_of(name, unit)}".rstrip() for name in RIVALLED)
+        yield (
+            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - found.minimum.cost:+.1f}. No interval holds "
+            "both: measure nearer to the beam, or the total reflectance, or the scale"
+        )
+
+
+def _beam(result: Answer) -> Iterator[str]:
+    """Which beam was assumed, and whether another one would matter."""
+    found, width = result.found, result.width
+    unit = found.data.unit or "units of r"
+    if found.question.instrument.beam is not None:
+        yield f"beam: {found.question.instrument.beam.words} {unit}"
+    if width is None:
+        return
+    if width.noticed:
+        yield (
+            f"THE BEAM IS NO PENCIL (p-value {_p_value(width.chance)}): a Gaussian one of 1/e^2 radius {width.w:.2g} "
+            f"{unit} explains the data better; without its `beam` the values above are off by more than their errors"
+        )
+    elif width.telling is None:
+        yield "a pencil beam is assumed; no Gaussian beam up to half of the last radius would move a value by its error"
+    else:
+        yield (
+            f"a pencil beam is assumed: a Gaussian one of 1/e^2 radius {width.telling:.2g} {unit} would move "
+            f"{width.moved} by a standard error, and these data would not show it; give `beam` if yours is as wide"
+        )
+
+
+def _scale(result: Answer) -> Iterator[str]:
+    """A free scale that no reflectance has, and a length that the data do not reach."""
+    found = result.found
+    scale, mfp, r = found.values["scale"], found.values["l"], found.data.r
+    free = "scale" in result.moving and found.question.scale is None and found.data.unit
+    if free and not ODD[0] < scale < ODD[1]:
+        yield (
+            f"the scale is {scale:.3g}; of values per incident light it is near 1: if yours are that, hold it, for "
+            "the medium is another one then"
+        )
+    if "l" in result.moving and not REACHED * r[0] < mfp < r[-1]:
+        yield f"l = {mfp:.3g} is beyond the data's reach, from r = {r[0]:.3g} to {r[-1]:.3g}: they tell little of it"
 
 
 def _identifiability(result: Answer) -> Iterator[str]:

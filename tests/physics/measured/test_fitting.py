@@ -14,7 +14,7 @@ from profilefit.fitting.quality import profile_quality
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import MediumFit, fitted
 from profilefit.measured.identifiability import identifiability, relative_errors
-from profilefit.measured.law_error import origin, relative_error
+from profilefit.measured.law_error import BEYOND, RMS, WAVE, origin, relative_error
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.optimal_design import advised
 from profilefit.measured.problem import Known, Question
@@ -34,7 +34,7 @@ TOTAL = LAW.albedo.reflectance(ALPHA)
 def light(inner, outer, scale=1.0) -> np.ndarray:
     """What the law itself would give of this medium."""
     point = np.array([u_of(ALPHA), np.log(MFP), np.log(scale)])
-    return Model(LAW, True).predicted(point[None], inner, outer)[0, :-1]
+    return Model(LAW).predicted(point[None], inner, outer)[0, :-1]
 
 
 def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
@@ -71,18 +71,24 @@ def test_light_without_noise_gives_its_medium(plain, unscaled):
 
 
 def test_errors_are_those_of_linear_least_squares(plain):
-    """A slow, obvious twin: derivatives of the light by differences, and the normal equations."""
+    """A slow, obvious twin: derivatives of the light by differences, and the normal equations.
+
+    The law's own error is a covariance of the rows: rel of it, in waves.
+    """
     data, names, step = plain.data, ("u", "ln l"), 1e-5
     columns = []
     for at in range(len(names)):
         ends = plain.point + step * np.outer([1, -1], np.eye(3)[at])
-        up, down = Model(LAW, True).predicted(ends, data.inner, data.outer)[:, :-1]
-        columns.append((up - down) / (2 * step) / data.sigma)
+        up, down = Model(LAW).predicted(ends, data.inner, data.outer)[:, :-1]
+        columns.append((up - down) / (2 * step))
     jacobian = np.column_stack(columns)
-    covariance = np.linalg.inv(jacobian.T @ jacobian)
-    np.testing.assert_allclose(plain.statistical[:2, :2], covariance, rtol=1e-5)
+    size = RMS * relative_error(LAW, ALPHA, SOURCE) * data.value * np.where(plain.beyond, BEYOND, 1.0)
+    apart = np.subtract.outer(np.log(data.r), np.log(data.r)) / WAVE
+    law, noise = np.exp(-0.5 * apart**2) * np.outer(size, size), np.diag(data.sigma**2)
+    gain = np.linalg.solve(jacobian.T @ np.linalg.solve(law + noise, jacobian), jacobian.T) @ np.linalg.inv(law + noise)
+    for found, rows in ((plain.statistical, noise), (plain.of_law, law), (plain.likely, law + noise)):
+        np.testing.assert_allclose(found[:2, :2], gain @ rows @ gain.T, rtol=1e-4)
     errors = plain.errors(plain.statistical)
-    assert errors["l"] == pytest.approx(MFP * np.sqrt(covariance[1, 1]), rel=1e-5)
     assert errors["scale"] == 0
     assert 0 < plain.errors(plain.of_law)["l"] < errors["l"], "hazard is ten times nearer than these data"
 
@@ -115,7 +121,7 @@ def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
     assert slip.misfit.detected
     for held in ({"l": 1e-300}, {"l": 1e300}, {"l": 1e-9, "alpha": 0.5, "scale": 1e300}):
         failed = fit(rings(), **({"scale": 1.0} | held)).minimum
-        assert not failed.converged or failed.cost > 1e4, held
+        assert not failed.converged or failed.cost > 1e3, held
 
 
 def test_light_that_rises_outwards_runs_away():
@@ -174,7 +180,7 @@ def test_near_the_beam_colour_length_and_scale_are_one():
 def test_intervals_are_where_chi_square_rises(plain):
     """Where the problem is nearly linear the profile likelihood has the width of the covariance."""
     for one in identifiability(plain).intervals:
-        half = 1.96 * plain.errors(plain.statistical)[one.name]
+        half = 1.96 * plain.errors(plain.likely)[one.name]
         assert (one.high - one.low) / 2 == pytest.approx(half, rel=0.05)
         assert one.low < plain.values[one.name] < one.high
 
@@ -220,23 +226,23 @@ def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled
     advice = advised(unscaled)
     found = {one.kind: one for one in advice.candidates}
     assert set(found) == {"point", "reflectance", "scale", "repeats"}
-    assert advice.now == max(relative_errors(unscaled, unscaled.statistical).values())
+    assert advice.now == max(relative_errors(unscaled, unscaled.likely).values())
     best = advice.candidates[0]
     assert best.kind == "reflectance"
     assert best.worst[1] < advice.now / 4
 
     taken = fitted(unscaled.data, replace(unscaled.question, total=Known(TOTAL, best.error)), SOURCE)
-    real = relative_errors(taken, taken.statistical)
+    real = relative_errors(taken, taken.likely)
     assert real == pytest.approx(best.relative, rel=0.02)
 
     point = found["point"]
     value = light(np.array([point.inner]), np.array([point.outer]), 3.0)[0]
     assert value == pytest.approx(point.value, rel=1e-5)
     with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.question, SOURCE)
-    assert relative_errors(with_point, with_point.statistical) == pytest.approx(point.relative, rel=0.02)
+    assert relative_errors(with_point, with_point.likely) == pytest.approx(point.relative, rel=0.02)
     assert max(point.relative.values()) > max(real.values())
     four = fit(rings(error=0.01, scale=3.0))
-    assert relative_errors(four, four.statistical) == pytest.approx(found["repeats"].relative, rel=0.02)
+    assert relative_errors(four, four.likely) == pytest.approx(found["repeats"].relative, rel=0.02)
 
 
 def test_what_is_known_of_a_law():

@@ -16,13 +16,13 @@ R = np.geomspace(0.05, 9.0, BLOCK + 3)  # more than one block
 
 
 def test_points_are_the_laws_own():
-    light, _ = Model(LAW, False).linearised(POINT, R, R)
+    light, _ = Model(LAW).linearised(POINT, R, R)
     np.testing.assert_allclose(light[:-1], 0.7 * LAW.profile(R, 0.9, 1.3), rtol=1e-12)
     assert light[-1] == pytest.approx(LAW.albedo.reflectance(0.9), rel=1e-14)
 
 
 def test_derivatives_and_flocks_agree_with_single_evaluations():
-    model, step = Model(LAW, False), 1e-5
+    model, step = Model(LAW), 1e-5
     light, slopes = model.linearised(POINT, R, R)
     ways = np.concatenate([POINT + step * np.eye(3), POINT - step * np.eye(3)])
     moved = model.predicted(ways, R, R)
@@ -34,7 +34,7 @@ def test_derivatives_and_flocks_agree_with_single_evaluations():
 
 def test_rings_are_averages():
     inner, outer = np.array([0.0, 0.5, 3.0]), np.array([0.3, 0.6, 5.0])
-    found = Model(LAW, True).predicted(POINT[None], inner, outer)[0, :-1]
+    found = Model(LAW).predicted(POINT[None], inner, outer)[0, :-1]
     nodes, weights = np.polynomial.legendre.leggauss(200)
     r = 0.5 * (outer + inner)[:, None] + 0.5 * (outer - inner)[:, None] * nodes
     integral = np.sum(2 * np.pi * r * 0.7 * LAW.profile(r, 0.9, 1.3) * weights, axis=1) * 0.5 * (outer - inner)

@@ -22,7 +22,7 @@ PHOTONS = 10**6
 
 def energies(alpha, mfp=1.0) -> np.ndarray:
     """Shares of the photons that leave through each ring (32,), by the law itself."""
-    return Model(LAW, True).predicted(np.array([[u_of(alpha), np.log(mfp), 0.0]]), INNER, OUTER)[0, :-1] * AREAS
+    return Model(LAW).predicted(np.array([[u_of(alpha), np.log(mfp), 0.0]]), INNER, OUTER)[0, :-1] * AREAS
 
 
 def counted(share, photons=PHOTONS) -> Measured:
@@ -66,8 +66,10 @@ def test_errors_of_a_fit_are_those_of_the_full_covariance(alpha, too_wide):
     found = fitted(data, question, SOURCE)
     assert found.minimum.converged
     slopes = found.predicted[1][:-1, :2]
-    exact = np.linalg.inv(slopes.T @ np.linalg.solve(covariance(energies(alpha)), slopes))
-    np.testing.assert_allclose(found.statistical[:2, :2], exact, rtol=1e-4)
+    photons, law = covariance(energies(alpha)), found.problem.noise.model
+    gain = np.linalg.solve(slopes.T @ np.linalg.solve(photons + law, slopes), slopes.T) @ np.linalg.inv(photons + law)
+    np.testing.assert_allclose(found.statistical[:2, :2], gain @ photons @ gain.T, rtol=1e-4)
+    exact = np.linalg.inv(slopes.T @ np.linalg.solve(photons, slopes))
     weights = 1 / (data.sigma**2 + data.value**2 / PHOTONS)
     apart = np.linalg.inv(slopes.T @ (weights[:, None] * slopes))
     assert np.sqrt(apart[0, 0] / exact[0, 0]) > too_wide

@@ -10,7 +10,9 @@ from mcml_sim import Setting, half_space
 from profilefit.errors import InputError, SettingError
 from profilefit.measured import Known, fit, read
 from profilefit.measured.fitting import fitted
+from profilefit.measured.law_error import origin
 from profilefit.measured.problem import Question
+from profilefit.recipes.catalogue import fits_folder
 
 DATA = Path(__file__).parents[3] / "examples"
 PHANTOM = DATA / "phantom.csv"  # alpha .95, l 1.1 mm
@@ -28,8 +30,8 @@ def test_it_reads_files():
 
 def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
-    parts = fitted(near, Question(law, {"scale": 1.0}))
-    result = fit(near, walk=False)
+    parts = fitted(near, Question(law, {"scale": 1.0}), origin("hazard", "regenerated", Setting(), fits_folder()))
+    result = fit(near, "hazard", walk=False)
     assert result.found.values == parts.values
     assert result.walk is None
     assert result.identifiability.all_identified
@@ -50,9 +52,12 @@ def test_a_simulation_brings_its_own_surface():
     simulated = read(DATA / "half_space.mco")
     oily = replace(simulated, medium=half_space(0.9, n=1.67))
     with pytest.raises(SettingError, match=r"belongs to .* n in \(1, 1.6\].*, got a request for searchlight, n = 1.67"):
-        fit(oily)
+        fit(oily, "hazard")
+    with pytest.raises(SettingError, match=r"the exact half space has n >= 1 and g = 0, got searchlight, n = 0.9"):
+        fit(oily, setting=Setting(n=0.9))
     found = fit(oily, setting=Setting(n=1.38), walk=False).found
     assert found.question.law.setting.n == 1.38
+    assert found.rel == 0, "light solved exactly"
     assert "the file's n is 1.67, fitted as n = 1.38" in found.data.notes
 
 

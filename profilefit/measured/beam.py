@@ -1,0 +1,188 @@
+"""Beams: irradiance about an axis, and its mean over circles that are not about it.
+
+K(d, rho) is the mean of the irradiance b over the circle of radius rho about a point at the distance d from the axis; b
+integrates to 1. A Gaussian beam of 1/e^2 radius w, b = 2 / (pi w^2) e^{-2 r^2 / w^2}, has
+K = b(d - rho) I_0(4 d rho / w^2) e^{-4 d rho / w^2}; a top hat of radius a, b = 1 / (pi a^2), has K = b theta / pi,
+cos theta = (d^2 + rho^2 - a^2) / (2 d rho).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import i0e
+
+from mcml_sim.files.whole_file import read_whole
+from profilefit.errors import InputError
+from profilefit.measured.lengths import length
+
+Floats = NDArray[np.float64]
+Nodes = tuple[Floats, Floats]
+PANEL = np.polynomial.legendre.leggauss(6)
+PANELS, REACH = 12, 6.0  # of a Gaussian beam: as wide as its standard deviation twice, so many w to either side
+GRADED, FINER = 9, 3.0  # panels into which the nearest one is divided, each that much narrower than the next
+EDGE = np.polynomial.legendre.leggauss(40)  # where a circle crosses the rim of a top hat
+AROUND = 64  # points on a circle that crosses a measured beam
+TOPHAT = "tophat:"
+MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
+CELLS = re.compile(r"[\s,;]+")
+
+
+class Beam(Protocol):
+    """Irradiance about an axis."""
+
+    @property
+    def words(self) -> str:
+        """What it is, for messages, without a unit."""
+
+    def nodes(self, d: Floats) -> Nodes:
+        """Radii rho and weights K drho, (..., J) each, for distances d from the axis of any shape."""
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A beam of 1/e^2 radius w [unit of r]."""
+
+    w: float
+
+    @property
+    def words(self) -> str:
+        return f"a Gaussian beam of 1/e^2 radius {self.w:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        reach = REACH * self.w
+        rho, weight = _panels(np.maximum(d - reach, 0.0), d + reach)
+        b = 2.0 / (np.pi * self.w**2) * np.exp(-2.0 * ((d[..., None] - rho) / self.w) ** 2)
+        return rho, weight * b * i0e(4.0 * d[..., None] * rho / self.w**2)
+
+
+@dataclass(frozen=True)
+class TopHat:
+    """A uniform disc of radius a [unit of r]."""
+
+    a: float
+
+    @property
+    def words(self) -> str:
+        return f"a top hat of radius {self.a:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        whole, dw = _graded(np.zeros_like(d), np.maximum(self.a - d, 0.0))
+        whole = np.where(dw > 0, whole, self.a)  # off the beam nothing counts, anywhere
+        low, high = np.abs(d - self.a), d + self.a
+        t = 0.5 * (1.0 + EDGE[0])
+        part = low[..., None] + (high - low)[..., None] * t * t * (3.0 - 2.0 * t)  # roots of K at both ends
+        dp = (high - low)[..., None] * 6.0 * t * (1.0 - t) * 0.5 * EDGE[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cosine = (d[..., None] ** 2 + part**2 - self.a**2) / (2.0 * d[..., None] * part)
+        share = np.where(np.isfinite(cosine), np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi, 0.5)
+        weights = np.concatenate([dw, dp * share], axis=-1) / (np.pi * self.a**2)
+        return np.concatenate([whole, part], axis=-1), weights
+
+
+@dataclass(frozen=True, eq=False)
+class Profiled:
+    """A measured beam: irradiance (n,) at radii (n,) from its axis, rising from 0, straight between them, 0 beyond."""
+
+    r: Floats
+    value: Floats
+
+    @cached_property
+    def power(self) -> float:
+        """int 2 pi r b dr of the given irradiance, exact for straight pieces."""
+        a, b, u, v = self.r[:-1], self.r[1:], self.value[:-1], self.value[1:]
+        return float(np.pi / 3.0 * np.sum((b - a) * (u * (2.0 * a + b) + v * (a + 2.0 * b))))
+
+    @property
+    def words(self) -> str:
+        return f"a measured beam out to {self.r[-1]:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        rho, weight = _panels(np.maximum(d - self.r[-1], 0.0), d + self.r[-1])
+        turn = np.pi * (np.arange(AROUND) + 0.5) / AROUND
+        far = np.sqrt(
+            (d[..., None, None] - rho[..., None]) ** 2
+            + 4.0 * d[..., None, None] * rho[..., None] * np.sin(0.5 * turn) ** 2
+        )
+        return rho, weight * np.interp(far, self.r, self.value, right=0.0).mean(axis=-1) / self.power
+
+
+def beam_of(option: str, text: str, unit: str) -> Beam:
+    """A beam from words: 0.5mm, a Gaussian one's 1/e^2 radius; tophat:0.5mm, a radius; or a file of irradiances.
+
+    unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.
+    """
+    if text.lower().endswith((".csv", ".tsv", ".txt")):
+        return _read(Path(text))
+    if text.startswith(TOPHAT):
+        return TopHat(length(option, text.removeprefix(TOPHAT), unit))
+    return Gaussian(length(option, text, unit))
+
+
+def _read(path: Path) -> Profiled:
+    """Rows of a radius [unit of r] and an irradiance in any measure; a first row of names is passed over."""
+    content = read_whole(path, MAX_BYTES)
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{path}: expected a beam of at most {MAX_BYTES} bytes, got a longer file")
+    text = content.decode("utf-8", "replace")
+    lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
+    lines = [(at, line) for at, line in lines if line]
+    rows: list[list[float]] = []
+    for number, (at, line) in enumerate(lines):
+        cells = CELLS.split(line)
+        found = [_number(cell) for cell in cells]
+        if number == 0 and any(math.isnan(one) for one in found):
+            continue
+        if len(found) != 2 or not all(math.isfinite(one) and one >= 0 for one in found):
+            raise InputError(f"{path}:{at}: expected a radius >= 0 and an irradiance >= 0, got {line[:40]!r}")
+        if rows and found[0] <= rows[-1][0]:
+            raise InputError(f"{path}:{at}: expected radii that rise above {rows[-1][0]:g}, got {found[0]:g}")
+        rows.append(found)
+    if not 2 <= len(rows) <= MOST_ROWS or not any(value > 0 for _, value in rows[:-1]):
+        raise InputError(
+            f"{path}: expected 2 to {MOST_ROWS} rows of radius and irradiance, with light, got {len(rows)}"
+        )
+    r, value = np.array(rows).T
+    if r[0] > 0:  # a profile that begins off the axis is flat up to there
+        r, value = np.append(0.0, r), np.append(value[0], value)
+    return Profiled(r, value)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def _panels(low: Floats, high: Floats) -> Nodes:
+    """Of PANELS equal panels, the first of them graded towards its lower end."""
+    edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
+    first, d_first = _graded(low, edges[..., 1])
+    half = 0.5 * np.diff(edges[..., 1:], axis=-1)[..., None]
+    middle = 0.5 * (edges[..., 1:-1] + edges[..., 2:])[..., None]
+    rest, d_rest = middle + half * PANEL[0], half * PANEL[1]
+    flat = (*low.shape, -1)
+    rho = np.concatenate([first, rest.reshape(flat)], axis=-1)
+    return rho, np.concatenate([d_first, d_rest.reshape(flat)], axis=-1)
+
+
+def _graded(low: Floats, high: Floats) -> Nodes:
+    edges, width = _grades()
+    width = (high - low)[..., None] * width
+    return low[..., None] + (high - low)[..., None] * edges, width
+
+
+@lru_cache(maxsize=1)
+def _grades() -> Nodes:
+    """Nodes and weights in (0, 1), finer towards 0."""
+    edges = np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5))
+    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
+    return (middle + half * PANEL[0]).ravel(), (half * PANEL[1]).ravel()

@@ -1,0 +1,91 @@
+"""Whether the data know of a beam that has a width, and what width would matter, where a fit assumes a pencil beam.
+
+The fit is repeated under Gaussian beams of widths from a five-hundredth of the last radius to half of it. If
+chi-square falls by more than a pencil beam's noise explains at 5 %, one-sided since a width is not negative, the data
+know of the width. How far the answer moves under the narrowest beam that moves it, as w^2, says which width would
+move it by a standard error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy import stats
+
+from profilefit.measured import model
+from profilefit.measured.beam import Gaussian
+from profilefit.measured.fitting import MediumFit
+from profilefit.measured.solving import Minimum, Problem, descended
+
+HALVINGS = 9  # of the widths that are tried, from half the last radius
+FINER = 3  # further trials between the best and its neighbours
+NOTICED = 0.05  # chance below which a width is said to be seen
+
+
+@dataclass(frozen=True)
+class BeamWidth:
+    """What a Gaussian beam would do to a fit that assumes a pencil beam.
+
+    w        the 1/e^2 radius that explains the data best [unit of r]; fall how much chi-square falls there; chance how
+             often noise lets it fall as much
+    telling  the 1/e^2 radius that moves `moved`, a quantity, by one of its standard errors [unit of r]; None if no
+             width does
+    """
+
+    w: float
+    fall: float
+    chance: float
+    telling: float | None
+    moved: str
+
+    @property
+    def noticed(self) -> bool:
+        return self.chance < NOTICED
+
+
+def beam_width(found: MediumFit) -> BeamWidth | None:
+    """None where a beam is given, or where the fit has no errors to compare with."""
+    if found.question.instrument.beam is not None or not found.minimum.converged:
+        return None
+    widths = list(0.5 * found.data.r[-1] * 0.5 ** np.arange(HALVINGS - 1.0, -1.0, -1.0))
+    fits = {0.0: found.minimum}
+    start = found.minimum
+    for w in widths:
+        start = _under(found.problem, w, start)
+        fits[w] = start
+    for _ in range(FINER):
+        best = min(fits, key=lambda w: _cost(fits[w]))
+        tried = sorted(fits)
+        at = tried.index(best)
+        for low, high in ((best, tried[min(at + 1, len(tried) - 1)]), (tried[max(at - 1, 0)], best)):
+            between = float(np.sqrt(low * high))
+            if between > 0 and between not in fits:
+                fits[between] = _under(found.problem, between, fits[best])
+    best = min(fits, key=lambda w: _cost(fits[w]))
+    fall = max(found.minimum.cost - _cost(fits[best]), 0.0)
+    chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
+    return BeamWidth(best, fall, chance, *_telling(found, {w: fits[w] for w in widths}))
+
+
+def _under(problem: Problem, w: float, start: Minimum) -> Minimum:
+    instrument = replace(problem.question.instrument, beam=Gaussian(w))
+    there = replace(problem, question=replace(problem.question, instrument=instrument))
+    return descended(there, start.point, problem.question.free)
+
+
+def _cost(one: Minimum) -> float:
+    return one.cost if np.isfinite(one.cost) else np.inf
+
+
+def _telling(found: MediumFit, fits: dict[float, Minimum]) -> tuple[float | None, str]:
+    """The least width that moves a quantity by its standard error, and the quantity."""
+    errors, here = found.errors(found.likely), found.values
+    names = [name for name, error in errors.items() if error > 0]
+    for w, one in fits.items():
+        values = model.quantities(one.point[None], np.array([np.nan]))
+        moved = {name: abs(float(values[name][0]) - here[name]) / errors[name] for name in names if name != "A"}
+        name = max(moved, key=lambda each: moved[each], default="")
+        if name and moved[name] > 1.0:
+            return w / float(np.sqrt(moved[name])), name
+    return None, ""
