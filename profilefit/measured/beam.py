@@ -35,7 +35,7 @@ MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
 CELLS = re.compile(r"[\s,;]+")
 
 
-class Beam(Protocol):
+class Irradiance(Protocol):
     """Irradiance about an axis."""
 
     @property
@@ -114,7 +114,7 @@ class Profiled:
         return rho, weight * np.interp(far, self.r, self.value, right=0.0).mean(axis=-1) / self.power
 
 
-def beam_of(option: str, text: str, unit: str) -> Beam:
+def beam_of(option: str, text: str, unit: str) -> Irradiance:
     """A beam from words: 0.5mm, a Gaussian one's 1/e^2 radius; tophat:0.5mm, a radius; or a file of irradiances.
 
     unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.

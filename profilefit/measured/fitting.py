@@ -24,8 +24,9 @@ from profilefit.measured.solving import Minimum, Problem, are_apart, descended, 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
-# A law's error is that at the albedo of the fit, which it decides: the second round changes nothing that is printed.
-ROUNDS = 2
+# A law's error is that at the albedo of the fit, which it hardly moves: one round more is enough.
+ROUNDS = 1
+FAR = 100.0  # above the lowest chi-square of the search: such minima are not followed under the final errors
 SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search allows for
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
 LEAST_EXPECTED = 0.01
@@ -210,6 +211,8 @@ def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...
     """Of other minima of the search those that fit as well within the interval's level, under the final errors."""
     rivals: list[Minimum] = []
     for one in others:
+        if one.cost > found.minimum.cost + FAR:
+            continue
         there = descended(found.problem, one.point, found.question.free)
         near = there.cost - found.minimum.cost < found.quantile**2
         if near and all(are_apart(there, other) for other in (found.minimum, *rivals)):

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from profilefit.errors import InputError
-from profilefit.measured.beam import Beam, Floats, Nodes
+from profilefit.measured.beam import Floats, Irradiance, Nodes
 
 RING, FIBRE = np.polynomial.legendre.leggauss(16), np.polynomial.legendre.leggauss(12)
 NEAR = 1000.0  # outer over inner radius, up to which a ring's nodes are straight in ln d
@@ -34,7 +34,7 @@ class Instrument:
     fibre  radius of the fibre's core that a point is averaged over [unit of r]; 0 of a point
     """
 
-    beam: Beam | None = None
+    beam: Irradiance | None = None
     fibre: float = 0.0
 
     def nodes(self, inner: Floats, outer: Floats) -> Nodes:

@@ -28,7 +28,7 @@ MAX_STEPS = 1000  # along a ridge, where alpha and scale run away together, hund
 ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
 LENGTHS, SHORTEST, LONGEST = 20, 1 / 20, 2.0
 APART = 0.05  # in a coordinate: minima nearer to each other than that are one
-STARTS = 6  # the best of them, no two neighbours, that are followed to their minimum
+STARTS = 4  # the best of them, no two neighbours, that are followed to their minimum
 # How far the coordinates may go: beyond, laws have reached their limits. ln l: from the range of the search; ln k: from
 # where it starts, as far as l may go.
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0

@@ -76,7 +76,7 @@ def test_a_folder_that_lacks_the_record_gives_no_other(command):
             assert "mine/" in err
             assert "there is no such record; `profilefit regenerate" in err
     Path("mine/burley.csv").write_text("r, value, sigma\n1,1,1\n2,.5,.1\n3,.1,.1\n")
-    status, out, err = command("fit", "mine/burley.csv", "--unit", "mm", "--fits", "mine")
+    status, out, err = command("fit", "mine/burley.csv", "--unit", "mm", "--law", "hazard", "--fits", "mine")
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert "mine/hazard.json: there is no such record" in err
 
