@@ -26,7 +26,6 @@ FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
 WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
-EXACT = "exact"
 PROFILE, PHASE = KINDS = ("profile", "phase")
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
@@ -36,8 +35,8 @@ def fit(
     data: Annotated[Path, typer.Argument(help="A table (.csv, .tsv, .txt), an .mco of MCML, or an .npz of mcml-sim.")],
     kind: Annotated[str, typer.Option(help="profile, or phase: a phase function.")] = PROFILE,
     law: Annotated[
-        str, typer.Option(help=f"exact, or one of {', '.join(PROFILES)}.", autocompletion=options.laws)
-    ] = EXACT,
+        str, typer.Option(help=f"exact, or one of {', '.join(PROFILES)}.", autocompletion=options.fitted)
+    ] = options.EXACT,
     constants: Annotated[
         str,
         typer.Option(
@@ -136,7 +135,7 @@ def fit(
         print_json(body)
     else:
         points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
-        model = "exact light" if law == EXACT else f"law {law}"
+        model = "exact light" if law == options.EXACT else f"law {law}"
         _show(result, f"{one_line(data.name)}: {points}, {model}, {result.found.question.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
@@ -239,10 +238,8 @@ def _instrument(measured: Measured, beam: str | None, fibre: str | None) -> Inst
 
     if fibre is not None and measured.rings:
         raise InputError("--fibre must be left out where rows are averages over annuli")
-    seen = _radius("--fibre", fibre, measured.unit) or 0.0
-    if seen and measured.inner[0] < seen:
-        raise InputError(f"--fibre must be at most the first r {measured.inner[0]:g}, got {fibre!r}")
-    return Instrument(None if beam is None else beam_of("--beam", beam, measured.unit), seen)
+    light = None if beam is None else beam_of("--beam", beam, measured.unit)
+    return Instrument(light, _radius("--fibre", fibre, measured.unit) or 0.0)
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:

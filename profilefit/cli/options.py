@@ -23,6 +23,7 @@ Fits = Annotated[
 AsJson = Annotated[bool, typer.Option("--json", help="Print all of it as JSON instead.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="No progress and no notes: the result only.")]
 
+EXACT = "exact"  # light that is solved, in place of a law
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 LIGHTS = ("searchlight", "diffuse")
 LIGHTS_HELP = "searchlight, a pencil beam (normal, collimated), or diffuse"
@@ -30,6 +31,7 @@ PARTS = ("truth", "laws", "samplers", "fits", "sea", "fur")
 FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
 OPTIONS = {
+    "beam": "--beam",
     "constants": "--constants",
     "held": "--fix",
     "out": "--out",
@@ -75,6 +77,11 @@ def tested(ctx: typer.Context, incomplete: str) -> Iterator[str]:
 def laws(incomplete: str) -> Iterator[str]:
     """Names of profile laws."""
     return _starting(incomplete, PROFILES)
+
+
+def fitted(incomplete: str) -> Iterator[str]:
+    """What `fit` takes for light: laws, and exact light."""
+    return _starting(incomplete, (EXACT, *PROFILES))
 
 
 def languages(incomplete: str) -> Iterator[str]:

@@ -80,11 +80,11 @@ def _cost(one: Minimum) -> float:
 
 def _telling(found: MediumFit, fits: dict[float, Minimum]) -> tuple[float | None, str]:
     """The least width that moves a quantity by its standard error, and the quantity."""
-    errors, here = found.errors(found.likely), found.values
-    names = [name for name, error in errors.items() if error > 0]
+    here = found.values
+    errors = {name: error for name, error in found.errors(found.likely).items() if error > 0 and name != "A"}
     for w, one in fits.items():
-        values = model.quantities(one.point[None], np.array([np.nan]))
-        moved = {name: abs(float(values[name][0]) - here[name]) / errors[name] for name in names if name != "A"}
+        values = model.quantities(one.point[None], np.zeros(1))  # A, which alpha has already, is not looked at
+        moved = {name: abs(float(values[name][0]) - here[name]) / error for name, error in errors.items()}
         name = max(moved, key=lambda each: moved[each], default="")
         if name and moved[name] > 1.0:
             return w / float(np.sqrt(moved[name])), name

@@ -16,10 +16,10 @@ from __future__ import annotations
 from functools import lru_cache
 
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from jax.typing import ArrayLike
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
@@ -47,13 +47,13 @@ class ExactLight(eqx.Module):
     """The profile of a half space with `setting`; lengths in mean free paths."""
 
     setting: Setting = eqx.field(static=True)
-    rest: Array | Floats
+    rest: Array
     """f's spline in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling."""
-    once: Array | Floats
+    once: Array
     """Of ln D_1 + k_c x, (intervals, 4)."""
-    kappa: Array | Floats
+    kappa: Array
     """Of kappa in the same polynomials as f, (degrees,)."""
-    share: Array | Floats
+    share: Array
     """A / alpha in Chebyshev polynomials of s, (degrees,)."""
 
     def total(self, alpha) -> Array:
@@ -95,28 +95,23 @@ def exact_light(setting: Setting) -> ExactLight:
     x = np.exp(log)[None]
     solved = np.minimum(x, np.where(kappa > WHITE, SOLVED, SOLVED_WHITE) / kappa)
     light = 2.0 * np.pi * solved * exact.profile(solved, alpha[:, None], setting=setting)
-    rest = (light - alpha[:, None] * _once(solved, setting)) / alpha[:, None] ** 2
+    rest = (light - alpha[:, None] * np.exp(_log_once(solved, setting))) / alpha[:, None] ** 2
     f = np.log(rest) + kappa * solved - np.log1p(kappa * solved) - 2.0 * np.log(x / solved)
     near = np.arange(np.log(SINGLE_NEAREST), np.log(FARTHEST) + STEP, STEP)
     far = single_scattering.critical_rate(setting) * np.exp(near)
     whole = _nodes() * 0.5 + 0.5
-    return ExactLight(
-        setting,
+    tables = (
         _coefficients(CubicSpline(log, f, axis=1).c.transpose(2, 1, 0)),
         CubicSpline(near, _log_once(np.exp(near), setting) + far).c.T,
         _coefficients(kappa[:, 0]),
         _coefficients(np.asarray(exact.reflectance(1.0 - whole**2, setting=setting)) / (1.0 - whole**2)),
     )
-
-
-def _once(x: Floats, setting: Setting) -> Floats:
-    """D_1 = 2 pi x R_1 / alpha of light scattered once [1/mfp]."""
-    k, weight = single_scattering.transform_density(setting)
-    return single_scattering.entered(setting) * (np.exp(-np.multiply.outer(x, k)) @ (k * weight))
+    with jax.enable_x64(True):
+        return ExactLight(setting, *map(jnp.asarray, tables))
 
 
 def _log_once(x: Floats, setting: Setting) -> Floats:
-    """ln of the same, where it has long underflowed, too."""
+    """ln of D_1 = 2 pi x R_1 / alpha, light scattered once [1/mfp], also where D_1 has long underflowed."""
     k, weight = single_scattering.transform_density(setting)
     critical = single_scattering.critical_rate(setting)
     decayed = np.exp(-np.multiply.outer(x, k - critical)) @ (k * weight)
@@ -142,9 +137,9 @@ def _chebyshev(s, most: float) -> Array:
     return jnp.cos(jnp.arange(DEGREES) * jnp.arccos(z))
 
 
-def _spline(coefficients: ArrayLike, at: Array) -> Array:
+def _spline(coefficients: Array, at: Array) -> Array:
     """At places in intervals of STEP, (intervals, 4) and (...)."""
-    interval = jnp.clip(jnp.floor(at), 0, jnp.shape(coefficients)[0] - 1).astype(int)
+    interval = jnp.clip(jnp.floor(at), 0, coefficients.shape[0] - 1).astype(int)
     t = (at - interval) * STEP
-    a, b, c, d = jnp.moveaxis(jnp.asarray(coefficients)[interval], -1, 0)
+    a, b, c, d = jnp.moveaxis(coefficients[interval], -1, 0)
     return d + t * (c + t * (b + t * a))

@@ -5,21 +5,21 @@ The light at a distance d from the axis of a beam of irradiance b is
     R_b(d) = int_0^inf D(rho) K(d, rho) drho,    D = 2 pi rho R_d(rho),    K the mean of b over a circle (`beam`)
 
 (the convolution of R_d with b in polar coordinates), and a row is its mean over a ring or the end of a fibre. So a
-row is a sum over nodes rho with weights that know nothing of the medium. Under a beam all rows share their nodes:
-between these D is a polynomial through eight of them, in t = ln(e^{rho / grain} - 1), which is ln rho near the axis
-and rho itself far from it.
+row is a sum over nodes rho with weights that know nothing of the medium. All rows share their nodes. Points under a
+pencil beam are their own; else D between nodes is a polynomial through eight of them, in t = ln(e^{rho / grain} - 1),
+which is ln rho near the axis and rho itself far from it.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
-from profilefit.errors import InputError
-from profilefit.measured.beam import Floats, Irradiance, Nodes
+from profilefit.measured.beam import Floats, Irradiance, Nodes, TopHat
 
-RING, FIBRE = np.polynomial.legendre.leggauss(16), np.polynomial.legendre.leggauss(12)
+RING = np.polynomial.legendre.leggauss(16)
 NEAR = 1000.0  # outer over inner radius, up to which a ring's nodes are straight in ln d
 # Shared nodes: how many a polynomial goes through, their distance in t, the first t, and grains to the last of them.
 STENCIL, STEP, FIRST, GRAINS = 8, 0.2, -10.0, 120.0
@@ -31,7 +31,7 @@ class Instrument:
     """How the light of a row is gathered.
 
     beam   None of a pencil beam
-    fibre  radius of the fibre's core that a point is averaged over [unit of r]; 0 of a point
+    fibre  radius of the fibre's core that a point is averaged over [unit of r], which may cover the axis; 0 of a point
     """
 
     beam: Irradiance | None = None
@@ -40,13 +40,14 @@ class Instrument:
     def nodes(self, inner: Floats, outer: Floats) -> Nodes:
         """Radii and weights [1/unit^2 per D drho] of rows from `inner` to `outer` (n,).
 
-        Of a pencil beam (n, J) both; of another the radii (m,) are those of all rows, and the weights (n, m).
+        The radii (m,) are those of all rows, and the weights (n, m).
         """
         d, mean = self._distances(inner, outer)
         if self.beam is None:
-            return d, mean / (2.0 * np.pi * d)
-        rows = [self.beam.nodes(one) for one in d]
-        return _shared(rows, mean)
+            own = mean / (2.0 * np.pi * d)
+            return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True))
+        beams = (self.beam.nodes(one) for one in d)
+        return _shared((rho, share[:, None] * weight) for (rho, weight), share in zip(beams, mean, strict=True))
 
     def _distances(self, inner: Floats, outer: Floats) -> Nodes:
         """Distances (n, M) from the axis, and how much each counts in the mean over the row's area."""
@@ -62,31 +63,25 @@ class Instrument:
             return d, 2.0 * d * step / ((outer - inner) * (outer + inner))[:, None]
         if self.fibre == 0:
             return inner[:, None], np.ones((inner.size, 1))
-        low, high = np.abs(inner - self.fibre)[:, None], (inner + self.fibre)[:, None]
-        if np.any(inner < self.fibre):
-            raise InputError(f"a fibre of core radius {self.fibre:g} must not cover the axis, got r = {inner.min():g}")
-        t, dt = 0.5 * (1.0 + FIBRE[0]), 0.5 * FIBRE[1]
-        d = low + (high - low) * t * t * (3.0 - 2.0 * t)
-        cosine = (d**2 + inner[:, None] ** 2 - self.fibre**2) / (2.0 * d * inner[:, None])
-        share = 2.0 * d * np.arccos(np.clip(cosine, -1.0, 1.0)) / (np.pi * self.fibre**2)
-        return d, share * (high - low) * 6.0 * t * (1.0 - t) * dt
+        d, share = TopHat(self.fibre).nodes(inner)  # a circle's share of a disc, whichever of them is about the axis
+        return d, 2.0 * np.pi * d * share
 
 
 PENCIL = Instrument()
 
 
-def _shared(rows: list[Nodes], mean: Floats) -> Nodes:
-    """The nodes of all rows, each (M, J), on common ones, as many for any beam."""
+def _shared(each: Iterable[Nodes]) -> Nodes:
+    """The nodes and weights of all rows on common nodes, as many for any beam."""
+    rows = list(each)
     grain = max(float(rho.max()) for rho, _ in rows) / GRAINS
     weights = np.zeros((len(rows), COUNT))
-    for row, ((rho, weight), share) in enumerate(zip(rows, mean, strict=True)):
+    for row, (rho, weight) in enumerate(rows):
         at = (np.maximum(_straight(rho / grain), FIRST).ravel() - FIRST) / STEP
         first = np.clip(np.floor(at).astype(int) - STENCIL // 2 + 1, 0, COUNT - STENCIL)
-        part = (share[:, None] * weight).ravel()
         for one in range(STENCIL):
             others = [other for other in range(STENCIL) if other != one]
             basis = np.prod([(at - first - other) / (one - other) for other in others], axis=0)
-            weights[row] += np.bincount(first + one, part * basis, COUNT)
+            weights[row] += np.bincount(first + one, weight.ravel() * basis, COUNT)
     return grain * np.logaddexp(0.0, FIRST + STEP * np.arange(COUNT)), weights
 
 

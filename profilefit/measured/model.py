@@ -6,8 +6,8 @@ u     s = sqrt(1 - alpha) = 1 / (1 + e^-u): laws are smooth in s, and both ends 
 ln l  of the transport mean free path [ln unit]
 ln k  of the scale: the value column is k times the reflectance per area
 
-The light of a row is a sum over the radii that its instrument gathers (`instrument`). Rows are evaluated in blocks of
-one size, so that data of any length share one compiled function.
+The light of a row is a sum over the radii that its instrument gathers (`instrument`). Their number is
+filled up to a multiple of one size, so that data of many lengths share one compiled function.
 
 The quantities A, alpha, l, mu_s' and mu_a follow from the coordinates, with errors.
 """
@@ -22,12 +22,12 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
+from jax import Array
 from numpy.typing import NDArray
 from scipy.special import expit
 
 from mcml_sim.exact.by_albedo import blocks
 from profilefit.laws.base import ProfileLaw
-from profilefit.measured.beam import Nodes
 from profilefit.measured.exact_light import ExactLight
 from profilefit.measured.instrument import PENCIL, Instrument
 
@@ -35,7 +35,7 @@ Floats = NDArray[np.float64]
 NAMES = ("alpha", "l", "scale")
 U, LENGTH, SCALE = range(3)
 BLOCK = 32  # radii
-FLOCK = 32  # points of the three coordinates that are evaluated at once
+FLOCK = 16  # points of the three coordinates that are evaluated at once
 
 
 Light = ProfileLaw | ExactLight
@@ -50,29 +50,24 @@ class Model:
 
     def linearised(self, point: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
         """Predictions (n + 1,) at one point (3,), the last being A, and their derivatives (n + 1, 3)."""
-        parts = [_linearised(self.law, point, *block) for block in self._blocks(inner, outer)]
-        light = np.concatenate([np.asarray(value)[:-1] for value, _ in parts])[: inner.size]
-        slopes = np.concatenate([np.asarray(slope)[:, :-1] for _, slope in parts], axis=1)[:, : inner.size]
-        value, slope = parts[0]
-        return np.append(light, np.asarray(value)[-1]), np.column_stack([slopes, np.asarray(slope)[:, -1]]).T
+        values, slopes = _linearised(self.law, point, *self._nodes(inner, outer))
+        rows = np.append(np.arange(inner.size), -1)
+        return np.asarray(values)[rows], np.asarray(slopes)[:, rows].T
 
     def predicted(self, points: Floats, inner: Floats, outer: Floats) -> Floats:
         """Predictions (m, n + 1) at points (m, 3), the last column being A."""
         flocks = -(-len(points) // FLOCK)
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
-        rows = []
-        for flock in np.split(filled, flocks):
-            parts = [np.asarray(_predicted(self.law, flock, *block)) for block in self._blocks(inner, outer)]
-            light = np.concatenate([part[:, :-1] for part in parts], axis=1)[:, : inner.size]
-            rows.append(np.column_stack([light, parts[0][:, -1]]))
-        return np.concatenate(rows)[: len(points)]
+        nodes, rows = self._nodes(inner, outer), np.append(np.arange(inner.size), -1)
+        light = [np.asarray(_predicted(self.law, flock, *nodes))[:, rows] for flock in np.split(filled, flocks)]
+        return np.concatenate(light)[: len(points)]
 
     def shares(self, point: Floats, r: Floats) -> Floats:
         """Shares of the reflected energy within radii (n,) [-]."""
         return np.concatenate([np.asarray(_shares(self.law, point, one)) for one in blocks(r, BLOCK)])[: r.size]
 
-    def _blocks(self, inner: Floats, outer: Floats) -> list[Nodes]:
-        """The nodes and weights of blocks of rows."""
+    def _nodes(self, inner: Floats, outer: Floats) -> tuple[Array, Array]:
+        """Those of the rows, and of more like the last up to a multiple of BLOCK."""
         return _nodes(self.instrument, inner.tobytes(), outer.tobytes())
 
 
@@ -88,18 +83,17 @@ def u_of(alpha: float) -> float:
 
 
 @lru_cache(maxsize=32)
-def _nodes(instrument: Instrument, inner: bytes, outer: bytes) -> list[Nodes]:
-    ends = zip(*(blocks(np.frombuffer(one), BLOCK) for one in (inner, outer)), strict=True)
-    if instrument.beam is None:
-        return [instrument.nodes(*block) for block in ends]
-    return [instrument.nodes(np.frombuffer(inner), np.frombuffer(outer))]
+def _nodes(instrument: Instrument, inner: bytes, outer: bytes) -> tuple[Array, Array]:
+    nodes = instrument.nodes(*(np.concatenate(blocks(np.frombuffer(one), BLOCK)) for one in (inner, outer)))
+    with jax.enable_x64(True):
+        return jnp.asarray(nodes[0]), jnp.asarray(nodes[1])
 
 
 def _light(law: Light, point, rho, weight):
     alpha = _alpha(point[U])
     mfp, scale = jnp.exp(point[LENGTH]), jnp.exp(point[SCALE])
     x = rho / mfp
-    light = jnp.sum(weight * (2.0 * jnp.pi * x * law.scaled_profile(x, alpha)), axis=-1) / mfp
+    light = weight @ (2.0 * jnp.pi * x * law.scaled_profile(x, alpha)) / mfp
     return jnp.append(scale * light, law.total(alpha))
 
 

@@ -27,6 +27,7 @@ from profilefit.recipes import record
 
 Floats = NDArray[np.float64]
 KEPT = 4000
+WALKERS = 2 * FLOCK  # which move by halves
 MAX_STEPS = 20_000
 ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
 WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not constrain
@@ -50,7 +51,7 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
     spread = np.minimum(np.sqrt(np.diag(found.likely)[free]), WIDEST)
-    start = centre[free] + spread * np.random.default_rng(seed).standard_normal((FLOCK, len(free)))
+    start = centre[free] + spread * np.random.default_rng(seed).standard_normal((WALKERS, len(free)))
     return walk(log_density, start, centre[free], seed, max_steps, KEPT)
 
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT, exact_light
 from profilefit.measured.fitting import fitted
@@ -58,10 +59,20 @@ def fit(
         got = f"{measured.illumination} light, got {where.illumination} light to fit"
         raise InputError(f"{measured.source}: a simulation of {got}")
     measured = _noted(measured, where)
-    chosen = exact_light(where) if law == EXACT else catalogue.load(law, constants, where, records)
+    chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
     question = Question(chosen, _held(chosen, held or {}, scale), total, known, instrument)
     return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
+
+
+def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
+    if law == EXACT:
+        if constants != "regenerated":
+            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
+        return exact_light(setting)
+    if law not in profile_classes() and not law.startswith("gaussians:"):
+        raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")
+    return catalogue.load(law, constants, setting, folder)
 
 
 def _noted(measured: Measured, setting: Setting) -> Measured:

@@ -151,8 +151,8 @@ def _lines(result: Answer) -> Iterator[str]:
     yield from _identifiability(result)
     if (g := _forward(result)) is not None:
         yield (
-            f"the medium scatters with g = {g:g}, the law isotropically: within ten transport mean free paths this is "
-            "off by tens of percent, which shows as a misfit only if rows lie within one"
+            f"the medium scatters with g = {g:g}, what is fitted isotropically: within ten transport mean free paths "
+            "this is off by tens of percent, which shows as a misfit only if rows lie within one"
         )
     if found.rel is None:
         yield "the model error is unknown for this surface: there is neither an exact profile nor a record of it"
@@ -192,8 +192,8 @@ def _goodness(result: Answer) -> Iterator[str]:
     )
     if one.detected:
         yield (
-            f"MISFIT (p-value {_p_value(one.joined)}): one layer does not explain the data under this law, "
-            f"illumination and surface; residuals of {100 * one.relative:.2g} % of a value are unexplained"
+            f"MISFIT (p-value {_p_value(one.joined)}): one layer does not explain the data under this light, "
+            f"scattering and surface; residuals of {100 * one.relative:.2g} % of a value are unexplained"
         )
     elif one.within_law:
         yield "the misfit is within the law's own error: what is missing is a better law, not another medium"

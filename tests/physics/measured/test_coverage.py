@@ -9,6 +9,7 @@ from scipy import stats
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
 from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
 from profilefit.measured.identifiability import identifiability
 from profilefit.measured.law_error import origin
@@ -149,7 +150,7 @@ def test_errors_of_simulations_are_the_scatter_of_seeds(tmp_path):
 def test_the_chain_has_the_width_of_the_covariance(replicates):
     walked = posterior(replicates[0])
     assert walked.result == "converged"
-    expected = np.sqrt(np.diag(replicates[0].statistical))[:2]
+    expected = np.sqrt(np.diag(replicates[0].likely))[:2]
     # 4000 thinned draws of tau ten know a standard deviation to 4 %: three of these.
     np.testing.assert_allclose(walked.samples.std(axis=0), expected, rtol=0.12)
 
@@ -177,14 +178,13 @@ def test_simulated_tissue_and_what_similarity_costs(tmp_path):
             Medium((Layer(1.4, 0.2, 10.0 / (1 - g), g),)), Grid(0.01, 150, 1.0, 1), 2**19, seed=seed, progress=False
         )
         write_results(tally, tmp_path / "a.npz")
-        data, law = read(tmp_path / "a.npz"), catalogue.load("hazard", setting=Setting(n=1.4))
+        data, question = read(tmp_path / "a.npz"), Question(exact_light(Setting(n=1.4)), {"scale": 1.0})
         for least in (None, 0.2):
-            question = Question(law, {"scale": 1.0})
-            found[g, least] = fitted(data.within(least, None), question, source(law.setting))
+            found[g, least] = fitted(data.within(least, None), question)
     straight = found[0.0, None]
-    joint = straight.errors(straight.statistical + straight.of_law)
-    assert abs(straight.values["mu_a"] - 0.2) < 3 * joint["mu_a"]
-    assert abs(straight.values["mu_s'"] - 10.0) < 3 * joint["mu_s'"]
+    errors = straight.errors(straight.statistical)
+    assert abs(straight.values["mu_a"] - 0.2) < 3 * errors["mu_a"]
+    assert abs(straight.values["mu_s'"] - 10.0) < 3 * errors["mu_s'"]
     assert not straight.misfit.detected
     whole, far = found[0.9, None], found[0.9, 0.2]
     assert whole.misfit.detected

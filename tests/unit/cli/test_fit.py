@@ -148,7 +148,7 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
     ("words", "told"),
     [
         (("nothing.csv",), "nothing.csv: expected a file that can be read, got: No such file"),
-        ((PHANTOM, "--law", "hazzard"), "law must be one of liang, burley"),
+        ((PHANTOM, "--law", "hazzard"), "law must be one of exact, liang, burley"),
         (
             (PHANTOM, "--law", "hazard", "--n", "1.7"),
             "got a request for searchlight, n = 1.7, g = 0; --n and --light choose one of these",
@@ -158,7 +158,11 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         ((PHANTOM, "--beam", "tophat:wide"), "--beam must be a length > 0 such as 1.2mm"),
         ((PHANTOM, "--beam", "none.csv"), "none.csv"),
         ((PHANTOM, "--beam", PHANTOM), "phantom.csv:3: expected a radius >= 0 and an irradiance >= 0, got"),
-        ((PHANTOM, "--fibre", "2mm"), "--fibre must be at most the first r 0.2, got '2mm'"),
+        ((PHANTOM, "--fibre", "0"), "--fibre must be a length > 0 such as 1.2mm"),
+        (
+            (PHANTOM, "--constants", "published"),
+            "--constants must be left out where light is solved exactly, got 'published'",
+        ),
         ((str(DATA / "half_space.mco"), "--fibre", "2mm"), "--fibre must be left out where rows are averages"),
         ((PHANTOM, "--n", "-1"), "n must be a refractive index > 0"),
         ((PHANTOM, "--light", "sun"), "--light must be one of searchlight, diffuse, got 'sun'"),
