@@ -23,13 +23,14 @@ from scalar_half_space import ROULETTE_CHANCE, WEIGHT_THRESHOLD
 
 from mcml_sim import Orders, exact
 from mcml_sim.exact import single_scattering
-from mcml_sim.tracing import order_bins
+from mcml_sim.tracing.order_bins import OrderBins
 from profilefit.studies.tradeoff.stopwatch import take_turns
 
 Floats = NDArray[np.float64]
 
 ALPHAS = 1 - np.linspace(0.97, 0.07, 32) ** 2
 ACCURACY = 0.01  # relative standard error of every ring
+ORDERS = OrderBins()
 FIRST_RING = 1  # the disc inside the innermost of the 100 rings is not one of them
 
 
@@ -69,14 +70,14 @@ def scalar_second_moments(alphas: Floats, probabilities: Floats) -> Floats:
     """Mean squared weight that one scalar photon brings to each ring, (alphas, rings)."""
     moments = np.empty((alphas.size, probabilities.shape[0]))
     for row, alpha in enumerate(alphas):
-        by_order = np.empty(order_bins.MAX_ORDER)
+        by_order = np.empty(ORDERS.max_order)
         weight, chance = 1.0, 1.0
         for n in range(by_order.size):
             weight *= alpha
             if weight < WEIGHT_THRESHOLD:
                 weight, chance = weight / ROULETTE_CHANCE, chance * ROULETTE_CHANCE
             by_order[n] = weight**2 * chance
-        moments[row] = probabilities @ order_bins.bin_mean(by_order)
+        moments[row] = probabilities @ ORDERS.mean(by_order)
     return moments
 
 

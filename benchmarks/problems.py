@@ -11,7 +11,7 @@ import scalar_layered
 
 from mcml_sim import Grid, Layer, Medium, Orders, Tally, half_space, simulate, simulate_orders
 from mcml_sim.tracing import layered_batch, matched_batch, orders_batch, rng
-from mcml_sim.tracing.order_bins import LAST_ORDERS
+from mcml_sim.tracing.order_bins import bins_of
 from profilefit.studies.tradeoff.stopwatch import Work
 
 ALPHA = 0.9
@@ -120,10 +120,11 @@ def order_events(run: Orders) -> float:
     heavier = np.append(run.weights(1.0)[1:] / run.weights(1.0)[:-1] - 1, 0.0)
     left = run.counts.exits.sum(axis=0)
     beyond, ended = float(run.counts.cut), 0.0
-    events = beyond * LAST_ORDERS[-1]
+    last_orders = bins_of(run.setting).last_orders
+    events = beyond * last_orders[-1]
     for at in reversed(range(left.size)):
         stopped = beyond * heavier[at]
-        events += stopped * LAST_ORDERS[at] + left[at] * run.orders[at]
+        events += stopped * last_orders[at] + left[at] * run.orders[at]
         ended += stopped
         beyond += stopped + left[at]
     if abs(ended - run.counts.rouletted) > 0.01 * run.photons:

@@ -20,7 +20,7 @@ from mcml_sim.results import estimate
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing import order_bins
 from mcml_sim.tracing.counts import Counts, Ledger
-from mcml_sim.tracing.isotropic_event import MAX_ORDER, roulette_weight
+from mcml_sim.tracing.order_bins import OrderBins
 
 Floats = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ class Orders:
     estimates have the shape of alpha, then that of the rings. All albedos come from the same photons, so their
     errors are strongly correlated: `covariance_factor` says how. What was scattered once is known exactly and not
     taken from the photons (`once`), so standard errors and effective samples are those of the rest. Photons with more
-    than 8192 scatterings are cut: `cut` bounds what that takes from the reflectance.
+    than 8192 / (1 - g) scatterings, about, are cut: `cut` bounds what that takes from the reflectance.
     """
 
     grid: Grid
@@ -64,7 +64,7 @@ class Orders:
     def profile_derivative(self, alpha: ArrayLike) -> Estimate:
         """d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
         albedo = _checked_alpha(alpha)
-        weights, ones = order_bins.weight_derivatives(albedo), np.ones_like(albedo)
+        weights, ones = self._bins.weight_derivatives(albedo), np.ones_like(albedo)
         slope = self._from_weights(self.ring_order_counts, weights, np.multiply.outer(ones, self._shares[:-1]))
         return slope.scaled(1 / self.grid.r_areas)
 
@@ -84,7 +84,7 @@ class Orders:
         albedos = np.atleast_1d(_checked_alpha(alpha))
         if albedos.ndim != 1:
             raise InputError(f"alpha must be a number or a list of numbers, got an array of shape {albedos.shape}")
-        limit = checked_whole("rank", rank, lowest=1, highest=len(order_bins.LAST_ORDERS))
+        limit = checked_whole("rank", rank, lowest=1, highest=self._bins.last_orders.size)
         counts = self.counts.exits if overflow else self.ring_order_counts
         return estimate.covariance_factor(counts[:, 1:], self.weights(albedos)[:, 1:], self.photons, limit)
 
@@ -99,8 +99,9 @@ class Orders:
 
     def cut(self, alpha: ArrayLike) -> float | Floats:
         """Upper bound on the reflectance that ending photons at the highest order took away [-]."""
-        lost = self.entered * float(roulette_weight(MAX_ORDER)) * self.counts.cut / self.photons
-        return _scalar_or_array(lost * _checked_alpha(alpha) ** MAX_ORDER)
+        last = self._bins.max_order
+        lost = self.entered * float(self._bins.roulette_weight(last)) * self.counts.cut / self.photons
+        return _scalar_or_array(lost * _checked_alpha(alpha) ** last)
 
     @property
     def ledger(self) -> Ledger:
@@ -115,16 +116,20 @@ class Orders:
     @property
     def orders(self) -> Floats:
         """Representative order of each bin [-], float64 (bins,)."""
-        return order_bins.MEAN_ORDERS
+        return self._bins.mean_orders
 
     def weights(self, alpha: ArrayLike) -> Floats:
         """What one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
-        return self.entered * order_bins.weights(_checked_alpha(alpha))
+        return self.entered * self._bins.weights(_checked_alpha(alpha))
 
     @property
     def entered(self) -> float:
         """Share of the light that the surface lets in [-]; the photons counted are of that."""
         return single_scattering.entered(self.setting)
+
+    @property
+    def _bins(self) -> OrderBins:
+        return order_bins.bins_of(self.setting)
 
     @cached_property
     def _shares(self) -> Floats:
@@ -133,7 +138,7 @@ class Orders:
 
     def _estimate(self, counts: NDArray[np.int64], shares: Floats, alpha: ArrayLike) -> Estimate:
         albedo = _checked_alpha(alpha)
-        return self._from_weights(counts, order_bins.weights(albedo), np.multiply.outer(albedo, shares))
+        return self._from_weights(counts, self._bins.weights(albedo), np.multiply.outer(albedo, shares))
 
     def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
         """Estimate from `exact`, the light scattered once, and the counted photons that were scattered again."""

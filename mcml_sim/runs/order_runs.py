@@ -23,7 +23,6 @@ from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing import order_bins, orders_batch
 from mcml_sim.tracing.counts import Counts
-from mcml_sim.tracing.isotropic_event import FIRST_ROULETTE, MAX_ORDER
 
 Floats = NDArray[np.float64]
 
@@ -112,11 +111,12 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple
 
 
 def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
-    return Store(folder, _made_by(grid, seed, setting), partial(Counts.from_arrays, shape=_shape(grid)))
+    return Store(folder, _made_by(grid, seed, setting), partial(Counts.from_arrays, shape=_shape(grid, setting)))
 
 
 def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
     """What decides which photons a batch holds and how they are counted."""
+    bins = order_bins.bins_of(setting)
     return {
         "kind": "orders",
         "setting": str(setting),
@@ -124,12 +124,12 @@ def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
         "grid": grid.digest,
         "r_edges": grid.r_edges.tolist(),
         "batch_photons": orders_batch.BATCH_PHOTONS,
-        "max_order": MAX_ORDER,
-        "first_roulette": FIRST_ROULETTE,
+        "max_order": bins.max_order,
+        "first_roulette": bins.first_roulette,
         "last_exact_order": order_bins.LAST_EXACT,
         "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
     }
 
 
-def _shape(grid: Grid) -> tuple[int, int]:
-    return grid.rings + 1, len(order_bins.LAST_ORDERS)
+def _shape(grid: Grid, setting: Setting) -> tuple[int, int]:
+    return grid.rings + 1, order_bins.bins_of(setting).last_orders.size

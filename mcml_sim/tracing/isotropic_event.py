@@ -15,23 +15,15 @@ from __future__ import annotations
 from typing import Any, NamedTuple, TypeVar
 
 import jax.numpy as jnp
-import numpy as np
 from jax import Array, lax
-from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.media.phase import Isotropic
 from mcml_sim.tracing import pool, rng
 
 PHASE = Isotropic()
-MAX_ORDER = 8192
 STOPPED = 0.5  # what a photon that was stopped inside is deeper outside than one that left
 UNROLLED = 4  # events in one go: 1 is slower by 13 %, 16 is faster by 7 % and compiles for twice as long
 GPU_UNROLLED = 16  # measured on an H100: 4 take twice as long
-# Each time the order doubles from here on, half the photons are dropped and the others count twice. Below 64 most of
-# the reflectance is made; without roulette six sevenths of all events would go to the few photons beyond it.
-FIRST_ROULETTE = 64
-DOUBLINGS = FIRST_ROULETTE * 2 ** np.arange(1 + round(np.log2(MAX_ORDER / FIRST_ROULETTE)), dtype=np.int32)
-"""Stops of the order-resolved run, int32: 64, 128, ... and at last MAX_ORDER, where nobody goes on."""
 
 # sin(pi v) = v P(v^2) on |v| <= 1/2: minimax polynomial of (1 - 2^-22) sin(pi v) by linear programming, error 3.4e-9.
 # The factor keeps |value| <= 1 whatever the rounding; with it and float32 the total error is below 5e-7.
@@ -146,8 +138,3 @@ def azimuth_cosine(words: Array) -> Array:
     for coefficient in SINE[-2::-1]:
         value = value * square + jnp.float32(coefficient)
     return v * value
-
-
-def roulette_weight(order: ArrayLike) -> NDArray[np.int64]:
-    """How many photons one that leaves (or is cut) at this order stands for: 1 up to 64, 2 to 128, 4 to 256, ..."""
-    return 2 ** np.ceil(np.log2(np.maximum(np.asarray(order) / FIRST_ROULETTE, 1))).astype(np.int64)

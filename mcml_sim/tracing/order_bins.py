@@ -1,58 +1,120 @@
-"""Bins of scattering order: exact where orders matter one by one, geometric beyond.
+"""Bins of scattering order, exact where orders matter one by one, geometric beyond; and where roulette is played.
 
 Every order to 256 has its own bin; then 64 bins an octave to the last order. All powers of two are bin edges, so the
 roulette weight is constant in a bin. What alpha^n is inside a bin that holds several orders is taken as its mean
 under the density n^-3/2 of a half space's long paths. Where the density is n^p instead, that mean is off by the
 share |p + 3/2| n |ln alpha| 1.6e-5 of itself, which is never more than 6e-6 |p + 3/2| of a photon.
+
+Each time the order doubles from the first roulette on, half the photons are dropped and the others count twice. Light
+that scatters forwards takes 1 / (1 - g) scatterings to turn as far as one does where scattering has no direction
+(similarity), so roulette and cap come that much later, by a power of two.
 """
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
 
-from mcml_sim.tracing.isotropic_event import MAX_ORDER, roulette_weight
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim.media.setting import Setting
 
 Floats = NDArray[np.float64]
 
 LAST_EXACT = 256
 BINS_PER_OCTAVE = 64
 LONG_PATHS = -1.5  # exponent of the order's density in a conservative half space
+# Where g = 0. Below 64 most of the reflectance is made; without roulette six sevenths of all events would go to the
+# few photons beyond it.
+FIRST_ROULETTE, MAX_ORDER = 64, 8192
+FARTHEST = 64  # reach, at most: MAX_ORDER times it is a whole float32
 
 
-def _last_orders() -> NDArray[np.int64]:
-    steps = np.arange(1, 1 + round(BINS_PER_OCTAVE * np.log2(MAX_ORDER / LAST_EXACT)))
-    geometric = np.rint(LAST_EXACT * 2.0 ** (steps / BINS_PER_OCTAVE)).astype(np.int64)
-    return np.concatenate([np.arange(1, LAST_EXACT + 1), geometric])
+@dataclass(frozen=True)
+class OrderBins:
+    """Where one scattering turns light as far as 1 / `reach` of one without direction."""
+
+    reach: int = 1
+    """A power of two from 1 to FARTHEST."""
+
+    @property
+    def first_roulette(self) -> int:
+        """Order after which half the photons end, and the others count twice."""
+        return FIRST_ROULETTE * self.reach
+
+    @property
+    def max_order(self) -> int:
+        """Order after which nobody goes on."""
+        return MAX_ORDER * self.reach
+
+    @cached_property
+    def stops(self) -> NDArray[np.int32]:
+        """Orders of roulette, int32: the first, twice that, ... and at last `max_order`."""
+        doublings = round(np.log2(MAX_ORDER / FIRST_ROULETTE))
+        return self.first_roulette * 2 ** np.arange(1 + doublings, dtype=np.int32)
+
+    @cached_property
+    def orders(self) -> NDArray[np.int64]:
+        """1 ... max_order."""
+        return np.arange(1, self.max_order + 1)
+
+    @cached_property
+    def last_orders(self) -> NDArray[np.int64]:
+        """Highest order in each bin, int64 (bins,)."""
+        steps = np.arange(1, 1 + round(BINS_PER_OCTAVE * np.log2(self.max_order / LAST_EXACT)))
+        geometric = np.rint(LAST_EXACT * 2.0 ** (steps / BINS_PER_OCTAVE)).astype(np.int64)
+        return np.concatenate([np.arange(1, LAST_EXACT + 1), geometric])
+
+    @cached_property
+    def first_orders(self) -> NDArray[np.int64]:
+        """Lowest order in each bin, int64 (bins,)."""
+        return np.concatenate([[1], self.last_orders[:-1] + 1])
+
+    @property
+    def bin_of_order(self) -> NDArray[np.int64]:
+        """Bin of order n at index n - 1, (max_order,)."""
+        return np.repeat(np.arange(self.last_orders.size), self.last_orders - self.first_orders + 1)
+
+    @cached_property
+    def mean_orders(self) -> Floats:
+        """Representative order of each bin, float64 (bins,)."""
+        return self.mean(self.orders.astype(float))
+
+    @cached_property
+    def roulette_weights(self) -> NDArray[np.int64]:
+        """What one photon of each bin counts for, int64 (bins,)."""
+        return self.roulette_weight(self.last_orders)
+
+    def roulette_weight(self, order: ArrayLike) -> NDArray[np.int64]:
+        """How many photons one that leaves (or is cut) at this order stands for: 1 to the first roulette, then 2."""
+        return 2 ** np.ceil(np.log2(np.maximum(np.asarray(order) / self.first_roulette, 1))).astype(np.int64)
+
+    def mean(self, values: Floats, exponent: float = LONG_PATHS) -> Floats:
+        """In each bin, under the density n^exponent, of values at every order: (..., max_order) -> (..., bins)."""
+        density = self.orders**exponent
+        starts = self.first_orders - 1
+        return np.add.reduceat(values * density, starts, axis=-1) / np.add.reduceat(density, starts)
+
+    def weights(self, alpha: Floats) -> Floats:
+        """What a photon of each bin adds to the reflectance at albedo alpha: (...) -> (..., bins)."""
+        return self.roulette_weights * self._each(alpha, lambda one: one**self.orders)
+
+    def weight_derivatives(self, alpha: Floats) -> Floats:
+        """d weights / d alpha: (...) -> (..., bins)."""
+        return self.roulette_weights * self._each(alpha, lambda one: self.orders * one ** (self.orders - 1))
+
+    def _each(self, alpha: Floats, power: Callable[[float], NDArray]) -> Floats:
+        """Mean in each bin of a power of one albedo after the other: the orders of all would fill the memory."""
+        found: Floats = np.stack([self.mean(power(one)) for one in np.ravel(alpha)])
+        return found.reshape(*np.shape(alpha), -1)
 
 
-ORDERS = np.arange(1, MAX_ORDER + 1)
-LAST_ORDERS = _last_orders()
-"""Highest order in each bin, int64 (bins,)."""
-FIRST_ORDERS = np.concatenate([[1], LAST_ORDERS[:-1] + 1])
-"""Lowest order in each bin, int64 (bins,)."""
-BIN_OF_ORDER = np.repeat(np.arange(len(LAST_ORDERS)), LAST_ORDERS - FIRST_ORDERS + 1)
-"""Bin of order n at index n - 1, (MAX_ORDER,)."""
+def bins_of(setting: Setting) -> OrderBins:
+    """Of a half space."""
+    turned = max(1.0 - setting.g, 1.0 / FARTHEST)
+    return _bins(2 ** max(round(np.log2(1.0 / turned)), 0))
 
 
-def bin_mean(values: Floats, exponent: float = LONG_PATHS) -> Floats:
-    """Mean in each bin, under the density n^exponent, of values at every order: (..., MAX_ORDER) -> (..., bins)."""
-    density = ORDERS**exponent
-    starts = FIRST_ORDERS - 1
-    return np.add.reduceat(values * density, starts, axis=-1) / np.add.reduceat(density, starts)
-
-
-MEAN_ORDERS = bin_mean(ORDERS.astype(float))
-"""Representative order of each bin, float64 (bins,)."""
-ROULETTE_WEIGHTS = roulette_weight(LAST_ORDERS)
-"""What one photon of each bin counts for, int64 (bins,)."""
-
-
-def weights(alpha: Floats) -> Floats:
-    """What a photon of each bin adds to the reflectance at albedo alpha: (...) -> (..., bins)."""
-    return ROULETTE_WEIGHTS * bin_mean(alpha[..., None] ** ORDERS)
-
-
-def weight_derivatives(alpha: Floats) -> Floats:
-    """d weights / d alpha: (...) -> (..., bins)."""
-    return ROULETTE_WEIGHTS * bin_mean(ORDERS * alpha[..., None] ** (ORDERS - 1))
+_bins = lru_cache(OrderBins)

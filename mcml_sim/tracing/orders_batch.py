@@ -19,15 +19,13 @@ from mcml_sim.media.setting import Setting
 from mcml_sim.tracing import half_space_event, isotropic_event, order_bins, pool, rng
 from mcml_sim.tracing.bins import rounded_up
 from mcml_sim.tracing.counts import Counts
-from mcml_sim.tracing.isotropic_event import DOUBLINGS, MAX_ORDER, IsotropicLanes
+from mcml_sim.tracing.isotropic_event import IsotropicLanes
+from mcml_sim.tracing.order_bins import OrderBins
 from mcml_sim.tracing.pool import BATCH_PHOTONS
 
 OrderLanes = IsotropicLanes | half_space_event.HalfSpaceLanes
 MATCHED = Setting()
 EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
-
-ROULETTED, CUT = len(order_bins.LAST_ORDERS), len(order_bins.LAST_ORDERS) + 1
-COLUMNS = CUT + 1
 
 
 class Ends(NamedTuple):
@@ -36,7 +34,7 @@ class Ends(NamedTuple):
     rho: Array
     """Where, distance from the beam [mfp], float32."""
     order: Array
-    """After n scatterings, int32: n out of the surface, -n inside (roulette, or cut at MAX_ORDER), 0 never started."""
+    """After n scatterings, int32: n out of the surface, -n inside (roulette, or the last order), 0 never started."""
 
 
 def trace_batch(
@@ -47,17 +45,18 @@ def trace_batch(
     Lengths of the grid are in mean free paths. Where the surface does not refract and scattering is isotropic, the
     kernel is the one that needs no directions.
     """
-    key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(DOUBLINGS)
+    bins = order_bins.bins_of(setting)
+    key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(bins.stops)
     if setting.is_matched_isotropic:
         ends = trace(key, number, stops, None, lanes, illumination=setting.illumination)
     else:
         ends = trace(key, number, stops, half_space_event.half_space(setting), lanes)
-    edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns())
-    histogram = np.asarray(_histogram(ends, edges, columns)).astype(np.int64)
+    edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns(bins))
+    found = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
     counts = Counts(
-        exits=histogram[:, :ROULETTED],
-        rouletted=int(histogram[:, ROULETTED].sum()),
-        cut=int(histogram[:, CUT].sum()),
+        exits=found[:, :-2],
+        rouletted=int(found[:, -2].sum()),
+        cut=int(found[:, -1].sum()),
         started=photons,
     )
     counts.require_closed()
@@ -117,18 +116,18 @@ def recorded(ends: Array, lanes: OrderLanes) -> Array:
     return ends.at[place].set(end, mode="promise_in_bounds", unique_indices=True)
 
 
-@jax.jit
-def _histogram(ends: Ends, edges: Array, columns: Array) -> Array:
-    """Count photons by ring (and beyond the last, in the last row) and column: int32 (rings + 1, COLUMNS)."""
+@partial(jax.jit, static_argnames="count")
+def histogram(ends: Ends, edges: Array, columns: Array, count: int) -> Array:
+    """Count photons by ring (and beyond the last, in the last row) and column: int32 (rings + 1, count)."""
     ring = jnp.searchsorted(edges[1:], ends.rho, side="right", method="scan_unrolled").astype(jnp.int32)
-    size = len(edges) * COLUMNS
-    cell = jnp.where(ends.order == 0, size, ring * COLUMNS + columns[ends.order + MAX_ORDER])
-    return jnp.zeros(size, jnp.int32).at[cell].add(1, mode="drop").reshape(len(edges), COLUMNS)
+    size = len(edges) * count
+    cell = jnp.where(ends.order == 0, size, ring * count + columns[ends.order + len(columns) // 2])
+    return jnp.zeros(size, jnp.int32).at[cell].add(1, mode="drop").reshape(len(edges), count)
 
 
-def _columns() -> NDArray[np.int32]:
-    """Column of the histogram for each end, at index order + MAX_ORDER."""
-    columns = np.full(2 * MAX_ORDER + 1, ROULETTED, np.int32)
-    columns[0] = CUT
-    columns[MAX_ORDER + 1 :] = order_bins.BIN_OF_ORDER
+def _columns(bins: OrderBins) -> NDArray[np.int32]:
+    """Column of the histogram for each end, at index order + max_order: bins, then roulette, then the cut."""
+    columns = np.full(2 * bins.max_order + 1, bins.last_orders.size, np.int32)
+    columns[0] = bins.last_orders.size + 1
+    columns[bins.max_order + 1 :] = bins.bin_of_order
     return columns

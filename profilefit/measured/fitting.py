@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 
+from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import law_error, model
 from profilefit.measured.data import Measured, require_workable
-from profilefit.measured.exact_light import ExactLight
 from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import Noise, noise

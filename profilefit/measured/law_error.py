@@ -1,7 +1,7 @@
 """Model error: how far the law's own distance from the exact profile can move what is fitted with it.
 
 A law misses the exact profile by `rel` on average (see `quality`), in waves along ln r. Its error at the radii of the
-data is taken for a Gaussian process: standard deviation RMS x rel of the light, correlation e^-1/2 at WAVE in ln r.
+data is taken for a Gaussian process: standard deviation RMS x rel of the light, correlation e^-1 at WAVE in ln r.
 Over seventeen pairs of law and albedo (hazard, normalized diffusion, four Gaussians, beam diffusion; alpha from .2 to
 .99) the root mean square is 1.2 to 2.5 times `rel`, the distance .1 to 2.5; tests hold the prediction against the real
 shift.
@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.quality import ENERGY_WITHIN, profile_quality
 from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import EXACT, ExactLight
+from profilefit.measured.exact_light import EXACT
 from profilefit.measured.model import Light, u_of
 from profilefit.measured.noise import Noise
 from profilefit.recipes.record import record_setting
@@ -83,7 +84,9 @@ def covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_]) -> 
     if not rel:
         return None
     size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)
-    found: Floats = waves(data.r) * np.outer(size, size)
+    distance = np.abs(np.subtract.outer(np.log(data.r), np.log(data.r))) / WAVE
+    # A smoother one, such as `waves`, would have neighbouring rows trusted for what they say beside it.
+    found: Floats = np.exp(-distance) * np.outer(size, size)
     return found
 
 

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from mcml_sim.exact.by_albedo import blocks
+from mcml_sim.exact.light import ExactLight
 from profilefit.laws.base import ProfileLaw
-from profilefit.measured.exact_light import ExactLight
 from profilefit.measured.instrument import PENCIL, Instrument
 
 Floats = NDArray[np.float64]

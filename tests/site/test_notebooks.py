@@ -206,7 +206,7 @@ def test_layers_hide_from_the_eye_and_the_index_does_not():
 def test_fits_report_what_is_not_identifiable():
     text = printed("06-fit-your-own-data")
     assert "alpha AND scale ARE NOT SEPARATELY IDENTIFIABLE" in text
-    assert "most informative additional measurement: the total reflectance A" in text
+    assert "most informative additional measurement: the scale" in text
     assert "MISFIT (p-value below 1e-16)" in text
     ((data, misfit),) = re.findall(r"two layers: mu_a = \S+ ± (\S+) \(statistical\) ± (\S+) \(lack of fit\)", text)
     assert float(misfit) > 24 * float(data)

@@ -9,7 +9,7 @@ from mcml_sim import Grid, Setting, exact, half_space, simulate, simulate_orders
 from mcml_sim.media.fresnel import fresnel as shipped_fresnel
 from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import half_space_event, orders_batch, rng
-from mcml_sim.tracing.isotropic_event import DOUBLINGS
+from mcml_sim.tracing.order_bins import OrderBins
 
 pytestmark = pytest.mark.slow
 
@@ -20,6 +20,7 @@ SETTINGS = [
     Setting("diffuse", n=1.5, g=-0.5),
     Setting("diffuse", n=0.8, g=0.4),
 ]
+STOPS = OrderBins().stops
 PHOTONS, LAST_ORDER = 150_000, 32
 
 
@@ -89,7 +90,7 @@ def traced(setting, photons):
     ends = orders_batch.trace(
         jnp.asarray(rng.batch_key(7, 0)),
         jnp.int32(photons),
-        jnp.asarray(DOUBLINGS),
+        jnp.asarray(STOPS),
         half_space_event.half_space(setting),
     )
     return np.asarray(ends.rho)[:photons], np.asarray(ends.order)[:photons]
@@ -121,7 +122,7 @@ def test_the_comparison_sees_another_setting(wrong, sidak):
 
 
 def test_it_agrees_with_the_isotropic_kernel_where_that_applies(sidak):
-    ends = orders_batch.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(DOUBLINGS))
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(8, 0)), jnp.int32(PHOTONS), jnp.asarray(STOPS))
     isotropic = table(np.asarray(ends.rho)[:PHOTONS], np.asarray(ends.order)[:PHOTONS])
     z = deviations(table(*traced(Setting(), PHOTONS)), isotropic)
     assert np.abs(z).max() < sidak(z.size)

@@ -4,7 +4,10 @@ import numpy as np
 import pytest
 
 from mcml_sim.tracing import isotropic_event, rng
-from mcml_sim.tracing.isotropic_event import FIRST_ROULETTE, MAX_ORDER, IsotropicLanes
+from mcml_sim.tracing.isotropic_event import IsotropicLanes
+from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
+
+STOPS = OrderBins().stops
 
 
 def azimuth_words():
@@ -53,14 +56,14 @@ FLY = jax.jit(isotropic_event.fly, static_argnames="events")
 
 
 def test_first_scatterings_lie_straight_below_at_exponential_depths():
-    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), isotropic_event.DOUBLINGS)
+    pool = ENTER(KEY, jnp.arange(2**16, dtype=jnp.uint32), STOPS)
     assert np.all(pool.place.real == 0)
     assert np.all(pool.order == 0)
     assert abs(np.mean(pool.place.imag) - 1) < 4 / 2**8
 
 
 def test_diffuse_light_enters_in_all_directions_weighted_by_their_cosine():
-    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS, "diffuse").place
+    place = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS, "diffuse").place
     rho, z = np.asarray(place.real, np.float64), np.asarray(place.imag, np.float64)
     path, square = np.hypot(rho, z), np.sort(z**2 / (rho**2 + z**2))
     assert abs(path.mean() - 1) < 4 / 2**9
@@ -114,24 +117,15 @@ def test_photons_are_stopped_at_their_last_order_and_nowhere_else():
 
 
 def test_half_the_photons_win_each_toss():
-    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS).last)
-    counts = np.array([np.sum(last == stop) for stop in isotropic_event.DOUBLINGS])
+    last = np.asarray(ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS).last)
+    counts = np.array([np.sum(last == stop) for stop in STOPS])
     expected = 2**18 * np.append(0.5 ** np.arange(1, 8), 0.5**7)
     assert counts.sum() == 2**18
-    assert isotropic_event.DOUBLINGS[-1] == MAX_ORDER
+    assert STOPS[-1] == MAX_ORDER
     assert np.all(np.abs(counts - expected) < 4 * np.sqrt(expected))
 
 
 def test_tosses_are_independent_of_the_depth_they_are_drawn_with():
-    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), isotropic_event.DOUBLINGS)
+    pool = ENTER(KEY, jnp.arange(2**18, dtype=jnp.uint32), STOPS)
     z, loses = np.asarray(pool.place.imag, np.float64), np.asarray(pool.last) == FIRST_ROULETTE
     assert abs(z[loses].mean() - z[~loses].mean()) < 4 * np.sqrt(4 / 2**18)
-
-
-def test_roulette_weight_doubles_just_after_each_toss():
-    orders = np.arange(1, MAX_ORDER + 1)
-    passed = np.searchsorted(isotropic_event.DOUBLINGS[:-1], orders)  # a photon that leaves at n has not tossed at n
-    np.testing.assert_array_equal(isotropic_event.roulette_weight(orders), 2**passed)
-    assert isotropic_event.roulette_weight(FIRST_ROULETTE) == 1
-    assert isotropic_event.roulette_weight(FIRST_ROULETTE + 1) == 2
-    assert isotropic_event.roulette_weight(MAX_ORDER) == 128

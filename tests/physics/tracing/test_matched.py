@@ -13,10 +13,11 @@ from mcml_sim.media.medium import half_space
 from mcml_sim.runs.input_runs import Compiling
 from mcml_sim.tracing import matched_batch, orders_batch, rng
 from mcml_sim.tracing.deposits import Deposits, shapes
-from mcml_sim.tracing.isotropic_event import DOUBLINGS
+from mcml_sim.tracing.order_bins import OrderBins
 
 pytestmark = pytest.mark.slow
 
+STOPS = OrderBins().stops
 ALPHAS = [0.0, 0.05, 0.3, 0.6, 0.9, 0.97, 0.99, 0.999]
 PHOTONS = 2**17
 MFP = 2.5
@@ -228,7 +229,7 @@ def test_a_lost_photon_is_noticed():
 
 def test_the_order_resolved_run_reweighted_agrees():
     """The same photons, drawn in another way: alpha^n of the order-resolved kernel."""
-    ends = orders_batch.trace(jnp.asarray(rng.batch_key(5, 0)), jnp.int32(PHOTONS), DOUBLINGS)
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(5, 0)), jnp.int32(PHOTONS), STOPS)
     order = np.asarray(ends.order)
     reflected = np.sum(0.5 ** order[order > 0]) / PHOTONS
     got = traced(0.5)

@@ -7,16 +7,17 @@ import pytest
 
 from mcml_sim import Grid, Setting, exact
 from mcml_sim.results.estimate import estimate
-from mcml_sim.tracing import half_space_event, order_bins, orders_batch, pool, rng
-from mcml_sim.tracing.isotropic_event import DOUBLINGS, FIRST_ROULETTE, MAX_ORDER
+from mcml_sim.tracing import half_space_event, orders_batch, pool, rng
+from mcml_sim.tracing.order_bins import FIRST_ROULETTE, MAX_ORDER, OrderBins
 
+STOPS = OrderBins().stops
 PHOTONS = 200_000
 LANES = pool.LANES
 
 
 def traced(photons, lanes=LANES):
     """Ends of the first photons of batch 0, seed 0."""
-    return orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), DOUBLINGS, lanes=lanes)
+    return orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), STOPS, lanes=lanes)
 
 
 def slow_twin(photons, last_order, seed):
@@ -78,7 +79,7 @@ def test_every_photon_ends_and_none_at_a_place_that_is_no_number(ends):
 
 
 def test_photons_end_inside_at_roulettes_and_at_the_cap_only(ends):
-    assert set(-ends[1][ends[1] < 0]) <= set(DOUBLINGS)
+    assert set(-ends[1][ends[1] < 0]) <= set(STOPS)
 
 
 def test_first_roulette_stops_half_of_those_that_reach_it(ends):
@@ -139,7 +140,7 @@ def lit(request):
 
 def deviations(counts, illumination):
     """z of the energy in every ring and beyond the last, (alphas, rings + 1)."""
-    got = estimate(counts.exits, order_bins.weights(EXACT_ALPHAS), counts.started)
+    got = estimate(counts.exits, OrderBins().weights(EXACT_ALPHAS), counts.started)
     setting = Setting(illumination)
     alphas = EXACT_ALPHAS[:, None]
     within = exact.cdf(np.append(RADII, np.inf), alphas, setting=setting) * exact.reflectance(alphas, setting)
@@ -161,7 +162,7 @@ def test_the_exact_answer_to_the_other_light_is_told_apart(lit, sidak):
 def test_the_general_kernel_agrees_where_the_fast_one_serves(lit, sidak):
     illumination, counts = lit
     where = half_space_event.half_space(Setting(illumination))
-    ends = orders_batch.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), DOUBLINGS, where)
+    ends = orders_batch.trace(jnp.asarray(rng.batch_key(3, 0)), jnp.int32(2**18), STOPS, where)
     rings = np.append(RADII, np.inf)
     general = np.histogram(np.asarray(ends.rho)[np.asarray(ends.order) == 3], bins=rings)[0] / 2**18
     fast = counts.exits[:, 2] / 2**19

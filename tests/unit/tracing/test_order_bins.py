@@ -1,34 +1,58 @@
 import numpy as np
 import pytest
 
-from mcml_sim.tracing import order_bins as bins
-from mcml_sim.tracing.isotropic_event import MAX_ORDER, roulette_weight
+from mcml_sim import Setting, phase
+from mcml_sim.tracing import order_bins
+from mcml_sim.tracing.order_bins import OrderBins
+
+bins = OrderBins()
 
 ALPHAS = np.concatenate([[0.0, 1e-3], np.linspace(0.05, 0.95, 19), 1 - np.geomspace(0.04, 1e-6, 20), [1.0]])
 
 
-def test_bins_hold_every_order_once():
-    held = [np.arange(a, b + 1) for a, b in zip(bins.FIRST_ORDERS, bins.LAST_ORDERS, strict=True)]
-    np.testing.assert_array_equal(np.concatenate(held), np.arange(1, MAX_ORDER + 1))
+@pytest.mark.parametrize("reach", [1, 2, 16])
+def test_bins_hold_every_order_once(reach):
+    bins = OrderBins(reach)
+    held = [np.arange(a, b + 1) for a, b in zip(bins.first_orders, bins.last_orders, strict=True)]
+    np.testing.assert_array_equal(np.concatenate(held), np.arange(1, 8192 * reach + 1))
     assert all(len(held[n]) == 1 for n in range(256))
-    assert np.all(bins.BIN_OF_ORDER[bins.LAST_ORDERS - 1] == np.arange(len(bins.LAST_ORDERS)))
+    assert np.all(bins.bin_of_order[bins.last_orders - 1] == np.arange(len(bins.last_orders)))
 
 
-def test_roulette_weight_is_one_number_in_each_bin():
-    assert np.all(roulette_weight(bins.FIRST_ORDERS) == bins.ROULETTE_WEIGHTS)
-    assert np.all(roulette_weight(bins.LAST_ORDERS) == bins.ROULETTE_WEIGHTS)
+@pytest.mark.parametrize("reach", [1, 2, 16])
+def test_roulette_weight_is_one_number_in_each_bin(reach):
+    bins = OrderBins(reach)
+    assert np.all(bins.roulette_weight(bins.first_orders) == bins.roulette_weights)
+    assert np.all(bins.roulette_weight(bins.last_orders) == bins.roulette_weights)
+
+
+def test_roulette_weight_doubles_just_after_each_toss():
+    passed = np.searchsorted(bins.stops[:-1], bins.orders)  # a photon that leaves at n has not tossed at n
+    np.testing.assert_array_equal(bins.roulette_weight(bins.orders), 2**passed)
+    assert bins.roulette_weight(64) == 1
+    assert bins.roulette_weight(65) == 2
+    assert bins.roulette_weight(8192) == 128
+
+
+def test_light_that_turns_slowly_has_more_orders():
+    def reach(*args, **kwargs):
+        return order_bins.bins_of(Setting(*args, **kwargs)).reach
+
+    assert [reach(g=g) for g in (-0.9, 0.0, 0.2, 0.5, 0.8, 0.9, 0.95, 0.999)] == [1, 1, 1, 2, 4, 8, 16, 64]
+    assert reach("diffuse", 1.4, phase=phase.HenyeyGreenstein(0.9)) == 8
+    assert order_bins.bins_of(Setting(g=0.9)).stops[[0, -1]].tolist() == [512, 65536]
 
 
 def test_weights_are_powers_where_orders_are_exact():
-    expected = bins.ROULETTE_WEIGHTS[:256] * ALPHAS[:, None] ** np.arange(1, 257)
+    expected = bins.roulette_weights[:256] * ALPHAS[:, None] ** np.arange(1, 257)
     np.testing.assert_allclose(bins.weights(ALPHAS)[:, :256], expected, rtol=1e-13, atol=1e-300)
 
 
 def test_weights_at_the_ends_of_alpha():
     assert np.all(bins.weights(np.array(0.0)) == 0)
-    np.testing.assert_allclose(bins.weights(np.array(1.0)), bins.ROULETTE_WEIGHTS, rtol=1e-13)
+    np.testing.assert_allclose(bins.weights(np.array(1.0)), bins.roulette_weights, rtol=1e-13)
     assert bins.weight_derivatives(np.array(0.0))[0] == 1
-    np.testing.assert_allclose(bins.weight_derivatives(np.array(1.0)), bins.ROULETTE_WEIGHTS * bins.MEAN_ORDERS)
+    np.testing.assert_allclose(bins.weight_derivatives(np.array(1.0)), bins.roulette_weights * bins.mean_orders)
 
 
 def test_derivative_is_that_of_the_weights():
@@ -40,9 +64,9 @@ def test_derivative_is_that_of_the_weights():
 @pytest.mark.parametrize("exponent", [-6.0, -3.0, 0.0, 6.0])
 def test_a_bin_is_off_by_no_more_than_stated_if_its_density_is_another(exponent):
     alphas = ALPHAS[2:-1]
-    truth, binned = (bins.bin_mean(alphas[:, None] ** bins.ORDERS, p) for p in (exponent, bins.LONG_PATHS))
-    decay = -bins.MEAN_ORDERS * np.log(alphas)[:, None]
-    slope = abs(exponent - bins.LONG_PATHS)
+    truth, binned = (bins.mean(alphas[:, None] ** bins.orders, p) for p in (exponent, order_bins.LONG_PATHS))
+    decay = -bins.mean_orders * np.log(alphas)[:, None]
+    slope = abs(exponent - order_bins.LONG_PATHS)
     seen = decay < 10  # beyond, a photon counts for e^-10
     assert np.all((np.abs(binned - truth) <= (1.6e-5 * slope * decay + 1e-13) * truth)[seen])
     assert np.abs(binned - truth).max() < 6e-6 * slope

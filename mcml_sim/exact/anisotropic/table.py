@@ -1,0 +1,100 @@
+"""The table of half spaces that scatter forwards, by refractive index and mean cosine; and what lies between.
+
+Lengths are in l* = 1 / (mu_a + mu_s (1 - g)), albedos alpha' = mu_s (1 - g) l*: in these light changes little with g
+(similarity), and smoothly up to g = 1. Light scattered once is closed (`single_scattering`). The rest is kept as
+
+    2 pi x R_d = ... + alpha'^2 e^{f(s, ln x) - kappa x} (1 + kappa x),        s = sqrt(1 - alpha')
+
+f a cubic spline in ln x at Chebyshev's nodes of s, for Chebyshev's extreme points of g and of n. Between those it is
+the polynomial through them. `benchmarks/half_space_table.py` makes the file: orders up to LOW of photons on a GPU, the
+higher ones solved (`high_orders`).
+"""
+
+from __future__ import annotations
+
+import hashlib
+from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import BSpline
+
+from mcml_sim.errors import InputError
+from mcml_sim.files.npz import read_npz
+from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.setting import ILLUMINATIONS, Setting
+
+Floats = NDArray[np.float64]
+
+COSINES = 0.475 * (1.0 - np.cos(np.pi * np.arange(8) / 7.0))
+"""g, from 0 to .95."""
+INDICES = np.array([1.33, 1.39, 1.45])
+LEAST = 1e-3  # alpha' of the last node of s
+S = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + np.cos(np.pi * (np.arange(20) + 0.5) / 20))
+FIRST, LAST, STEP = 1e-3, 40.0, 0.12  # l*, and of ln x between knots
+KNOTS = np.log(FIRST) + STEP * np.arange(-3, int(np.ceil(np.log(LAST / FIRST) / STEP)) + 4)
+FILE = Path(__file__).with_name("half_space.npz")
+MOST_BYTES = 1 << 23
+
+
+class SplinedLight(NamedTuple):
+    """Of one half space."""
+
+    rest: Floats
+    """Coefficients of f in B-splines on KNOTS, by node of s, (s, splines)."""
+    share: Floats
+    """A / alpha', (s,)."""
+    kappa: Floats
+    """[1/l*], (s,)."""
+
+
+def covers(setting: Setting) -> bool:
+    """True where the table has the half space."""
+    forwards = setting.phase is None and 0.0 < setting.g <= COSINES[-1]
+    return forwards and INDICES[0] <= setting.n <= INDICES[-1]
+
+
+def curves(setting: Setting) -> SplinedLight:
+    """Of a half space that the table covers."""
+    rest, share, kappa = _table()
+    light = ILLUMINATIONS.index(setting.illumination)
+    by_g, by_n = _polynomial(COSINES, setting.g), _polynomial(INDICES, setting.n)
+    return SplinedLight(
+        np.einsum("n,g,ngsb->sb", by_n, by_g, rest[light]),
+        np.einsum("n,g,ngs->s", by_n, by_g, share[light]),
+        by_g @ kappa,
+    )
+
+
+def pieces(rest: Floats) -> Floats:
+    """f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
+    t = np.arange(4) * STEP / 3.0
+    starts = KNOTS[3:-4]
+    basis = BSpline.design_matrix((starts[:, None] + t * (1 - 1e-12)).ravel(), KNOTS, 3).toarray()
+    values = (rest @ basis.T).reshape(rest.shape[0], starts.size, 4)
+    found: Floats = values @ np.linalg.inv(np.vander(t, 4)).T
+    return found
+
+
+def _polynomial(nodes: Floats, at: float) -> Floats:
+    """Weights of the values at the nodes, of the polynomial through them."""
+    apart = np.where(np.eye(nodes.size, dtype=bool), 1.0, nodes[:, None] - nodes)
+    away = np.where(np.eye(nodes.size, dtype=bool), 1.0, at - nodes[None])
+    return np.prod(away / apart, axis=1)
+
+
+@lru_cache(maxsize=1)
+def _table() -> SplinedLight:
+    """Of all lights, n and g: (2, n, g, ...), and kappa (g, s)."""
+    arrays = read_npz(read_whole(FILE, MOST_BYTES), MOST_BYTES, text=("sha256",))
+    found = SplinedLight(*(arrays[name].astype(float) for name in SplinedLight._fields))
+    if str(arrays["sha256"]) != digest(found):
+        raise InputError(f"{FILE} is damaged: its numbers are not those that were written; install mcml_sim again")
+    return found
+
+
+def digest(table: SplinedLight) -> str:
+    """Of its numbers."""
+    return hashlib.sha256(b"".join(np.ascontiguousarray(part, "<f8").tobytes() for part in table)).hexdigest()
