@@ -2,10 +2,10 @@
 
     python -m benchmarks.half_space_table [--photons 2e9] [--out FILE]
 
-Photons give the first orders of scattering (LOW of them) on rings, as whole counts, which are kept beside this file
-and traced again only where --photons says how many: a minute on a GPU, a day without. The higher orders are solved:
-three minutes on a GPU, an hour or two on two cores. `half_space_reference.npz` has whole runs of 1e8 to 6e8 photons, by
-ring and bin of order, of half spaces that are no nodes of the table (seed 101).
+Photons give the first orders of scattering on rings, as whole counts, which are kept beside this file and traced again
+only where --photons says how many. The higher orders are solved: minutes on a GPU, an hour or two on two cores.
+`half_space_reference.npz` has whole runs of 1e8 to 6e8 photons, by ring and bin of order, of half spaces that are no
+nodes of the table (seed 101).
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from mcml_sim.exact.anisotropic import high_orders, table
 from mcml_sim.exact.anisotropic.table import COSINES, INDICES, KNOTS, S, SplinedLight
+from mcml_sim.exact.light import coefficients, log_once
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.setting import ILLUMINATIONS
@@ -53,7 +54,7 @@ class Low(NamedTuple):
 
 
 def beyond(g: float) -> int:
-    """LOW: how many orders are photons'. Light that turns slowly is narrow for longer."""
+    """How many orders are photons'. Light that turns slowly is narrow for longer."""
     return 24 if g < 0.92 else MOST_ORDERS
 
 
@@ -85,6 +86,7 @@ def joined(
     n, g = settings[0].n, settings[0].g
     orders, reduced = beyond(g), 1.0 - S**2
     alpha = reduced / (reduced + (1.0 - g) * (1.0 - reduced))
+    kappa = np.array([high_orders.decay_rate(one, g) for one in alpha])
     at_origin = high_orders.transforms(n, g, orders, np.array([1e-6 + 0j]), alpha, rule)[:, 0].real
     found, rest = [], np.full((2, S.size, KNOTS.size - 4), np.nan)
     scales = []
@@ -92,7 +94,7 @@ def joined(
         by_order = single_scattering.entered(setting) * own.exits.sum(axis=0) / own.started
         by_order[0] = single_scattering.reflected(setting)
         # What enters a white half space comes out again.
-        white = at_s(at_origin[light] / alpha ** (orders + 1), 0.0)
+        white = at_white(at_origin[light] / alpha ** (orders + 1))
         scales.append((single_scattering.entered(setting) - by_order.sum()) / white)
         total = alpha[:, None] ** np.arange(1, orders + 1) @ by_order + scales[-1] * at_origin[light]
         found.append(total / reduced)
@@ -102,11 +104,10 @@ def joined(
         high = high_orders.ring_density(line, values, x) * np.array(scales)[:, None, None]
         for column, member in enumerate(members):
             for light, own in enumerate(low):
-                kappas = high_orders.decay_rate(alpha[member], g), line.k[0].imag
+                kappas = kappa[member], line.k[0].imag
                 entered = single_scattering.entered(settings[light])
                 rest[light, member] = _rest(alpha[member], g, kappas, own, entered, x, high[light, :, column])
-    kappa = np.array([high_orders.decay_rate(a, g) for a in alpha]) / (1.0 - alpha * g)
-    return [SplinedLight(one, share, kappa) for one, share in zip(rest, found, strict=True)]
+    return [SplinedLight(one, share, kappa / (1.0 - alpha * g)) for one, share in zip(rest, found, strict=True)]
 
 
 def _rest(
@@ -138,11 +139,9 @@ def isotropic(setting: Setting) -> SplinedLight:
     """Where g = 0, from the exact solution."""
     alpha, log = 1.0 - S**2, np.arange(np.log(table.FIRST), np.log(table.LAST), 0.06)
     kappa, rest = np.asarray(exact.decay_rate(alpha)), []
-    k, weight = single_scattering.transform_density(setting)
     for a, rate in zip(alpha, kappa, strict=True):
         x = np.exp(log[rate * np.exp(log) < (28.0 if rate > 0.06 else 12.0)])
-        once = single_scattering.entered(setting) * (np.exp(-np.multiply.outer(x, k)) @ (k * weight))
-        again = 2.0 * np.pi * x * exact.profile(x, a, setting=setting) - a * once
+        again = 2.0 * np.pi * x * exact.profile(x, a, setting=setting) - a * np.exp(log_once(x, setting))
         rest.append(smoothed(np.log(x), np.log(again / a**2 / _decay(rate * x)), np.full(x.size, ROUNDING)))
     return SplinedLight(np.array(rest), np.asarray(exact.reflectance(alpha, setting)) / alpha, kappa)
 
@@ -160,10 +159,9 @@ def smoothed(log: Floats, values: Floats, error: Floats) -> Floats:
     return np.asarray(found)
 
 
-def at_s(values: Floats, s: float) -> float:
-    """Of the polynomial through values at the nodes S."""
-    most = np.sqrt(1.0 - table.LEAST)
-    return float(np.polynomial.Chebyshev.fit(S, values, S.size - 1, domain=[0.0, most])(s))
+def at_white(values: Floats) -> float:
+    """At s = 0, of the polynomial through values at the nodes S."""
+    return float(np.polynomial.chebyshev.chebval(-1.0, coefficients(values)))
 
 
 def stored(setting: Setting) -> Low:

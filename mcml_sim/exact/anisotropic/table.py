@@ -6,8 +6,8 @@ Lengths are in l* = 1 / (mu_a + mu_s (1 - g)), albedos alpha' = mu_s (1 - g) l*:
     2 pi x R_d = ... + alpha'^2 e^{f(s, ln x) - kappa x} (1 + kappa x),        s = sqrt(1 - alpha')
 
 f a cubic spline in ln x at Chebyshev's nodes of s, for Chebyshev's extreme points of g and of n. Between those it is
-the polynomial through them. `benchmarks/half_space_table.py` makes the file: orders up to LOW of photons on a GPU, the
-higher ones solved (`high_orders`).
+the polynomial through them. `benchmarks/half_space_table.py` makes the file: low orders of photons, the higher ones
+solved (`high_orders`).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from mcml_sim.errors import InputError
+from mcml_sim.exact.light import LEAST, nodes
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
@@ -31,8 +32,7 @@ Floats = NDArray[np.float64]
 COSINES = 0.475 * (1.0 - np.cos(np.pi * np.arange(8) / 7.0))
 """g, from 0 to .95."""
 INDICES = np.array([1.33, 1.39, 1.45])
-LEAST = 1e-3  # alpha' of the last node of s
-S = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + np.cos(np.pi * (np.arange(20) + 0.5) / 20))
+S = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(20))
 FIRST, LAST, STEP = 1e-3, 40.0, 0.12  # l*, and of ln x between knots
 KNOTS = np.log(FIRST) + STEP * np.arange(-3, int(np.ceil(np.log(LAST / FIRST) / STEP)) + 4)
 FILE = Path(__file__).with_name("half_space.npz")
