@@ -84,7 +84,7 @@ def test_errors_are_those_of_linear_least_squares(plain):
     jacobian = np.column_stack(columns)
     size = RMS * relative_error(LAW, ALPHA, SOURCE) * data.value * np.where(plain.beyond, BEYOND, 1.0)
     apart = np.subtract.outer(np.log(data.r), np.log(data.r)) / WAVE
-    law, noise = np.exp(-0.5 * apart**2) * np.outer(size, size), np.diag(data.sigma**2)
+    law, noise = np.exp(-np.abs(apart)) * np.outer(size, size), np.diag(data.sigma**2)
     gain = np.linalg.solve(jacobian.T @ np.linalg.solve(law + noise, jacobian), jacobian.T) @ np.linalg.inv(law + noise)
     for found, rows in ((plain.statistical, noise), (plain.of_law, law), (plain.likely, law + noise)):
         np.testing.assert_allclose(found[:2, :2], gain @ rows @ gain.T, rtol=1e-4)
