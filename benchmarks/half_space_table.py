@@ -4,14 +4,14 @@
 
 Photons give the first orders of scattering on rings, as whole counts, which are kept beside this file and traced again
 only where --photons says how many. The higher orders are solved: minutes on a GPU, an hour or two on two cores.
-`half_space_reference.npz` has whole runs of 1e8 to 6e8 photons, by ring and bin of order, of half spaces that are no
-nodes of the table (seed 101).
+`half_spaces` holds the table against other photons.
 """
 
 from __future__ import annotations
 
 import argparse
 import io
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
 from typing import NamedTuple
@@ -25,7 +25,7 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from mcml_sim.exact.anisotropic import high_orders, table
 from mcml_sim.exact.anisotropic.table import COSINES, INDICES, KNOTS, S, SplinedLight
-from mcml_sim.exact.light import coefficients, log_once
+from mcml_sim.exact.light import LEAST, coefficients, log_once, nodes
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.setting import ILLUMINATIONS
@@ -38,11 +38,18 @@ COUNTS = Path(__file__).with_name("half_space_counts.npz")
 EDGES = np.append(0.0, np.geomspace(1e-3, 100.0, 193))  # of rings [mfp]
 MIDDLES = np.sqrt(EDGES[1:-1] * EDGES[2:])
 MOST_ORDERS, FIRST_SEED = 48, 1001
-REACH = 9.0  # (kappa - b) x up to which what is solved keeps its digits
+S_MOST = np.sqrt(1.0 - LEAST)
+SOLVED = S_MOST * 0.5 * (1.0 + nodes(20))  # s at which high orders are solved
+REACH = 12.0  # (kappa - b) x up to which what is solved keeps its digits
+LAST_KNOWN = 10  # radii by which a row of logarithms is continued
+CONTINUED = 0.03  # relative error beyond these
+WELL = 0.1  # of a ring that the shape of light within rings is found from
 NOISY = 0.3  # relative error beyond which a ring says nothing
 ROUNDING = 1e-5  # the least relative error
 PENALTIES = 10.0 ** np.arange(-2.0, 9.0, 0.5)  # of third differences
 FOUR = np.polynomial.legendre.leggauss(4)
+IN_RINGS = 0.5 * (EDGES[1:-1] + EDGES[2:])[:, None] + 0.5 * np.diff(EDGES)[1:, None] * FOUR[0]
+RING_WEIGHTS = 0.5 * np.diff(EDGES)[1:, None] * FOUR[1]
 
 
 class Low(NamedTuple):
@@ -73,62 +80,131 @@ def traced(setting: Setting, photons: int, seed: int) -> Low:
     return Low(exits[:, :orders], batches * orders_batch.BATCH_PHOTONS)
 
 
-def solved(n: float, g: float, rule: high_orders.Fineness = high_orders.STANDARD) -> list[SplinedLight]:
+def solved(n: float, g: float) -> list[SplinedLight]:
     """Under either light, from stored photons."""
     settings = [Setting(name, n, g) for name in ILLUMINATIONS]
-    return joined(settings, [stored(setting) for setting in settings], rule)
+    return joined(settings, [stored(setting) for setting in settings])
 
 
-def joined(
-    settings: list[Setting], low: list[Low], rule: high_orders.Fineness = high_orders.STANDARD
-) -> list[SplinedLight]:
-    """Of one n and g under both lights: the photons' orders and the rest."""
+def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness | None = None) -> list[SplinedLight]:
+    """Of one n and g under both lights: the photons' orders, which are known at any albedo, and the rest."""
     n, g = settings[0].n, settings[0].g
-    orders, reduced = beyond(g), 1.0 - S**2
-    alpha = reduced / (reduced + (1.0 - g) * (1.0 - reduced))
-    kappa = np.array([high_orders.decay_rate(one, g) for one in alpha])
-    at_origin = high_orders.transforms(n, g, orders, np.array([1e-6 + 0j]), alpha, rule)[:, 0].real
-    found, rest = [], np.full((2, S.size, KNOTS.size - 4), np.nan)
-    scales = []
+    orders, rule = beyond(g), rule or high_orders.fine(g)
+    alpha, kappa = table.unreduced(1.0 - S**2, g), high_orders.decay_rates(1.0 - S**2, g)
+    solved_at = table.unreduced(1.0 - SOLVED**2, g)
+    whole = high_orders.totals(n, g, orders, solved_at, rule) / solved_at ** (orders + 1)
+    at_origin = np.exp(np.log(whole) @ _locally()[0].T)  # over alpha^(orders + 1)
+    found, scales = [], []
     for light, (setting, own) in enumerate(zip(settings, low, strict=True)):
         by_order = single_scattering.entered(setting) * own.exits.sum(axis=0) / own.started
         by_order[0] = single_scattering.reflected(setting)
         # What enters a white half space comes out again.
-        white = at_white(at_origin[light] / alpha ** (orders + 1))
+        white = at_white(at_origin[light])
         scales.append((single_scattering.entered(setting) - by_order.sum()) / white)
-        total = alpha[:, None] ** np.arange(1, orders + 1) @ by_order + scales[-1] * at_origin[light]
-        found.append(total / reduced)
+        total = alpha[:, None] ** np.arange(1, orders + 1) @ by_order
+        total += scales[-1] * alpha ** (orders + 1) * at_origin[light]
+        found.append(total / (1.0 - S**2))
+    x = np.append(MIDDLES, np.exp(np.arange(np.log(EDGES[-1]) + 0.03, np.log(table.LAST / (1.0 - g)), 0.06)))
+    high, doubt = _high(n, g, orders, x, rule)
+    high *= np.array(scales)[:, None, None]
+    rest = [
+        [
+            _rest(a, g, k, own, single_scattering.entered(setting), x, a ** (orders + 1) * one, doubt[light, at])
+            for at, (a, k, one) in enumerate(zip(alpha, kappa * (1.0 - alpha * g), high[light], strict=True))
+        ]
+        for light, (setting, own) in enumerate(zip(settings, low, strict=True))
+    ]
+    return [SplinedLight(np.array(one), share) for one, share in zip(rest, found, strict=True)]
+
+
+def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness) -> tuple[Floats, Floats]:
+    """Of both lights, at S, over alpha^(orders + 1): solved at fewer albedos. And its relative error.
+
+    Where digits are lost it goes on straight over ln x, once its decay is taken out.
+    """
+    reduced = 1.0 - SOLVED**2
+    alpha = table.unreduced(reduced, g)
+    kappa = high_orders.decay_rates(reduced, g) * (1.0 - alpha * g)
+    logs = np.full((2, SOLVED.size, x.size), np.nan)
     for line, members in high_orders.lines(alpha, g):
         values = high_orders.transforms(n, g, orders, line.k, line.alpha, rule)
-        x = np.append(MIDDLES, np.exp(np.arange(np.log(EDGES[-1]) + 0.03, np.log(table.LAST / (1.0 - g)), 0.06)))
-        high = high_orders.ring_density(line, values, x) * np.array(scales)[:, None, None]
-        for column, member in enumerate(members):
-            for light, own in enumerate(low):
-                kappas = kappa[member], line.k[0].imag
-                entered = single_scattering.entered(settings[light])
-                rest[light, member] = _rest(alpha[member], g, kappas, own, entered, x, high[light, :, column])
-    return [SplinedLight(one, share, kappa / (1.0 - alpha * g)) for one, share in zip(rest, found, strict=True)]
+        density = np.moveaxis(high_orders.ring_density(line, values, x), 2, 1)
+        digits = (kappa[members, None] - line.k[0].imag) * x < REACH
+        usable = np.logical_and.accumulate(digits & (density > 0), axis=-1)
+        own = np.log(np.where(usable, density, 1.0)) - (orders + 1) * np.log(alpha[members, None])
+        logs[:, members] = np.where(usable, own + kappa[members, None] * x, np.nan)
+    unknown = np.isnan(logs)
+    for row in logs.reshape(-1, x.size):
+        first = np.flatnonzero(~np.isnan(row))[-LAST_KNOWN:]
+        row[first[-1] + 1 :] = np.polyval(np.polyfit(np.log(x[first]), row[first], 1), np.log(x[first[-1] + 1 :]))
+    way, next_ones = _locally()
+    between = way @ logs
+    doubt = np.where((next_ones @ unknown) > 0, CONTINUED, ROUNDING)
+    fine = high_orders.decay_rates(1.0 - S**2, g) * (1.0 - table.unreduced(1.0 - S**2, g) * g)
+    return np.asarray(np.exp(between - fine[:, None] * x)), doubt
+
+
+def _locally() -> tuple[Floats, Floats]:
+    """From values at SOLVED to those at S, (64, 20): polynomials through the eight next ones, in Chebyshev's angle.
+
+    And how many of the four next ones each is. One polynomial through all of them would carry what happens next to
+    black over all albedos.
+    """
+    angle, step = np.arccos(2.0 * S / S_MOST - 1.0), np.pi / SOLVED.size
+    found, four = np.zeros((2, S.size, SOLVED.size))
+    for row, next_ones, at in zip(found, four, angle / step - 0.5, strict=True):
+        nearest = int(np.floor(at)) + np.arange(-3, 5)
+        for one in nearest:
+            others = nearest[nearest != one]
+            weight = np.prod((at - others) / (one - others))
+            place = min(one % (2 * SOLVED.size), -(one + 1) % (2 * SOLVED.size))  # even about either end
+            row[place] += weight
+            next_ones[place] += one in nearest[2:6]
+    return found, four
 
 
 def _rest(
-    alpha: float, g: float, kappas: tuple[float, float], low: Low, entered: float, x: Floats, high: Floats
+    alpha: float, g: float, kappa: float, low: Low, entered: float, x: Floats, high: Floats, doubt: Floats
 ) -> Floats:
     """Splines of f at one albedo, from rings of photons and what is solved at x [mfp]."""
-    kappa, start = kappas
     once_more = alpha ** np.arange(1, low.exits.shape[1] + 1)
     once_more[0] = 0.0
-    nodes = 0.5 * (EDGES[1:-1] + EDGES[2:])[:, None] + 0.5 * np.diff(EDGES)[1:, None] * FOUR[0]
-    within = np.sum(_decay(kappa * nodes) * 0.5 * np.diff(EDGES)[1:, None] * FOUR[1], axis=1)
-    density = entered / low.started * _decay(kappa * MIDDLES) / within
+    length = 1.0 / (1.0 - alpha * g)
+    albedo, at = alpha * (1.0 - g) * length, x / length
+    inside = (at > table.FIRST) & (at < table.LAST)
+    share = entered / low.started * (low.exits[1:-1] @ once_more)
+    # One photon more of the last order: a far ring that none has reached yet is not known to be dark.
+    spread = entered / low.started * np.sqrt(low.exits[1:-1] @ once_more**2 + once_more[-1] ** 2)
+    shape = _flat
+    for _ in range(2):  # a ring's mean becomes the value at its middle by the shape that the first round finds
+        within = np.sum(_decay(kappa * IN_RINGS) * np.exp(shape(np.log(IN_RINGS / length))) * RING_WEIGHTS, axis=1)
+        density = _decay(kappa * MIDDLES) * np.exp(shape(np.log(MIDDLES / length))) / within
+        photons, error = share * density, spread * density
+        seen = inside[: MIDDLES.size] & (error < WELL * photons)
+        own, logs = photons[seen], np.log(at[: MIDDLES.size][seen])
+        shape = _held(smoothed(logs, np.log(own / _decay(kappa * MIDDLES[seen])), error[seen] / own), logs)
     fill = np.zeros(x.size - MIDDLES.size)
-    photons = np.append(low.exits[1:-1] @ once_more * density, fill)
-    error = np.append(np.sqrt(low.exits[1:-1] @ once_more**2) * density, fill)
-    rest, length, albedo = photons + high, 1.0 / (1.0 - alpha * g), alpha * (1.0 - g) / (1.0 - alpha * g)
-    at = x / length
-    known = (rest > 0.0) & (at > table.FIRST) & (at < table.LAST) & ((kappa - start) * x < REACH)
+    rest, error = np.append(photons, fill) + high, np.append(error, fill)
+    error = np.hypot(error, doubt * high)
+    known = inside & (rest > 0.0)
     known[known] = (error[known] / rest[known]) < NOISY
     f = np.log(rest[known] * length / albedo**2 / _decay(kappa * x[known]))
     return smoothed(np.log(at[known]), f, np.hypot(error[known] / rest[known], ROUNDING))
+
+
+def _held(spline: Floats, logs: Floats) -> Callable[[Floats], Floats]:
+    """A spline on KNOTS, straight on from its data's ends by the slope of the last half."""
+    curve, first, last = BSpline(KNOTS, spline, 3), logs[0], logs[-1]
+    slope = (curve(last) - curve(last - 0.5)) / 0.5
+
+    def at(log: Floats) -> Floats:
+        return np.asarray(curve(np.clip(log, first, last)) + slope * np.maximum(log - last, 0.0))
+
+    return at
+
+
+def _flat(log: Floats) -> Floats:
+    return np.zeros_like(log)
 
 
 def _decay(x: Floats) -> Floats:
@@ -143,7 +219,7 @@ def isotropic(setting: Setting) -> SplinedLight:
         x = np.exp(log[rate * np.exp(log) < (28.0 if rate > 0.06 else 12.0)])
         again = 2.0 * np.pi * x * exact.profile(x, a, setting=setting) - a * np.exp(log_once(x, setting))
         rest.append(smoothed(np.log(x), np.log(again / a**2 / _decay(rate * x)), np.full(x.size, ROUNDING)))
-    return SplinedLight(np.array(rest), np.asarray(exact.reflectance(alpha, setting)) / alpha, kappa)
+    return SplinedLight(np.array(rest), np.asarray(exact.reflectance(alpha, setting)) / alpha)
 
 
 def smoothed(log: Floats, values: Floats, error: Floats) -> Floats:
@@ -167,11 +243,12 @@ def at_white(values: Floats) -> float:
 def stored(setting: Setting) -> Low:
     """Photons traced before."""
     arrays = read_npz(read_whole(COUNTS, 1 << 26), 1 << 26)
-    name = _name(setting)
+    name = name_of(setting)
     return Low(arrays[f"{name} exits"].astype(np.int64), int(arrays[f"{name} started"]))
 
 
-def _name(setting: Setting) -> str:
+def name_of(setting: Setting) -> str:
+    """What its arrays are called."""
     return f"{setting.illumination} n {setting.n:g} g {setting.g:.4f}"
 
 
@@ -185,9 +262,9 @@ def main() -> None:
         for seed, (g, n, name) in enumerate(product(COSINES[:0:-1], INDICES, ILLUMINATIONS), FIRST_SEED):
             setting = Setting(name, float(n), float(g))
             low = traced(setting, int(given.photons), seed)
-            found |= {f"{_name(setting)} exits": low.exits, f"{_name(setting)} started": np.int64(low.started)}
+            found |= {f"{name_of(setting)} exits": low.exits, f"{name_of(setting)} started": np.int64(low.started)}
             print(f"{setting}: {low.started:.3g} photons", flush=True)
-        write_whole(COUNTS, _bytes(found))
+        write_whole(COUNTS, content(found))
     whole = []
     for n in INDICES:
         zero = [isotropic(Setting(name, float(n))) for name in ILLUMINATIONS]
@@ -198,27 +275,15 @@ def main() -> None:
         whole.append(rows)
     rest, share = (
         np.array([[[getattr(one, name) for one in row] for row in rows] for rows in whole])
-        for name in SplinedLight._fields[:2]
+        for name in SplinedLight._fields
     )
-    kept = SplinedLight(
-        np.moveaxis(rest, 2, 0).astype(np.float32).astype(float),
-        np.moveaxis(share, 2, 0),
-        np.array([row[0].kappa for row in whole[0]]),
-    )
-    write_whole(
-        given.out,
-        _bytes(
-            {
-                "rest": kept.rest.astype(np.float32),
-                "share": kept.share,
-                "kappa": kept.kappa,
-                "sha256": table.digest(kept),
-            }
-        ),
-    )
+    kept = SplinedLight(np.moveaxis(rest, 2, 0).astype(np.float32).astype(float), np.moveaxis(share, 2, 0))
+    arrays = {"rest": kept.rest.astype(np.float32), "share": kept.share, "sha256": table.digest(kept)}
+    write_whole(given.out, content(arrays))
 
 
-def _bytes(arrays: dict) -> bytes:
+def content(arrays: dict) -> bytes:
+    """Of a file that holds them."""
     file = io.BytesIO()
     np.savez_compressed(file, allow_pickle=False, **arrays)
     return file.getvalue()

@@ -12,10 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import dispersion, hankel
+from mcml_sim.exact.anisotropic import functions as forwards
 from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, surface, total
 from mcml_sim.exact.transform import STANDARD, Transform
 from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
-from mcml_sim.media.setting import ILLUMINATIONS, Setting, is_traced
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting, is_traced
 
 Floats = NDArray[np.float64]
 Numbers = ArrayLike | jax.Array
@@ -23,6 +24,10 @@ Numbers = ArrayLike | jax.Array
 SEARCHLIGHT = Setting()
 FINER = STANDARD.scaled(1.5)
 
+WHERE = (
+    f"n >= 1 where g = 0, and n from {FORWARD_N[0]} to {FORWARD_N[1]} where Henyey and Greenstein's g is from 0 to "
+    f"{FORWARD_G}"
+)
 # What an argument of this name is, and its least and greatest value.
 ARGUMENTS = {
     "alpha": ("a single-scattering albedo in [0, 1]", 0.0, 1.0),
@@ -39,8 +44,10 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
     mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
     n > 1 below 3e-8. Its derivative at alpha = 1 is infinite: differentiate by sqrt(1 - alpha) there.
     """
-    _require_solved(setting)
+    require_solved(setting)
     (albedo,) = _all_checked(alpha=alpha)
+    if not setting.is_isotropic:
+        return _scalar_or_array(forwards.reflectance(albedo, setting))
     return _scalar_or_array(albedo * elementwise(_reflectance[setting.illumination], albedo, surface(setting)))
 
 
@@ -49,16 +56,21 @@ def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = S
 
     2 pi r R_d tends to alpha/2 at r = 0 where n = 1, else to alpha times `single_scattering.source_strength`.
     """
-    _require_solved(setting)
+    require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
-    values = by_alpha(hankel.profile, radius / length, albedo, setting)
+    if setting.is_isotropic:
+        values = by_alpha(hankel.profile, radius / length, albedo, setting)
+    else:
+        values = forwards.profile(radius / length, albedo, setting)
     return _scalar_or_array(values / length**2)
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
     """Share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
-    _require_solved(setting)
+    require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
+    if not setting.is_isotropic:
+        return _scalar_or_array(forwards.cdf(radius / length, albedo, setting))
     return _scalar_or_array(by_alpha(_cdf, radius / length, albedo, setting))
 
 
@@ -67,9 +79,11 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
 
     The derivative at xi = 1, infinite, is given as 0.
     """
-    _require_solved(setting)
+    require_solved(setting)
     share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
-    if any(isinstance(one, jax.Array) for one in (share, albedo, setting.n)):
+    if not setting.is_isotropic:
+        values = forwards.quantile(share, albedo, setting)
+    elif any(isinstance(one, jax.Array) for one in (share, albedo, setting.n)):
         # A number must stay one: as an array it would be an n to differentiate by, and 1 no longer be told from 1 + 0.
         n, known = (setting.n, None) if is_traced(setting.n) else (None, setting.n)
         values = _radius_within(share, albedo, n, known, setting.illumination)
@@ -89,11 +103,16 @@ def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Sett
     Their errors fall exponentially with the number of nodes, so nearly all of the change is the error of `profile`:
     that of quadrature, and of rounding, which differs too. It knows nothing of what both take for granted: the
     equation of transfer, and the limit closer to the source than 1e-6 mfp. 0 where the profile is 0 or infinite.
+
+    Where g > 0: its change without the g of the table that is farthest from the setting's.
     """
-    _require_solved(setting)
+    require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     x = radius / length
-    coarse, fine = (by_alpha(hankel.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
+    if setting.is_isotropic:
+        coarse, fine = (by_alpha(hankel.profile, x, albedo, setting, rule) for rule in (STANDARD, FINER))
+    else:
+        coarse, fine = (forwards.profile(x, albedo, setting, coarse) for coarse in (True, False))
     xp = jnp if isinstance(fine, jax.Array) else np
     same = coarse == fine
     return _scalar_or_array(xp.abs(xp.where(same, 1.0, coarse) / xp.where(same, 1.0, fine) - 1.0))
@@ -146,9 +165,10 @@ def _setting(illumination: str, n: Any, known: Any) -> Setting:
     return Setting(illumination, known if n is None else n)
 
 
-def _require_solved(setting: Setting) -> None:
-    if not (isinstance(setting, Setting) and setting.is_isotropic and (is_traced(setting.n) or setting.n >= 1)):
-        raise SettingError(f"the exact half space has n >= 1 and g = 0, got {setting}: simulate it instead")
+def require_solved(setting: Setting) -> None:
+    """SettingError of a half space that is not solved."""
+    if not (isinstance(setting, Setting) and setting.is_solved):
+        raise SettingError(f"exact light needs {WHERE}, got {setting}: simulate it instead (mcml_sim.simulate_orders)")
 
 
 def _all_checked(**given: Any) -> list[Any]:

@@ -13,7 +13,10 @@ mu_s (1 - g) l*. D_1 belongs to the unreduced medium, 1 + alpha g / (1 - g) mean
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import equinox as eqx
+import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
@@ -28,16 +31,22 @@ STEP = 0.06  # of ln x, of D_1
 SINGLE_NEAREST, SINGLE_FARTHEST = 1e-7, 1e5  # mfp
 LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
-ENERGY = np.polynomial.legendre.leggauss(32)
+ENERGY = np.polynomial.legendre.leggauss(96)
+SEARCHLIGHT = Setting()
 
 
 class ExactLight(eqx.Module):
     """The profile of a half space with `setting`; albedos and lengths are reduced ones."""
 
     setting: Setting = eqx.field(static=True)
-    nearest: float = eqx.field(static=True)
+    g: Array
+    critical: Array
+    """k_c of light scattered once [1/mfp]."""
+    nearest: Array
     """x of f's first knot; nearer, light scattered more than once is taken for x (1 - ln x) of itself."""
-    step: float = eqx.field(static=True)
+    farthest: Array
+    """x of the last one; farther, light goes on as its decay over x^2."""
+    step: Array
     """Of ln x, from knot to knot."""
     rest: Array
     """f's spline in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling."""
@@ -48,25 +57,27 @@ class ExactLight(eqx.Module):
     share: Array
     """A / alpha in Chebyshev polynomials of s, (degrees,)."""
 
+    @property
+    def unlabelled(self) -> ExactLight:
+        """The same without its setting: what is compiled for one serves all."""
+        return replace(self, setting=SEARCHLIGHT)
+
     def total(self, alpha) -> Array:
         """Total reflectance A [-]."""
         return alpha * (_chebyshev(self.share.size, jnp.sqrt(1.0 - alpha), 1.0) @ self.share)
 
     def ring_density(self, x: Array, alpha: Array) -> Array:
         """2 pi x R_d [1/l*] at x > 0 of any shape, of one albedo."""
-        g = self.setting.g
-        paths = x * (1.0 + alpha * g / (1.0 - g))
-        critical = single_scattering.critical_rate(self.setting)
+        paths = x * (1.0 + alpha * self.g / (1.0 - self.g))
         log = (jnp.log(paths) - np.log(SINGLE_NEAREST)) / STEP
-        once = jnp.exp(_spline(self.once, log, STEP) - critical * paths) / (1.0 - g)
+        once = jnp.exp(_spline(self.once, log, STEP) - self.critical * paths) / (1.0 - self.g)
         polynomials = _chebyshev(self.kappa.size, jnp.sqrt(1.0 - alpha), np.sqrt(1.0 - LEAST))
         spline, kappa = jnp.tensordot(polynomials, self.rest, 1), polynomials @ self.kappa
-        farthest = self.nearest * np.exp(self.step * self.rest.shape[1])
-        inside = jnp.clip(x, self.nearest, farthest)
-        at = (jnp.log(inside) - np.log(self.nearest)) / self.step
+        inside = jnp.clip(x, self.nearest, self.farthest)
+        at = jnp.log(inside / self.nearest) / self.step
         light = jnp.exp(_spline(spline, at, self.step) - kappa * x) * (1.0 + kappa * x)
         near = jnp.minimum(x, self.nearest)
-        light = light * near * (1.0 - jnp.log(near)) / (self.nearest * (1.0 - np.log(self.nearest)))
+        light = light * near * (1.0 - jnp.log(near)) / (self.nearest * (1.0 - jnp.log(self.nearest)))
         light = light * (inside / jnp.maximum(x, inside)) ** 2
         return alpha * once + alpha**2 * light
 
@@ -75,10 +86,18 @@ class ExactLight(eqx.Module):
         return self.ring_density(x, alpha) / (2.0 * jnp.pi * x)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        """Share of the reflected energy within x [-], to 1e-4."""
+        """Share of the reflected energy within x [-], to 1e-6."""
         t, weight = 0.5 * (1.0 + ENERGY[0]), 0.5 * ENERGY[1]
         parts = self.ring_density(jnp.maximum(x, 1e-30)[..., None] * t**3, alpha) * (3.0 * t**2 * weight)
         return jnp.clip(x * jnp.sum(parts, axis=-1) / self.total(alpha), 0.0, 1.0)
+
+
+def tabulated(setting: Setting, nearest: float, step: float, rest: Floats, kappa: Floats, share: Floats) -> ExactLight:
+    """From numpy arrays, as in `ExactLight`."""
+    critical, farthest = single_scattering.critical_rate(setting), nearest * np.exp(step * rest.shape[1])
+    parts = setting.g, critical, nearest, farthest, step, rest, once(setting), kappa, share
+    with jax.enable_x64(True), jax.core.eval_context():
+        return ExactLight(setting, *(jnp.asarray(part, float) for part in parts))
 
 
 def once(setting: Setting) -> Floats:
@@ -118,7 +137,7 @@ def _chebyshev(degrees: int, s, most: float) -> Array:
     return jnp.cos(jnp.arange(degrees) * jnp.arccos(z))
 
 
-def _spline(coefficients: Array, at: Array, step: float) -> Array:
+def _spline(coefficients: Array, at: Array, step) -> Array:
     """At places in intervals of one step, (intervals, 4) and (...)."""
     interval = jnp.clip(jnp.floor(at), 0, coefficients.shape[0] - 1).astype(int)
     t = (at - interval) * step

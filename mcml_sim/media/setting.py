@@ -13,6 +13,8 @@ from mcml_sim.media import phase as phases
 from mcml_sim.media.checks import is_number, shown
 
 ILLUMINATIONS = ("searchlight", "diffuse")
+FORWARD_N, FORWARD_G = (1.33, 1.45), 0.95
+"""Indices between which, and g up to which, half spaces that scatter forwards are solved."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +63,10 @@ class Setting:
     @property
     def is_solved(self) -> bool:
         """True where `mcml_sim.exact` has the half space."""
-        return self.n >= 1.0 and self.is_isotropic
+        if self.is_isotropic:
+            return is_traced(self.n) or self.n >= 1.0
+        in_table = not is_traced(self.n) and FORWARD_N[0] <= self.n <= FORWARD_N[1] and 0.0 < self.g <= FORWARD_G
+        return in_table and self.phase is None
 
     def as_table(self) -> dict[str, Any]:
         """What files say of it; `phase` where it is not Henyey and Greenstein's."""

@@ -95,7 +95,7 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     lines = Lines(name, _checked(name, content))
     (version,) = lines.take(1, "the file version, 1.0")
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
-        raise lines.error("the file version, 1.0", _shown(version))
+        raise lines.error("the file version, 1.0", shown(version))
     (word,) = lines.take(1, "the number of runs")
     taken: set[str] = set()
     return tuple(read_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
@@ -124,8 +124,18 @@ class Lines:
             if len(words) >= count:
                 return [self._text(word) for word in words[:wanted]]
             if words:
-                raise self.error(f"{count} values, {expected}", f"{len(words)}: {_shown(' '.join(words))}")
+                raise self.error(f"{count} values, {expected}", f"{len(words)}: {shown(' '.join(words))}")
         raise self.error(expected, "the end of the file")
+
+    def find(self, key: str) -> None:
+        """Go on to the line that begins with the word `key`."""
+        for line in self._lines:
+            self._number += 1
+            if self._number > MAX_LINES:
+                raise self.error(f"the section {key}", f"more than {MAX_LINES} lines before it")
+            if line.partition("#")[0].split(maxsplit=1)[:1] == [key]:
+                return
+        raise self.error(f"the section {key}", "the end of the file")
 
     def _text(self, word: str) -> str:
         if stray := STRAY.search(word):
@@ -140,13 +150,13 @@ class Lines:
         """A whole number from 1 to `most`."""
         if WHOLE.fullmatch(word) and 1 <= int(word) <= most:
             return int(word)
-        raise self.error(f"{name}, a whole number from 1 to {most}", _shown(word))
+        raise self.error(f"{name}, a whole number from 1 to {most}", shown(word))
 
     def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
         """A number within bounds, both included."""
         if DECIMAL.fullmatch(word) and bounds[0] <= float(word) <= bounds[1]:
             return float(word) + 0.0  # no -0
-        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", _shown(word))
+        raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", shown(word))
 
     def coefficient(self, name: str, word: str) -> float:
         """A coefficient, which may be 0, but not so little that no float32 holds the mean free path."""
@@ -175,12 +185,12 @@ def _output(lines: Lines, taken: set[str]) -> tuple[str, str]:
     """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     name, *form = lines.take(1, "the name of an output file, and A or B", optional=1)
     if len(name) > MAX_NAME or not name.isprintable():
-        raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", _shown(name))
+        raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", shown(name))
     if form and not FORMAT.fullmatch(form[0]):
-        raise lines.error("A or B after the name (a name holds no spaces)", _shown(form[0]))
+        raise lines.error("A or B after the name (a name holds no spaces)", shown(form[0]))
     same = posixpath.normpath(name)
     if same in taken:
-        raise lines.error("an output file that no other run has", _shown(name))
+        raise lines.error("an output file that no other run has", shown(name))
     taken.add(same)
     return name, "B" if form and form[0][0] in "bB" else "A"
 
@@ -205,15 +215,21 @@ def _layer(lines: Lines, at: int, number: int) -> Layer:
         "n": lines.decimal(f"n {of}", n, INDICES),
         "mu_a": lines.coefficient(f"mu_a {of} in 1/cm", mu_a),
         "mu_s": lines.coefficient(f"mu_s {of} in 1/cm", mu_s),
-        "g": lines.decimal(f"g {of}", g, (-1.0, 1.0)),
     }
-    if abs(values["g"]) == 1 and (values["mu_s"] > 0 or values["g"] < 0):
-        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", _shown(g))
+    values["g"] = require_g(lines, of, g, values["mu_s"])
     if at == number and INFINITE.fullmatch(thickness):
         if values["mu_a"] == values["mu_s"] == 0:
-            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{_shown(mu_a)} and {_shown(mu_s)}")
+            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", f"{shown(mu_a)} and {shown(mu_s)}")
         return Layer(**values)
     return Layer(**values, thickness=lines.decimal(f"thickness {of} in cm", thickness, LENGTHS))
+
+
+def require_g(lines: Lines, of: str, word: str, mu_s: float) -> float:
+    """A mean cosine, 1 only where nothing scatters."""
+    g = lines.decimal(f"g {of}", word, (-1.0, 1.0))
+    if abs(g) == 1 and (mu_s > 0 or g < 0):
+        raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", shown(word))
+    return g
 
 
 def _checked(name: str, content: bytes) -> bytes:
@@ -235,5 +251,5 @@ def _numbers(words: list[str]) -> int:
     return sum(1 for _ in itertools.takewhile(_is_number, " ".join(words).split()))
 
 
-def _shown(word: str) -> str:
+def shown(word: str) -> str:
     return repr(word if len(word) <= LONGEST_SHOWN else f"{word[: LONGEST_SHOWN - 3]}...")

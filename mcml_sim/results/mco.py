@@ -15,6 +15,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media.grid import Grid
+from mcml_sim.results import mco2
 from mcml_sim.results.mci import DECIMAL, Lines, Run, read_run
 from mcml_sim.results.tally import Tally
 
@@ -229,7 +230,7 @@ class Output:
 
 
 def read_mco(path: str | os.PathLike[str]) -> Output:
-    """Parameters, totals and Rd_r of a V1 .mco file. InputError in one line, `FILE:LINE: expected ..., got ...`."""
+    """Parameters, totals and Rd_r of an .mco of MCML V1 or 2; InputError, `FILE:LINE: expected ..., got ...`."""
     return parse_mco(read_whole(path, MAX_BYTES), str(path))
 
 
@@ -238,7 +239,8 @@ def parse_mco(content: bytes, name: str) -> Output:
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
     lines = Lines(name, content.replace(b"\x00", b"\xff"))
-    _beginning(lines)
+    if _beginning(lines) == mco2.VERSION:
+        return Output(*mco2.parse(lines))
     run = read_run(lines, set())
     _keyword(lines, "RAT")
     specular, diffuse, _, _ = _read_column(lines, "RAT", 4)
@@ -250,19 +252,21 @@ def parse_mco(content: bytes, name: str) -> Output:
 
 
 def begins_mco(path: str | os.PathLike[str]) -> bool:
-    """Whether a file begins as an .mco does, down to its parameters."""
+    """Whether a file begins as an .mco of V1 does, down to its parameters."""
     try:
-        _beginning(Lines(str(path), read_whole(path, HEAD_BYTES)))
+        return _beginning(Lines(str(path), read_whole(path, HEAD_BYTES))) == "A1"
     except InputError:
         return False
-    return True
 
 
-def _beginning(lines: Lines) -> None:
+def _beginning(lines: Lines) -> str:
+    """The version."""
     (version,) = lines.take(1, "the file version, A1")
-    if version != "A1":
-        raise lines.error("the file version, A1", repr(version[:8]))
-    _keyword(lines, "InParm")
+    if version not in ("A1", mco2.VERSION):
+        raise lines.error(f"the file version, A1 or {mco2.VERSION}", repr(version[:10]))
+    if version == "A1":
+        _keyword(lines, "InParm")
+    return version
 
 
 def _keyword(lines: Lines, key: str) -> None:

@@ -12,15 +12,14 @@ import typer
 from mcml_sim.cli.lazy import interruptible
 from mcml_sim.cli.program import one_line
 from profilefit.cli import options
+from profilefit.cli.fit_layers import fit_of_layers
 from profilefit.cli.folders import records_folder
 from profilefit.cli.options import AsJson, Fits, Quiet
 from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
-    from mcml_sim import Setting
-    from profilefit.measured import Answer, Known, Measured
-    from profilefit.measured.instrument import Instrument
+    from profilefit.measured import Answer, Known
 
 FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
@@ -50,23 +49,37 @@ def fit(
     unit: Annotated[
         str | None, typer.Option(help="Unit of r, if the header has none: nm, um, mm, cm, m, inch.")
     ] = None,
+    colour: Annotated[str | None, typer.Option(help="Of a TLS850's records: red, green or blue.")] = None,
     scale: Annotated[
         str, typer.Option(help="What the values are multiplied by: a number, 1.0+-0.02 if known so well, or free.")
     ] = "1",
     total: Annotated[
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
     ] = None,
-    light: Annotated[str, typer.Option(help=f"{options.LIGHTS_HELP}.")] = options.LIGHTS[0],
+    light: Annotated[
+        str | None, typer.Option(help=f"{options.LIGHTS_HELP}.", show_default=f"the file's, else {options.LIGHTS[0]}")
+    ] = None,
     beam: Annotated[
         str | None,
         typer.Option(
-            help="1/e² radius of a Gaussian beam (0.5mm), tophat:0.5mm, or a .csv of radius and irradiance.",
+            help="1/e² radius of a Gaussian beam (0.5mm), a range of it (0.3mm:0.7mm), tophat:0.5mm, or a .csv.",
             show_default="a pencil beam",
         ),
     ] = None,
     fibre: Annotated[str | None, typer.Option(help="Core radius of the fibre that a point is seen by.")] = None,
     n: Annotated[
-        float | None, typer.Option(help="Refractive index of the medium.", show_default="the file's, else 1")
+        str | None,
+        typer.Option(help="Refractive index of the medium, or a range: 1.33:1.45.", show_default="the file's, else 1"),
+    ] = None,
+    g: Annotated[
+        str | None,
+        typer.Option(help="Mean cosine of scattering, or a range: 0.7:0.95.", show_default="the file's, else 0"),
+    ] = None,
+    layers: Annotated[
+        Path | None, typer.Option(help="STACK.toml of layers to fit in place of a half space: minutes.")
+    ] = None,
+    free: Annotated[
+        str | None, typer.Option(help="What is free in the layers: d1, mu_a2, mu_s2, ...", metavar="NAME,NAME")
     ] = None,
     r_min: Annotated[str | None, typer.Option(help="Leave out what is nearer to the beam, such as 0.5mm.")] = None,
     r_max: Annotated[str | None, typer.Option(help="Leave out what is farther.")] = None,
@@ -83,8 +96,8 @@ def fit(
 
     That is mu_s' and mu_a, from a measured or simulated profile; and what the data do not identify. A table has columns
     r, value, sigma; or r, value1, value2, value3, ... of replicates; or r_in, r_out instead of r for averages over
-    annuli. Values are reflected light per area and per incident light, unless the scale is free. Exit status 1 if the
-    fit fails.
+    annuli. Values are reflected light per area and per incident light, unless the scale is free. Comments such as
+    "# n = 1.4" may state light, n, g, beam, fibre and unit. Exit status 1 if the fit fails.
 
     With --kind phase a table has columns angle (degrees), value and, if known, sigma; one to four terms of Henyey
     and Greenstein, Haltrin's form, and Fournier and Forand's are fitted to it, moments free or held: a minute. The one
@@ -94,6 +107,7 @@ def fit(
     Examples, on the files of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
+      profilefit fit examples/two_layers.mco --layers examples/two_layers.toml --free d1,mu_a1
       profilefit fit petzold --kind phase
     """
     with interruptible(__name__):
@@ -102,6 +116,7 @@ def fit(
         from mcml_sim.runs.progress import working
         from profilefit.measured import fit as fitted
         from profilefit.measured import read
+        from profilefit.measured.premises import premises
         from profilefit.measured.result import content
 
     if kind not in KINDS:
@@ -114,20 +129,26 @@ def fit(
     if seed < 0:
         raise InputError(f"--seed must be a whole number >= 0, got {seed}")
     folder = records_folder(fits, quiet)
-    measured = read(data, unit, scale == FREE)
+    measured = read(data, unit, scale == FREE, colour)
     measured = measured.within(_radius("--r-min", r_min, measured.unit), _radius("--r-max", r_max, measured.unit))
-    setting = _setting(measured, light, n)
+    told = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
+    where = premises(measured, law, told, {name: f"--{name}" for name in told})
     held = _held(fix or [], measured.unit)
     known = None if total is None else _total(total)
     factor = _scale(scale)
-    instrument = _instrument(measured, beam, fibre)
+    if layers is not None:
+        _require_layers_only(context)
+        fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
+        return
+    if free is not None:
+        raise InputError("--free must be left out where there are no --layers")
     if out is not None:
         require_folder(out)
     try:
         with working("fitting", quiet):
-            result = fitted(measured, law, constants, setting, held, known, factor, instrument, seed, folder=folder)
+            result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder)
     except SettingError as error:
-        raise SettingError(f"{error}; --n and --light choose one of these") from None
+        raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
     body = options.in_options(content(result, law, constants))
     if out is not None:
         _write(result, body, out, quiet)
@@ -139,6 +160,14 @@ def fit(
         _show(result, f"{one_line(data.name)}: {points}, {model}, {result.found.question.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
+
+
+def _require_layers_only(context: typer.Context) -> None:
+    """InputError of an option that says something of a half space."""
+    for name in ("law", "constants", "fix", "total", "n", "g", "seed"):
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"--{name} must be left out where --layers say what is fitted")
 
 
 def _of_phase(
@@ -214,32 +243,6 @@ def _radius(option: str, text: str | None, unit: str) -> float | None:
         from profilefit.measured.lengths import length
 
     return None if text is None else length(option, text, unit)
-
-
-def _setting(measured: Measured, light: str, n: float | None) -> Setting:
-    """Illumination and surface: of a simulation its own, where no option says otherwise."""
-    with interruptible(__name__):
-        from mcml_sim import Setting
-
-    if light not in options.LIGHTS:
-        raise InputError(f"--light must be one of {', '.join(options.LIGHTS)}, got {light!r}")
-    if measured.illumination not in (None, light):
-        raise InputError(
-            f"--light must be {measured.illumination} for {measured.source}, which was simulated so, got {light!r}"
-        )
-    return Setting(light, measured.n or 1.0 if n is None else n)
-
-
-def _instrument(measured: Measured, beam: str | None, fibre: str | None) -> Instrument:
-    """The beam, and the fibre's core."""
-    with interruptible(__name__):
-        from profilefit.measured.beam import beam_of
-        from profilefit.measured.instrument import Instrument
-
-    if fibre is not None and measured.rings:
-        raise InputError("--fibre must be left out where rows are averages over annuli")
-    light = None if beam is None else beam_of("--beam", beam, measured.unit)
-    return Instrument(light, _radius("--fibre", fibre, measured.unit) or 0.0)
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:

@@ -32,8 +32,13 @@ FUNCTIONS = ("exact", "convert", "solver", "stacks", "heart", "sea", "fur")
 # What the library calls an argument, at the head of a message ("out must be") or in backquotes, and its option here.
 OPTIONS = {
     "beam": "--beam",
+    "colour": "--colour",
     "constants": "--constants",
+    "fibre": "--fibre",
+    "free": "--free",
+    "g": "--g",
     "held": "--fix",
+    "n": "--n",
     "out": "--out",
     "part": "PART",
     "r_max": "--r-max",

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -33,6 +34,7 @@ class Measured:
     medium     what a simulation was of, lengths in `unit`; None of what was measured
     illumination  under which light it was; None of what was measured
     notes      what was left out or merged, for the reader
+    stated     what a table's comments state of light, n, g, beam and fibre, as texts
     """
 
     source: str
@@ -51,6 +53,7 @@ class Measured:
     medium: Medium | None = None
     illumination: str | None = None
     notes: tuple[str, ...] = ()
+    stated: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def rings(self) -> bool:
@@ -71,6 +74,11 @@ class Measured:
     def n(self) -> float | None:
         """Refractive index of a simulated medium over that above it [-]; None of what was measured."""
         return None if self.medium is None else self.medium.layers[0].n / self.medium.n_above
+
+    @property
+    def g(self) -> float | None:
+        """Mean cosine of the scattering of a simulated medium [-]; None of what was measured."""
+        return None if self.medium is None or self.medium.layers[0].phase else self.medium.layers[0].g
 
     def within(self, r_min: float | None, r_max: float | None) -> Measured:
         """Only the rows that lie wholly between two radii [unit]; InputError if none does."""

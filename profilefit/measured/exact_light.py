@@ -1,12 +1,13 @@
-"""Exact light of a half space where scattering has no direction, ready to be fitted (`mcml_sim.exact.light`).
+"""Exact light of a half space, ready to be fitted (`mcml_sim.exact.light`).
 
-Between its nodes this is within 1e-5 of `mcml_sim.exact` for x up to 20 mfp, within 3e-4 farther out, until light has
-fallen by e^-20. Beyond x = 28 / kappa, where the exact solution runs out of digits (12 / kappa next to white), R_d goes
-on as e^{-kappa x} (1 + kappa x) / x^3.
+Where scattering has a direction it is that of the table. Where it has none, between its nodes this is within 1e-5 of
+`mcml_sim.exact` for x up to 20 mfp, within 3e-4 farther out, until light has fallen by e^-20. Beyond x = 28 / kappa,
+where the exact solution runs out of digits (12 / kappa next to white), R_d goes on as e^{-kappa x} (1 + kappa x) / x^3.
 """
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import lru_cache
 
 import jax
@@ -15,7 +16,9 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import exact
-from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, once
+from mcml_sim.exact.anisotropic import table
+from mcml_sim.exact.half_space import require_solved
+from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
 from mcml_sim.media.setting import Setting
 
 EXACT = "exact"  # its name among laws
@@ -28,7 +31,10 @@ SOLVED, SOLVED_WHITE, WHITE = 28.0, 12.0, 0.06
 
 @lru_cache(maxsize=8)
 def exact_light(setting: Setting) -> ExactLight:
-    """Of a half space that `mcml_sim.exact` solves; SettingError of another. A second."""
+    """Of a half space that `mcml_sim.exact` solves; SettingError of another. Seconds where g = 0."""
+    require_solved(setting)
+    if not setting.is_isotropic:
+        return _filled(table.light(setting))
     s = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(DEGREES))
     alpha = 1.0 - s**2
     log = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP)
@@ -39,11 +45,15 @@ def exact_light(setting: Setting) -> ExactLight:
     rest = (light - alpha[:, None] * np.exp(log_once(solved, setting))) / alpha[:, None] ** 2
     f = np.log(rest) + kappa * solved - np.log1p(kappa * solved) - 2.0 * np.log(x / solved)
     whole = nodes(DEGREES) * 0.5 + 0.5
-    tables = (
-        coefficients(CubicSpline(log, f, axis=1).c.transpose(2, 1, 0)),
-        once(setting),
-        coefficients(kappa[:, 0]),
-        coefficients(np.asarray(exact.reflectance(1.0 - whole**2, setting=setting)) / (1.0 - whole**2)),
-    )
+    share = coefficients(np.asarray(exact.reflectance(1.0 - whole**2, setting=setting)) / (1.0 - whole**2))
+    rest = coefficients(CubicSpline(log, f, axis=1).c.transpose(2, 1, 0))
+    return tabulated(setting, NEAREST, STEP, rest, coefficients(kappa[:, 0]), share)
+
+
+def _filled(light: ExactLight) -> ExactLight:
+    """The same in arrays as large as those where g = 0, which share compiled code."""
+    more, intervals = DEGREES - light.kappa.size, np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
     with jax.enable_x64(True):
-        return ExactLight(setting, NEAREST, STEP, *map(jnp.asarray, tables))
+        rest = jnp.pad(light.rest, ((0, more), (0, 0), (0, 0)))
+        rest = jnp.pad(rest, ((0, 0), (0, intervals - rest.shape[1]), (0, 0)), mode="edge")
+        return replace(light, rest=rest, kappa=jnp.pad(light.kappa, (0, more)), share=jnp.pad(light.share, (0, more)))

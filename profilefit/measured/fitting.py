@@ -24,8 +24,8 @@ from profilefit.measured.solving import Minimum, Problem, are_apart, descended, 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
-# A law's error is that at the albedo of the fit, which it hardly moves: one round more is enough.
-ROUNDS = 1
+# The errors of a law, and of what is known as a range, are those at the medium of the fit, which they hardly move.
+ROUNDS, ROUNDS_OPEN = 1, 3
 FAR = 100.0  # above the lowest chi-square of the search: such minima are not followed under the final errors
 SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search allows for
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
@@ -195,16 +195,37 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     problem = Problem(data, question, noise(data, widening=wider, model=model))
     minimum = first = minimised(problem)
     found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
-    for _ in range(max(REWEIGHTED if data.counted else 0, ROUNDS if model is not None else 0)):
+    rounds = (
+        REWEIGHTED if data.counted else 0,
+        ROUNDS if model is not None else 0,
+        ROUNDS_OPEN if question.others else 0,
+    )
+    for _ in range(max(rounds)):
         light = problem.model.linearised(minimum.point, data.inner, data.outer)[0][:-1]
         if not np.all(np.isfinite(light)):
             break
         expected = np.maximum(light, LEAST_EXPECTED * data.value)
-        model = law_error.covariance(data, found.rel, found.beyond)
+        model = _sum(law_error.covariance(data, found.rel, found.beyond), _open(problem, minimum.point))
         problem = replace(problem, noise=noise(data, expected, wider, model))
         minimum = descended(problem, minimum.point, question.free)
         found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
     return replace(found, rivals=_rivals(found, first.others))
+
+
+def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
+    return one if other is None else other if one is None else one + other
+
+
+def _open(problem: Problem, point: Floats) -> Floats | None:
+    """(n, n) covariance of the light in the rows from what is known as a range; None where nothing is."""
+    if not problem.question.others:
+        return None
+    inner, outer = problem.data.inner, problem.data.outer
+    here, spread = problem.model.predicted(point[None], inner, outer)[0, :-1], np.zeros((inner.size,) * 2)
+    for weight, law, instrument in problem.question.others:
+        away = Model(law, instrument).predicted(point[None], inner, outer)[0, :-1] - here
+        spread += weight * np.outer(away, away)
+    return spread
 
 
 def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:

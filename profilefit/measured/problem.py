@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import jax
@@ -31,6 +32,8 @@ class Question:
     """What to fit: exact light or a law, by the albedo, the transport mean free path and the scale of the values.
 
     instrument  the beam, and what a row is averaged over
+    others  (weight, light, instrument) under other values of what is known as a range: their mean square is an error
+    ranges  those ranges, of n, g and the beam; assumed which of n and g nobody named
     held    coordinates that stay where they are, by name: alpha, l, scale, as values (not logarithms)
     total   the total reflectance A [-], if that was measured as well; scale known to within an error
     """
@@ -40,6 +43,9 @@ class Question:
     total: Known | None = None
     scale: Known | None = None
     instrument: Instrument = PENCIL
+    others: tuple[tuple[float, Light, Instrument], ...] = ()
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
 
     @property
     def free(self) -> tuple[int, ...]:

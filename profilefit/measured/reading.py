@@ -18,6 +18,8 @@ are merged until each holds enough photons, the empty tail included.
 from __future__ import annotations
 
 import hashlib
+import math
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +30,7 @@ from mcml_sim.results import mco, tally_file
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.table_file import read_table
+from profilefit.measured.tls_file import is_tls, read_tls
 
 UNIT = "cm"
 # At a hundred photons the standard error of a ring is known to 10 %, and near enough to a normal one.
@@ -35,6 +38,8 @@ FEWEST_PHOTONS = 100.0
 # Narrower rings, relative to their radius, add no information about a smooth profile.
 NARROWEST = 0.03
 FEWEST_RINGS = 3
+MOST_SHOWN = 6  # layers
+ENDLESS = 1e4  # cm: what users of MCML write for a half space is 1e8
 ALL_LIGHT = 1.0 + 1e-3  # files are rounded
 
 
@@ -51,7 +56,8 @@ def read_mco_profile(path: Path) -> Measured:
     notes = (f"the last of {grid.rings} annuli, which holds all light beyond it, is left out",)
     return _counted(
         path, content, grid.r_edges[:-1], energy, energy * each, energy / each, float(photons),
-        "bounds: no photon weighs more than it entered with", True, found.run.medium, "searchlight", notes,
+        "bounds: no photon weighs more than it entered with", True, found.run.medium, "searchlight",
+        (*notes, *_layers(found.run.medium)),
     )  # fmt: skip
 
 
@@ -71,7 +77,8 @@ def read_npz_profile(path: Path) -> Measured:
     squares = error**2 + energy**2 / (found.photons - 1.0)
     return _counted(
         path, content, found.grid.r_edges, energy, squares, np.asarray(estimate.effective_samples),
-        float(found.photons), "standard errors of the simulation", False, found.medium, found.illumination, (),
+        float(found.photons), "standard errors of the simulation", False, found.medium, found.illumination,
+        tuple(_layers(found.medium)),
     )  # fmt: skip
 
 
@@ -120,6 +127,23 @@ def _counted(
     )  # fmt: skip
 
 
+def _layers(medium: Medium) -> Iterator[str]:
+    """What a medium has that no half space has."""
+    if len(medium.layers) > 1:
+        each = (
+            f"n {one.n:g}, mu_a {one.mu_a:g}, mu_s' {one.similar.mu_s:g} 1/cm, "
+            + ("endless" if math.isinf(one.thickness) else f"{one.thickness:g} cm")
+            for one in medium.layers[:MOST_SHOWN]
+        )
+        more = f"; and {len(medium.layers) - MOST_SHOWN} more" if len(medium.layers) > MOST_SHOWN else ""
+        yield f"the file's {len(medium.layers)} layers, from above: {'; '.join(each)}{more}"
+    if not (medium.is_half_space or medium.z_edges[-1] > ENDLESS):
+        yield (
+            f"the file's medium is a slab {medium.z_edges[-1]:g} cm thick, fitted as a half space: light that leaves "
+            "below reads as absorbed"
+        )
+
+
 def _require_light(path: Path, energy: Floats) -> None:
     if not (np.all(energy >= 0) and np.all(energy <= ALL_LIGHT) and energy.sum() <= ALL_LIGHT):
         raise InputError(f"{path}: expected annuli of reflectance >= 0 that add up to at most 1")
@@ -139,16 +163,26 @@ def merged(edges: Floats, photons: Floats) -> np.ndarray:
 SIMULATED = {".mco": read_mco_profile, ".npz": read_npz_profile}
 
 
-def read(path: Path, unit: str | None = None, scaled: bool = False) -> Measured:
+def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str | None = None) -> Measured:
     """A profile by the ending of its file: .mco and .npz are simulated, everything else is a table.
 
     unit    of length, where the file names none; scaled whether the scale of the values is unknown
+    colour  of the records that are wanted, red, green or blue, where the file is a TLS850's (`tls_file`)
     InputError in one line names the file, and the row and column of what is wrong with it.
     """
     if path.suffix.lower() not in SIMULATED:
+        if is_tls(path):
+            return read_tls(path, colour, scaled)
+        _require_no_colour(colour)
         return read_table(path, unit, scaled)
+    _require_no_colour(colour)
     if unit not in (None, UNIT):
         raise InputError(
             f"unit must be {UNIT} or left out for {path.suffix}, whose lengths are in {UNIT}, got {unit!r}"
         )
     return SIMULATED[path.suffix.lower()](path)
+
+
+def _require_no_colour(colour: str | None) -> None:
+    if colour is not None:
+        raise InputError(f"colour must be left out but for records of a TLS850, got {colour!r}")

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.fitting.chains import Walk, walk
 from profilefit.measured import model
-from profilefit.measured.beam_width import BeamWidth, beam_width
+from profilefit.measured.assumed import BeamWidth, Tissue, as_tissue, beam_width
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit
 from profilefit.measured.identifiability import Identifiability, Interval, identifiability
@@ -79,7 +79,7 @@ class Answer:
     """A judged fit: how identifiable its quantities are, the most informative additional measurements, the chain.
 
     The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded. `width` is
-    None of a simulation, whose beam is known, and where a beam is given.
+    None of a simulation, whose beam is known, and where a beam is given; `tissue` where n and g are known.
 
     Where the data do not exclude the end of a coordinate's range (alpha = 1, say: chi-square there is within the
     square of the 95 % quantile, 3.84 of known errors, of the minimum), the optimum is no estimate and the derivatives
@@ -95,6 +95,7 @@ class Answer:
     advice: Advice | None
     walk: Walk | None
     width: BeamWidth | None = None
+    tissue: Tissue | None = None
 
     @cached_property
     def draws(self) -> dict[str, Floats]:
@@ -211,7 +212,7 @@ def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
     walked = posterior(found, seed) if walk and found.question.free and not endless else None
     width = None if found.data.medium is not None else beam_width(found)
-    result = Answer(found, judgement, advised(_inside(found, judgement)), walked, width)
+    result = Answer(found, judgement, advised(_inside(found, judgement)), walked, width, as_tissue(found))
     _ = found.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
     return result
 
@@ -279,6 +280,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         },
         "beam": None if question.instrument.beam is None else question.instrument.beam.words,
         "fibre": question.instrument.fibre,
+        "ranges": question.ranges,
         "free": [NAMES[at] for at in question.free],
         "held": question.held,
         "known": {"A": question.total, "scale": question.scale},
@@ -301,6 +303,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
         body["advice"] = result.advice
         body["beam_width"] = result.width
+        body["tissue"] = result.tissue
         body["rivals"] = [rival_values(found, one) | {"chi2": one.cost} for one in found.rivals]
         body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
     if result.walk is not None:

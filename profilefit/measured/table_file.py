@@ -5,7 +5,8 @@
     r_in, r_out, value, sigma            averages over annuli
 
 Cells are separated by tabs, else semicolons, else commas, else spaces, by what the header has. Units stand in brackets,
-in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment. The value's unit, if it is not the one of
+in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment; above the header, # n = 1.4 states a fact
+(light, n, g, beam, fibre or unit). The value's unit, if it is not the one of
 r, is converted; [a.u.] or any other word needs an unknown scale. Numbers have decimal points: a comma may part
 thousands as well, so it is an error and no guess.
 """
@@ -48,6 +49,8 @@ NAMES = {
 }
 REPLICATE = re.compile(r"value[_ ]?\d+")
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
+STATED = ("light", "n", "g", "beam", "fibre", "unit")
+STATEMENT = re.compile(r"#+\s*(?P<name>\w+)\s*[=:]\s*(?P<value>.{1,200}?)")
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
 LONGEST_SHOWN = 40  # characters of a cell in a message
@@ -60,6 +63,8 @@ def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Mea
         raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     header, rows = _cells(path, lines)
+    stated = _stated(path, lines[: header.line - 1])
+    unit = stated.pop("unit", None) if unit is None else unit
     numbers = _numbers(path, header, rows)
     inner, outer = _radii(path, header, rows, numbers)
     length = _length_unit(path, header, unit)
@@ -77,6 +82,7 @@ def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Mea
         errors,
         length,
         pooled=found.pooled,
+        stated=stated,
     )
 
 
@@ -117,6 +123,19 @@ def _text(path: Path, content: bytes) -> str:
         line = text[: text.index("\x00")].count("\n") + 1
         raise InputError(f"{path}:{line}: expected text in UTF-8, got the byte 0x00")
     return text
+
+
+def _stated(path: Path, lines: list[str]) -> dict[str, str]:
+    """What comments above the header state, such as # n = 1.4; other comments are passed over."""
+    found: dict[str, str] = {}
+    for at, line in enumerate(lines, start=1):
+        match = STATEMENT.fullmatch(line.strip())
+        if match is None or (name := match["name"].lower()) not in STATED:
+            continue
+        if name in found:
+            raise InputError(f"{path}:{at}: expected {name} once, got it again")
+        found[name] = match["value"]
+    return found
 
 
 def _cells(path: Path, lines: list[str]) -> tuple[_Header, list[_Row]]:

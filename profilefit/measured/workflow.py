@@ -13,9 +13,9 @@ from profilefit.laws import profile_classes
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT, exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.law_error import origin
 from profilefit.measured.model import Light
+from profilefit.measured.premises import Premises, premises
 from profilefit.measured.problem import Known, Question, held_albedo
 from profilefit.measured.reading import read
 from profilefit.measured.result import Answer, judged
@@ -28,11 +28,10 @@ def fit(
     data: Measured | Path | str,
     law: str = EXACT,
     constants: str = "regenerated",
-    setting: Setting | None = None,
+    setting: Setting | Premises | None = None,
     held: Mapping[str, float] | None = None,
     total: Known | None = None,
     scale: float | Known | None = 1.0,
-    instrument: Instrument = PENCIL,
     seed: int = 0,
     walk: bool = True,
     folder: Path | None = None,
@@ -41,12 +40,11 @@ def fit(
 
     data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
     law        "exact": light solved exactly; or a law's name, and which constants, as for `catalogue.load`
-    setting    illumination and surface; by default the light and the surface that were simulated, else "searchlight"
-               (a pencil beam, normal, collimated) and n = 1
+    setting    illumination, surface and scattering, or all that is known of these and of the beam (`premises`); by
+               default what the file states, else "searchlight" (a pencil beam, normal, collimated), n = 1 and g = 0
     held       fixed quantities: alpha or A [-], l [unit of the data]
     total      the total reflectance A [-], if that was measured too
     scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
-    instrument the beam, and what a row is averaged over
     seed       of the posterior's walkers; walk whether to sample it: else intervals are of the statistical error alone
     folder     of the records, by default the ones shipped
 
@@ -54,14 +52,18 @@ def fit(
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
     records = folder or catalogue.fits_folder()
-    where = setting or Setting(measured.illumination or "searchlight", measured.n or 1.0)
+    told = Premises(setting) if isinstance(setting, Setting) else setting or premises(measured, law)
+    where = told.setting
     if measured.illumination not in (None, where.illumination):
         got = f"{measured.illumination} light, got {where.illumination} light to fit"
         raise InputError(f"{measured.source}: a simulation of {got}")
     measured = _noted(measured, where)
     chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
-    question = Question(chosen, _held(chosen, held or {}, scale), total, known, instrument)
+    others = tuple((weight, chosen if one == where else exact_light(one), seen) for weight, one, seen in told.others)
+    question = Question(
+        chosen, _held(chosen, held or {}, scale), total, known, told.instrument, others, told.ranges, told.assumed
+    )
     return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 
 

@@ -39,7 +39,7 @@ FADES = 0.5  # of the degree: where moments begin to fade
 TILT = np.pi / 8
 # In x. Light of order n goes as e^{-i n arctan x} (1 + x^2)^{-n/2}.
 PANELS, MIDDLE, FARTHEST = 5, (0.3, 0.6, 0.9, 1.2, 1.8, 3.0, 5.5, 9.0), 120.0
-OUTSIDE, AROUND = 14, 14  # directions of the cone, by polar angle, and by azimuth beside the degree
+OUTSIDE, AROUND = 8, 4  # directions of the cone, by polar angle, and by azimuth beside the degree: 1e-8
 
 
 class HarmonicSystem(NamedTuple):

@@ -6,8 +6,8 @@ Lengths are in l* = 1 / (mu_a + mu_s (1 - g)), albedos alpha' = mu_s (1 - g) l*:
     2 pi x R_d = ... + alpha'^2 e^{f(s, ln x) - kappa x} (1 + kappa x),        s = sqrt(1 - alpha')
 
 f a cubic spline in ln x at Chebyshev's nodes of s, for Chebyshev's extreme points of g and of n. Between those it is
-the polynomial through them. `benchmarks/half_space_table.py` makes the file: low orders of photons, the higher ones
-solved (`high_orders`).
+the polynomial through them; kappa is found anew. `benchmarks/half_space_table.py` makes the file: low orders of
+photons, the higher ones solved (`high_orders`).
 """
 
 from __future__ import annotations
@@ -22,17 +22,17 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from mcml_sim.errors import InputError
-from mcml_sim.exact.light import LEAST, nodes
+from mcml_sim.exact.anisotropic import high_orders
+from mcml_sim.exact.light import LEAST, ExactLight, coefficients, nodes, tabulated
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole
-from mcml_sim.media.setting import ILLUMINATIONS, Setting
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting
 
 Floats = NDArray[np.float64]
 
-COSINES = 0.475 * (1.0 - np.cos(np.pi * np.arange(8) / 7.0))
-"""g, from 0 to .95."""
-INDICES = np.array([1.33, 1.39, 1.45])
-S = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(20))
+COSINES = 0.5 * FORWARD_G * (1.0 - np.cos(np.pi * np.arange(8) / 7.0))
+INDICES = np.linspace(*FORWARD_N, 3)
+S = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(64))
 FIRST, LAST, STEP = 1e-3, 40.0, 0.12  # l*, and of ln x between knots
 KNOTS = np.log(FIRST) + STEP * np.arange(-3, int(np.ceil(np.log(LAST / FIRST) / STEP)) + 4)
 FILE = Path(__file__).with_name("half_space.npz")
@@ -46,26 +46,35 @@ class SplinedLight(NamedTuple):
     """Coefficients of f in B-splines on KNOTS, by node of s, (s, splines)."""
     share: Floats
     """A / alpha', (s,)."""
-    kappa: Floats
-    """[1/l*], (s,)."""
 
 
-def covers(setting: Setting) -> bool:
-    """True where the table has the half space."""
-    forwards = setting.phase is None and 0.0 < setting.g <= COSINES[-1]
-    return forwards and INDICES[0] <= setting.n <= INDICES[-1]
+@lru_cache(maxsize=32)
+def light(setting: Setting, coarse: bool = False) -> ExactLight:
+    """Of a half space that the table has (`Setting.is_solved`); `coarse` as in `curves`."""
+    own, whole = curves(setting, coarse), 0.5 * (1.0 + nodes(S.size))
+    share = np.polynomial.chebyshev.chebval(2.0 * whole / np.sqrt(1.0 - LEAST) - 1.0, coefficients(own.share))
+    kappa = high_orders.decay_rates(1.0 - S**2, setting.g)
+    tables = map(coefficients, (pieces(own.rest), kappa, share))
+    return tabulated(setting, FIRST, STEP, *tables)
 
 
-def curves(setting: Setting) -> SplinedLight:
-    """Of a half space that the table covers."""
-    rest, share, kappa = _table()
-    light = ILLUMINATIONS.index(setting.illumination)
-    by_g, by_n = _polynomial(COSINES, setting.g), _polynomial(INDICES, setting.n)
+def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
+    """At the nodes of s; where `coarse`, without the g of the table that is farthest from the setting's."""
+    rest, share = _table()
+    of = ILLUMINATIONS.index(setting.illumination)
+    by_n, kept = _polynomial(INDICES, setting.n), np.full(COSINES.size, True)
+    kept[np.argmax(np.abs(COSINES - setting.g))] = not coarse
+    by_g = np.zeros(COSINES.size)
+    by_g[kept] = _polynomial(COSINES[kept], setting.g)
     return SplinedLight(
-        np.einsum("n,g,ngsb->sb", by_n, by_g, rest[light]),
-        np.einsum("n,g,ngs->s", by_n, by_g, share[light]),
-        by_g @ kappa,
+        np.einsum("n,g,ngsb->sb", by_n, by_g, rest[of]),
+        np.einsum("n,g,ngs->s", by_n, by_g, share[of]),
     )
+
+
+def unreduced(alpha: Floats, g: float) -> Floats:
+    """mu_s / (mu_s + mu_a) of reduced albedos."""
+    return alpha / (alpha + (1.0 - g) * (1.0 - alpha))
 
 
 def pieces(rest: Floats) -> Floats:
@@ -87,7 +96,7 @@ def _polynomial(nodes: Floats, at: float) -> Floats:
 
 @lru_cache(maxsize=1)
 def _table() -> SplinedLight:
-    """Of all lights, n and g: (2, n, g, ...), and kappa (g, s)."""
+    """Of all lights, n and g: (2, n, g, ...)."""
     arrays = read_npz(read_whole(FILE, MOST_BYTES), MOST_BYTES, text=("sha256",))
     found = SplinedLight(*(arrays[name].astype(float) for name in SplinedLight._fields))
     if str(arrays["sha256"]) != digest(found):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from rich.console import RenderableType
@@ -31,7 +31,9 @@ RIVALLED = ("mu_s'", "mu_a", "scale")
 ODD = (0.5, 2.0)  # scales between these are a calibration's
 REACHED = 0.1  # of the first radius
 TINIEST = 1e-16  # p-value that is worth printing
+ANYTHING, WIDE = "anything", 1e4  # of an interval, and from which ratio of its ends
 CAPTION = "± statistical: from the errors of the data"
+OF_RANGES = "; ± model: from what is known as a range"
 OF_LAW = "; ± model: from the law's own error, taken for a Gaussian process along ln r"
 
 
@@ -62,16 +64,16 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         "± statistical": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
     }
     caption = CAPTION
-    if found.rel != 0:  # exact light has no error of its own
+    if found.rel != 0 or found.question.ranges:  # exact light has no error of its own
         columns["± model"] = [significant(law[name]) if name in law and name in moving else ABSENT for name in names]
-        caption += OF_LAW
+        caption += OF_RANGES if found.question.ranges else OF_LAW
     if result.identifiability is not None and found.misfit.detected:
         misfit = found.errors(found.of_misfit) if moving else {}
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
     whole = bool(result.whole_draws)
     columns["95 %"] = [
-        interval(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
+        _ends(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
         for name in names
     ]
     caption += "; 95 %: interval by " + ("all of these errors together" if whole else "the statistical error alone")
@@ -80,10 +82,18 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
     if found.question.law.setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
     columns["unit"] = [unit_of(name, found.data.unit) for name in names]
+    if found.question.law.setting.g:
+        caption += "; alpha is the reduced albedo, l = 1 / (mu_s' + mu_a)"
     if truth:
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
         caption += "; of file: its first layer, scattering reduced by 1 - g"
     return column_table(title, columns, caption, left=("", "unit"))
+
+
+def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
+    """An interval, or in words that it says nothing."""
+    low, high = ends or (None, None)
+    return ANYTHING if low is not None and high is not None and high > WIDE * max(low, 0.0) else interval(ends, most)
 
 
 def _mark(result: Answer, name: str) -> str:
@@ -147,6 +157,7 @@ def _lines(result: Answer) -> Iterator[str]:
     yield from _goodness(result)
     yield from _rivals(result)
     yield from _beam(result)
+    yield from _medium(result)
     yield from _scale(result)
     yield from _identifiability(result)
     if (g := _forward(result)) is not None:
@@ -176,10 +187,12 @@ def _estimated(result: Answer) -> Iterator[str]:
 def _forward(result: Answer) -> float | None:
     """g of the first layer of a simulation whose scattering the law takes for isotropic."""
     medium = result.found.data.medium
-    return None if medium is None or medium.layers[0].g == 0 else medium.layers[0].g
+    if medium is None or result.found.question.law.setting.g:
+        return None
+    return medium.layers[0].g or None
 
 
-def _p_value(value: float) -> str:
+def p_value(value: float) -> str:
     return f"below {TINIEST:g}" if value < TINIEST else f"{value:.2g}"
 
 
@@ -187,20 +200,28 @@ def _goodness(result: Answer) -> Iterator[str]:
     one = result.found.misfit
     at_most = " (at most: the errors are bounds)" if result.found.data.bounded else ""
     yield (
-        f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, p-value {_p_value(one.chance)}; "
+        f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, p-value {p_value(one.chance)}; "
         f"lag-1 autocorrelation {one.along_r:+.2f}, {one.runs[0]} sign runs ({one.runs[1]:.0f} expected)"
     )
     if one.detected:
         yield (
-            f"MISFIT (p-value {_p_value(one.joined)}): one layer does not explain the data under this light, "
-            f"scattering and surface; residuals of {100 * one.relative:.2g} % of a value are unexplained"
+            f"MISFIT (p-value {p_value(one.joined)}): one layer does not explain the data under this light, "
+            f"scattering and surface; {_unexplained(one.relative)}"
         )
+    elif one.within_law and result.found.question.ranges:
+        yield "the misfit is within what is known as a range only"
     elif one.within_law:
         yield "the misfit is within the law's own error: what is missing is a better law, not another medium"
     elif not result.found.data.bounded and 1.0 - one.chance < DETECTED:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
         yield "no misfit is detected: one layer explains the data"
+
+
+def _unexplained(relative: float) -> str:
+    return (
+        f"residuals of {100 * relative:.2g} % of a value are unexplained" if relative < 1 else "it misses whole values"
+    )
 
 
 def _rivals(result: Answer) -> Iterator[str]:
@@ -225,7 +246,7 @@ def _beam(result: Answer) -> Iterator[str]:
         return
     if width.noticed:
         yield (
-            f"THE BEAM IS NO PENCIL (p-value {_p_value(width.chance)}): a Gaussian one of 1/e^2 radius {width.w:.2g} "
+            f"THE BEAM IS NO PENCIL (p-value {p_value(width.chance)}): a Gaussian one of 1/e^2 radius {width.w:.2g} "
             f"{unit} explains the data better; without its `beam` the values above are off by more than their errors"
         )
     elif width.telling is None:
@@ -235,6 +256,26 @@ def _beam(result: Answer) -> Iterator[str]:
             f"a pencil beam is assumed: a Gaussian one of 1/e^2 radius {width.telling:.2g} {unit} would move "
             f"{width.moved} by a standard error, and these data would not show it; give `beam` if yours is as wide"
         )
+
+
+def _medium(result: Answer) -> Iterator[str]:
+    """What is open of n and g, or assumed."""
+    question, there, unit = result.found.question, result.tissue, result.found.data.unit
+    if question.ranges:
+        known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in question.ranges.items())
+        yield f"known as ranges: {known}; the middle is fitted, and what it leaves open is in the intervals"
+    if there is not None:
+        names = question.assumed
+        here, other = (_named(names, one) for one in (question.law.setting, there.setting))
+        told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
+        yield (
+            f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
+            f"chi-square {there.rise:+.1f}: give {' and '.join(f'`{name}`' for name in names)}, or a range"
+        )
+
+
+def _named(names: tuple[str, ...], setting: Setting) -> str:
+    return " and ".join(f"{name} = {getattr(setting, name):g}" for name in names)
 
 
 def _scale(result: Answer) -> Iterator[str]:
@@ -265,6 +306,9 @@ def _identifiability(result: Answer) -> Iterator[str]:
     for one in identifiability.intervals:
         low = "anything less" if one.open_low else f"{one.low:.3g}"
         high = "anything more" if one.open_high else f"{one.high:.3g}"
+        if (one.open_low and one.open_high) or one.high > WIDE * one.low:
+            yield f"  {one.name}: anything fits as well"
+            continue
         yield f"  {one.name} from {low} to {high} {unit_of(one.name, unit)}".rstrip() + " fits as well, at 95 %"
     for name, error in (identifiability.loose if result.identified else {}).items():  # no errors at an edge
         yield f"  {name} is known to {100 * min(error, 99.0):.0f} %" + (" or worse" if error > 99 else "")

@@ -9,6 +9,7 @@ import pytest
 DATA = Path(__file__).parents[3] / "examples"
 PHANTOM = str(Path(__file__).parents[3] / "examples" / "phantom.csv")
 LAYERS = str(DATA / "two_layers.mco")
+STACK = str(DATA / "two_layers.toml")
 
 
 @pytest.fixture
@@ -151,9 +152,20 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         ((PHANTOM, "--law", "hazzard"), "law must be one of exact, liang, burley"),
         (
             (PHANTOM, "--law", "hazard", "--n", "1.7"),
-            "got a request for searchlight, n = 1.7, g = 0; --n and --light choose one of these",
+            "got a request for searchlight, n = 1.7, g = 0; --n, --g and --light choose one of these",
         ),
-        ((PHANTOM, "--n", "0.9"), "the exact half space has n >= 1 and g = 0, got searchlight, n = 0.9"),
+        ((PHANTOM, "--n", "0.9"), "exact light needs n >= 1 where g = 0, and n from 1.33 to 1.45 where"),
+        ((PHANTOM, "--g", "0.9"), "got searchlight, n = 1, g = 0.9: simulate it instead"),
+        ((PHANTOM, "--n", "1.4", "--g", "0.95:0.7"), "--g must be a mean cosine in (-1, 1), or a range such as"),
+        ((PHANTOM, "--n", "1.4:"), "--n must be a refractive index > 0, or a range such as 1.33:1.45, got '1.4:'"),
+        ((PHANTOM, "--law", "hazard", "--n", "1.3:1.5"), "--n must be a number where a law is fitted, got '1.3:1.5'"),
+        ((LAYERS, "--free", "d1"), "--free must be left out where there are no --layers"),
+        ((LAYERS, "--layers", STACK), "--free must name quantities such as d1, mu_a2 or mu_s2, got ''"),
+        ((LAYERS, "--layers", STACK, "--free", "d3"), "--free must name one of 2 layers, got 'd3'"),
+        ((LAYERS, "--layers", STACK, "--free", "d1", "--g", "0.9"), "--g must be left out where --layers say what"),
+        ((LAYERS, "--layers", "none.toml", "--free", "d1"), "none.toml: expected a file that can be read"),
+        ((LAYERS, "--layers", str(DATA / "skin.toml"), "--free", "d1"), "g = 0"),
+        ((PHANTOM, "--beam", "0.7mm:0.3mm"), "--beam must have a range that rises, such as 0.3mm:0.7mm"),
         ((PHANTOM, "--beam", "-1mm"), "--beam must be a length > 0 such as 1.2mm"),
         ((PHANTOM, "--beam", "tophat:wide"), "--beam must be a length > 0 such as 1.2mm"),
         ((PHANTOM, "--beam", "none.csv"), "none.csv"),
@@ -164,7 +176,7 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
             "--constants must be left out where light is solved exactly, got 'published'",
         ),
         ((str(DATA / "half_space.mco"), "--fibre", "2mm"), "--fibre must be left out where rows are averages"),
-        ((PHANTOM, "--n", "-1"), "n must be a refractive index > 0"),
+        ((PHANTOM, "--n", "-1"), "--n must be a refractive index > 0"),
         ((PHANTOM, "--light", "sun"), "--light must be one of searchlight, diffuse, got 'sun'"),
         ((LAYERS, "--light", "diffuse"), "--light must be searchlight for"),
         ((LAYERS, "--unit", "mm"), "--unit must be cm or left out for .mco"),

@@ -53,7 +53,7 @@ def test_a_simulation_brings_its_own_surface():
     oily = replace(simulated, medium=half_space(0.9, n=1.67))
     with pytest.raises(SettingError, match=r"belongs to .* n in \(1, 1.6\].*, got a request for searchlight, n = 1.67"):
         fit(oily, "hazard")
-    with pytest.raises(SettingError, match=r"the exact half space has n >= 1 and g = 0, got searchlight, n = 0.9"):
+    with pytest.raises(SettingError, match=r"exact light needs n >= 1 where g = 0, .*, got searchlight, n = 0.9"):
         fit(oily, setting=Setting(n=0.9))
     found = fit(oily, setting=Setting(n=1.38), walk=False).found
     assert found.question.law.setting.n == 1.38

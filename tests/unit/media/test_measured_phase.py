@@ -141,7 +141,7 @@ def test_no_preferred_mean_is_not_isotropic():
     both = Mixture((0.5, 0.5), (HenyeyGreenstein(0.5), HenyeyGreenstein(-0.5)))
     assert Setting(phase=both).g == 0
     assert not Setting(phase=both).is_matched_isotropic
-    with pytest.raises(SettingError, match="the exact half space has n >= 1 and g = 0"):
+    with pytest.raises(SettingError, match="exact light needs n >= 1 where g = 0"):
         exact.reflectance(0.5, Setting(phase=both))
     with pytest.raises(InputError, match="must scatter with g = 0"):
         exact.solve(Medium((Layer(1.0, 0.1, 1.0, 0.0, phase=both),)))

@@ -85,8 +85,8 @@ def test_what_was_written_comes_back(tmp_path):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("A1", "B2"), r"x.mco:1: expected the file version, A1, got 'B2'"),
-        (("A1", "1.0"), r"x.mco:1: expected the file version, A1, got '1.0'"),
+        (("A1", "B2"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got 'B2'"),
+        (("A1", "1.0"), r"x.mco:1: expected the file version, A1 or mcmloA2.0, got '1.0'"),
         (("\nInParm \t", "\nInput \t"), r"x.mco:\d+: expected the section InParm, got 'Input'"),
         (("3.0000E+01", "-nan"), r"x.mco:38: expected number 1 of 3 of Rd_r, got '-nan'"),
         (("2.0000E+00", "-2.0"), r"x.mco:39: expected number 2 of 3 of Rd_r, a number from 0 to 1e\+30, got '-2.0'"),

@@ -1,9 +1,11 @@
-"""Whether the data know of a beam that has a width, and what width would matter, where a fit assumes a pencil beam.
+"""What a fit takes for granted where nobody says otherwise, and what that is worth: a pencil beam, n = 1 and g = 0.
 
-The fit is repeated under Gaussian beams of widths from a five-hundredth of the last radius to half of it. If
-chi-square falls by more than a pencil beam's noise explains at 5 %, one-sided since a width is not negative, the data
-know of the width. How far the answer moves under the narrowest beam that moves it, as w^2, says which width would
-move it by a standard error.
+Whether the data know of a beam that has a width, and what width would matter: the fit is repeated under Gaussian beams
+of widths from a five-hundredth of the last radius to half of it. If chi-square falls by more than a pencil beam's noise
+explains at 5 %, one-sided since a width is not negative, the data know of the width. How far the answer moves under the
+narrowest beam that moves it, as w^2, says which width would move it by a standard error.
+
+What n and g of soft tissue would make of the same data: the fit is repeated once.
 """
 
 from __future__ import annotations
@@ -13,14 +15,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy import stats
 
+from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.setting import Setting
 from profilefit.measured import model
 from profilefit.measured.beam import Gaussian
+from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.solving import Minimum, Problem, descended
 
 HALVINGS = 9  # of the widths that are tried, from half the last radius
 FINER = 3  # further trials between the best and its neighbours
 NOTICED = 0.05  # chance below which a width is said to be seen
+TISSUE = {"n": 1.4, "g": 0.9}
 
 
 @dataclass(frozen=True)
@@ -66,6 +72,30 @@ def beam_width(found: MediumFit) -> BeamWidth | None:
     fall = max(found.minimum.cost - _cost(fits[best]), 0.0)
     chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
     return BeamWidth(best, fall, chance, *_telling(found, {w: fits[w] for w in widths}))
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """The same data under n and g of soft tissue, where these are assumed.
+
+    values  of the quantities; rise  of chi-square
+    """
+
+    setting: Setting
+    values: dict[str, float]
+    rise: float
+
+
+def as_tissue(found: MediumFit) -> Tissue | None:
+    """None where n and g are told, where a law is fitted, or where the fit has no errors to compare with."""
+    question = found.question
+    there = Setting.of(question.law.setting.as_table() | {name: TISSUE[name] for name in question.assumed})
+    if not (question.assumed and there.is_solved and isinstance(question.law, ExactLight) and found.minimum.converged):
+        return None
+    problem = replace(found.problem, question=replace(question, law=exact_light(there)))
+    end = descended(problem, found.point, question.free)
+    values = model.quantities(end.point[None], np.zeros(1))
+    return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - found.minimum.cost)
 
 
 def _under(problem: Problem, w: float, start: Minimum) -> Minimum:

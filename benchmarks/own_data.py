@@ -1,0 +1,218 @@
+"""How often intervals of `profilefit fit` hold the truth, and what a measurement can know at all.
+
+    python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
+    python -m benchmarks.own_data --count 1000
+    python -m benchmarks.own_data --chart own-data.png     # a minute: error by r_min, r_max, noise, beam, n and g
+
+Media are drawn from what a fit takes for possible: n from 1.33 to 1.45, g from 0 to .95, alpha' flat in sqrt(1 -
+alpha'), l* from a fifth to five times the middle radius; 24 rings of a factor 150 in r, errors of 1 to 3 %. Light is
+that of the table at the medium's own n and g, the noise normal. Half-widths are over the Fisher bound: of the same
+rows, by the derivatives at the truth, n and g known or normal with the variance of their range.
+"""
+
+from __future__ import annotations
+
+import argparse
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks.render_figure import save
+from mcml_sim import Setting
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N
+from profilefit.measured import model
+from profilefit.measured.beam import Gaussian
+from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import exact_light
+from profilefit.measured.fitting import fitted
+from profilefit.measured.instrument import Instrument
+from profilefit.measured.model import Model, u_of
+from profilefit.measured.premises import Premises
+from profilefit.measured.problem import Question
+from profilefit.report.figures.canvas import BLUE, GREEN, ORANGE, VERMILION, WIDTH, canvas, plain_log, styled
+
+Floats = NDArray[np.float64]
+
+EDGES = np.geomspace(0.1, 15.0, 25)  # mm
+MIDDLE = float(np.sqrt(EDGES[0] * EDGES[-1]))
+OPEN = {"n": FORWARD_N, "g": (0.0, FORWARD_G)}
+NAMES = ("mu_s'", "mu_a")
+SCALE = {"scale": 1.0}
+
+
+class Medium(NamedTuple):
+    """One that is drawn; lengths in mm."""
+
+    setting: Setting
+    alpha: float
+    length: float
+    error: float
+
+
+class Coverage(NamedTuple):
+    """Of one quantity."""
+
+    held: float
+    """Share of the intervals that hold the truth."""
+    answered: float
+    """Share of the media that have one."""
+    wider: float
+    """Median half-width over the Fisher bound's."""
+
+
+def drawn(rng: np.random.Generator) -> Medium:
+    """A medium of the prior."""
+    n, g, s = rng.uniform(*FORWARD_N), rng.uniform(0.0, FORWARD_G), rng.uniform(0.03, 0.95)
+    length = MIDDLE * np.exp(rng.uniform(-np.log(5.0), np.log(5.0)))
+    return Medium(Setting(n=float(n), g=float(g)), 1.0 - s * s, float(length), rng.uniform(0.01, 0.03))
+
+
+def rows(one: Medium, rng: np.random.Generator) -> Measured:
+    """What is measured of it."""
+    inner, outer = EDGES[:-1], EDGES[1:]
+    light = Model(exact_light(one.setting)).predicted(_point(one)[None], inner, outer)[0, :-1]
+    keep = light > 1e-9 * light[0]
+    value = light * (1.0 + one.error * rng.standard_normal(light.size))
+    known = np.full(light.size, np.inf)
+    whole = Measured("drawn", "", inner, outer, value, one.error * light, known, "as given", "mm")
+    return whole.chosen(keep)
+
+
+def coverage(count: int, opened: bool, seed: int = 1) -> dict[str, Coverage]:
+    """Over so many media, n and g given or `opened`."""
+    rng, found = np.random.default_rng(seed), {name: [] for name in NAMES}
+    for _ in range(count):
+        one = drawn(rng)
+        data, premises = rows(one, rng), _premises(one, opened)
+        question = _question(premises)
+        fit = fitted(data, question)
+        truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
+        errors = fit.errors(fit.likely) if fit.minimum.converged else dict.fromkeys(NAMES, np.nan)
+        bound = _fisher(one, data, premises)
+        for name in NAMES:
+            ratio = errors[name] / fit.values[name]
+            off = abs(np.log(fit.values[name] / truth[name]))
+            found[name].append((off < 1.96 * ratio, ratio < 0.5, ratio / bound[name]))
+    return {name: _summary(np.array(each, float)) for name, each in found.items()}
+
+
+def _summary(each: Floats) -> Coverage:
+    answered = each[:, 1] > 0
+    return Coverage(float(each[answered, 0].mean()), float(answered.mean()), float(np.median(each[answered, 2])))
+
+
+def _point(one: Medium) -> Floats:
+    return np.array([u_of(one.alpha), np.log(one.length), 0.0])
+
+
+def _premises(one: Medium, opened: bool) -> Premises:
+    if not opened:
+        return Premises(one.setting)
+    return Premises(Setting(n=float(np.mean(OPEN["n"])), g=float(np.mean(OPEN["g"]))), ranges=OPEN)
+
+
+def _question(premises: Premises) -> Question:
+    others = tuple((weight, exact_light(one), seen) for weight, one, seen in premises.others)
+    law = exact_light(premises.setting)
+    return Question(law, SCALE, None, None, premises.instrument, others, premises.ranges)
+
+
+def _fisher(one: Medium, data: Measured, premises: Premises) -> dict[str, float]:
+    """Relative errors that no unbiased estimate undercuts."""
+    own = Model(exact_light(one.setting), premises.instrument)
+    point = _point(one)
+    light, slopes = own.linearised(point, data.inner, data.outer)
+    rows = np.diag(data.sigma**2)
+    for name, (low, high) in premises.ranges.items():
+        value = getattr(one.setting, name)
+        step = 0.02 * (high - low)
+        ends = [
+            Model(exact_light(replace(one.setting, **{name: float(np.clip(value + side, low, high))})), own.instrument)
+            .predicted(point[None], data.inner, data.outer)[0, :-1]
+            for side in (-step, step)
+        ]  # fmt: skip
+        apart = float(np.clip(value + step, low, high) - np.clip(value - step, low, high))
+        slope = (ends[1] - ends[0]) / apart
+        rows += np.outer(slope, slope) * (high - low) ** 2 / 12.0
+    free = slopes[:-1, :2]
+    covariance = np.zeros((3, 3))
+    covariance[:2, :2] = np.linalg.inv(free.T @ np.linalg.solve(rows, free))
+    errors = model.errors(model.slopes(point, slopes[-1]), covariance)
+    values = model.quantities(point[None], light[-1:])
+    return {name: errors[name] / float(values[name][0]) for name in NAMES}
+
+
+TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm
+NOISE = (0.5, 1.0, 2.0, 5.0)  # %
+NEAREST, FARTHEST = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0), (2.0, 4.0, 7.0, 10.0, 15.0)
+KNOWN = {
+    "n and g given": {},
+    "g open": {"g": OPEN["g"]},
+    "n and g open": OPEN,
+    "beam 0.5 mm known to 20 %": {"beam": (0.4, 0.6)},
+}
+
+
+def known_to(nearest: float, farthest: float, error: float, ranges: dict) -> dict[str, float]:
+    """Relative errors of tissue from rings a fifth apart in r."""
+    edges = np.geomspace(nearest, farthest, max(int(np.log(farthest / nearest) / 0.2), 4) + 1)
+    instrument = Instrument(Gaussian(0.5) if "beam" in ranges else None)
+    inner, outer = edges[:-1], edges[1:]
+    law = Model(exact_light(TISSUE.setting), instrument)
+    light, slopes = law.linearised(_point(TISSUE), inner, outer)
+    rows = np.diag((error * light[:-1]) ** 2)
+    for weight, one, seen in Premises(TISSUE.setting, instrument, ranges).others:
+        away = Model(exact_light(one), seen).predicted(_point(TISSUE)[None], inner, outer)[0, :-1] - light[:-1]
+        rows += weight * np.outer(away, away)
+    free, covariance = slopes[:-1, :2], np.zeros((3, 3))
+    covariance[:2, :2] = np.linalg.inv(free.T @ np.linalg.solve(rows, free))
+    errors = model.errors(model.slopes(_point(TISSUE), slopes[-1]), covariance)
+    return {"mu_s'": errors["mu_s'"] * TISSUE.length / TISSUE.alpha, "mu_a": errors["mu_a"] / 0.02}
+
+
+@styled
+def chart(path: Path) -> None:
+    """Error of mu_a and mu_s' over the nearest ring, the farthest, and the noise."""
+    panels = (
+        ("nearest ring [mm], up to 15 mm", NEAREST, lambda x, ranges: known_to(x, 15.0, 0.02, ranges)),
+        ("farthest ring [mm], from 0.2 mm", FARTHEST, lambda x, ranges: known_to(0.2, x, 0.02, ranges)),
+        ("error of a ring [%], 0.2 to 15 mm", NOISE, lambda x, ranges: known_to(0.2, 15.0, x / 100.0, ranges)),
+    )
+    figure = canvas(4.6, WIDTH)
+    axes = figure.subplots(2, len(panels), sharey="row", sharex="col")
+    for column, (label, values, errors) in enumerate(panels):
+        for (name, ranges), colour in zip(KNOWN.items(), (BLUE, ORANGE, VERMILION, GREEN), strict=True):
+            found = [errors(value, ranges) for value in values]
+            for row, quantity in zip(axes[:, column], NAMES, strict=True):
+                row.plot(values, [100.0 * one[quantity] for one in found], "o-", color=colour, label=name, ms=3)
+        for row, quantity in zip(axes[:, column], NAMES, strict=True):
+            row.set_xscale("log")
+            row.set_yscale("log")
+            plain_log(row.xaxis)
+            plain_log(row.yaxis)
+            if column == 0:
+                row.set_ylabel(f"error of {quantity} [%]")
+        axes[1, column].set_xlabel(label)
+    figure.legend(*axes[0, 0].get_legend_handles_labels(), loc="outside upper center", ncols=len(KNOWN))
+    save(figure, path, colours=64)
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=200, help="media")
+    parser.add_argument("--chart", type=Path, help="draw the chart there instead")
+    given = parser.parse_args()
+    if given.chart is not None:
+        chart(given.chart)
+        return
+    for opened in (False, True):
+        print(f"n and g {'open' if opened else 'given'}, {given.count} media")
+        for name, one in coverage(given.count, opened).items():
+            print(f"  {name:6} held {one.held:.1%}, answered {one.answered:.1%}, {one.wider:.2f} x the Fisher bound")
+
+
+if __name__ == "__main__":
+    main()

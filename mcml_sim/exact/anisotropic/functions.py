@@ -1,0 +1,119 @@
+"""What `mcml_sim.exact` answers of a half space that scatters forwards, from the table: arrays in, arrays out.
+
+Albedos and radii are those of the medium itself, radii in mean free paths. Arguments are float64 arrays of one shape,
+after broadcasting, of numpy or of jax, and so are the answers.
+"""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import Any, NamedTuple
+
+import equinox as eqx
+import jax
+import jax.numpy as jnp
+import numpy as np
+from jax import Array
+
+from mcml_sim.exact.anisotropic.table import light
+from mcml_sim.exact.by_albedo import BLOCK, blocks
+from mcml_sim.exact.light import ExactLight
+from mcml_sim.media.setting import Setting
+
+# In l*: nearer than the first, 2 pi r R_d has its limit; the ends between which a share's radius lies.
+NEAREST, FARTHEST = 1e-7, 1e30
+SHORTEST, LONGEST, HALVINGS = 1e-12, 1e12, 64
+FAR = 1e4
+
+
+class Reduced(NamedTuple):
+    """What a medium has in common with one whose scattering has no direction."""
+
+    alpha: Any
+    """mu_s (1 - g) l*."""
+    length: Any
+    """l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
+
+
+def reduced(alpha: Any, g: Any) -> Reduced:
+    """Of an albedo mu_s / (mu_s + mu_a)."""
+    length = 1.0 / (1.0 - alpha * g)
+    return Reduced(alpha * (1.0 - g) * length, length)
+
+
+def reflectance(alpha: Any, setting: Setting) -> Any:
+    """A [-]."""
+    return _called(_reflectance, light(setting), alpha, alpha)
+
+
+def profile(x: Any, alpha: Any, setting: Setting, coarse: bool = False) -> Any:
+    """R_d [1/mfp^2]; `coarse` as in `table.curves`."""
+    return _called(_profile, light(setting, coarse), x, alpha)
+
+
+def cdf(x: Any, alpha: Any, setting: Setting) -> Any:
+    """Share of the reflected energy within x [-]."""
+    return _called(_cdf, light(setting), x, alpha)
+
+
+def quantile(xi: Any, alpha: Any, setting: Setting) -> Any:
+    """Radius within which that share leaves [mfp]."""
+    return _called(_quantile, light(setting), xi, alpha)
+
+
+def _called(function: Any, own: ExactLight, x: Any, alpha: Any) -> Any:
+    """Of jax arrays at once; of numpy's a block at a time, so that no shape of them compiles anew."""
+    own = own.unlabelled
+    if any(isinstance(one, jax.Array) for one in (x, alpha)):
+        x, alpha = jnp.broadcast_arrays(x, alpha)
+        values = _each(function, own, x.ravel(), alpha.ravel())
+        return jnp.where(jnp.isnan(x + alpha), jnp.nan, values.reshape(x.shape))
+    x, alpha = np.broadcast_arrays(x, alpha)
+    with jax.enable_x64(True), jax.core.eval_context():
+        pairs = zip(blocks(x.ravel(), BLOCK), blocks(alpha.ravel(), BLOCK), strict=True)
+        parts = [np.asarray(_each(function, own, *map(jnp.asarray, pair))) for pair in pairs]
+    return np.concatenate([np.empty(0), *parts])[: x.size].reshape(x.shape)
+
+
+@eqx.filter_jit
+def _each(function: Any, own: ExactLight, x: Array, alpha: Array) -> Array:
+    return jax.vmap(partial(function, own))(x, alpha)
+
+
+def _reflectance(own: ExactLight, _: Array, alpha: Array) -> Array:
+    return own.total(reduced(alpha, own.g).alpha)
+
+
+def _profile(own: ExactLight, x: Array, alpha: Array) -> Array:
+    by, length = reduced(alpha, own.g)
+    near = jnp.clip(x / length, NEAREST, FARTHEST)
+    return own.ring_density(near, by) / (2.0 * jnp.pi * x * length)
+
+
+def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
+    by, length = reduced(alpha, own.g)
+    return _within(own, x / length, by)
+
+
+def _within(own: ExactLight, x: Array, alpha: Array) -> Array:
+    """The share within x [l*], of reduced albedos; far away what is left falls off as that of a white medium."""
+    near = jnp.minimum(x, FAR)
+    return 1.0 - (1.0 - own.scaled_cdf(near, alpha)) * FAR / jnp.maximum(x, FAR)
+
+
+def _quantile(own: ExactLight, xi: Array, alpha: Array) -> Array:
+    by, length = reduced(alpha, own.g)
+    low, high = jnp.log(SHORTEST), jnp.log(LONGEST)
+
+    def halved(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
+        low, high = ends
+        middle = 0.5 * (low + high)
+        beyond = _within(own, jnp.exp(middle), by) < xi
+        return jnp.where(beyond, middle, low), jnp.where(beyond, high, middle)
+
+    ends = jax.lax.fori_loop(0, HALVINGS, halved, (low, high))
+    x = jax.lax.stop_gradient(jnp.exp(0.5 * (ends[0] + ends[1])))
+    # One step of Newton's, which moves nothing but has the derivatives of the implicit function.
+    share, density = _within(own, x, by), own.ring_density(x, by) / own.total(by)
+    x = x + (xi - share) / jax.lax.stop_gradient(density)
+    return length * jnp.where(xi == 0.0, 0.0, jnp.where(xi == 1.0, jnp.inf, x))

@@ -1,0 +1,127 @@
+"""Under which light, surface and scattering a profile was measured: as told, else as its file states, else assumed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mcml_sim.media.setting import ILLUMINATIONS, Setting
+from profilefit.errors import InputError
+from profilefit.measured.beam import TOPHAT, Gaussian, Irradiance, beam_of
+from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import EXACT
+from profilefit.measured.instrument import PENCIL, Instrument
+from profilefit.measured.lengths import length
+
+MEDIUM = ("n", "g")
+ACCEPTED = {
+    "n": "a refractive index > 0, or a range such as 1.33:1.45",
+    "g": "a mean cosine in (-1, 1), or a range such as 0.7:0.95",
+}
+# Of a range: where light is solved, and weights. The middle one is fitted.
+POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
+
+
+@dataclass(frozen=True)
+class Premises:
+    """What a fit takes for granted.
+
+    setting     illumination, surface and scattering; the middle of what is known as a range
+    instrument  the beam, and what a row is averaged over
+    ranges      (low, high) of n, g, and a Gaussian beam's 1/e^2 radius [unit of r], where these are known no better
+    assumed     those of n and g that nobody named
+    """
+
+    setting: Setting
+    instrument: Instrument = PENCIL
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    assumed: tuple[str, ...] = ()
+
+    @property
+    def others(self) -> list[tuple[float, Setting, Instrument]]:
+        """What else may be the case within the ranges, with its weight in a mean over them."""
+        found: list[tuple[float, dict[str, float]]] = [(1.0, {})]
+        for name, (low, high) in self.ranges.items():
+            values = low + (high - low) * 0.5 * (1.0 + POINTS)
+            found = [
+                (weight * 0.5 * share, {**one, name: float(value)})
+                for weight, one in found
+                for share, value in zip(WEIGHTS, values, strict=True)
+            ]
+        each = [
+            (
+                weight,
+                Setting.of(self.setting.as_table() | {name: one[name] for name in MEDIUM if name in one}),
+                replace(self.instrument, beam=Gaussian(one["beam"])) if "beam" in one else self.instrument,
+            )
+            for weight, one in found
+        ]
+        return [one for one in each if one[1:] != (self.setting, self.instrument)]
+
+
+def premises(
+    data: Measured,
+    law: str = EXACT,
+    told: Mapping[str, str | None] | None = None,
+    names: Mapping[str, str] | None = None,
+) -> Premises:
+    """From what is told, texts by the names light, n, g, beam and fibre; else from what the file states.
+
+    names   what messages call these. A simulation's medium is what its file states, its g only where exact light has it
+    """
+    spoken = {name: text for name, text in (told or {}).items() if text is not None}
+    options = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
+    options |= {name: f"{data.source}: {name}" for name in data.stated.keys() - spoken.keys()}
+    given = {**data.stated, **spoken}
+    light = given.get("light", data.illumination or "searchlight")
+    if light not in ILLUMINATIONS:
+        raise InputError(f"{options['light']} must be one of {', '.join(ILLUMINATIONS)}, got {light!r}")
+    if data.illumination not in (None, light):
+        raise InputError(
+            f"{options['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
+        )
+    ranges = {name: parsed(options[name], given[name], name) for name in MEDIUM if name in given}
+    n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
+    setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
+    if "g" not in given and law == EXACT and data.g and replace(setting, g=data.g).is_solved:
+        setting = replace(setting, g=data.g)
+    ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
+    if ranges and law != EXACT:
+        raise InputError(f"{options[min(ranges)]} must be a number where a law is fitted, got {given[min(ranges)]!r}")
+    if "fibre" in given and data.rings:
+        raise InputError(f"{options['fibre']} must be left out where rows are averages over annuli")
+    beam, widths = _beam(options["beam"], given.get("beam"), data.unit)
+    ranges |= {} if widths is None else {"beam": widths}
+    fibre = length(options["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
+    assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
+    return Premises(setting, Instrument(beam, fibre), ranges, assumed)
+
+
+def _beam(option: str, text: str | None, unit: str) -> tuple[Irradiance | None, tuple[float, float] | None]:
+    """A beam, and the range of its width, LOW:HIGH, if it has one."""
+    if text is None:
+        return None, None
+    parts = text.split(":")
+    if len(parts) != 2 or parts[0] == TOPHAT.rstrip(":"):
+        return beam_of(option, text, unit), None
+    low, high = (length(option, part, unit) for part in parts)
+    if not low < high:
+        raise InputError(f"{option} must have a range that rises, such as 0.3mm:0.7mm, got {text!r}")
+    return Gaussian(0.5 * (low + high)), (low, high)
+
+
+def parsed(option: str, text: Any, name: str) -> tuple[float, float]:
+    """Both ends of a number or of a range LOW:HIGH."""
+    parts = str(text).split(":")
+    try:
+        ends = [float(part) for part in parts]
+    except ValueError:
+        ends = []
+    least, most = (0.0, math.inf) if name == "n" else (-1.0, 1.0)
+    if not (1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]):
+        raise InputError(f"{option} must be {ACCEPTED[name]}, got {text!r}")
+    return ends[0], ends[-1]

@@ -1,0 +1,94 @@
+"""A fit of a stack of layers as tables, as sentences, and as JSON content."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from rich.console import RenderableType
+
+from profilefit.measured.layers import LOOSE, LayersFit
+from profilefit.measured.misfit import DETECTED
+from profilefit.recipes import record
+from profilefit.report.tables.cells import ABSENT, column_table, interval, significant, to_error
+from profilefit.report.tables.fit_tables import p_value
+
+UNKNOWN = "not identified"
+MOST = 9.0  # relative error, as a logarithm, beyond which a product is not known at all
+
+
+def layers_tables(found: LayersFit, title: str) -> list[RenderableType]:
+    """What is free, with errors and correlations; and the products of powers that the data know, best first."""
+    free = {
+        "": found.names,
+        "value": [to_error(value, value * error) for value, error in zip(found.values, found.errors, strict=True)],
+        "±": [significant(value * error) for value, error in zip(found.values, found.errors, strict=True)],
+        "95 %": [
+            UNKNOWN if name in found.loose else interval(ends)
+            for name, ends in zip(found.names, found.intervals.tolist(), strict=True)
+        ],
+        "unit": [_unit(name, found.data.unit) for name in found.names],
+    }
+    for at, name in enumerate(found.names[:-1]):
+        free[name] = [f"{found.correlation[row, at]:.2f}" if row > at else "" for row in range(len(found.names))]
+    caption = "±: from the errors of the data, wider where they do not explain the residuals; right: correlations"
+    products = {
+        "product": [found.product(at) for at in range(len(found.products))],
+        "known to": [f"{100 * error:.2g} %" if error < MOST else ABSENT for _, error in found.products],
+    }
+    parts = [column_table(title, free, caption, left=("", "unit"))]
+    if len(found.names) > 1:
+        parts.append(column_table("What the data know, best first", products, left=("product",)))
+    return list(parts)
+
+
+def layers_lines(found: LayersFit) -> Iterator[str]:
+    """A sentence each on what was held, the goodness of fit, and what is not identified."""
+    if found.result != "converged":
+        yield f"the fit failed: {found.result}"
+    for number, layer in enumerate(found.medium.layers, start=1):
+        thick = "endless" if math.isinf(layer.thickness) else f"d {layer.thickness:.4g}"
+        yield f"layer {number}: n {layer.n:g}, mu_a {layer.mu_a:.4g}, mu_s {layer.mu_s:.4g}, {thick}"
+    yield (
+        f"chi-square {found.chi2:.1f} for {found.freedom} degrees of freedom"
+        f"{' (at most: the errors are bounds)' if found.data.bounded else ''}, p-value {p_value(found.chance)}: "
+        + ("THESE LAYERS DO NOT EXPLAIN THE DATA" if found.chance < DETECTED else "no misfit is detected")
+    )
+    for name in found.loose:
+        yield f"{name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; hold it, or measure elsewhere"
+
+
+def layers_content(found: LayersFit) -> dict[str, Any]:
+    """Everything, as JSON content."""
+    data = found.data
+    plain: dict[str, Any] = record.plain(
+        {
+            "data": {"file": data.source, "sha256": data.digest, "unit": data.unit, "inner": data.inner,
+                     "outer": data.outer, "value": data.value, "sigma": data.sigma, "notes": data.notes},
+            "light": found.light,
+            "setting": found.premises.setting,
+            "beam": None if found.premises.instrument.beam is None else found.premises.instrument.beam.words,
+            "start": found.start,
+            "medium": found.medium,
+            "free": found.names,
+            "values": found.values,
+            "relative_errors": found.errors,
+            "intervals_95": found.intervals,
+            "correlation": found.correlation,
+            "products": [{"exponents": powers, "relative_error": error} for powers, error in found.products],
+            "chi2": found.chi2,
+            "freedom": found.freedom,
+            "p_value": found.chance,
+            "not_identified": found.loose,
+            "result": found.result,
+            "versions": record.versions(),
+        }
+    )  # fmt: skip
+    return plain
+
+
+def _unit(name: str, unit: str) -> str:
+    if name == "scale":
+        return ""
+    return (unit or "unit of r") if name[0] == "d" else f"1/{unit or 'unit of r'}"

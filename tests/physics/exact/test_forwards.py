@@ -1,0 +1,125 @@
+"""Exact light of half spaces that scatter forwards: the table against photons and against what is known of it."""
+
+import jax
+import jax.numpy as jnp
+import numpy as np
+import pytest
+from scipy import stats
+
+from benchmarks import half_spaces
+from mcml_sim import Setting, exact
+from mcml_sim.errors import InputError, SettingError
+from mcml_sim.exact import single_scattering
+from mcml_sim.exact.anisotropic import table
+
+ALPHAS = np.array([0.3, 0.9, 0.99, 0.9995])
+R = np.geomspace(0.01, 30.0, 9)
+TISSUE = Setting(n=1.4, g=0.9)
+
+
+@pytest.fixture(scope="module", params=half_spaces.SETTINGS, ids=str)
+def compared(request):
+    return request.param, half_spaces.rows(request.param, half_spaces.reference(request.param))
+
+
+def test_photons_agree(compared):
+    """Rings of 1e8 to 6e8 photons at n and g that are no nodes, by albedo; all albedos have the same photons.
+
+    In dark media, and at the table's last g, light of many l* is less well known.
+    """
+    setting, found = compared
+    for one in found:
+        well = one.alpha >= 0.5 and setting.g <= 0.9
+        assert one.worst[0] < (0.01 + 2 * one.worst[1] if well else 0.12)
+        assert abs(one.total[0]) < (5e-4 if setting.g <= 0.9 else 2e-3)
+
+
+def test_similarity_is_told_from_it():
+    """A negative control: light of g = 0 at the same reduced albedo."""
+    found = half_spaces.reference(TISSUE)
+    photons = found.energy(half_spaces.unreduced(0.9, 0.9))
+    edges = found.grid.r_edges * (1.0 - 0.9 * half_spaces.unreduced(0.9, 0.9))
+    other = np.diff(exact.cdf(edges, 0.9, setting=Setting(n=1.4))) * exact.reflectance(0.9, Setting(n=1.4))
+    z = (other - photons.value) / np.maximum(photons.standard_error, 1e-12)
+    rings = (edges[:-1] > 0.05) & (edges[1:] < 5)
+    assert stats.chi2.sf(np.sum(z[rings] ** 2), rings.sum()) < 1e-9
+
+
+def test_next_to_no_direction_it_is_the_other_exact_solution():
+    for light in ("searchlight", "diffuse"):
+        there, near = Setting(light, 1.37), Setting(light, 1.37, 1e-6)
+        wanted = exact.profile(R[:-1, None], ALPHAS, setting=there)
+        np.testing.assert_allclose(exact.profile(R[:-1, None], ALPHAS, setting=near), wanted, rtol=1e-3)
+        wanted = exact.reflectance(ALPHAS, there)
+        np.testing.assert_allclose(exact.reflectance(ALPHAS, near), wanted, rtol=3e-4)
+
+
+@pytest.mark.parametrize("setting", [TISSUE, Setting("diffuse", 1.35, 0.4)])
+def test_the_ends_are_exact(setting):
+    assert exact.reflectance(1.0, setting) == pytest.approx(single_scattering.entered(setting), rel=1e-4)
+    assert exact.reflectance(0.0, setting) == 0
+    source = 2 * np.pi * 1e-9 * exact.profile(1e-9, ALPHAS, setting=setting)
+    np.testing.assert_allclose(source, ALPHAS * single_scattering.source_strength(setting), rtol=1e-4)
+    assert exact.profile(0.0, 0.9, setting=setting) == np.inf
+    assert exact.profile(np.inf, 0.9, setting=setting) == 0
+    np.testing.assert_allclose(exact.cdf([0.0, np.inf], 0.9, setting=setting), [0, 1], atol=1e-5)
+
+
+def test_lengths_and_shapes_are_those_of_the_medium():
+    np.testing.assert_allclose(
+        exact.profile(R[:, None], ALPHAS, 2.0, TISSUE), exact.profile(R[:, None] / 2, ALPHAS, setting=TISSUE) / 4
+    )
+    assert exact.profile(R[:0], 0.9, setting=TISSUE).shape == (0,)
+    assert isinstance(exact.profile(1.0, 0.9, setting=TISSUE), float)
+    xi = np.array([0.0, 0.1, 0.5, 0.99, 1.0])
+    radius = exact.quantile(xi, 0.99, 3.0, TISSUE)
+    np.testing.assert_allclose(exact.cdf(radius[:-1], 0.99, 3.0, TISSUE), xi[:-1], atol=1e-9)
+    assert (radius[0], radius[-1]) == (0.0, np.inf)
+
+
+def test_the_cdf_is_the_profiles_integral():
+    edges = np.geomspace(1e-3, 40.0, 400)
+    r, width = np.sqrt(edges[1:] * edges[:-1]), np.diff(np.log(edges))
+    share = 2 * np.pi * r**2 * exact.profile(r, 0.97, setting=TISSUE) / exact.reflectance(0.97, TISSUE)
+    inside = exact.cdf(edges, 0.97, setting=TISSUE)
+    assert np.sum(share * width) == pytest.approx(inside[-1] - inside[0], rel=1e-3)
+
+
+def test_it_has_derivatives():
+    """Of jax, against differences."""
+    with jax.enable_x64(True):
+        for function, first in ((exact.profile, 1.3), (exact.cdf, 1.3), (exact.quantile, 0.4)):
+            slope = jax.jit(jax.grad(lambda a, f=function, x=first: f(x, a, setting=TISSUE)))(jnp.float64(0.97))
+            ends = [float(function(first, 0.97 + step, setting=TISSUE)) for step in (-1e-5, 1e-5)]
+            assert float(slope) == pytest.approx((ends[1] - ends[0]) / 2e-5, rel=1e-4)
+
+
+def test_what_another_table_would_change_is_small():
+    error = exact.error_estimate(R[:6, None], ALPHAS[1:], setting=Setting(n=1.4, g=0.87))
+    assert 1e-9 < error.max() < 5e-3
+
+
+@pytest.mark.parametrize(
+    "setting",
+    [Setting(n=1.5, g=0.9), Setting(n=1.0, g=0.9), Setting(n=1.4, g=0.97), Setting(n=1.4, g=-0.1)],
+    ids=str,
+)
+def test_outside_the_table_the_tracer_is_named(setting):
+    assert not setting.is_solved
+    with pytest.raises(SettingError, match=r"n from 1.33 to 1.45 where .* g is from 0 to 0.95, got .*simulate_orders"):
+        exact.reflectance(0.9, setting)
+
+
+def test_a_damaged_table_is_named(monkeypatch, tmp_path):
+    content = table.FILE.read_bytes()
+    bad = tmp_path / "half_space.npz"
+    arrays = dict(np.load(table.FILE))
+    np.savez(bad, **{**arrays, "share": arrays["share"] * 1.001})
+    monkeypatch.setattr(table, "FILE", bad)
+    table.light.cache_clear(), table._table.cache_clear()
+    with pytest.raises(InputError, match="is damaged: its numbers are not those that were written"):
+        exact.reflectance(0.9, TISSUE)
+    monkeypatch.undo()
+    table.light.cache_clear(), table._table.cache_clear()
+    assert exact.reflectance(0.9, TISSUE) > 0
+    assert content == table.FILE.read_bytes()

@@ -1,0 +1,81 @@
+"""Fits of media that scatter forwards: g given, known as a range, or not thought of."""
+
+import numpy as np
+import pytest
+
+from benchmarks import half_spaces, own_data
+from mcml_sim import Layer, Medium, Setting
+from profilefit.measured import fit
+from profilefit.measured.data import Measured
+from profilefit.measured.premises import Premises
+from profilefit.report.tables.fit_tables import fit_lines
+
+TISSUE = Setting(n=1.4, g=0.9)
+MU_A, MU_S = 0.2, 10.0  # reduced, per cm
+
+
+@pytest.fixture(scope="module")
+def photons():
+    """2e8 photons of tissue, in cm, as a simulation's rings."""
+    found = half_spaces.reference(TISSUE)
+    length = 1.0 / (MU_A + MU_S / (1 - TISSUE.g))
+    energy = found.energy(MU_S / (1 - TISSUE.g) * length)
+    edges, areas = found.grid.r_edges * length, found.grid.r_areas * length**2
+    seen = np.asarray(energy.effective_samples) > 1000
+    value, error = np.asarray(energy.value), np.asarray(energy.standard_error)
+    seen &= (edges[1:] * (MU_A + MU_S) > 0.02) & (error > 0)
+    rings = [one[seen] for one in (edges[:-1], edges[1:], value / areas, np.maximum(error, 2e-3 * value) / areas)]
+    medium = Medium((Layer(1.4, MU_A, MU_S / (1 - TISSUE.g), TISSUE.g),))
+    many = np.full(rings[0].size, np.inf)
+    return Measured("tissue", "", *rings, many, "photons", "cm", medium=medium, illumination="searchlight")
+
+
+def off(found):
+    return found.values["mu_a"] / MU_A - 1, found.values["mu_s'"] / MU_S - 1
+
+
+def test_photons_of_tissue_give_their_medium(photons):
+    """2 % and 1 % from all rings, 4 % and 2 % from those beyond two transport mean free paths."""
+    result = fit(photons, walk=False)
+    assert result.found.question.law.setting == TISSUE, "of the simulation"
+    near, far = off(result.found), off(fit(photons.within(0.2, None), walk=False).found)
+    assert abs(near[0]) < 0.02
+    assert abs(near[1]) < 0.01
+    assert abs(far[0]) < 0.04
+    assert abs(far[1]) < 0.02
+    isotropic = fit(photons, setting=Setting(n=1.4), walk=False).found
+    assert abs(off(isotropic)[0]) > 0.04, "a negative control: similarity"
+
+
+@pytest.mark.parametrize("ranges", [{}, {"g": (0.3, 0.95)}, {"n": (1.35, 1.45), "g": (0.7, 0.95)}], ids=str)
+def test_what_is_open_widens_the_errors(ranges):
+    one = own_data.TISSUE
+    data = own_data.rows(one, np.random.default_rng(3))
+    given = fit(data, setting=one.setting, walk=False).found
+    found = fit(
+        data, setting=Premises(Setting(n=1.4, g=float(np.mean(ranges.get("g", 0.9)))), ranges=ranges), walk=False
+    )
+    errors = found.found.errors(found.found.likely)
+    own = given.errors(given.likely)
+    assert (errors["mu_a"] > 1.05 * own["mu_a"]) == bool(ranges)
+    assert abs(found.found.values["mu_a"] - 0.02) < 3 * errors["mu_a"]
+    lines = [line.plain for line in fit_lines(found)]
+    assert any(line.startswith("known as ranges: ") for line in lines) == bool(ranges)
+
+
+def test_what_nobody_said_is_said_to_be_assumed():
+    data = own_data.rows(own_data.TISSUE, np.random.default_rng(3))
+    result = fit(data, walk=False)
+    assert result.tissue.values["mu_a"] == pytest.approx(0.02, rel=0.1)
+    told = next(line.plain for line in fit_lines(result) if "assumed; n = 1.4 and g = 0.9" in line.plain)
+    assert told.startswith("n = 1 and g = 0 are assumed; ")
+    assert told.endswith("give `n` and `g`, or a range")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("opened", [False, True])
+def test_intervals_hold_the_truth(opened):
+    """In 100 media; 95 % of them within the binomial's 1e-3."""
+    for one in own_data.coverage(100, opened, seed=4).values():
+        assert one.held > 0.86
+        assert one.wider < 3
