@@ -32,9 +32,9 @@ source the profile is taken for its own limit, alpha / (4 pi r) where n = 1, whi
 other surfaces. Absolute error of `cdf`: below 1e-10 where n = 1, else below 2e-7, so that `quantile` of shares that are
 that close to 1 is too large there. `error_estimate` says what more nodes would change.
 
-Relative error of the table, g > 0, from .05 to 15 l* against photons where n = 1.4 (`benchmarks/half_spaces.py`): A below
-3e-4, 1e-3 where g = .95; rings within what 1e8 to 6e8 photons know, .5 % mostly and 1 % at the worst, where alpha' >= .5
-and g <= .9; .9 to 5 % far from the source of darker media, 9 % where g = .95.
+Relative error of the table, g > 0, from .05 to 15 l* against photons where n = 1.4 (`benchmarks/half_spaces.py`): A
+below 3e-4, 1.3e-3 where g = .95; rings, where alpha' >= .5 and g <= .9, mostly below .5 %, which is what 1e8 to 6e8
+photons know; up to 5 % far from the source of darker media, 9 % where g = .95.
 """
 
 from mcml_sim.exact.half_space import (

@@ -41,7 +41,7 @@ OF_LAYERS = {
     "render-fur.png": "A ball of fur, from the top left: rays against each strand; sixteen shells, linear, quadratic "
     "and of the fitted exponent; sixteen swept slabs that test one strand, and two.",
     "render-fur-cost.png": "Error of fur's layers over time, toward six angles.",
-    "own-data.png": "What rings can know of tissue, by where they lie and how well they are known; n and g given or open.",
+    "own-data.png": "What rings can know of tissue, by place and error; n and g given or open.",
 }
 GROUPS = {
     "laws": ("Laws in float32", OF_PROFILE),
