@@ -5,7 +5,7 @@ import pytest
 
 from mcml_sim import Setting
 from profilefit.measured.beam import Gaussian
-from profilefit.measured.beam_width import beam_width
+from profilefit.measured.assumed import beam_width
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
