@@ -75,7 +75,7 @@ def target_of(setting: Setting | None, law: ProfileLaw | None) -> Target:
         return LawTarget(law)
     where = setting or Setting()
     if not where.is_solved:
-        raise SettingError(f"the exact half space has n >= 1 and g = 0, got {where}: give a law of that setting")
+        raise SettingError(f"exact light is not solved for {where}: give a law of that setting")
     return ExactTarget(where)
 
 

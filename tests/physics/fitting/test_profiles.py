@@ -48,7 +48,7 @@ def test_the_setting_comes_along():
     found = Profiles.from_exact([0.5], [0.0, 1.0], Setting("diffuse"))
     assert found.setting == Setting("diffuse")
     assert found.reflectance[0] == pytest.approx(exact.reflectance(0.5, Setting("diffuse")))
-    with pytest.raises(SettingError, match="n >= 1 and g = 0"):
+    with pytest.raises(SettingError, match="n >= 1 where g = 0"):
         Profiles.from_exact([0.5], [0.0, 1.0], Setting(n=0.9))
 
 

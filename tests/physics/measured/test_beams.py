@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from mcml_sim import Setting
-from profilefit.measured.beam import Gaussian
 from profilefit.measured.assumed import beam_width
+from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
