@@ -107,7 +107,7 @@ def fit(
     Examples, on the files of profilefit examples:
       profilefit fit examples/phantom.csv --out phantom
       profilefit fit examples/phantom.csv --law burley --scale free --json
-      profilefit fit examples/two_layers.mco --layers examples/two_layers.toml --free d1,mu_a1
+      profilefit fit examples/phantom.csv --n 1.4 --g 0.8:0.95
       profilefit fit petzold --kind phase
     """
     with interruptible(__name__):
