@@ -25,7 +25,7 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from mcml_sim.exact.anisotropic import high_orders, table
 from mcml_sim.exact.anisotropic.table import COSINES, INDICES, KNOTS, S, SplinedLight
-from mcml_sim.exact.light import LEAST, coefficients, log_once, nodes
+from mcml_sim.exact.light import LEAST, coefficients, log_once, nodes, unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.setting import ILLUMINATIONS
@@ -90,8 +90,8 @@ def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness |
     """Of one n and g under both lights: the photons' orders, which are known at any albedo, and the rest."""
     n, g = settings[0].n, settings[0].g
     orders, rule = beyond(g), rule or high_orders.fine(g)
-    alpha, kappa = table.unreduced(1.0 - S**2, g), high_orders.decay_rates(1.0 - S**2, g)
-    solved_at = table.unreduced(1.0 - SOLVED**2, g)
+    alpha, kappa = unreduced(1.0 - S**2, g), high_orders.decay_rates(1.0 - S**2, g)
+    solved_at = unreduced(1.0 - SOLVED**2, g)
     whole = high_orders.totals(n, g, orders, solved_at, rule) / solved_at ** (orders + 1)
     at_origin = np.exp(np.log(whole) @ _locally()[0].T)  # over alpha^(orders + 1)
     found, scales = [], []
@@ -123,7 +123,7 @@ def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness
     Where digits are lost it goes on straight over ln x, once its decay is taken out.
     """
     reduced = 1.0 - SOLVED**2
-    alpha = table.unreduced(reduced, g)
+    alpha = unreduced(reduced, g)
     kappa = high_orders.decay_rates(reduced, g) * (1.0 - alpha * g)
     logs = np.full((2, SOLVED.size, x.size), np.nan)
     for line, members in high_orders.lines(alpha, g):
@@ -140,7 +140,7 @@ def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness
     way, next_ones = _locally()
     between = way @ logs
     doubt = np.where((next_ones @ unknown) > 0, CONTINUED, ROUNDING)
-    fine = high_orders.decay_rates(1.0 - S**2, g) * (1.0 - table.unreduced(1.0 - S**2, g) * g)
+    fine = high_orders.decay_rates(1.0 - S**2, g) * (1.0 - unreduced(1.0 - S**2, g) * g)
     return np.asarray(np.exp(between - fine[:, None] * x)), doubt
 
 

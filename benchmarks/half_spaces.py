@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from benchmarks import half_space_table
 from mcml_sim import Grid, Orders, Setting, exact, simulate_orders
 from mcml_sim.exact.anisotropic import high_orders, table
+from mcml_sim.exact.light import unreduced
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.tracing.counts import Counts
@@ -60,11 +61,6 @@ def reference(setting: Setting) -> Orders:
     if exits.shape[0] == arrays[f"{name} edges"].size - 1:
         raise ValueError(f"{REFERENCE} has no row beyond the last ring")
     return Orders(Grid.from_edges(r=arrays[f"{name} edges"]), started, SEED, setting, Counts(exits, 0, 0, started))
-
-
-def unreduced(alpha: float, g: float) -> float:
-    """mu_s / (mu_s + mu_a) of a reduced albedo."""
-    return alpha / (alpha + (1.0 - g) * (1.0 - alpha))
 
 
 def rows(setting: Setting, found: Orders) -> list[Row]:

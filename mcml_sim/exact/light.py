@@ -14,6 +14,7 @@ mu_s (1 - g) l*. D_1 belongs to the unreduced medium, 1 + alpha g / (1 - g) mean
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any, NamedTuple
 
 import equinox as eqx
 import jax
@@ -33,6 +34,26 @@ LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
 ENERGY = np.polynomial.legendre.leggauss(96)
 SEARCHLIGHT = Setting()
+
+
+class Reduced(NamedTuple):
+    """What a medium has in common with one whose scattering has no direction."""
+
+    alpha: Any
+    """mu_s (1 - g) l*."""
+    length: Any
+    """l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
+
+
+def reduced(alpha: Any, g: Any) -> Reduced:
+    """Of an albedo mu_s / (mu_s + mu_a)."""
+    length = 1.0 / (1.0 - alpha * g)
+    return Reduced(alpha * (1.0 - g) * length, length)
+
+
+def unreduced(alpha: Any, g: float) -> Any:
+    """mu_s / (mu_s + mu_a) of a reduced albedo."""
+    return alpha / (alpha + (1.0 - g) * (1.0 - alpha))
 
 
 class ExactLight(eqx.Module):

@@ -44,17 +44,11 @@ class Optics(NamedTuple):
     g: float
 
 
-class Scored(NamedTuple):
-    """What `mco.Output` is made of."""
+def parse(lines: Lines) -> tuple[Run, float, float, np.ndarray]:
+    """What follows the version, in the order of `mco.Output`.
 
-    run: Run
-    specular: float
-    diffuse: float
-    reflectance_r: np.ndarray
-
-
-def parse(lines: Lines) -> Scored:
-    """What follows the version; InputError names the line of what is not such a file, or has no Rd_r."""
+    InputError names the line of what is not such a file, or has no Rd_r.
+    """
     (word,) = lines.take(1, "the input's version, mcmli2.0")
     if not word.startswith("mcmli2."):
         raise lines.error("the input's version, mcmli2.0", shown(word))
@@ -63,7 +57,7 @@ def parse(lines: Lines) -> Scored:
     specular, _, diffuse, *_ = (_first(lines, f"number {at} of 6 of RAT") for at in range(1, 7))
     lines.find("Rd_r")
     column = [_first(lines, f"number {at} of {run.nr} of Rd_r") for at in range(1, run.nr + 1)]
-    return Scored(run, specular, diffuse, np.array(column))
+    return run, specular, diffuse, np.array(column)
 
 
 def _media(lines: Lines) -> dict[str, Optics]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -26,6 +27,7 @@ FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
 WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
 PROFILE, PHASE = KINDS = ("profile", "phase")
+OF_HALF_SPACE = ("law", "constants", "fix", "total", "n", "g", "seed")
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 
@@ -137,7 +139,7 @@ def fit(
     known = None if total is None else _total(total)
     factor = _scale(scale)
     if layers is not None:
-        _require_layers_only(context)
+        _require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
         fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
         return
     if free is not None:
@@ -162,12 +164,12 @@ def fit(
         raise typer.Exit(FAILED)
 
 
-def _require_layers_only(context: typer.Context) -> None:
-    """InputError of an option that says something of a half space."""
-    for name in ("law", "constants", "fix", "total", "n", "g", "seed"):
+def _require_left_out(context: typer.Context, names: Iterable[str], where: str) -> None:
+    """InputError of an option that was given although it says nothing there."""
+    for name in names:
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
-            raise InputError(f"--{name} must be left out where --layers say what is fitted")
+            raise InputError(f"--{name.replace('_', '-')} must be left out where {where}")
 
 
 def _of_phase(
@@ -185,10 +187,7 @@ def _of_phase(
         from profilefit.report.tables.phase_table import phase_tables, premise_lines
 
     taken = {"data", "kind", "angles", "out", "as_json", "quiet"}
-    for name in context.params:
-        source = context.get_parameter_source(name)
-        if name not in taken and source is not None and source.name == "COMMANDLINE":
-            raise InputError(f"--{name.replace('_', '-')} must be left out where --kind is {PHASE}")
+    _require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
     table = read_phase(table_of(str(data)) or data)
     if out is not None:
         require_folder(out)

@@ -51,9 +51,8 @@ def exact_light(setting: Setting) -> ExactLight:
 
 
 def _filled(light: ExactLight) -> ExactLight:
-    """The same in arrays as large as those where g = 0, which share compiled code."""
-    more, intervals = DEGREES - light.kappa.size, np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
+    """The same with as many intervals as where g = 0, which are never reached: both share compiled code."""
+    intervals = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
     with jax.enable_x64(True):
-        rest = jnp.pad(light.rest, ((0, more), (0, 0), (0, 0)))
-        rest = jnp.pad(rest, ((0, 0), (0, intervals - rest.shape[1]), (0, 0)), mode="edge")
-        return replace(light, rest=rest, kappa=jnp.pad(light.kappa, (0, more)), share=jnp.pad(light.share, (0, more)))
+        more = ((0, 0), (0, intervals - light.rest.shape[1]), (0, 0))
+        return replace(light, rest=jnp.pad(light.rest, more, mode="edge"))

@@ -205,27 +205,35 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
         if not np.all(np.isfinite(light)):
             break
         expected = np.maximum(light, LEAST_EXPECTED * data.value)
-        model = _sum(law_error.covariance(data, found.rel, found.beyond), _open(problem, minimum.point))
-        problem = replace(problem, noise=noise(data, expected, wider, model))
+        rows, of_total = _open(problem, minimum.point)
+        model = _sum(law_error.covariance(data, found.rel, found.beyond), rows)
+        problem = replace(problem, noise=noise(data, expected, wider, model), question=_widened(question, of_total))
         minimum = descended(problem, minimum.point, question.free)
         found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
     return replace(found, rivals=_rivals(found, first.others))
+
+
+def _widened(question: Question, variance: float) -> Question:
+    """With so much more variance of a known A."""
+    if question.total is None:
+        return question
+    return replace(question, total=replace(question.total, error=float(np.hypot(question.total.error, variance**0.5))))
 
 
 def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
     return one if other is None else other if one is None else one + other
 
 
-def _open(problem: Problem, point: Floats) -> Floats | None:
-    """(n, n) covariance of the light in the rows from what is known as a range; None where nothing is."""
+def _open(problem: Problem, point: Floats) -> tuple[Floats | None, float]:
+    """Covariance (n, n) of the rows, and A's variance, by what is known as a range; None and 0 where nothing is."""
     if not problem.question.others:
-        return None
+        return None, 0.0
     inner, outer = problem.data.inner, problem.data.outer
-    here, spread = problem.model.predicted(point[None], inner, outer)[0, :-1], np.zeros((inner.size,) * 2)
+    here, spread = problem.model.predicted(point[None], inner, outer)[0], np.zeros((inner.size + 1,) * 2)
     for weight, law, instrument in problem.question.others:
-        away = Model(law, instrument).predicted(point[None], inner, outer)[0, :-1] - here
+        away = Model(law, instrument).predicted(point[None], inner, outer)[0] - here
         spread += weight * np.outer(away, away)
-    return spread
+    return spread[:-1, :-1], float(spread[-1, -1])
 
 
 def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:

@@ -97,6 +97,8 @@ def fit_layers(
     scale  as in `workflow.fit`. InputError of a medium that `exact.solve` has not, and of names that it has not
     """
     require_workable(data)
+    if "beam" in premises.ranges:
+        raise InputError("beam must be one width where layers are fitted, got a range")
     names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
     _require_free(medium, free)
     if data.value.size <= len(names):

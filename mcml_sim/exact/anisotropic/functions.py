@@ -7,7 +7,7 @@ after broadcasting, of numpy or of jax, and so are the answers.
 from __future__ import annotations
 
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import equinox as eqx
 import jax
@@ -17,28 +17,13 @@ from jax import Array
 
 from mcml_sim.exact.anisotropic.table import light
 from mcml_sim.exact.by_albedo import BLOCK, blocks
-from mcml_sim.exact.light import ExactLight
+from mcml_sim.exact.light import ExactLight, reduced
 from mcml_sim.media.setting import Setting
 
 # In l*: nearer than the first, 2 pi r R_d has its limit; the ends between which a share's radius lies.
 NEAREST, FARTHEST = 1e-7, 1e30
 SHORTEST, LONGEST, HALVINGS = 1e-12, 1e12, 64
 FAR = 1e4
-
-
-class Reduced(NamedTuple):
-    """What a medium has in common with one whose scattering has no direction."""
-
-    alpha: Any
-    """mu_s (1 - g) l*."""
-    length: Any
-    """l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
-
-
-def reduced(alpha: Any, g: Any) -> Reduced:
-    """Of an albedo mu_s / (mu_s + mu_a)."""
-    length = 1.0 / (1.0 - alpha * g)
-    return Reduced(alpha * (1.0 - g) * length, length)
 
 
 def reflectance(alpha: Any, setting: Setting) -> Any:

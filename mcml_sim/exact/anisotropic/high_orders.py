@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import hankel1
 
 from mcml_sim.exact.anisotropic import system as systems
+from mcml_sim.exact.light import unreduced
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.setting import Setting
 
@@ -77,7 +78,7 @@ def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
 
 def decay_rates(reduced: Floats, g: float) -> Floats:
     """kappa of reduced albedos [1/l*]."""
-    alpha = reduced / (reduced + (1.0 - g) * (1.0 - reduced))
+    alpha = unreduced(reduced, g)
     return np.array([decay_rate(one, g) for one in alpha]) / (1.0 - alpha * g)
 
 

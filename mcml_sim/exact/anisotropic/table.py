@@ -72,11 +72,6 @@ def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
     )
 
 
-def unreduced(alpha: Floats, g: float) -> Floats:
-    """mu_s / (mu_s + mu_a) of reduced albedos."""
-    return alpha / (alpha + (1.0 - g) * (1.0 - alpha))
-
-
 def pieces(rest: Floats) -> Floats:
     """f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
     t = np.arange(4) * STEP / 3.0

@@ -93,7 +93,8 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
 def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
     """An interval, or in words that it says nothing."""
     low, high = ends or (None, None)
-    return ANYTHING if low is not None and high is not None and high > WIDE * max(low, 0.0) else interval(ends, most)
+    wide = low is not None and high is not None and low > 0 and high > WIDE * low
+    return ANYTHING if wide else interval(ends, most)
 
 
 def _mark(result: Answer, name: str) -> str:

@@ -11,6 +11,7 @@ from mcml_sim import Setting, exact
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import single_scattering
 from mcml_sim.exact.anisotropic import table
+from mcml_sim.exact.light import unreduced
 
 ALPHAS = np.array([0.3, 0.9, 0.99, 0.9995])
 R = np.geomspace(0.01, 30.0, 9)
@@ -37,8 +38,8 @@ def test_photons_agree(compared):
 def test_similarity_is_told_from_it():
     """A negative control: light of g = 0 at the same reduced albedo."""
     found = half_spaces.reference(TISSUE)
-    photons = found.energy(half_spaces.unreduced(0.9, 0.9))
-    edges = found.grid.r_edges * (1.0 - 0.9 * half_spaces.unreduced(0.9, 0.9))
+    photons = found.energy(unreduced(0.9, 0.9))
+    edges = found.grid.r_edges * (1.0 - 0.9 * unreduced(0.9, 0.9))
     other = np.diff(exact.cdf(edges, 0.9, setting=Setting(n=1.4))) * exact.reflectance(0.9, Setting(n=1.4))
     z = (other - photons.value) / np.maximum(photons.standard_error, 1e-12)
     rings = (edges[:-1] > 0.05) & (edges[1:] < 5)

@@ -163,6 +163,7 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         ((LAYERS, "--layers", STACK), "--free must name quantities such as d1, mu_a2 or mu_s2, got ''"),
         ((LAYERS, "--layers", STACK, "--free", "d3"), "--free must name one of 2 layers, got 'd3'"),
         ((LAYERS, "--layers", STACK, "--free", "d1", "--g", "0.9"), "--g must be left out where --layers say what"),
+        ((LAYERS, "--layers", STACK, "--free", "d1", "--beam", "1mm:2mm"), "--beam must be one width where layers are"),
         ((LAYERS, "--layers", "none.toml", "--free", "d1"), "none.toml: expected a file that can be read"),
         ((LAYERS, "--layers", str(DATA / "skin.toml"), "--free", "d1"), "g = 0"),
         ((PHANTOM, "--beam", "0.7mm:0.3mm"), "--beam must have a range that rises, such as 0.3mm:0.7mm"),
