@@ -1,6 +1,6 @@
 """How often intervals of `profilefit fit` hold the truth, and what a measurement can know at all.
 
-    python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
+    python -m benchmarks.own_data                          # 200 media, n and g given and open: four minutes
     python -m benchmarks.own_data --count 1000
     python -m benchmarks.own_data --chart own-data.png     # a minute: error by r_min, r_max, noise, beam, n and g
 
