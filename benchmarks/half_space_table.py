@@ -40,7 +40,8 @@ MIDDLES = np.sqrt(EDGES[1:-1] * EDGES[2:])
 MOST_ORDERS, FIRST_SEED = 48, 1001
 S_MOST = np.sqrt(1.0 - LEAST)
 SOLVED = S_MOST * 0.5 * (1.0 + nodes(20))  # s at which high orders are solved
-REACH = 12.0  # (kappa - b) x up to which what is solved keeps its digits
+LOST = 1e-4, 2e-2  # share of the waves below which too few digits are left, at g up to SLOW and beyond
+SLOW = 0.92
 LAST_KNOWN = 10  # radii by which a row of logarithms is continued
 CONTINUED = 0.03  # relative error beyond these
 WELL = 0.1  # of a ring that the shape of light within rings is found from
@@ -62,7 +63,7 @@ class Low(NamedTuple):
 
 def beyond(g: float) -> int:
     """How many orders are photons'. Light that turns slowly is narrow for longer."""
-    return 24 if g < 0.92 else MOST_ORDERS
+    return 24 if g < SLOW else MOST_ORDERS
 
 
 def traced(setting: Setting, photons: int, seed: int) -> Low:
@@ -120,7 +121,8 @@ def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness |
 def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness) -> tuple[Floats, Floats]:
     """Of both lights, at S, over alpha^(orders + 1): solved at fewer albedos. And its relative error.
 
-    Where digits are lost it goes on straight over ln x, once its decay is taken out.
+    Where digits are lost it goes on as light far away does, x^-2 once its decay is taken out, which its slope
+    approaches as 1 / x.
     """
     reduced = 1.0 - SOLVED**2
     alpha = unreduced(reduced, g)
@@ -128,20 +130,28 @@ def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness
     logs = np.full((2, SOLVED.size, x.size), np.nan)
     for line, members in high_orders.lines(alpha, g):
         values = high_orders.transforms(n, g, orders, line.k, line.alpha, rule)
-        density = np.moveaxis(high_orders.ring_density(line, values, x), 2, 1)
-        digits = (kappa[members, None] - line.k[0].imag) * x < REACH
-        usable = np.logical_and.accumulate(digits & (density > 0), axis=-1)
+        density, share = (np.moveaxis(part, 2, 1) for part in high_orders.ring_density(line, values, x))
+        past = np.arange(x.size) > np.argmax(share, axis=-1)[..., None]
+        lost = past & (share < LOST[g > SLOW])
+        usable = np.logical_and.accumulate(~lost & (density > 0), axis=-1)
         own = np.log(np.where(usable, density, 1.0)) - (orders + 1) * np.log(alpha[members, None])
-        logs[:, members] = np.where(usable, own + kappa[members, None] * x, np.nan)
+        logs[:, members] = np.where(usable, own - np.log(_decay(kappa[members, None] * x)), np.nan)
     unknown = np.isnan(logs)
     for row in logs.reshape(-1, x.size):
-        first = np.flatnonzero(~np.isnan(row))[-LAST_KNOWN:]
-        row[first[-1] + 1 :] = np.polyval(np.polyfit(np.log(x[first]), row[first], 1), np.log(x[first[-1] + 1 :]))
+        _continued(row, x, np.flatnonzero(~np.isnan(row))[-LAST_KNOWN:])
     way, next_ones = _locally()
     between = way @ logs
     doubt = np.where((next_ones @ unknown) > 0, CONTINUED, ROUNDING)
     fine = high_orders.decay_rates(1.0 - S**2, g) * (1.0 - unreduced(1.0 - S**2, g) * g)
-    return np.asarray(np.exp(between - fine[:, None] * x)), doubt
+    return np.asarray(np.exp(between) * _decay(fine[:, None] * x)), doubt
+
+
+def _continued(row: Floats, x: Floats, known: NDArray[np.intp]) -> None:
+    """Fill in a row of logarithms of what goes as x^-2 in the end from its last known places on."""
+    last = x[known[-1]]
+    slope, _ = np.polyfit(np.log(x[known]), row[known], 1)
+    beyond = x[known[-1] + 1 :]
+    row[known[-1] + 1 :] = row[known[-1]] - 2.0 * np.log(beyond / last) + (slope + 2.0) * (1.0 - last / beyond)
 
 
 def _locally() -> tuple[Floats, Floats]:

@@ -189,12 +189,13 @@ def _solution(operator: Callable[[Array], Array], right: Array, steps: int) -> A
     return size * jnp.linalg.solve(small[:steps], jnp.eye(steps)[0]) @ basis[:steps]
 
 
-def ring_density(line: Contour, values: Complexes, x: Floats) -> Floats:
-    """2 pi x R_d [1/mfp] at radii (x,) from R^ on a line, (..., k, m): (..., x, m)."""
+def ring_density(line: Contour, values: Complexes, x: Floats) -> tuple[Floats, Floats]:
+    """2 pi x R_d [1/mfp] at radii (x,) from R^ on a line, (..., k, m): (..., x, m). And the share of it in the sizes of
+    the waves that it is the sum of: what cancels takes digits."""
     k, dk, finer = _refined(line, values)
     waves = hankel1(0, np.multiply.outer(x, k)) * (k * dk)
-    found: Floats = x[:, None] * (waves @ finer).real
-    return found
+    found: Floats = (waves @ finer).real
+    return x[:, None] * found, np.abs(found) / (np.abs(waves) @ np.abs(finer))
 
 
 def _refined(line: Contour, values: Complexes) -> tuple[Complexes, Complexes, Complexes]:
