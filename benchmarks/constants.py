@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 from threadpoolctl import threadpool_limits
@@ -46,7 +47,7 @@ def refitted(name: str, indices: tuple[float, ...]) -> Iterator[Row]:
         begun = start.with_vector(held, [0.0] * len(held))
         limits = (0.0, 0.0, chosen.weighting.rising)
         law = fit(profiles, begun, chosen.weighting.objective, free, limits=limits, jackknife=False).law
-        laws = [law.at_index(one) for one in indices] if chosen.indices else [law]
+        laws = [law.at(replace(law.setting, n=one)) for one in indices] if chosen.indices else [law]
         yield chosen.setting.illumination, n, label, str(len(free)), *_worst(laws)
 
 

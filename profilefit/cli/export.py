@@ -41,6 +41,9 @@ def export(
         float | None,
         typer.Option("--n", help="Refractive index of the surface, if not that of the record: 1 to 1.6 for hazard."),
     ] = None,
+    g: Annotated[
+        float | None, typer.Option("--g", help="Mean cosine of the scattering angle: 0 to 0.95 for hazard, n near 1.4.")
+    ] = None,
     name: Annotated[
         str | None,
         typer.Option(help="What its functions begin with instead of the law's name: two media in one shader need two."),
@@ -60,6 +63,7 @@ def export(
     Examples:
       profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
       profilefit export hazard-diffuse --n 1.37
+      profilefit export hazard --n 1.4 --g 0.9
     """
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
@@ -76,28 +80,29 @@ def export(
     if path is None and fits is None:  # beside one's own records of other laws, or where there are none of these
         path = stack_record.find(what, LOCAL) or stack_record.find(what, fits_folder())
     if path is not None:
-        _require_none("a stack", what, constants, n)
+        _require_none("a stack", what, constants, n, g)
         text = export_stack(stack_record.load(path), lang, name)
     elif what in (phases := known_phases(fits)):
-        _require_none("a phase function", what, constants, n)
+        _require_none("a phase function", what, constants, n, g)
         text = export_phase(load(phases[what]), lang, name)
     elif what == SEGMENT or what.endswith(SCENE):
-        _require_none("of light in water", what, constants, n)
+        _require_none("of light in water", what, constants, n, g)
         text = _of_sea(what, lang, name)
     elif what == FUR:
-        _require_none("of fur", what, constants, n)
+        _require_none("of fur", what, constants, n, g)
         text = _of_fur(lang, name)
     else:
-        text = exported(find(what, folder, constants, n), folder, lang, name)
+        text = exported(find(what, folder, constants, n, g), folder, lang, name)
     if out is None:
         sys.stdout.write(text)
     else:
         write_whole(out, text)
 
 
-def _require_none(kind: str, what: str, constants: str | None, n: float | None) -> None:
+def _require_none(kind: str, what: str, constants: str | None, n: float | None, g: float | None) -> None:
     """Options that only laws have."""
-    if given := [option for option, value in (("--constants", constants), ("--n", n)) if value is not None]:
+    options = (("--constants", constants), ("--n", n), ("--g", g))
+    if given := [option for option, value in options if value is not None]:
         raise InputError(f"{given[0]} must be left out where NAME is {kind}, got {what!r}")
 
 

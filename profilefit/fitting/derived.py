@@ -22,10 +22,10 @@ from profilefit.fitting.estimate import Fit, ResidualFunction
 from profilefit.fitting.objectives import NO_LIMITS, Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN
+from profilefit.laws.base import OF_MAPS
 from profilefit.laws.liang import QUANTILES
 
 Floats = NDArray[np.float64]
-MAPS = ("albedo", "reflectance")
 # Albedos that a record's table shows.
 SHOWN = (0.2, 0.5, 0.8, 0.95, 0.99)
 # Rings fine enough that their middles stand for them, from the source to where no light is left [mfp].
@@ -78,8 +78,13 @@ class LawWithErrors:
         return cls(law, tuple(covariance["names"]), objective, noise, discrepancy.read(content, arrays))
 
     @property
+    def reduced(self) -> Any:
+        """The law of the reduced albedos and radii that all quantities here are of."""
+        return self.law.in_reduced()
+
+    @property
     def is_map(self) -> bool:
-        return self.objective in MAPS
+        return self.objective in OF_MAPS
 
     def statistical_error(self, slope: Floats) -> Floats:
         """Of quantities whose derivatives are `slope` (k, p)."""
@@ -101,10 +106,10 @@ class AtAlbedo:
     @cached_property
     def _predicted(self) -> tuple[Floats, Floats]:
         problem = ResidualFunction(self.known.objective, self.known.free)
-        total = float(self.known.law.albedo.reflectance(self.alpha))
+        total = float(self.known.reduced.albedo.reflectance(self.alpha))
         alone, none = np.array([self.alpha]), np.zeros((1, EDGES.size - 1))
         rings = Rings(alone, EDGES, none, np.array([total]), none, alone, np.array(NO_LIMITS), np.zeros(0))
-        energy, slope = predicted(problem, self.known.law, rings)
+        energy, slope = predicted(problem, self.known.reduced, rings)
         lit = energy[0] > 0  # (7) ends where it falls below zero
         return np.where(lit, energy[0], 0.0), np.where(lit[:, None], slope[0], 0.0)
 
@@ -167,7 +172,7 @@ def profile(known: LawWithErrors, r: ArrayLike, alpha: float) -> Quantity:
     if known.is_map or known.objective in QUANTILES:
         raise InputError(f"objective must be of a fit to profiles, got {known.objective!r}")
     here, radii = AtAlbedo(known, float(alpha)), np.atleast_1d(np.asarray(r, float))
-    value = np.asarray(known.law.profile(radii, alpha), float)
+    value = np.asarray(known.reduced.profile(radii, alpha), float)
     energy = np.where(here.energy > 0, here.energy, 1.0)
     noise = known.statistical_error(here.slope) / energy
     off = np.sqrt(np.maximum(np.diag(here.covariance), 0.0)) / energy
@@ -183,7 +188,7 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
     albedos = np.atleast_1d(np.asarray(alpha, float))
     one, none = np.ones(albedos.size), np.zeros((albedos.size, 1))
     rings = Rings(albedos, np.array([0.0, 1.0]), none, one, none, one, np.array(NO_LIMITS), np.zeros(0))
-    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.law, rings)
+    energy, slope = predicted(ResidualFunction(known.objective, known.free), known.reduced, rings)
     value = energy[:, 0]
     model = np.full(value.size, np.nan)
     if known.off is not None:
@@ -195,10 +200,12 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
 
 
 def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
-    """Root mean square of law/data - 1 of the radius of `share`, over the albedos of `profiles` that hold it [-]."""
+    """Root mean square of law/data - 1 of the radius of `share`, over the albedos of `profiles` that hold it [-]; of
+    those of the law's setting, where profiles are of several."""
     off = []
-    for alpha, cdf in zip(profiles.alpha, profiles.cdf, strict=True):
-        if alpha < 1.0 and cdf[-1] > share:
+    settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
+    for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
+        if setting == known.law.setting and alpha < 1.0 and cdf[-1] > share:
             truth = float(np.interp(share, cdf, profiles.r_edges))
             off.append(AtAlbedo(known, float(alpha)).radius(share)[0] / truth - 1.0)
     return float(np.sqrt(np.mean(np.square(off)))) if off else np.nan

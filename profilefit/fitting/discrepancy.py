@@ -16,7 +16,7 @@ the profile's source limit, alpha / 4 pi r, instead of the profile itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,12 +27,14 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
 from profilefit.fitting.gaussian_process import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.laws.base import OF_MAPS
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.surface import surface_of
 
@@ -60,7 +62,7 @@ class Discrepancy:
     covariance       (p, p) of the constants: their model error
     result           whether there is one, or what failed
     u (g,), s (m,), influence (p, m, g): where delta was looked at, and d constants / d delta. Of a fit to several
-    indices s is (m, 2), a point in the plane of sqrt(1 - alpha) and rho (`laws.surface`)
+    indices s is (m, 2), a point in the plane of sqrt(1 - alpha) and rho (`laws.surface`), and (m, 3) with g
     """
 
     amplitude: float
@@ -95,7 +97,7 @@ class Discrepancy:
 
     def places(self, alpha: Floats, setting: Setting) -> Floats:
         """Where albedos (k,) of a setting lie in s."""
-        return _placed(alpha, np.full(len(alpha), surface_of(setting).trapped) if self.s.ndim > 1 else None)
+        return _placed(alpha, [setting] * len(alpha), 1 if self.s.ndim == 1 else self.s.shape[1])
 
     def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
         if not np.isfinite(length):  # a fit that sees no rings knows of no radius
@@ -122,7 +124,8 @@ class Residuals:
     """Relative residuals of a law on groups of neighbouring rings.
 
     table      (m, g) law less data over what counts as 1 [-]; live where a group counts
-    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha), (m, 2) of that and rho where profiles are of several indices
+    u, s       (g,) of ln r, (m,) of sqrt(1 - alpha), (m, 2) of that and rho where profiles are of several indices, and
+               (m, 3) with g
     slope      (m, g, p) d table / d constants; noise (g, m, k) factors of the photons' relative covariance
     influence  (p, m, g) d constants / d delta, `delta` of all the rings of a group
     """
@@ -170,7 +173,7 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     gain = sensitivity(problem, fit.solution, fit.law, rings)
     energy, slope = predicted(problem, fit.law, rings)
     albedos = np.asarray(rings.weight)[:, None] > 0
-    if fit.objective in ("albedo", "reflectance"):
+    if fit.objective in OF_MAPS:
         return _one_ring(profiles, energy, slope, gain, albedos)
     data, counted = profiles.energy, albedos & (np.asarray(rings.used) > 0)
     judged = counted & (data > 0) & (profiles.cdf[:, 1:] <= ENERGY_WITHIN)
@@ -216,13 +219,16 @@ def _one_ring(profiles: Profiles, energy: Floats, slope: Floats, gain: Floats, l
 
 
 def _s(profiles: Profiles) -> Floats:
-    trapped = np.array([surface_of(setting).trapped for setting in profiles.settings])
-    return _placed(profiles.alpha, trapped if trapped.size else None)
+    settings = profiles.settings
+    return _placed(profiles.alpha, settings, 1 if not settings else 2 if len({one.g for one in settings}) == 1 else 3)
 
 
-def _placed(alpha: Floats, trapped: Floats | None) -> Floats:
+def _placed(alpha: Floats, settings: Sequence[Setting], size: int) -> Floats:
+    """In s, of so many numbers."""
     s = np.sqrt(1.0 - alpha)
-    return s if trapped is None else np.column_stack([s, trapped])
+    if size == 1:
+        return s
+    return np.column_stack([s, [(surface_of(one).trapped, one.g)[: size - 1] for one in settings]])
 
 
 def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
@@ -276,8 +282,8 @@ def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
 
 def _energy(objective: str, law, rings: Rings) -> Array:
     edges, alpha, law = jnp.asarray(rings.r_edges), jnp.asarray(rings.alpha), law.under(rings.surface)
-    if objective in ("albedo", "reflectance"):
-        return law.reflectance(alpha[:, None])
+    if objective in OF_MAPS:
+        return law.reflectance(unreduced(alpha[:, None], law.setting.g))
     if objective == "radial":
         r = 0.5 * (edges[1:] + edges[:-1])
         a, b, c = law.coefficients(alpha[:, None])

@@ -17,6 +17,7 @@ from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
+from mcml_sim.exact.light import reduced, unreduced
 from profilefit.fitting.profiles import FEWEST_EFFECTIVE_SAMPLES, Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.surface import RefractingSurface, surfaces_of
@@ -40,8 +41,8 @@ class Rings(eqx.Module):
     weight (m,) 1 where an albedo counts, else 0; limits (3,) weights of the energy limit, of the source limit
     and of rising with alpha
     xi (k,) shares of energy for quantiles
-    surface, surfaces  closed numbers of each profile (m, 1), and of each index (j, 1), profiles of one after those of
-    another; None where all belong to the law's own setting
+    surface, surfaces  closed numbers of each profile (m, 1), and of each setting (j, 1), profiles of one after those of
+    another; None where all belong to the law's own
     """
 
     alpha: Values
@@ -126,13 +127,20 @@ def radial(law, rings: Rings) -> Array:
 
 
 def albedo(law, rings: Rings) -> Array:
-    """alpha(A) - alpha, unweighted over the albedos given."""
-    return law.under(rings.surface).alpha(rings.reflectance[:, None]) - rings.alpha[:, None]
+    """alpha(A) - alpha of reduced albedos, unweighted over those given."""
+    found = law.under(rings.surface).alpha(rings.reflectance[:, None])
+    return reduced(found, law.setting.g).alpha - rings.alpha[:, None]
 
 
 def reflectance(law, rings: Rings) -> Array:
     """A(alpha) - A, unweighted over the albedos given."""
-    return law.under(rings.surface).reflectance(rings.alpha[:, None]) - rings.reflectance[:, None]
+    alpha = unreduced(rings.alpha[:, None], law.setting.g)
+    return law.under(rings.surface).reflectance(alpha) - rings.reflectance[:, None]
+
+
+def relative_reflectance(law, rings: Rings) -> Array:
+    """A(alpha) / A - 1, unweighted over the albedos given."""
+    return reflectance(law, rings) / rings.reflectance[:, None]
 
 
 def radius(law, rings: Rings) -> Array:
@@ -152,7 +160,7 @@ def share(law, rings: Rings) -> Array:
     return inner - rings.xi
 
 
-_ALL = (energy, relative, radial, albedo, reflectance, radius, relative_radius, share)
+_ALL = (energy, relative, radial, albedo, reflectance, relative_reflectance, radius, relative_radius, share)
 OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective in _ALL}
 
 

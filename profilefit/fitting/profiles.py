@@ -6,7 +6,7 @@ The radius at which the paper trims a profile before fitting is found by the sea
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
 from mcml_sim.errors import InputError
+from mcml_sim.exact.light import unreduced
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.setting import Setting
 from mcml_sim.results.orders import Orders
@@ -83,9 +84,9 @@ class Covariance:
 
 @dataclass(frozen=True)
 class Profiles:
-    """Reflectance profiles in units of the transport mean free path (l = 1).
+    """Reflectance profiles in units of the transport mean free path (l* = 1).
 
-    alpha              (m,) single-scattering albedos [-]
+    alpha              (m,) reduced single-scattering albedos [-]
     r_edges            (n + 1,) ring edges from 0 [mfp]
     energy             (m, n) energy reflected through each ring, per unit incident [-]: the integral of 2 pi r R_d
     standard_error     (m, n) of `energy`; zero where the truth has no noise
@@ -93,7 +94,8 @@ class Profiles:
     beyond             (m,) energy reflected beyond the last edge [-]
     covariance         between all rings and albedos; None where the truth has no noise, or where it was not requested
     source             what made them: "orders" (photons), "exact"
-    indices            (m,) refractive indices, where profiles of several are joined; None for that of `setting`
+    settings           of each profile (m,), where those of several indices and g are joined; none where all are of
+                       `setting`
     """
 
     alpha: Floats
@@ -106,28 +108,23 @@ class Profiles:
     setting: Setting
     photons: int | None = None
     covariance: Covariance | None = None
-    indices: Floats | None = None
+    settings: tuple[Setting, ...] = ()
 
     @classmethod
     def joined(cls, parts: Sequence[Profiles], setting: Setting) -> Profiles:
-        """Profiles without noise of several indices, each of the same albedos and rings, under the light of `setting`,
-        to which the record of a fit will belong."""
+        """Profiles without noise of several indices and g, each of the same albedos and rings, under the light of
+        `setting`, to which the record of a fit will belong."""
         first = parts[0]
         if not all(
             np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
         ):
-            raise InputError("profiles of several indices must have the same albedos and rings, got others")
+            raise InputError("profiles of several settings must have the same albedos and rings, got others")
         rows: dict[str, Any] = {
             name: np.concatenate([getattr(one, name) for one in parts])
             for name in ("alpha", "energy", "standard_error", "effective_samples", "beyond")
         }
-        indices = np.repeat([one.setting.n for one in parts], first.alpha.size)
-        return cls(**rows, r_edges=first.r_edges, source=first.source, setting=setting, indices=indices)
-
-    @property
-    def settings(self) -> tuple[Setting, ...]:
-        """The setting of each profile (m,), where they are of several indices; else none."""
-        return () if self.indices is None else tuple(replace(self.setting, n=float(n)) for n in self.indices)
+        settings = tuple(one.setting for one in parts for _ in first.alpha)
+        return cls(**rows, r_edges=first.r_edges, source=first.source, setting=setting, settings=settings)
 
     @classmethod
     def from_orders(cls, orders: Orders, alpha: ArrayLike, correlated: bool = True) -> Profiles:
@@ -160,8 +157,9 @@ class Profiles:
         """The exact half space on rings: integrals over them, without noise."""
         where = setting or Setting()
         albedos, edges = _albedos(alpha), Grid.from_edges(r=r_edges).r_edges
-        total = np.asarray(exact.reflectance(albedos, setting=where))
-        inside = total[:, None] * np.asarray(exact.cdf(edges, albedos[:, None], setting=where))
+        own = unreduced(albedos, where.g)
+        total, mfp = np.asarray(exact.reflectance(own, setting=where)), 1.0 - own * where.g  # where l* = 1
+        inside = total[:, None] * np.asarray(exact.cdf(edges, own[:, None], mfp[:, None], where))
         energy = np.diff(inside, axis=1)
         zero, infinite = np.zeros_like(energy), np.full_like(energy, np.inf)
         return cls(albedos, edges, energy, zero, infinite, total - inside[:, -1], "exact", where)

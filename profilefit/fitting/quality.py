@@ -1,6 +1,6 @@
 """How far a law is from the exact profile: one name and one definition for each measure, used everywhere.
 
-rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l, r at 99.5 % of the energy]
+rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l*, r at 99.5 % of the energy]
 largest  the largest such error at a single radius
 ks       max over r of |cdf_law - cdf_exact|
 l1       half the integral of |2 pi r (R_law - R_exact)| over r, over A: misplaced energy
@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.profiles import trimmed_radius
 from profilefit.laws.base import AlbedoLaw, ProfileLaw
@@ -44,7 +45,7 @@ class Quality:
 
 
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
-    """Measure a law against the exact profile of its own setting at each albedo in `alpha` (m,)."""
+    """Measure a law against the exact profile of its own setting at each (reduced) albedo in `alpha` (m,)."""
     albedos = np.atleast_1d(np.asarray(alpha, float))
     rows = [_at(law, float(value)) for value in albedos]
     return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
@@ -57,7 +58,7 @@ def r_squared(data: Floats, law: Floats) -> float:
 
 @dataclass(frozen=True)
 class _Truth:
-    """The exact half space where the measures look: log-spaced radii, far log-spaced edges, even radii [mfp]."""
+    """The exact half space where the measures look: log-spaced radii, far log-spaced edges, even radii [l*]."""
 
     r: Floats
     profile: Floats
@@ -67,27 +68,34 @@ class _Truth:
     scaled: Floats
 
 
+def _medium(reduced: float, setting: Setting) -> tuple[float, float]:
+    """alpha and mfp of a reduced albedo, where l* = 1."""
+    own = float(unreduced(reduced, setting.g))
+    return own, 1.0 - own * setting.g
+
+
 @lru_cache(maxsize=256)
 def _truth(alpha: float, setting: Setting) -> _Truth:
-    outer = float(exact.quantile(ENERGY_WITHIN, alpha, setting=setting))
+    own, mfp = _medium(alpha, setting)
+    outer = float(exact.quantile(ENERGY_WITHIN, own, mfp, setting))
     r = np.geomspace(NEAREST, outer, RADII)
     far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
     walked = np.append(r, outer + np.arange(1, 9) / 8)  # (6) may stop one stride beyond
-    profile = np.asarray(exact.profile(walked, alpha, setting=setting))
+    profile = np.asarray(exact.profile(walked, own, mfp, setting))
     cut = trimmed_radius(walked, walked * profile)
     even = (np.arange(RADII) + 0.5) / RADII * cut
-    scaled = even * np.asarray(exact.profile(even, alpha, setting=setting))
-    return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, alpha, setting=setting)), even, scaled)
+    scaled = even * np.asarray(exact.profile(even, own, mfp, setting))
+    return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, own, mfp, setting)), even, scaled)
 
 
 def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:
-    truth = _truth(alpha, law.setting)
-    off = np.abs(law.profile(truth.r, alpha) / truth.profile - 1.0)
-    law_cdf = law.cdf(truth.far, alpha)
+    truth, (own, mfp) = _truth(alpha, law.setting), _medium(alpha, law.setting)
+    off = np.abs(law.profile(truth.r, own, mfp) / truth.profile - 1.0)
+    law_cdf = law.cdf(truth.far, own, mfp)
     ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.
     l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(truth.cdf)))
-    model = truth.even * law.profile(truth.even, alpha)
+    model = truth.even * law.profile(truth.even, own, mfp)
     (mse, r2), *halves = (
         (float(np.mean((truth.scaled[part] - model[part]) ** 2)), r_squared(truth.scaled[part], model[part]))
         for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))
@@ -115,10 +123,12 @@ class AlbedoQuality:
 
 
 def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
-    """Measure a map on 1000 albedos even in sqrt(1 - alpha), and its shape on even reflectances up to the largest."""
+    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances up to the
+    largest."""
+    law, setting = law.in_reduced(), law.setting
     s = (np.arange(1000) + 0.5) / 1000
     alpha = 1.0 - s**2
-    truth = np.asarray(exact.reflectance(alpha, setting=law.setting))
+    truth = np.asarray(exact.reflectance(unreduced(alpha, setting.g), setting=setting))
     mapped = np.asarray(law.reflectance(alpha))
     mapped_alpha = np.asarray(law.alpha(truth))
     with np.errstate(invalid="ignore"):

@@ -24,10 +24,14 @@ MAPS = {
     "van_de_hulst": "van_de_hulst.VanDeHulst",
     "chiang": "chiang.Chiang",
 }
-# Those that have another form where the surface refracts, which goes by the same name.
+# Those that have other forms of the same name, where the surface refracts and where scattering has a direction.
 REFRACTING = {
     "hazard.Hazard": "refracting_hazard.RefractingHazard",
     "rational.Rational": "refracting_rational.RefractingRational",
+}
+FORWARD = {
+    "hazard.Hazard": "forward_hazard.ForwardHazard",
+    "rational.Rational": "forward_rational.ForwardRational",
 }
 
 
@@ -47,10 +51,11 @@ def home(place: str) -> "Any":
     return getattr(import_module(module if "." in module else f"{__name__}.{module}"), kind)
 
 
-def at_index(kind: "Any", n: float) -> "Any":
-    """The class that a law or map has at a refractive index: this one, or that for surfaces that refract."""
-    place = REFRACTING.get(f"{kind.__module__.rpartition('.')[2]}.{kind.__name__}")
-    return kind if n == 1.0 or place is None else home(place)
+def at(kind: "Any", setting: "Any") -> "Any":
+    """The class that a law or map has in a setting: this one, or that for surfaces that refract, or for any g."""
+    forms = REFRACTING if setting.is_isotropic else FORWARD
+    place = forms.get(f"{kind.__module__.rpartition('.')[2]}.{kind.__name__}")
+    return kind if setting.is_matched_isotropic or place is None else home(place)
 
 
 def _classes(table: "Mapping[str, str]") -> "dict[str, Any]":

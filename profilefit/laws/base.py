@@ -17,10 +17,10 @@ from profilefit.laws.entry import EVERYWHERE, Entry, Range
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.surface import RefractingSurface
 
-
-def closed() -> Any:
-    """A field that is no constant: numbers known in closed form, None for those of the law's own setting."""
-    return eqx.field(default=None, metadata={"closed": True})
+OF_MAPS = ("albedo", "reflectance", "relative_reflectance")
+"""Objectives of maps between alpha and A."""
+CLOSED = {"closed": True}
+"""Marks a field that is no constant: numbers known in closed form, None for those of the law's own setting."""
 
 
 class Constants(eqx.Module):
@@ -44,15 +44,19 @@ class Constants(eqx.Module):
 
     @classmethod
     def at_one_index(cls) -> tuple[str, ...]:
-        """The constants that profiles of one refractive index tell apart: all, but of a law that spans indices."""
+        """The constants that profiles of one refractive index and g tell apart: all, but of a law that spans them."""
         return cls.constant_names()
 
-    def at_index(self, n: float) -> Self:
-        """The same constants, and those of its map, at another refractive index of those that they span."""
-        given: dict[str, Any] = {"setting": replace(self.setting, n=n)}
+    def at(self, setting: Setting) -> Self:
+        """The same constants, and those of its map, in another setting of those that they span."""
+        given: dict[str, Any] = {"setting": setting}
         if getattr(self, "albedo", None) is not None:
-            given["albedo"] = self.albedo.at_index(n)  # type: ignore[attr-defined]
+            given["albedo"] = self.albedo.at(setting)  # type: ignore[attr-defined]
         return replace(self, **given)
+
+    def in_reduced(self) -> Self:
+        """The same law of reduced albedos and l*, as its shader source has it: itself, but of a law with g."""
+        return self
 
     def under(self, surface: RefractingSurface | None) -> Self:
         """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
@@ -94,7 +98,7 @@ class AlbedoLaw(Constants):
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
-        return cls.constant_names() if objective in ("albedo", "reflectance") else ()
+        return cls.constant_names() if objective in OF_MAPS else ()
 
     @abc.abstractmethod
     def alpha(self, reflectance) -> Array:
@@ -144,7 +148,8 @@ class ProfileLaw(Constants):
         """Limit of 2 pi x R_d at x -> 0, before any scaling [1/mfp]; the exact one is alpha / 2."""
 
     def total(self, alpha) -> Array:
-        """Total reflectance A [-] that the profile integrates to: by the map `albedo`, where it has none of its own."""
+        """Total reflectance A [-] that the profile integrates to at an albedo of the scaled functions: by the map
+        `albedo`, where it has none of its own."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
 
     def text_shape(self) -> dict[str, float] | None:
@@ -166,15 +171,21 @@ class ProfileLaw(Constants):
         """Every way to draw radii for this law; "exact" inverts its cdf, to rounding."""
         return {"exact": self.sampler}
 
+    def similar(self, alpha: Any, mfp: Any) -> tuple[Any, Any]:
+        """alpha and l of the scaled functions: the medium's own, or its reduced albedo and l* where the law has a g."""
+        return alpha, mfp
+
     @evaluated
     def profile(self, r, alpha, mfp=1.0) -> Array:
         """R_d(r) [1/length^2]: 2 pi r R_d integrates to the reflectance. `r`, `mfp` in one unit; all broadcast."""
-        return self.scaled_profile(r / mfp, alpha) / mfp**2
+        by, length = self.similar(alpha, mfp)
+        return self.scaled_profile(r / length, by) / length**2
 
     @evaluated
     def cdf(self, r, alpha, mfp=1.0) -> Array:
         """Share of the reflected energy within radius r [-]. `r` and `mfp` in one unit; all broadcast."""
-        return self.scaled_cdf(r / mfp, alpha)
+        by, length = self.similar(alpha, mfp)
+        return self.scaled_cdf(r / length, by)
 
 
 class Sampler(eqx.Module):
@@ -205,14 +216,17 @@ class Sampler(eqx.Module):
     @evaluated
     def undone(self, r, xi, alpha, mfp=1.0) -> Array:
         """xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the error of the inversion. All broadcast."""
-        return self.scaled_undone(r / mfp, xi, alpha)
+        by, length = self.law.similar(alpha, mfp)
+        return self.scaled_undone(r / length, xi, by)
 
     @evaluated
     def sample(self, xi, alpha, mfp=1.0) -> Array:
         """Radius [length] for a uniform number xi in [0, 1). All broadcast."""
-        return self.scaled_sample(xi, alpha) * mfp
+        by, length = self.law.similar(alpha, mfp)
+        return self.scaled_sample(xi, by) * length
 
     @evaluated
     def pdf(self, r, alpha, mfp=1.0) -> Array:
         """Density in r of `sample` [1/length], so that it integrates to 1 less the sampler's atoms. All broadcast."""
-        return self.scaled_pdf(r / mfp, alpha) / mfp
+        by, length = self.law.similar(alpha, mfp)
+        return self.scaled_pdf(r / length, by) / length

@@ -30,6 +30,7 @@ class Range:
 
 EVERYWHERE = Range()
 MATCHED, ANY_INDEX = Range(1.0, 1.0), Range(0.0, np.inf, open_low=True, open_high=True)
+ISOTROPIC = Range(0.0, 0.0)
 # Arguments that a shader source replaces by others, in words.
 NEAR_CLAMPS = "R_d within 1e-6 mfp of the source to that at 1e-6 mfp; xi to 1 - 2^-24"
 CLAMPS = f"{NEAR_CLAMPS}; r to 1e8 mfp"
@@ -65,7 +66,7 @@ class Entry:
     start    constants to fit from where none are printed
     alpha    albedos [-] that it holds for; profile those of its R_d, if not all of them
     xi       shares [-] that its sampler holds for; of fitted constants: print promises all
-    n        refractive indices [-] that it is made for
+    n        refractive indices [-] that it is made for; g mean cosines
     as_fitted  whether a fitted inverse of it holds only for the albedos of its record
     own      whether it is this project's own, and must hold wherever it claims to
     text     its shader source, or why there is none
@@ -80,6 +81,7 @@ class Entry:
     profile: Range = EVERYWHERE
     xi: Range = EVERYWHERE
     n: Range = MATCHED
+    g: Range = ISOTROPIC
     as_fitted: bool = False
     own: bool = False
     text: Text | str = ""

@@ -14,7 +14,7 @@ from profilefit.laws.base import ProfileLaw
 from profilefit.laws.entry import Entry, Text
 from profilefit.laws.escape import decay_rate
 from profilefit.laws.hazard import Shape
-from profilefit.laws.refracting_hazard import LEAST_W, Parts, RefractingHazardSampler, guess
+from profilefit.laws.two_parts import LEAST_W, Parts, TwoPartSampler, guess
 
 
 class ForwardHalfSpace(ProfileLaw):
@@ -86,12 +86,12 @@ class ForwardHalfSpace(ProfileLaw):
         return of.once.reflectance * of.once.source
 
     @property
-    def sampler(self) -> RefractingHazardSampler:
-        """As that of `RefractingHazard`: a part of the light by chance, and the inverse of its cdf."""
-        return RefractingHazardSampler(self)
+    def sampler(self) -> TwoPartSampler:
+        """As that of `TwoPartHazard`: a part of the light by chance, and the inverse of its cdf."""
+        return TwoPartSampler(self)
 
     def text_shape(self) -> dict[str, float]:
-        """Those of `RefractingHazard`'s text."""
+        """Those of `TwoPartHazard`'s text."""
         of = self.parts(jnp.asarray(0.0))
         white, slowest = guess(of)
         curve = ("kappa", "source", "w", "h", "a", "b", "c")

@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import abc
+from dataclasses import replace
+from typing import NamedTuple, Self
 
 import equinox as eqx
 import jax.numpy as jnp
 from jax import Array
 
+from mcml_sim.exact.light import reduced, unreduced
 from mcml_sim.media.setting import Setting
-from profilefit.laws.base import closed
+from profilefit.laws.base import CLOSED
 from profilefit.laws.entry import Entry, Range, Text
 from profilefit.laws.evaluate import evaluated
 from profilefit.laws.rational import Normalisation
 from profilefit.laws.surface import Number, RefractingSurface, surface_of
 
 REFRACTING = Range(1.0, 1.6, open_low=True)  # n [-] that constants are fitted to
-STEPS = 4  # of Newton's method in the inverse: the root that they start from is right to a hundredth
+STEPS = (
+    6  # of Newton's method in the inverse: the root that they start from is right to a hundredth, a tenth where g > .9
+)
 
 
 class Terms(NamedTuple):
@@ -34,18 +39,99 @@ class Terms(NamedTuple):
     m: tuple[Number, Number, Number, Number]
 
 
-class RefractingRational(Normalisation):
-    """A = t (1 - rho) R / (1 - rho R),  R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2),  s = sqrt(1 - alpha)
+class FoldedRational(Normalisation):
+    """A = t (1 - rho) R / (1 - rho R),  R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2),  s = sqrt(1 - a)
 
-    t is the share of the light that enters, rho that which the surface reflects back of cosine-weighted light from
-    inside: were all light inside cosine-weighted, R would be the reflectance without a surface, whatever n. What it is
-    not makes the constants depend on n, by q = mu_c^(2/3), mu_c = sqrt(1 - 1/n^2): A changes fastest next to n = 1.
+    a is the reduced albedo; t is the share of the light that enters, rho that which the surface reflects back of
+    cosine-weighted light from inside: were all light inside cosine-weighted, R would be the reflectance without a
+    surface, whatever n. What c, d and f are made of is each map's own (`folded`).
+
+    b follows from light scattered once, which is exact: A / a -> A_1 at a = 0. So A(0) = 0, the slope there and A(1) =
+    t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more than t,
+    and alpha(A > t) = 1.
+    """
+
+    surface: RefractingSurface | None = eqx.field(default=None, kw_only=True, metadata=CLOSED)
+
+    @abc.abstractmethod
+    def folded(self) -> tuple[Number, Number, Number]:
+        """c, d, f at its index and g."""
+
+    def here(self) -> RefractingSurface:
+        """The closed numbers of its setting, or of those that it was put under."""
+        return self.surface or surface_of(self.setting)
+
+    def in_reduced(self) -> Self:
+        return replace(self, setting=replace(self.setting, g=0.0), surface=self.here())
+
+    def text_numbers(self) -> dict[str, float]:
+        """The share that enters, rho, and A_1 over alpha [-]."""
+        here = self.here()
+        return {"entered": here.entered, "trapped": here.trapped, "once": here.once}
+
+    def text_constants(self) -> dict[str, float]:
+        c, d, f = self.folded()
+        return {"c": float(c), "d": float(d), "f": float(f)}
+
+    @property
+    def entered(self) -> float:
+        """t, the share of the light that enters [-]."""
+        return float(self.here().entered)
+
+    def terms(self) -> Terms:
+        """All that depends on n and g only."""
+        here = self.here()
+        (c, d, f), rho, once = self.folded(), here.trapped, here.once
+        p = here.entered * (1.0 - rho)
+        b = 2.0 * once / p * (1.0 + c + d) - 1.0 - f
+        g = 1.0 - rho, c - rho * (b - 1.0), d - rho * (f - b), rho * f
+        m0 = p - once * g[0]
+        m1 = m0 + p * b - once * (g[0] + g[1])
+        m2 = m1 + p * f - once * (g[1] + g[2])
+        return Terms(p, b, c, d, f, g, (m0, m1, m2, once * g[3]))
+
+    @evaluated
+    def reflectance(self, alpha) -> Array:
+        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
+        by = reduced(jnp.asarray(alpha), self.setting.g).alpha
+        return by / self.albedo_over_reflectance(by)
+
+    @evaluated
+    def albedo_over_reflectance(self, alpha) -> Array:
+        """alpha / A [-] of a reduced albedo, finite at alpha = 0 too."""
+        s, of = jnp.sqrt(1.0 - alpha), self.terms()
+        return (1.0 + s) * _cubic(of.g, s) / (of.p * (1.0 + s * (of.b + of.f * s)))
+
+    @evaluated
+    def scattered_again(self, alpha) -> Array:
+        """Reflectance by light scattered twice and more over alpha^2 [-], of a reduced albedo.
+
+        A - alpha A_1 without its cancellation.
+        """
+        s, of = jnp.sqrt(1.0 - alpha), self.terms()
+        return _cubic(of.m, s) / ((1.0 + s) ** 2 * _cubic(of.g, s))
+
+    @evaluated
+    def alpha(self, reflectance) -> Array:
+        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
+        here, of = self.here(), self.terms()
+        share = jnp.minimum(reflectance / here.entered, 1.0)
+        inside = 1.0 - here.trapped * (1.0 - share)
+        light, dark = share / inside, (1.0 - here.trapped) * (1.0 - share) / inside  # R and 1 - R
+        # In s where A is large, in 1 - s where it is small, so that neither cancels.
+        s = _root(dark, 1.0 - of.b + light * of.c, of.b - of.f + light * of.d, of.f)
+        linear = 1.0 + of.b + of.f + light * (of.c + 2.0 * of.d)
+        y = _root(light * (1.0 + of.c + of.d), linear, -(of.b + 2.0 * of.f + light * of.d), of.f)
+        return unreduced(jnp.where(share < 0.5, y * (2.0 - y), (1.0 - s) * (1.0 + s)), self.setting.g)
+
+
+class RefractingRational(FoldedRational):
+    """`FoldedRational` where g = 0. That light inside is not cosine-weighted makes the constants depend on n, by
+    q = mu_c^(2/3), mu_c = sqrt(1 - 1/n^2): A changes fastest next to n = 1.
 
     c = c0 + c1 q + c2 q^2 + c3 q^3 + c4 q^4     d likewise, up to d5 q^5     f = f0 + f1 q
 
-    b follows from light scattered once, which is exact: A / alpha -> A_1 at alpha = 0. So A(0) = 0, the slope there and
-    A(1) = t hold whatever the constants. The inverse is the root in [0, 1] of a cubic in s; no albedo reflects more
-    than t, and alpha(A > t) = 1. For n in (1, 1.6], under either light.
+    For n in (1, 1.6], under either light.
 
     c0 ... c4, d0 ... d5, f0, f1  constants [-]
     """
@@ -64,7 +150,6 @@ class RefractingRational(Normalisation):
     d5: float
     f0: float
     f1: float
-    surface: RefractingSurface | None = closed()
     entry = Entry(
         "rational",
         "rational map",
@@ -83,27 +168,9 @@ class RefractingRational(Normalisation):
     def at_one_index(cls) -> tuple[str, ...]:
         return ("c0", "d0", "f0")
 
-    def here(self) -> RefractingSurface:
-        """The closed numbers of its setting, or of those that it was put under."""
-        return self.surface or surface_of(self.setting)
-
-    def text_numbers(self) -> dict[str, float]:
-        """The share that enters, rho, and A_1 over alpha [-]."""
-        here = surface_of(self.setting)
-        return {"entered": here.entered, "trapped": here.trapped, "once": here.once}
-
-    def text_constants(self) -> dict[str, float]:
-        c, d, f = self.folded()
-        return {"c": float(c), "d": float(d), "f": float(f)}
-
     def folds(self) -> dict[str, dict[str, float]]:
-        q = surface_of(self.setting).cosine ** (2 / 3)
+        q = self.here().cosine ** (2 / 3)
         return {x: {one: q ** int(one[1]) for one in self.constant_names() if one[0] == x} for x in "cdf"}
-
-    @property
-    def entered(self) -> float:
-        """t, the share of the light that enters [-]."""
-        return surface_of(self.setting).entered
 
     def folded(self) -> tuple[Number, Number, Number]:
         """c, d, f at its index."""
@@ -111,48 +178,6 @@ class RefractingRational(Normalisation):
         c = self.c0 + q * (self.c1 + q * (self.c2 + q * (self.c3 + q * self.c4)))
         d = self.d0 + q * (self.d1 + q * (self.d2 + q * (self.d3 + q * (self.d4 + q * self.d5))))
         return c, d, self.f0 + q * self.f1
-
-    def terms(self) -> Terms:
-        """All that depends on n only."""
-        here = self.here()
-        (c, d, f), rho, once = self.folded(), here.trapped, here.once
-        p = here.entered * (1.0 - rho)
-        b = 2.0 * once / p * (1.0 + c + d) - 1.0 - f
-        g = 1.0 - rho, c - rho * (b - 1.0), d - rho * (f - b), rho * f
-        m0 = p - once * g[0]
-        m1 = m0 + p * b - once * (g[0] + g[1])
-        m2 = m1 + p * f - once * (g[1] + g[2])
-        return Terms(p, b, c, d, f, g, (m0, m1, m2, once * g[3]))
-
-    @evaluated
-    def reflectance(self, alpha) -> Array:
-        """Total reflectance A [-] at single-scattering albedo alpha [-]."""
-        return alpha / self.albedo_over_reflectance(jnp.asarray(alpha))
-
-    @evaluated
-    def albedo_over_reflectance(self, alpha) -> Array:
-        """alpha / A [-], finite at alpha = 0 too."""
-        s, of = jnp.sqrt(1.0 - alpha), self.terms()
-        return (1.0 + s) * _cubic(of.g, s) / (of.p * (1.0 + s * (of.b + of.f * s)))
-
-    @evaluated
-    def scattered_again(self, alpha) -> Array:
-        """Reflectance by light scattered twice and more over alpha^2 [-]: A - alpha A_1 without its cancellation."""
-        s, of = jnp.sqrt(1.0 - alpha), self.terms()
-        return _cubic(of.m, s) / ((1.0 + s) ** 2 * _cubic(of.g, s))
-
-    @evaluated
-    def alpha(self, reflectance) -> Array:
-        """Single-scattering albedo alpha [-] at total reflectance A [-]."""
-        here, of = self.here(), self.terms()
-        share = jnp.minimum(reflectance / here.entered, 1.0)
-        inside = 1.0 - here.trapped * (1.0 - share)
-        light, dark = share / inside, (1.0 - here.trapped) * (1.0 - share) / inside  # R and 1 - R
-        # In s where A is large, in 1 - s where it is small, so that neither cancels.
-        s = _root(dark, 1.0 - of.b + light * of.c, of.b - of.f + light * of.d, of.f)
-        linear = 1.0 + of.b + of.f + light * (of.c + 2.0 * of.d)
-        y = _root(light * (1.0 + of.c + of.d), linear, -(of.b + 2.0 * of.f + light * of.d), of.f)
-        return jnp.where(share < 0.5, y * (2.0 - y), (1.0 - s) * (1.0 + s))
 
 
 def _cubic(terms: tuple[Number, Number, Number, Number], s: Array) -> Array:

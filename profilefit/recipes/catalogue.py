@@ -42,7 +42,7 @@ def load(
     """
     kind, records = _profile_law(name), Records.of(folder or fits_folder())
     values, where = _constants(kind, constants, _checked(setting), records)
-    at = laws.at_index(kind, where.n)
+    at = laws.at(kind, where)
     given = {} if kind.own_reflectance else {"albedo": normalisation(where, records)}
     return _made(at, values, constants, setting=where, **given)
 
@@ -55,7 +55,7 @@ def albedo_law(
         raise InputError(f"albedo law must be one of {', '.join(laws.MAPS)}, got {name!r}")
     kind: type[AlbedoLaw] = laws.home(laws.MAPS[name])
     values, where = _constants(kind, constants, _checked(setting), Records.of(folder or fits_folder()))
-    return _made(laws.at_index(kind, where.n), values, constants, setting=where)
+    return _made(laws.at(kind, where), values, constants, setting=where)
 
 
 def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisation:
@@ -66,7 +66,7 @@ def normalisation(setting: Setting, folder: Folder | None = None) -> Normalisati
         warnings.warn(
             f"no record {path.stem!r} in {str(records.folder)!r}: the shipped map serves", ShippedMap, stacklevel=3
         )
-    kind = laws.at_index(Rational, setting.n)
+    kind = laws.at(Rational, setting)
     return _made(kind, _of_record(records.read(path), setting, path.stem), path.stem, setting=setting)
 
 

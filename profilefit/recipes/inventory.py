@@ -82,22 +82,25 @@ def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> li
     return [*(_printed(entries, records) if names is None else ()), *_regenerated(records, entries, names, matched)]
 
 
-def find(name: str, folder: Folder, constants: str | None = None, n: float | None = None) -> Named:
+def find(
+    name: str, folder: Folder, constants: str | None = None, n: float | None = None, g: float | None = None
+) -> Named:
     """A law or map by the name of one of its records, or by its own name.
 
     A name of both is the profile law's; "albedo liang" is the map's.
 
     constants  as in `catalogue.load`; None takes the regenerated ones or, where there are none, the only printed set
-    n          refractive index, if not that of the record or set
-    InputError, with the nearest names that there are, for any other name; SettingError for an index without constants.
+    n, g       refractive index and mean cosine, if not those of the record or set
+    InputError, with the nearest names that there are, for any other name; SettingError for others without constants.
     """
     records = Records.of(folder)
     found = _found(name, records, constants)
-    if n is None or n == found.setting.n:
+    given: dict[str, Any] = {name: value for name, value in (("n", n), ("g", g)) if value is not None}
+    if (setting := replace(found.setting, **given)) == found.setting:
         return found
     entry = found.law.entry
     which = "regenerated" if found.records or not found.constants else found.constants
-    return _named(entry, which, _load(entry, which, replace(found.setting, n=n), records), records)
+    return _named(entry, which, _load(entry, which, setting, records), records)
 
 
 def _found(name: str, records: Records, constants: str | None) -> Named:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Orders, exact
+from mcml_sim import Orders, Setting, exact
 from profilefit.errors import RecipeError
 from profilefit.fitting import staged
 from profilefit.fitting.estimate import Fit, fit
@@ -32,8 +33,9 @@ Floats = NDArray[np.float64]
 Made = tuple[dict[str, Any], Arrays]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
-# Indices that a law which spans them is judged at, fitted or not: from next to none to glass.
+# Indices that a law which spans them is judged at, fitted or not: from next to none to glass. And mean cosines.
 JUDGED = (1.001, 1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
+JUDGED_COSINES = (0.2, 0.5, 0.8, 0.9, 0.95)
 
 
 def needs_photons(recipe: Recipe) -> bool:
@@ -49,8 +51,9 @@ def _albedo(recipe: Recipe, run: RecipeRun, light: Orders | None) -> Made:
     content["quality"] = {name: albedo_quality(law) for name, law in laws.items()}
     if recipe.indices:
         law: Any = result.law
-        each = {n: albedo_quality(law.at_index(n)).delta_A for n in _judged(recipe)}
-        content["quality"]["by_index"] = {"n": list(each), "delta_A": list(each.values())}
+        there = _judged(recipe)
+        off = [albedo_quality(law.at(setting)).delta_A for setting in there]
+        content["quality"]["by_index"] = {**_places(there), "delta_A": off}
     drawn = curves(profiles)
     arrays |= {"reflectance": drawn["energy"].sum(axis=1) + drawn["beyond"]}
     arrays |= {"reflectance_error": drawn["energy_error"].sum(axis=1)}
@@ -144,25 +147,35 @@ def inversion_error(law: Any, alpha: Floats) -> Floats:
     return np.array(errors)
 
 
-def by_index(law: Any, indices: Sequence[float]) -> dict[str, list[float]]:
-    """Worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at each n."""
+def by_index(law: Any, settings: Sequence[Setting]) -> dict[str, list[float]]:
+    """Worst `rel`, `ks` and error at a single radius within 99.5 % of the energy, over held-out albedos, at each n and
+    g."""
     alpha = albedo_values(QUALITY_ALBEDOS)
-    each = [profile_quality(law.at_index(n), alpha) for n in indices]
+    each = [profile_quality(law.at(setting), alpha) for setting in settings]
     worst = {name: [float(np.max(getattr(one, name))) for one in each] for name in ("rel", "ks", "largest")}
-    return {"n": list(indices), **worst}
+    return {**_places(settings), **worst}
+
+
+def _places(settings: Sequence[Setting]) -> dict[str, list[float]]:
+    """Their n; and their g, where these have one."""
+    g = [one.g for one in settings]
+    return {"n": [one.n for one in settings], **({"g": g} if any(g) else {})}
 
 
 def surfaces(recipe: Recipe) -> tuple[float, ...]:
-    """The indices above 1 whose exact light a recipe takes."""
-    if recipe.truth != "exact":
+    """The indices above 1 whose exact light a recipe takes, that of isotropic scattering."""
+    if recipe.truth != "exact" or recipe.cosines:
         return ()
-    return tuple(n for n in {recipe.setting.n, *recipe.indices, *(_judged(recipe) if recipe.indices else ())} if n > 1)
+    judged = [one.n for one in _judged(recipe)] if recipe.indices else []
+    return tuple(n for n in {recipe.setting.n, *recipe.indices, *judged} if n > 1)
 
 
-def _judged(recipe: Recipe) -> tuple[float, ...]:
-    """The indices that a law which spans them is judged at: `JUDGED`, as far as the recipe reaches."""
+def _judged(recipe: Recipe) -> tuple[Setting, ...]:
+    """Where a law that spans indices, and g, is judged: at `JUDGED` as far as the recipe reaches and light is exact."""
     low, high = recipe.span
-    return tuple(n for n in JUDGED if low < n <= high)
+    places = product(JUDGED, JUDGED_COSINES if recipe.cosines else (0.0,))
+    each = [replace(recipe.setting, n=n, g=g) for n, g in places if low < n <= high]
+    return tuple(one for one in each if one.is_solved)
 
 
 def _fitted(recipe: Recipe, run: RecipeRun, profiles: Profiles, light: Orders | None) -> tuple[Fit, dict[str, Any]]:

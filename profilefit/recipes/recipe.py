@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import MISSING, dataclass, field, fields
+from dataclasses import MISSING, dataclass, field, fields, replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
 from mcml_sim.files.text_file import read_toml
 from mcml_sim.media.checks import shown
-from mcml_sim.media.setting import Setting
+from mcml_sim.media.setting import FORWARD_G, FORWARD_N, Setting
 from profilefit.errors import InputError, RecipeError
 from profilefit.recipes.kinds import LONGEST_TEXT, is_line, is_number
 from profilefit.recipes.schema import PIPELINES
@@ -24,6 +25,8 @@ SPACINGS = ("alpha", "reflectance", "sqrt(1-alpha)")
 TRIMMED = ("r R_d", "R_d", "none")
 NEAR_MATCHED = 1.02  # laws in n are continued to 1 from here
 FEWEST_INDICES, LARGEST_INDEX = 4, 3.0  # coefficients are cubics in n; exact light is promised up to 3
+FEWEST_OF_G = 3  # indices, and mean cosines, of a law in g, whose coefficients are straight lines in n
+FORWARD_SPAN = (1.3, 1.5)  # indices that a law in g is continued to, from those of exact light
 MFP = (1e-3, 1e3)  # beyond three decades a length is a slip of the pen
 FINEST = 0.0025  # the first edge of the run that rings are merged from [mfp]
 FEWEST_RINGS, MOST_RINGS = 3, 4000  # the run has 4000 even rings
@@ -116,6 +119,8 @@ class Recipe:
     setting        the light and the surface; the constants belong to it and to no other
     indices        refractive indices that a law which spans them is fitted to at once; the record says n = setting.n
                    where it speaks of one
+    cosines        mean cosines g that a law which spans them is fitted to at once, at each index; albedos and rings are
+                   reduced ones then
     check          "orders": fit the tracer's photons too, and compare with the fit to the exact half space
     random_starts  how many fits begin at random constants, to see whether one ends better
     """
@@ -129,6 +134,7 @@ class Recipe:
     start: str = "published"
     setting: Setting = SEARCHLIGHT
     indices: tuple[float, ...] = ()
+    cosines: tuple[float, ...] = ()
     check: str = ""
     random_starts: int = 0
     albedos: Albedos = Albedos(0.05, 0.995, 24)
@@ -142,8 +148,16 @@ class Recipe:
     @property
     def span(self) -> tuple[float, float]:
         """The indices that its constants hold for: above the first, up to the last; and from 1 if the first is near."""
+        if self.cosines:
+            return FORWARD_SPAN
         first, last = self.indices[0], self.indices[-1]
         return (1.0 if first <= NEAR_MATCHED else first), last
+
+    @property
+    def settings(self) -> tuple[Setting, ...]:
+        """All that it is fitted to: its own, or each of its indices and mean cosines."""
+        each = product(self.indices or (self.setting.n,), self.cosines or (self.setting.g,))
+        return tuple(replace(self.setting, n=n, g=g) for n, g in each)
 
     def problems(self) -> str | None:
         """What is impossible about it, in one line, or None."""
@@ -176,8 +190,10 @@ class Recipe:
 
     def _problems_of_setting(self) -> str | None:
         where = self.setting
-        if where.g != 0:
-            return f"setting.g must be 0: profiles are fitted to isotropic scattering, got {where.g!r}"
+        if self.cosines and (text := self._problems_of_cosines()):
+            return text
+        if where.g != 0 and not self.cosines:
+            return f"setting.g must be 0 where there are no cosines, got {where.g!r}"
         if self.truth == "exact" and not where.n >= 1:
             return f"setting.n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got {where.n!r}"
         if self.indices and (text := self._problems_of_indices()):
@@ -196,10 +212,23 @@ class Recipe:
             return f"indices need truth = \"exact\" and pipeline 'albedo' or 'profile', got {got}"
         if not all(1 < n <= LARGEST_INDEX for n in self.indices) or list(self.indices) != sorted(set(self.indices)):
             return f"indices must rise, each in (1, {LARGEST_INDEX:g}], got {list(self.indices)!r}"
-        if len(self.indices) < FEWEST_INDICES:
-            return f"indices must be at least {FEWEST_INDICES}, got {list(self.indices)!r}"
+        if len(self.indices) < (fewest := FEWEST_OF_G if self.cosines else FEWEST_INDICES):
+            return f"indices must be at least {fewest}, got {list(self.indices)!r}"
         if self.setting.n not in self.indices:
             return f"setting.n must be one of the indices {list(self.indices)!r}, got {self.setting.n!r}"
+        return None
+
+    def _problems_of_cosines(self) -> str | None:
+        low, high = FORWARD_N
+        if not self.indices or not all(low <= n <= high for n in self.indices):
+            return f"indices must be in [{low:g}, {high:g}] where there are cosines, got {list(self.indices)!r}"
+        rising = list(self.cosines) == sorted(set(self.cosines))
+        if not rising or not all(0 < g <= FORWARD_G for g in self.cosines) or len(self.cosines) < FEWEST_OF_G:
+            return f"cosines must rise, at least {FEWEST_OF_G} in (0, {FORWARD_G:g}], got {list(self.cosines)!r}"
+        if self.check:
+            return f"check must be absent where there are cosines, got {self.check!r}"
+        if self.setting.g not in self.cosines:
+            return f"setting.g must be one of the cosines {list(self.cosines)!r}, got {self.setting.g!r}"
         return None
 
     def _problems_of_tests(self) -> str | None:

@@ -114,12 +114,18 @@ def require_sound(content: dict[str, Any], path: Path, whole: bool) -> None:
 
 
 def _outside(content: Mapping[str, Any]) -> str | None:
-    """An index of its own that is none of those which its constants are for."""
-    n = content["setting"].get("n")
-    if "indices" not in content or not kinds.is_number(n):
-        return None
-    low, high = content["indices"]
-    return None if low < n <= high else f"setting.n must be in ({low:g}, {high:g}], as its indices are, got {n:g}"
+    """An index or a mean cosine of its own that is none of those which its constants are for."""
+    for name, span in SPANS.items():
+        own = content["setting"].get(name)
+        if span in content and kinds.is_number(own) and not _within(content, span, own):
+            low, high = content[span]
+            return f"setting.{name} must be in ({low:g}, {high:g}], as its {span} are, got {own:g}"
+    return None
+
+
+def _within(content: Mapping[str, Any], span: str, value: float) -> bool:
+    low, high = content.get(span) or (0.0, 0.0)
+    return bool(low < value <= high)
 
 
 def record_setting(content: Mapping[str, Any]) -> Setting:
@@ -131,13 +137,15 @@ def record_setting(content: Mapping[str, Any]) -> Setting:
 
 
 REFRACTING = "refracting"  # in the name of a record that holds for every index of a range
+FORWARD = "forward"  # and of one that holds for every mean cosine of a range, too
+SPANS = {"n": "indices", "g": "cosines"}  # a setting's numbers, and the ranges of them that a record may hold for
 
 
 def covers(content: Mapping[str, Any], setting: Setting) -> bool:
-    """Whether a record's constants hold for a setting: its own or, if they span indices, one of these."""
+    """Whether a record's constants hold for a setting: its own or, if they span indices and g, one of these."""
     own = record_setting(content)
-    low, high = content.get("indices") or (0.0, 0.0)
-    return own == setting or (low < setting.n <= high and own == replace(setting, n=own.n))
+    there = {name: getattr(own, name) for name, span in SPANS.items() if _within(content, span, getattr(setting, name))}
+    return own == replace(setting, **there)
 
 
 def record_name(base: str, setting: Setting) -> str:
@@ -153,8 +161,10 @@ def record_name(base: str, setting: Setting) -> str:
 
 
 def spanning_name(base: str, setting: Setting) -> str:
-    """The record for every index of a range, under the light of a setting: hazard-refracting, -diffuse-refracting."""
-    return f"{record_name(base, replace(setting, n=1.0))}-{REFRACTING}"
+    """The record for every index of a range, under the light of a setting: hazard-refracting, -diffuse-refracting; or,
+    where scattering has a direction, for every g, too: hazard-forward, -diffuse-forward."""
+    spanning = REFRACTING if setting.g == 0.0 else FORWARD
+    return f"{record_name(base, replace(setting, n=1.0, g=0.0))}-{spanning}"
 
 
 def _shortest(value: float) -> str:

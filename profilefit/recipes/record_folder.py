@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import RecordError, SettingError
 from profilefit.recipes import record
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.record import covers, record_name, record_setting, spanning_name
+from profilefit.recipes.record import SPANS, covers, record_name, record_setting, spanning_name
 
 SEARCHLIGHT = Setting()
 
@@ -70,8 +70,8 @@ class Records:
         )
 
     def name(self, base: str, setting: Setting) -> str:
-        """The name of the record of a setting: its own, that of a range of indices where there is such and none of its
-        own, and its own where there is neither."""
+        """The name of the record of a setting: its own, that of a range of indices and g where there is such and none
+        of its own, and its own where there is neither."""
         own, spanning = record_name(base, setting), self.folder / f"{spanning_name(base, setting)}.json"
         if (self.folder / f"{own}.json").exists() or not spanning.exists():
             return own
@@ -98,8 +98,12 @@ class Records:
 
     def _described(self, base: str, setting: Setting) -> str:
         """A setting that there is a record for, in words."""
-        span = self.content(self.name(base, setting)).get("indices")
-        return str(setting).replace(f"n = {setting.n:g}", f"n in ({span[0]:g}, {span[1]:g}]") if span else str(setting)
+        content, words = self.content(self.name(base, setting)), str(setting)
+        for name, span in SPANS.items():
+            if span in content:
+                low, high = content[span]
+                words = words.replace(f"{name} = {getattr(setting, name):g}", f"{name} in ({low:g}, {high:g}]")
+        return words
 
 
 Folder = Path | Records

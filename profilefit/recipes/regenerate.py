@@ -117,6 +117,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
         "note": recipe.note,
         "setting": recipe.setting,
         **({"indices": recipe.span} if recipe.indices else {}),
+        **({"cosines": (0.0, recipe.cosines[-1])} if recipe.cosines else {}),
         "protocol": {
             "albedos": recipe.albedos,
             "rings": recipe.rings,
@@ -125,6 +126,7 @@ def _header(recipe: Recipe, run: RecipeRun, light: Orders | None) -> dict[str, A
             "start": recipe.start,
             "held": recipe.held,
             **({"indices": recipe.indices} if recipe.indices else {}),
+            **({"cosines": recipe.cosines} if recipe.cosines else {}),
         },
         "truth": {"kind": recipe.truth},
         "preset": run.preset,

@@ -44,7 +44,14 @@ ERRORS = {
     "jackknife_error": "jackknife",
 }
 # What a law is made of.
-NAMED: Kinds = {"law": TEXT, "pipeline": TEXT, "setting": TABLE, "indices?": SPAN, "data_digest?": DIGEST}
+NAMED: Kinds = {
+    "law": TEXT,
+    "pipeline": TEXT,
+    "setting": TABLE,
+    "indices?": SPAN,
+    "cosines?": SPAN,
+    "data_digest?": DIGEST,
+}
 CONSTANTS: Kinds = {
     "constants": TABLE,
     "constants.*": TABLE,
@@ -71,7 +78,7 @@ TOLD: Kinds = {
 }
 # A measure of laws by albedo; the worst of laws and maps at each index; and one of maps as a whole.
 BY_ALBEDO = ("rel", "largest", "ks", "l1", "mse", "r2", "inversion_error")
-HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "rel", "ks", "largest", "delta_A")
+HALVED, BY_INDEX = ("mse_halves", "r2_halves"), ("n", "g", "rel", "ks", "largest", "delta_A")
 OF_MAP = {
     "delta_A": NUMBER,
     "delta_alpha": NUMBER,
@@ -131,6 +138,7 @@ PROTOCOL: Kinds = {
     "rings?.trim": TEXT,
     "held?": TEXTS,
     "indices?": NUMBERS,
+    "cosines?": NUMBERS,
     "weighting": TABLE,
     "weighting.objective": TEXT,
     **{f"weighting.{name}": NUMBER for name in ("energy_limit", "source_limit", "shares", "last_share")},
@@ -218,7 +226,7 @@ EVIDENCE: Kinds = {
 }
 # Each pipeline: the objectives that its recipes can make small, and what its records hold.
 PIPELINES: dict[str, tuple[tuple[str, ...], Kinds]] = {
-    "albedo": (("albedo", "reflectance"), ALBEDO),
+    "albedo": (("albedo", "reflectance", "relative_reflectance"), ALBEDO),
     "profile": (("energy", "relative"), PROFILE),
     "as-published": (("radial",), STAGED),
     "inverse": (("radius", "relative_radius", "share"), INVERSE),

@@ -43,7 +43,7 @@ def law_class(recipe: Recipe) -> type[Constants]:
     known = _laws(recipe)
     if recipe.law not in known:
         raise RecipeError(f"{recipe.path}: law must be one of {', '.join(known)}, got {recipe.law!r}")
-    kind: type[Constants] = laws.at_index(known[recipe.law], recipe.setting.n)
+    kind: type[Constants] = laws.at(known[recipe.law], recipe.setting)
     return kind
 
 
@@ -66,6 +66,8 @@ def require_known(recipe: Recipe) -> None:
         )
     if beyond := [n for n in recipe.indices if not kind.entry.n.holds(n)]:
         raise RecipeError(f"{recipe.path}: indices of {recipe.law} must be in {kind.entry.n}, got {beyond[0]:g}")
+    if recipe.cosines and not kind.entry.g.holds(recipe.setting.g):
+        raise RecipeError(f"{recipe.path}: cosines are for a law with g, got {recipe.law!r}")
     if objective and not free(recipe, kind):
         raise RecipeError(f"{recipe.path}: held leaves no constant of {recipe.law} free")
     unknown = [name for name in recipe.held if name not in kind.constant_names()]

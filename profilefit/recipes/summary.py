@@ -113,8 +113,8 @@ def described(
 
 
 def curves(profiles: Profiles) -> Arrays:
-    """What the figures draw: the data with its errors; of a fit to several indices, those of its own setting."""
-    own = slice(None) if profiles.indices is None else profiles.indices == profiles.setting.n
+    """What the figures draw: the data with its errors; of a fit to several settings, those of its own."""
+    own = [one == profiles.setting for one in profiles.settings] if profiles.settings else slice(None)
     return {
         "alpha": profiles.alpha[own],
         "r_edges": profiles.r_edges,

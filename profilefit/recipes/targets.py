@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -52,10 +50,8 @@ def truth_of(recipe: Recipe, light: Orders | None, mfp: float = 1.0) -> Profiles
     """The profiles that a recipe fits; `light` is of its setting."""
     alpha, edges = albedo_values(recipe.albedos, recipe.setting), ring_edges(recipe.rings, mfp)
     if recipe.truth == "exact":
-        if not recipe.indices:
-            return Profiles.from_exact(alpha, edges, recipe.setting)
-        each = [replace(recipe.setting, n=n) for n in recipe.indices]
-        return Profiles.joined([Profiles.from_exact(alpha, edges, where) for where in each], recipe.setting)
+        each = [Profiles.from_exact(alpha, edges, where) for where in recipe.settings]
+        return Profiles.joined(each, recipe.setting) if recipe.indices else each[0]
     if light is None:
         raise ValueError(f"recipe {recipe.name} needs photons, got none")
     if light.setting != recipe.setting:

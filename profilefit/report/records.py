@@ -18,7 +18,7 @@ from profilefit.errors import RecordError
 from profilefit.fitting.measures import MEASURES
 from profilefit.laws.base import AlbedoLaw, Constants, ProfileLaw
 from profilefit.recipes import catalogue, record
-from profilefit.recipes.record import record_setting
+from profilefit.recipes.record import SPANS, record_setting
 from profilefit.recipes.record_folder import Records
 from profilefit.recipes.schema import ERRORS, SETS
 
@@ -76,18 +76,25 @@ def index_words(content: Content) -> str:
 
 
 def at_index(content: Content) -> str:
-    """In a title, the index at which a record that spans several is reported; nothing for others."""
-    return f", n = {content['setting']['n']:g}" if content.get("indices") else ""
+    """In a title, the index, and the g, at which a record that spans several is reported; nothing for others."""
+    spanned = [name for name, span in SPANS.items() if content.get(span)]
+    return "".join(f", {name} = {content['setting'][name]:g}" for name in spanned)
+
+
+def cosine_words(content: Content) -> str:
+    """The mean cosine that a record is of, or those that its constants span: "0", "(0, 0.95]"."""
+    span = content.get("cosines")
+    return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['g']:g}"
 
 
 def by_index(content: Content) -> Mapping[str, list[float]]:
-    """The worst measures of a record at each index n that it was judged at; empty if it is of one."""
+    """The worst measures of a record at each index n, and g, that it was judged at; empty if it is of one."""
     found: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
     return found
 
 
 def regenerated_worst(content: Content, measure: str) -> float:
-    """The worst over alpha of the regenerated constants, and over n where a record spans indices."""
+    """The worst over alpha of the regenerated constants, and over n and g where a record spans them."""
     values = [content["quality"]["regenerated"][measure], by_index(content).get(measure, [])]
     return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 

@@ -164,7 +164,8 @@ def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None)
 
 def _setting_lines(setting: Setting) -> list[str]:
     light = f"light: {LIGHT[setting.illumination]}"
-    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}, other media by reduced lengths"
+    surface = f"surface: refractive index n = {setting.n:g}; g = {setting.g:g}"
+    surface += ", other media by reduced lengths" if setting.is_isotropic else ""
     return [light, surface, *CONVENTIONS.splitlines()]
 
 
@@ -178,6 +179,8 @@ def _provenance(source: _Source, before: str) -> list[str]:
     lines.append(f"fitted for alpha from {fitted['low']:g} to {fitted['high']:g}")
     if span := content.get("indices"):
         lines.append(f"fitted for every refractive index above {span[0]:g} up to {span[1]:g}")
+    if span := content.get("cosines"):
+        lines.append(f"and every mean cosine g above {span[0]:g} up to {span[1]:g}")
     measured = dict(content["quality"]["regenerated"])
     measured |= content["quality"].get("by_index", {})
     known = [MEASURES[key] for key in (*OF_PROFILE, "delta_A") if key in measured]

@@ -42,11 +42,11 @@ def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str
     """A line a law and a line a map."""
     parts: list[RenderableType] = []
     if laws:
-        columns = {"law": [one.of.label for one in laws], "n": _indices(laws)}
+        columns = {"law": [one.of.label for one in laws], **_places(laws)}
         columns |= _columns(LAW_COLUMNS, [_law_cells(one) for one in laws]) | _verdicts(laws)
         parts.append(column_table(f"Laws in float32, {device}", columns, CAPTION, left=("result",), fold=("law",)))
     if maps:
-        columns = {"map": [one.of.label for one in maps], "n": _indices(maps)}
+        columns = {"map": [one.of.label for one in maps], **_places(maps)}
         columns |= _columns(MAP_COLUMNS, [_map_cells(one) for one in maps]) | _verdicts(maps)
         parts.append(column_table(f"Maps in float32, {device}", columns, left=("result",), fold=("map",)))
     return parts
@@ -116,11 +116,11 @@ def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: M
     """The README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
     if laws:
-        header = ("law", "light", "n", *(_flat(name) for name in (*LAW_COLUMNS, *COUNTS)), "result")
+        header = ("law", "light", "n", "g", *(_flat(name) for name in (*LAW_COLUMNS, *COUNTS)), "result")
         rows = [(one.of.label, *_setting(one.of), *_law_cells(one), *_counts(one), _result(one)) for one in laws]
         parts.append(markdown_table(header, rows))
     if maps:
-        header = ("law", "light", "n", *(_flat(name) for name in (*MAP_COLUMNS, *COUNTS)), "result")
+        header = ("map", "light", "n", "g", *(_flat(name) for name in (*MAP_COLUMNS, *COUNTS)), "result")
         rows = [(one.of.label, *_setting(one.of), *_map_cells(one), *_counts(one), _result(one)) for one in maps]
         parts.append(markdown_table(header, rows))
     checks: list[LawCheck | MapCheck] = [*laws, *maps]
@@ -179,11 +179,14 @@ def _called(one: LawCheck | MapCheck) -> str:
 
 
 def _at_index(one: Named) -> str:
-    return one.label if one.setting.n == 1.0 else f"{one.label}, n = {one.setting.n:g}"
+    where = f", n = {one.setting.n:g}" if one.setting.n != 1.0 else ""
+    return one.label + where + (f", g = {one.setting.g:g}" if one.setting.g else "")
 
 
-def _indices(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> list[str]:
-    return [f"{one.of.setting.n:g}" for one in checks]
+def _places(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
+    """n; and g, where one has it."""
+    g = {"g": [f"{one.of.setting.g:g}" for one in checks]} if any(one.of.setting.g for one in checks) else {}
+    return {"n": [f"{one.of.setting.n:g}" for one in checks], **g}
 
 
 def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str, list[str]]:
@@ -217,8 +220,8 @@ def _result(one: LawCheck | MapCheck) -> str:
     return FAIL if one.broken else PASS
 
 
-def _setting(one: Named) -> tuple[str, str]:
-    return one.setting.illumination, f"{one.setting.n:g}"
+def _setting(one: Named) -> tuple[str, str, str]:
+    return one.setting.illumination, f"{one.setting.n:g}", f"{one.setting.g:g}"
 
 
 def _flat(header: str) -> str:

@@ -19,9 +19,19 @@ from profilefit.laws import MAPS, PROFILES, home, published
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.entry import EVERYWHERE, Entry, Text
 from profilefit.recipes.inventory import Named, albedo_laws, all_profiles
-from profilefit.recipes.record import record_name, record_setting
+from profilefit.recipes.record import SPANS, record_name, record_setting
 from profilefit.recipes.record_folder import Folder, Records
-from profilefit.report.records import SETS, TOTAL, Content, by_index, converged, known_errors, largest_error, z_score
+from profilefit.report.records import (
+    SETS,
+    TOTAL,
+    Content,
+    at_index,
+    by_index,
+    converged,
+    known_errors,
+    largest_error,
+    z_score,
+)
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.report.tables.quality_tables import INDEX_MEASURES, ROWS, albedo_number
@@ -176,7 +186,10 @@ def _loading(one: Named) -> str:
     call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
     lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
     if _spans(one):
-        lines[0] += f" The same constants hold for every n in {one.law.entry.n}: `--n` and `Setting` choose."
+        entry = one.law.entry
+        g = f" and g in {entry.g}" if one.setting.g else ""
+        choose = "`--n`, `--g`" if g else "`--n`"
+        lines[0] += f" The same constants hold for every n in {entry.n}{g}: {choose} and `Setting` choose."
     lines += ["", "```python", f"profilefit.{call}({', '.join(_arguments(one))})", "```"]
     command = _export(one)
     return "\n".join([*lines, "", "```", command, "```"] if command else lines)
@@ -309,10 +322,14 @@ def _by_index(content: Content) -> str:
     if not found:
         return ""
     keys = [key for key in INDEX_MEASURES if key in found]
-    rows = [(f"{n:g}", *(significant(found[key][i]) for key in keys)) for i, n in enumerate(found["n"])]
+    places = [name for name in SPANS if name in found]
+    rows = [
+        (*(f"{found[name][i]:g}" for name in places), *(significant(found[key][i]) for key in keys))
+        for i in range(len(found["n"]))
+    ]
     meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in keys)
-    table = markdown_table(("n", *keys), rows)
-    return f"By refractive index, the worst albedo:\n\n{table}\n\n{meaning}.\n\nAt n = {content['setting']['n']:g}:"
+    table, by = markdown_table((*places, *keys), rows), "refractive index" + (" and g" if "g" in found else "")
+    return f"By {by}, the worst albedo:\n\n{table}\n\n{meaning}.\n\nAt{at_index(content).removeprefix(',')}:"
 
 
 def _digests(content: Content, path: Path) -> str:

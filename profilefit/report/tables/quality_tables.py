@@ -8,6 +8,7 @@ import numpy as np
 from rich.console import RenderableType
 
 from profilefit.fitting.measures import MEASURES, OF_MAP, OF_PROFILE
+from profilefit.recipes.record import SPANS
 from profilefit.report.records import Content, at_index, by_index, converged, measured_sets, measures, regenerated_worst
 from profilefit.report.tables.cells import column_table, on_the_point, significant, span, spark
 
@@ -88,13 +89,14 @@ def quality_tables(content: Content) -> list[RenderableType]:
 def index_table(content: Content) -> RenderableType:
     """The worst measures over alpha at each index that a record was judged at."""
     found = by_index(content)
-    columns = {"n": [f"{n:g}" for n in found["n"]]}
+    columns = {name: [f"{value:g}" for value in found[name]] for name in SPANS if name in found}
     for measure in INDEX_MEASURES:
         if measure in found:
             columns[MEASURES[measure].header] = on_the_point([significant(value) for value in found[measure]])
     known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in found]
     caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
-    return column_table("By refractive index" + _failed(content), columns, caption, left=("n",))
+    title = "By refractive index" + (" and g" if "g" in found else "")
+    return column_table(title + _failed(content), columns, caption, left=("n",))
 
 
 def _table(content: Content, group: list[str]) -> RenderableType:

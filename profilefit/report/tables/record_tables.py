@@ -20,6 +20,7 @@ from profilefit.report.records import (
     Content,
     at_index,
     converged,
+    cosine_words,
     index_words,
     known_errors,
     largest_error,
@@ -225,9 +226,10 @@ def _provenance(content: Content) -> list[Line]:
     setting = content["setting"]
     beam = " (a pencil beam, normal, collimated)" if setting["illumination"] == Setting().illumination else ""
     surface = f"every n in {index_words(content)}" if content.get("indices") else f"n = {setting['n']:g}"
-    light = f"{setting['illumination']}{beam}, {surface}, g = {setting['g']:g}"
+    g = f"every g in {cosine_words(content)}" if content.get("cosines") else f"g = {setting['g']:g}"
+    light = f"{setting['illumination']}{beam}, {surface}, {g}"
     if content.get("indices"):
-        light += f"; tables and figures are of n = {setting['n']:g} where they do not say another"
+        light += f"; tables and figures are of {at_index(content).removeprefix(', ')} where they do not say another"
     lines: list[Line] = [
         ("law", f"{content['law']}, {content['equations']}"),
         ("setting", light),
@@ -239,6 +241,8 @@ def _provenance(content: Content) -> list[Line]:
         lines.append(("albedos", f"{a['count']} from {a['low']:g} to {a['high']:g}, even in {a['spacing']}"))
     if protocol.get("indices"):
         lines.append(("indices", ", ".join(f"{n:g}" for n in protocol["indices"])))
+    if protocol.get("cosines"):
+        lines.append(("g", ", ".join(f"{g:g}" for g in protocol["cosines"]) + "; albedos and radii are reduced"))
     if protocol.get("rings"):
         lines.append(("bins", _rings(protocol["rings"])))
     if protocol.get("weighting"):

@@ -91,25 +91,28 @@ def _regenerated(one: Named, laws: Sequence[Named]) -> Named | None:
 
 
 def _recorded(names: Sequence[str], measures: Sequence[str], records: Records, setting: Setting) -> dict[str, float]:
-    """What records state at a setting: of another index than their own what they measured around it."""
+    """What records state at a setting: of another index or g than their own what they measured around it."""
     found: dict[str, float] = {}
     for name in names:
         content = records.content(name)
         quality: dict[str, Any] = content.get("quality", {})
         try:
-            if setting.n == record_setting(content).n:
+            if setting == record_setting(content):
                 own = quality.get("regenerated", {})
                 found |= {one: MEASURES[one].worst(own[one]) for one in measures if one in own}
             else:
-                found |= _around(setting.n, quality["by_index"], measures)
+                found |= _around(setting, quality["by_index"], measures)
         except (KeyError, TypeError, ValueError):
             raise RecordError(f"record {name} is damaged: its quality has no numbers; regenerate it") from None
     return found
 
 
-def _around(n: float, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:
-    """Of an index that was measured its own, else the worse of both neighbours; nothing below the least."""
-    known = by_index["n"]
+def _around(setting: Setting, by_index: dict[str, list[float]], measures: Sequence[str]) -> dict[str, float]:
+    """Of an index that was measured its own, else the worse of both neighbours; nothing below the least. The worst of
+    all where a law has g."""
+    if setting.g:
+        return {one: float(np.max(by_index[one])) for one in measures if one in by_index}
+    known, n = by_index["n"], setting.n
     i = int(np.searchsorted(known, n))
     if n < known[0]:
         return {}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from pathlib import Path
 
 import moderngl
@@ -22,8 +23,8 @@ from profilefit.shader.check.shader_law import half_extension, no_half
 from profilefit.shader.context import opened, renderer
 
 REGENERATED = "regenerated"
-# Indices that a law which spans them is checked at, of those: both ends and between.
-INDICES = (1.001, 1.02, 1.2, 1.4, 1.6)
+# Indices, and mean cosines, that a law which spans them is checked at, of those: both ends and between.
+INDICES, COSINES = (1.001, 1.02, 1.2, 1.4, 1.6), (0.1, 0.5, 0.95)
 Chosen = tuple[list[Named], list[Named]]
 """Profile laws, and maps between A and alpha."""
 
@@ -70,8 +71,11 @@ def regenerated(folder: Folder) -> Chosen:
 
 
 def _spread(one: Named, records: Records) -> list[Named]:
-    low, high = records.content(one.label).get("indices") or (0.0, 0.0)
-    return [inventory.find(one.label, records, n=n) for n in INDICES if low < n <= high] or [one]
+    content = records.content(one.label)
+    low, high = content.get("indices") or (0.0, 0.0)
+    cosines = COSINES if "cosines" in content else (one.setting.g,)
+    places = product((n for n in INDICES if low < n <= high), cosines)
+    return [inventory.find(one.label, records, n=n, g=g) for n, g in places] or [one]
 
 
 def printed(constants: str, folder: Folder) -> Chosen:

@@ -32,7 +32,7 @@ class HalfCheck:
 
 def check_half(context: moderngl.Context, one: Named) -> HalfCheck:
     """Store one thing in float16 at a time, all else in float32; then compute in it, if that is offered."""
-    law = one.law
+    law = one.law.in_reduced()
     r, alpha = np.geomspace(NEAREST, FARTHEST, RADII)[None, :], ALBEDOS[:, None]
     cdf = np.asarray(law.cdf(r, alpha))
     truth = np.asarray(law.profile(r, alpha)), cdf, cdf <= ENERGY_WITHIN

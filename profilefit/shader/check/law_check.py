@@ -130,7 +130,7 @@ class LawCheck(ShaderCheck):
 def check_laws(context: moderngl.Context, laws: Sequence[Named], folder: Folder) -> Iterator[LawCheck]:
     """Check one law after the other, while other threads evaluate the next ones in float64."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
-        references = pool.map(lambda one: dense_grid.reference(one.law, dense_grid.arguments()), laws)
+        references = pool.map(lambda one: dense_grid.reference(one.law.in_reduced(), dense_grid.arguments()), laws)
         for one, exact in zip(laws, references, strict=True):
             yield check_law(context, one, folder, exact=exact)
 
@@ -146,11 +146,11 @@ def check_law(
     shader, at = ShaderLaw(context, one.law, text), dense_grid.arguments()
     found = shader.values(at.r, at.xi, at.alpha, at.mfp)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
-        exact = exact or dense_grid.reference(one.law, at)
+        exact = exact or dense_grid.reference(one.law.in_reduced(), at)
         profiled, drawn = (
             np.broadcast_to(mask, at.shape) for mask in validity.masks(valid, dense_grid.ALPHA, dense_grid.XI)
         )
-        spreads, rounding = _rounding(one.law, found, exact, at, profiled, drawn)
+        spreads, rounding = _rounding(one.law.in_reduced(), found, exact, at, profiled, drawn)
         judged = dense_grid.ALPHA[drawn.any(axis=(1, 2))]
         own = Twin(shader.name, shader.text).mismatch(shader, judged, valid.xi.low)
     if own is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, validity
@@ -35,12 +36,12 @@ def check_map(context: moderngl.Context, one: Named, folder: Folder, text: str =
     """Check a map with its constants; `text` in place of its own. ShaderError if it does not compile."""
     model = bounds.of_map(one, folder)
     of_reflectance, of_alpha = validity.of_map(one, folder)
-    shader = ShaderMap(context, one.law, text)
+    shader, law = ShaderMap(context, one.law, text), one.law.in_reduced()
     alpha, reflectance = shader.alpha(REFLECTANCE), shader.reflectance(ALPHA)
     with np.errstate(all="ignore"):  # what is no number is counted, not warned of
         errors = {
-            "delta_A": np.abs(reflectance - one.law.reflectance(ALPHA))[of_alpha.holds(ALPHA)],
-            "delta_alpha": np.abs(alpha - one.law.alpha(REFLECTANCE))[of_reflectance.holds(REFLECTANCE)],
+            "delta_A": np.abs(reflectance - law.reflectance(ALPHA))[of_alpha.holds(ALPHA)],
+            "delta_alpha": np.abs(alpha - law.alpha(REFLECTANCE))[of_reflectance.holds(REFLECTANCE)],
         }
     rounding = {name: float(np.max(values)) for name, values in errors.items()}
     places = {
@@ -64,7 +65,7 @@ def _measured(shader: ShaderMap, of_alpha: Range) -> dict[str, float]:
     if not shader.setting.is_solved:
         return {}
     alpha = ALPHA[of_alpha.holds(ALPHA)]
-    truth = np.asarray(exact.reflectance(alpha, setting=shader.setting))
+    truth = np.asarray(exact.reflectance(unreduced(alpha, shader.setting.g), setting=shader.setting))
     return {
         "delta_A": float(np.max(np.abs(shader.reflectance(alpha) - truth))),
         "delta_alpha": float(np.max(np.abs(shader.alpha(truth) - alpha))),

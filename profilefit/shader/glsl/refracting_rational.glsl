@@ -36,7 +36,7 @@ float LAW_map_again(float alpha) {
 // x >= 0 with rest = linear x + quadratic x^2 + f x^3: the root of the quadratic, and Newton's method
 float LAW_map_root(float rest, float linear_term, float quadratic) {
     float x = 2.0 * rest / (linear_term + sqrt(max(linear_term * linear_term + 4.0 * quadratic * rest, 0.0)));
-    for (int i = 0; i < 4; ++i) {
+    for (int i = 0; i < 6; ++i) {
         float over = x * (linear_term + x * (quadratic + x * LAW_map_f)) - rest;
         x -= over / (linear_term + x * (2.0 * quadratic + 3.0 * LAW_map_f * x));
     }

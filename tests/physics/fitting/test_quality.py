@@ -18,12 +18,12 @@ class Truth:
     def __init__(self, stretch=1.0, brighter=1.0, setting=None):
         self.stretch, self.brighter, self.setting = stretch, brighter, setting or Setting()
 
-    def profile(self, r, alpha):
-        stretched = exact.profile(np.asarray(r) / self.stretch, alpha, setting=self.setting) / self.stretch**2
+    def profile(self, r, alpha, mfp=1.0):
+        stretched = exact.profile(np.asarray(r) / self.stretch, alpha, mfp, self.setting) / self.stretch**2
         return self.brighter * stretched
 
-    def cdf(self, r, alpha):
-        return exact.cdf(np.asarray(r) / self.stretch, alpha, setting=self.setting)
+    def cdf(self, r, alpha, mfp=1.0):
+        return exact.cdf(np.asarray(r) / self.stretch, alpha, mfp, self.setting)
 
 
 class ExactMap(AlbedoLaw):
@@ -52,8 +52,8 @@ def test_a_law_is_measured_against_its_own_light():
     """Negative control: the searchlight's profile called diffuse."""
 
     class Mistaken(Truth):
-        def profile(self, r, alpha):
-            return exact.profile(r, alpha)
+        def profile(self, r, alpha, mfp=1.0):
+            return exact.profile(r, alpha, mfp)
 
     assert np.all(profile_quality(Mistaken(setting=Setting("diffuse")), ALPHAS).rel > 0.02)
 

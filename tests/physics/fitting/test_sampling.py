@@ -18,7 +18,7 @@ from profilefit.fitting.sampling import (
     sampler_quality,
 )
 from profilefit.laws.base import ProfileLaw, Sampler
-from profilefit.laws.refracting_hazard import RefractingHazardSampler
+from profilefit.laws.two_parts import TwoPartSampler
 
 ALPHA = 0.9
 STEP = 2.0**-24  # what the last step of xi leaves out
@@ -65,7 +65,7 @@ class Clipped(Sampler):
         return jnp.where(x < self.farthest, self.law.sampler.scaled_pdf(x, alpha), 0.0)
 
 
-class Longer(RefractingHazardSampler):
+class Longer(TwoPartSampler):
     """Radii of both parts a hundredth too long, whatever its density says."""
 
     def scaled_sample(self, xi, alpha):

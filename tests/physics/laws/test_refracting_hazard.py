@@ -11,8 +11,9 @@ from mcml_sim import Setting, exact
 from mcml_sim.exact import single_scattering
 from profilefit import SettingError, load, profile_quality
 from profilefit.laws.hazard import cumulative, growth
-from profilefit.laws.refracting_hazard import RefractingHazard, RefractingHazardSampler, drawn
+from profilefit.laws.refracting_hazard import RefractingHazard
 from profilefit.laws.refracting_rational import RefractingRational
+from profilefit.laws.two_parts import TwoPartSampler, drawn
 
 ALPHA = 1 - np.linspace(1, 0, 41) ** 2
 R = np.geomspace(1e-4, 300, 200)
@@ -97,7 +98,7 @@ def test_near_exact_light_at_an_index_that_was_not_fitted(setting):
     assert np.max(quality.rel) < 0.006
     assert np.max(quality.ks) < 0.0016
     other = load("hazard", setting=replace(setting, n=1.2))  # the negative control: another index is seen
-    mixed = RefractingHazard(setting, other.albedo.at_index(1.37), **other.constants())
+    mixed = RefractingHazard(setting, other.albedo.at(replace(other.setting, n=1.37)), **other.constants())
     assert profile_quality(replace(mixed, surface=other.here()), [0.5]).rel[0] > 0.02
 
 
@@ -140,7 +141,7 @@ def test_the_sampler_draws_its_own_density(law):
         assert np.mean(weight) == pytest.approx(1.0, abs=2e-5)
         for edge in (0.1, 1.0):
             assert np.mean(weight * (x < edge)) == pytest.approx(law.cdf(edge, alpha), abs=2e-5)
-    two = RefractingHazardSampler(law, 2)
+    two = TwoPartSampler(law, 2)
     x = two.sample(xi[::500], 0.9)
     own = 2 * np.pi * x * law.profile(x, 0.9) / law.total(0.9)
     np.testing.assert_allclose(two.pdf(x, 0.9), own, rtol=1e-6)
@@ -173,7 +174,7 @@ def test_many_indices_at_once_are_each_alone(law):
     together = energies(law, settings, alpha)
     for row, one, a in zip(together, settings, alpha[:, 0], strict=True):
         # Two rows here, too: another program rounds 1 - S otherwise, which next to the source is 1e-12 of it.
-        alone = energies(law.at_index(one.n), (one, one), np.array([[a], [a]]))
+        alone = energies(law.at(one), (one, one), np.array([[a], [a]]))
         np.testing.assert_allclose(row, alone[0], rtol=1e-12)
         other = energies(law, (replace(one, n=one.n + 0.1),) * 2, np.array([[a], [a]]))
         assert np.max(np.abs(row / other[0] - 1)) > 0.01

@@ -252,14 +252,14 @@ def test_what_is_known_of_a_law():
     refracting = catalogue.load("hazard", setting=Setting(n=1.4))
     there = origin("hazard", "regenerated", refracting.setting, catalogue.fits_folder())
     assert 0.001 < relative_error(refracting, 0.9, there) < 0.004
-    between = refracting.at_index(1.37)  # its record is of n = 1.4: measured
+    between = refracting.at(replace(refracting.setting, n=1.37))  # its record is of n = 1.4: measured
     there = origin("hazard", "regenerated", between.setting, catalogue.fits_folder())
     assert there.path.name == "hazard-refracting.json"
     assert relative_error(between, 0.9, there) == profile_quality(between, [0.9]).rel[0]
     dipole = catalogue.load("better_dipole", setting=Setting(n=1.4))
     assert origin("better_dipole", "regenerated", dipole.setting, catalogue.fits_folder()) is None
     assert relative_error(dipole, 0.9, None) > 0.1
-    rarer = dipole.at_index(0.9)  # there is no exact profile
+    rarer = dipole.at(replace(dipole.setting, n=0.9))  # there is no exact profile
     assert relative_error(rarer, 0.9, None) is None
 
 

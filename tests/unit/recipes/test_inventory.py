@@ -54,6 +54,16 @@ def test_a_law_that_spans_indices_is_found_at_each():
         find("burley", FITS, "published", n=1.4)
 
 
+def test_a_law_with_g_is_found_at_each():
+    for g, record in ((0.0, "hazard-refracting"), (0.3, "hazard-forward"), (0.95, "hazard-forward")):
+        found = find("hazard", FITS, n=1.4, g=g)
+        assert (found.setting, found.records) == (Setting(n=1.4, g=g), (record,))
+    with pytest.raises(SettingError, match=r"g in \(0, 0.95\].* got a request for searchlight, n = 1.4, g = 0.97"):
+        find("hazard", FITS, n=1.4, g=0.97)
+    with pytest.raises(SettingError, match="burley"):
+        find("burley", FITS, "published", g=0.5)
+
+
 def test_refracting_surfaces_are_left_out_where_laws_are_compared():
     settings = {one.setting for one in profile_laws(FITS)}
     assert settings == {Setting(), Setting("diffuse")}

@@ -230,7 +230,7 @@ def test_a_setting_is_read_and_is_the_searchlight_by_default(write):
         (["n = nan"], "[setting]: n must be a finite number, got nan"),
         (['n = "glass"'], "[setting]: n must be a finite number, got 'glass'"),
         (["g = 1.0"], "[setting]: g must be a mean cosine in (-1, 1), got 1.0"),
-        (["g = 0.5"], "setting.g must be 0: profiles are fitted to isotropic scattering, got 0.5"),
+        (["g = 0.5"], "setting.g must be 0 where there are no cosines, got 0.5"),
         (["eta = 1.4"], "[setting]: unknown key 'eta', accepted: illumination, n, g"),
         (["n = 0.9"], "setting.n must be at least 1 where truth is 'exact' (use truth = \"orders\"), got 0.9"),
     ],
@@ -303,6 +303,37 @@ def test_indices_are_read_and_photons_have_one(write):
     assert read(write(text.replace("1.02", "1.1"))).span == (1.1, 1.6)
     with pytest.raises(RecipeError, match=r"indices need truth = \"exact\" and pipeline 'albedo' or 'profile'"):
         read(write(text.replace('"exact"', '"orders"')))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (
+            "indices = [1.2, 1.3, 1.4]\ncosines = [0.1, 0.5, 0.9]",
+            "indices must be in [1.33, 1.45] where there are cosines",
+        ),
+        ("cosines = [0.1, 0.5, 0.9]", "indices must be in [1.33, 1.45] where there are cosines, got []"),
+        (
+            "indices = [1.33, 1.4, 1.45]\ncosines = [0.5, 0.9]",
+            "cosines must rise, at least 3 in (0, 0.95], got [0.5, 0.9]",
+        ),
+        ("indices = [1.33, 1.4, 1.45]\ncosines = [0.9, 0.5, 0.1]", "cosines must rise"),
+        ("indices = [1.33, 1.4, 1.45]\ncosines = [0.1, 0.8, 0.97]", "cosines must rise"),
+        ("indices = [1.33, 1.4, 1.45]\ncosines = [0.1, 0.5, 0.8]", "setting.g must be one of the cosines"),
+    ],
+)
+def test_cosines_that_a_law_cannot_span(write, given, words):
+    with pytest.raises(RecipeError, match=re.escape(words)):
+        read(write(f"{given}\n{with_setting('n = 1.4', 'g = 0.9')}"))
+
+
+def test_cosines_are_read_with_every_index(write):
+    lists = "indices = [1.33, 1.4, 1.45]\ncosines = [0.1, 0.5, 0.9]"
+    found = read(write(f"{lists}\n{with_setting('n = 1.4', 'g = 0.9')}"))
+    assert (found.cosines, found.span) == ((0.1, 0.5, 0.9), (1.3, 1.5))
+    assert found.settings == tuple(Setting(n=n, g=g) for n in (1.33, 1.4, 1.45) for g in (0.1, 0.5, 0.9))
+    with pytest.raises(RecipeError, match=r"setting.g must be 0 where there are no cosines, got 0.9"):
+        read(write(with_setting("n = 1.4", "g = 0.9")))
 
 
 def test_checks_and_random_starts(write):

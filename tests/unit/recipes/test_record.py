@@ -318,6 +318,16 @@ def test_what_a_law_of_many_indices_needs(tmp_path):
             record.read(path, whole=whole)
 
 
+def test_what_a_law_with_g_needs(tmp_path):
+    for g in (0.0, 0.96):
+        content = json.loads((fits_folder() / "hazard-forward.json").read_text())
+        content["setting"]["g"] = g
+        path = tmp_path / "mine.json"
+        path.write_text(json.dumps(content))
+        with pytest.raises(RecordError, match=rf"setting.g must be in \(0, 0.95\], as its cosines are, got {g:g}"):
+            record.read(path)
+
+
 def test_records_that_cannot_be_read_are_named(tmp_path):
     with pytest.raises(RecordError, match=r"gone\.json: there is no such record; `profilefit regenerate` makes them"):
         record.read(tmp_path / "gone.json")

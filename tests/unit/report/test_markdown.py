@@ -89,6 +89,7 @@ def test_quality_reads_back_with_printed_sets_once():
 def test_the_short_table_and_the_hazard_s_constants_say_which_index():
     found = sections(RECORDS)
     assert "| hazard-refracting, n = 1.4 |" in found["short"]
-    of_one, spanning = found["hazard"].split("\n\n")
+    of_one, forward, spanning = found["hazard"].split("\n\n")
     assert re.search(r"^\| n +\| 1 +\| 1 +\|$", of_one, re.MULTILINE)
+    assert re.search(r"^\| n +\| \(1.3, 1.5\] +\| \(1.3, 1.5\] +\|$", forward, re.MULTILINE)
     assert re.search(r"^\| n +\| \(1, 1.6\] +\| \(1, 1.6\] +\|$", spanning, re.MULTILINE)

@@ -252,7 +252,7 @@ def test_second_opinions_are_told():
     assert "random starts" not in rendered([record_tables.fit_facts(RECORDS["gaussians-6"])], 100)
 
 
-@pytest.mark.parametrize("name", ["hazard-refracting", "albedo-rational-diffuse-refracting"])
+@pytest.mark.parametrize("name", ["hazard-refracting", "albedo-rational-diffuse-refracting", "hazard-forward"])
 def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
     content = RECORDS[name]
     found = content["quality"]["by_index"]
@@ -260,9 +260,14 @@ def test_a_record_that_spans_indices_shows_its_worst_at_each(name):
     start = next(i for i, line in enumerate(lines) if line.startswith("By refractive index"))
     rows = [line.split() for line in lines[start + 2 : start + 2 + len(found["n"])]]
     keys = [key for key in ("rel", "largest", "ks", "delta_A") if key in found]
+    places = [name for name in ("n", "g") if name in found]
     for i, row in enumerate(rows):
-        assert [float(cell) for cell in row] == pytest.approx([found[key][i] for key in ("n", *keys)], rel=0.06)
-    assert any("every n in (1, 1.6]" in line for line in lines)
-    assert any(line.startswith("Quality") and line.rstrip().endswith(", n = 1.4") for line in lines)
+        assert [float(cell) for cell in row] == pytest.approx([found[key][i] for key in (*places, *keys)], rel=0.06)
+    has_g = "cosines" in content
+    text = " ".join(" ".join(lines).split())
+    assert ("every n in (1.3, 1.5]" if has_g else "every n in (1, 1.6]") in text
+    assert ("every g in (0, 0.95]" in text) == has_g
+    ends = ", n = 1.4, g = 0.9" if has_g else ", n = 1.4"
+    assert any(line.startswith("Quality") and line.rstrip().endswith(ends) for line in lines)
     worst = quality_tables.worst_measures(content)[keys[0]]["regenerated"]
     assert worst == max(*found[keys[0]], *np.atleast_1d(content["quality"]["regenerated"][keys[0]]))
