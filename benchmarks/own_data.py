@@ -13,7 +13,7 @@ rows, by the derivatives at the truth, n and g known or normal with the variance
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
+from collections.abc import Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -24,14 +24,17 @@ from benchmarks.render_figure import save
 from mcml_sim import Setting
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N
 from profilefit.measured import model
+from profilefit.measured.assumed import beam_width
 from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
-from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import Instrument
+from profilefit.measured.fitting import MediumFit, fitted
+from profilefit.measured.identifiability import LOOSE, relative_errors
+from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Question
+from profilefit.measured.ranges import DRAWS
 from profilefit.report.figures.canvas import BLUE, GREEN, ORANGE, VERMILION, WIDTH, canvas, plain_log, styled
 
 Floats = NDArray[np.float64]
@@ -70,10 +73,10 @@ def drawn(rng: np.random.Generator) -> Medium:
     return Medium(Setting(n=float(n), g=float(g)), 1.0 - s * s, float(length), rng.uniform(0.01, 0.03))
 
 
-def rows(one: Medium, rng: np.random.Generator) -> Measured:
+def rows(one: Medium, rng: np.random.Generator, seen: Instrument = PENCIL, edges: Floats = EDGES) -> Measured:
     """What is measured of it."""
-    inner, outer = EDGES[:-1], EDGES[1:]
-    light = Model(exact_light(one.setting)).predicted(_point(one)[None], inner, outer)[0, :-1]
+    inner, outer = edges[:-1], edges[1:]
+    light = Model(exact_light(one.setting), seen).predicted(_point(one)[None], inner, outer)[0, :-1]
     keep = light > 1e-9 * light[0]
     value = light * (1.0 + one.error * rng.standard_normal(light.size))
     known = np.full(light.size, np.inf)
@@ -90,13 +93,20 @@ def coverage(count: int, opened: bool, seed: int = 1) -> dict[str, Coverage]:
         question = _question(premises)
         fit = fitted(data, question)
         truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
-        errors = fit.errors(fit.likely) if fit.minimum.converged else dict.fromkeys(NAMES, np.nan)
-        bound = _fisher(one, data, premises)
+        draws = _draws(fit, rng) if fit.minimum.converged else dict.fromkeys(NAMES, np.full(2, np.nan))
+        bound = _fisher(one, data, premises.instrument, premises.ranges)
         for name in NAMES:
-            ratio = errors[name] / fit.values[name]
-            off = abs(np.log(fit.values[name] / truth[name]))
-            found[name].append((off < 1.96 * ratio, ratio < 0.5, ratio / bound[name]))
+            low, high = np.quantile(draws[name], [0.025, 0.975])
+            ratio = (high - low) / 3.92 / fit.values[name]
+            found[name].append((low < truth[name] < high, ratio < 0.5, ratio / bound[name]))
     return {name: _summary(np.array(each, float)) for name, each in found.items()}
+
+
+def _draws(fit: MediumFit, rng: np.random.Generator) -> dict[str, Floats]:
+    """Those that intervals are of, the chain's by its limit of small errors."""
+    points = rng.multivariate_normal(fit.point, fit.conditional, DRAWS, method="eigh")
+    points += 0.0 if fit.open is None else fit.open.offsets
+    return model.quantities(points, np.zeros(DRAWS))
 
 
 def _summary(each: Floats) -> Coverage:
@@ -115,27 +125,22 @@ def _premises(one: Medium, opened: bool) -> Premises:
 
 
 def _question(premises: Premises) -> Question:
-    others = tuple((weight, exact_light(one), seen) for weight, one, seen in premises.others)
-    law = exact_light(premises.setting)
-    return Question(law, SCALE, None, None, premises.instrument, others, premises.ranges)
+    return Question(exact_light(premises.setting), SCALE, instrument=premises.instrument, ranges=premises.ranges)
 
 
-def _fisher(one: Medium, data: Measured, premises: Premises) -> dict[str, float]:
-    """Relative errors that no unbiased estimate undercuts."""
-    own = Model(exact_light(one.setting), premises.instrument)
-    point = _point(one)
-    light, slopes = own.linearised(point, data.inner, data.outer)
+def _fisher(
+    one: Medium, data: Measured, seen: Instrument, ranges: Mapping[str, tuple[float, float]]
+) -> dict[str, float]:
+    """Relative errors that no unbiased estimate undercuts; what is a range is normal with the range's variance."""
+    truth, point = Question(exact_light(one.setting), SCALE, instrument=seen), _point(one)
+    light, slopes = Model(truth.law, seen).linearised(point, data.inner, data.outer)
     rows = np.diag(data.sigma**2)
-    for name, (low, high) in premises.ranges.items():
-        value = getattr(one.setting, name)
-        step = 0.02 * (high - low)
-        ends = [
-            Model(exact_light(replace(one.setting, **{name: float(np.clip(value + side, low, high))})), own.instrument)
-            .predicted(point[None], data.inner, data.outer)[0, :-1]
-            for side in (-step, step)
-        ]  # fmt: skip
-        apart = float(np.clip(value + step, low, high) - np.clip(value - step, low, high))
-        slope = (ends[1] - ends[0]) / apart
+    for name, (low, high) in ranges.items():
+        value = seen.beam.w if isinstance(seen.beam, Gaussian) and name == "beam" else getattr(one.setting, name)
+        ends = [float(np.clip(value + side * 0.02 * (high - low), low, high)) for side in (-1.0, 1.0)]
+        there = [truth.under({name: end}) for end in ends]
+        below, above = (Model(at.law, at.instrument).predicted(point[None], data.inner, data.outer)[0] for at in there)
+        slope = (above - below)[:-1] / (ends[1] - ends[0])
         rows += np.outer(slope, slope) * (high - low) ** 2 / 12.0
     free = slopes[:-1, :2]
     covariance = np.zeros((3, 3))
@@ -143,6 +148,66 @@ def _fisher(one: Medium, data: Measured, premises: Premises) -> dict[str, float]
     errors = model.errors(model.slopes(point, slopes[-1]), covariance)
     values = model.quantities(point[None], light[-1:])
     return {name: errors[name] / float(values[name][0]) for name in NAMES}
+
+
+BEAM_EDGES = np.arange(0.0, 10.01, 0.25)  # mm
+
+
+class Beams(NamedTuple):
+    """Shares of media under beams of .25 to 1 mm, seen from 0 to 4 w on, scale known or free."""
+
+    held: dict[str, float]
+    """Of the intervals, the beam given, those that hold the truth, by quantity."""
+    answered: float
+    """The beam given: both quantities have an interval, and no other medium fits as well."""
+    wrong: float
+    """The beam not given: an interval misses the truth."""
+    warned: float
+    """Of these, the answer says so: the width or a misfit is noticed, or a beam as wide is said to matter."""
+    noticed: float
+    """Of these, the width or a misfit is noticed."""
+    accused: float
+    """Of media under a pencil beam those where a width is noticed."""
+
+
+def beams(count: int, seed: int = 1) -> Beams:
+    """Over so many media; isotropic, n = 1, errors of .2 to 2 %."""
+    rng, light = np.random.default_rng(seed), exact_light(Setting())
+    held, answered, wrong, warned, noticed, accused = [], [], [], [], [], []
+    for at in range(count):
+        s, length = rng.uniform(0.05, 0.8), np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
+        one = Medium(Setting(), 1.0 - s * s, float(length), float(np.exp(rng.uniform(np.log(0.002), np.log(0.02)))))
+        w = float(np.exp(rng.uniform(np.log(0.25), np.log(1.0))))
+        edges, known = BEAM_EDGES[rng.uniform(0.0, 4.0) * w <= BEAM_EDGES], SCALE if at % 2 else {}
+        seen = Instrument(Gaussian(w))
+        data = rows(one, rng, seen, edges)
+        given = fitted(data, Question(light, known, instrument=seen))
+        inside = _holds(given, one, rng)
+        answered.append(inside is not None and not given.rivals)
+        if answered[-1]:
+            held.append(inside)
+        blind = fitted(data, Question(light, known))
+        inside = _holds(blind, one, rng)
+        wrong.append(inside is not None and not all(inside))
+        if wrong[-1]:
+            width = beam_width(blind)
+            noticed.append(blind.misfit.detected or (width is not None and width.noticed))
+            told = width is not None and width.telling is not None and width.telling < w
+            warned.append(noticed[-1] or told)
+        width = beam_width(fitted(rows(one, rng, PENCIL, edges), Question(light, known)))
+        if width is not None:
+            accused.append(width.noticed)
+    shares = dict(zip(NAMES, np.mean(held, axis=0).tolist(), strict=True))
+    return Beams(shares, *(float(np.mean(each)) for each in (answered, wrong, warned, noticed, accused)))
+
+
+def _holds(fit: MediumFit, one: Medium, rng: np.random.Generator) -> tuple[bool, ...] | None:
+    """Whether the intervals hold the truth; None where a quantity has none within a factor of two or so."""
+    if not fit.minimum.converged or any(relative_errors(fit, fit.likely)[name] > LOOSE for name in NAMES):
+        return None
+    truth, draws = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}, _draws(fit, rng)
+    ends = {name: np.quantile(draws[name], [0.025, 0.975]) for name in NAMES}
+    return tuple(bool(low < truth[name] < high) for name, (low, high) in ends.items())
 
 
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm
@@ -159,18 +224,11 @@ KNOWN = {
 def known_to(nearest: float, farthest: float, error: float, ranges: dict) -> dict[str, float]:
     """Relative errors of tissue from rings a fifth apart in r."""
     edges = np.geomspace(nearest, farthest, max(int(np.log(farthest / nearest) / 0.2), 4) + 1)
-    instrument = Instrument(Gaussian(0.5) if "beam" in ranges else None)
-    inner, outer = edges[:-1], edges[1:]
-    law = Model(exact_light(TISSUE.setting), instrument)
-    light, slopes = law.linearised(_point(TISSUE), inner, outer)
-    rows = np.diag((error * light[:-1]) ** 2)
-    for weight, one, seen in Premises(TISSUE.setting, instrument, ranges).others:
-        away = Model(exact_light(one), seen).predicted(_point(TISSUE)[None], inner, outer)[0, :-1] - light[:-1]
-        rows += weight * np.outer(away, away)
-    free, covariance = slopes[:-1, :2], np.zeros((3, 3))
-    covariance[:2, :2] = np.linalg.inv(free.T @ np.linalg.solve(rows, free))
-    errors = model.errors(model.slopes(_point(TISSUE), slopes[-1]), covariance)
-    return {"mu_s'": errors["mu_s'"] * TISSUE.length / TISSUE.alpha, "mu_a": errors["mu_a"] / 0.02}
+    seen = Instrument(Gaussian(0.5) if "beam" in ranges else None)
+    light = Model(exact_light(TISSUE.setting), seen).predicted(_point(TISSUE)[None], edges[:-1], edges[1:])[0, :-1]
+    known = np.full(light.size, np.inf)
+    data = Measured("tissue", "", edges[:-1], edges[1:], light, error * light, known, "as given", "mm")
+    return _fisher(TISSUE, data, seen, ranges)
 
 
 @styled
@@ -203,10 +261,17 @@ def chart(path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200, help="media")
+    parser.add_argument("--beams", action="store_true", help="of media under beams of a width instead")
     parser.add_argument("--chart", type=Path, help="draw the chart there instead")
     given = parser.parse_args()
     if given.chart is not None:
         chart(given.chart)
+        return
+    if given.beams:
+        one = beams(given.count)
+        print(f"beams of .25 to 1 mm, given: held {one.held}, answered {one.answered:.1%}")
+        print(f"not given: wrong {one.wrong:.1%}, of these warned {one.warned:.1%}, width or misfit {one.noticed:.1%}")
+        print(f"pencil beams accused: {one.accused:.1%}")
         return
     for opened in (False, True):
         print(f"n and g {'open' if opened else 'given'}, {given.count} media")

@@ -18,14 +18,14 @@ from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.problem import Question
+from profilefit.measured.ranges import Opened, fitted_under, opened
 from profilefit.measured.replicates import widening
 from profilefit.measured.solving import Minimum, Problem, are_apart, descended, minimised
 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
 REWEIGHTED = 3
-# The errors of a law, and of what is known as a range, are those at the medium of the fit, which they hardly move.
-ROUNDS, ROUNDS_OPEN = 1, 3
+ROUNDS = 1  # the errors of a law are those at the medium of the fit, which they hardly move
 FAR = 100.0  # above the lowest chi-square of the search: such minima are not followed under the final errors
 SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search allows for
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
@@ -39,6 +39,7 @@ class MediumFit:
 
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
     rivals      other minima whose chi-square is no more above it than where the 95 % interval ends
+    open        what the data leave open of ranges; the fit is that at their means
     """
 
     problem: Problem
@@ -47,6 +48,7 @@ class MediumFit:
     rel: float | None
     widening: float = 1.0
     rivals: tuple[Minimum, ...] = ()
+    open: Opened | None = None
 
     @property
     def data(self) -> Measured:
@@ -105,8 +107,18 @@ class MediumFit:
 
     @property
     def likely(self) -> Floats:
-        """Covariance (3, 3) of the coordinates by the likelihood: the data's own errors, and the law's."""
+        """Covariance (3, 3) of the coordinates: the data's own errors, the law's, and what is open of ranges."""
+        return self.conditional + self.of_ranges
+
+    @property
+    def conditional(self) -> Floats:
+        """Covariance (3, 3) of the coordinates by the likelihood, all else known."""
         return self.gain @ self.gain.T
+
+    @property
+    def of_ranges(self) -> Floats:
+        """Covariance (3, 3) of the coordinates from what is open of ranges."""
+        return np.zeros((3, 3)) if self.open is None else self.open.covariance
 
     @cached_property
     def law_rows(self) -> Floats:
@@ -140,8 +152,8 @@ class MediumFit:
 
     @property
     def of_law(self) -> Floats:
-        """Covariance (3, 3) of the coordinates from the law's own error."""
-        return self.gain @ self.law_rows @ self.gain.T
+        """Covariance (3, 3) of the coordinates from the law's own error, and from what is open of ranges."""
+        return self.gain @ self.law_rows @ self.gain.T + self.of_ranges
 
     @property
     def of_misfit(self) -> Floats:
@@ -195,45 +207,26 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     problem = Problem(data, question, noise(data, widening=wider, model=model))
     minimum = first = minimised(problem)
     found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
-    rounds = (
-        REWEIGHTED if data.counted else 0,
-        ROUNDS if model is not None else 0,
-        ROUNDS_OPEN if question.others else 0,
-    )
-    for _ in range(max(rounds)):
-        light = problem.model.linearised(minimum.point, data.inner, data.outer)[0][:-1]
-        if not np.all(np.isfinite(light)):
-            break
-        expected = np.maximum(light, LEAST_EXPECTED * data.value)
-        rows, of_total = _open(problem, minimum.point)
-        model = _sum(law_error.covariance(data, found.rel, found.beyond), rows)
-        problem = replace(problem, noise=noise(data, expected, wider, model), question=_widened(question, of_total))
-        minimum = descended(problem, minimum.point, question.free)
-        found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
+    reweighted = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
+    for _ in range(reweighted):
+        found = _reweighted(found)
+    if question.ranges and (left := opened(found.problem, found.minimum)) is not None:
+        there = found.problem.under(left.mean)
+        found = replace(found, problem=there, minimum=fitted_under(found.problem, left.mean, found.minimum), open=left)
+        found = _reweighted(found) if reweighted else found
     return replace(found, rivals=_rivals(found, first.others))
 
 
-def _widened(question: Question, variance: float) -> Question:
-    """With so much more variance of a known A."""
-    if question.total is None:
-        return question
-    return replace(question, total=replace(question.total, error=float(np.hypot(question.total.error, variance**0.5))))
-
-
-def _sum(one: Floats | None, other: Floats | None) -> Floats | None:
-    return one if other is None else other if one is None else one + other
-
-
-def _open(problem: Problem, point: Floats) -> tuple[Floats | None, float]:
-    """Covariance (n, n) of the rows, and A's variance, by what is known as a range; None and 0 where nothing is."""
-    if not problem.question.others:
-        return None, 0.0
-    inner, outer = problem.data.inner, problem.data.outer
-    here, spread = problem.model.predicted(point[None], inner, outer)[0], np.zeros((inner.size + 1,) * 2)
-    for weight, law, instrument in problem.question.others:
-        away = Model(law, instrument).predicted(point[None], inner, outer)[0] - here
-        spread += weight * np.outer(away, away)
-    return spread[:-1, :-1], float(spread[-1, -1])
+def _reweighted(found: MediumFit) -> MediumFit:
+    """The same with the errors that its own light has; as it was where this is not finite."""
+    light, data = found.problem.model.linearised(found.point, found.data.inner, found.data.outer)[0][:-1], found.data
+    if not np.all(np.isfinite(light)):
+        return found
+    expected = np.maximum(light, LEAST_EXPECTED * data.value)
+    model = law_error.covariance(data, found.rel, found.beyond)
+    problem = replace(found.problem, noise=noise(data, expected, found.widening, model))
+    minimum = descended(problem, found.point, found.question.free)
+    return replace(found, problem=problem, minimum=minimum, rel=_rel(found.question, minimum, found.source))
 
 
 def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:

@@ -111,8 +111,11 @@ def _end(found: MediumFit, at: int, side: float) -> tuple[float, bool]:
         start[at] = x
         there = descended(found.problem, start, others)
         last.append(there.point)
-        return there.cost - best.cost - found.quantile**2
+        return there.cost - best.cost - threshold
 
+    # What is open of ranges widens an interval in the ratio of the errors.
+    variance = max(float(found.conditional[at, at]), np.finfo(float).tiny)
+    threshold = found.quantile**2 * (1.0 + float(found.of_ranges[at, at]) / variance)
     step = max(float(np.sqrt(found.likely[at, at])), 1e-6)
     inside = outside = best.point[at]
     for _ in range(STRIDES):

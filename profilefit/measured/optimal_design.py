@@ -98,7 +98,7 @@ def _repeated(found: MediumFit) -> Floats:
     gain = np.linalg.pinv(np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
     covariance = np.zeros((len(NAMES), len(NAMES)))
     covariance[np.ix_(free, free)] = gain @ gain.T
-    return covariance
+    return covariance + found.of_ranges
 
 
 def _candidate(
@@ -109,4 +109,4 @@ def _candidate(
     gain = np.linalg.pinv(rows)
     covariance = np.zeros((len(NAMES), len(NAMES)))
     covariance[np.ix_(free, free)] = gain @ gain.T
-    return Candidate(kind, inner, outer, value, error, relative_errors(found, covariance))
+    return Candidate(kind, inner, outer, value, error, relative_errors(found, covariance + found.of_ranges))

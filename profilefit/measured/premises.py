@@ -7,8 +7,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
 from profilefit.measured.beam import TOPHAT, Gaussian, Irradiance, beam_of
@@ -16,14 +14,12 @@ from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT
 from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.lengths import length
+from profilefit.measured.problem import MEDIUM
 
-MEDIUM = ("n", "g")
 ACCEPTED = {
     "n": "a refractive index > 0, or a range such as 1.33:1.45",
     "g": "a mean cosine in (-1, 1), or a range such as 0.7:0.95",
 }
-# Of a range: where light is solved, and weights. The middle one is fitted.
-POINTS, WEIGHTS = np.polynomial.legendre.leggauss(3)
 
 
 @dataclass(frozen=True)
@@ -40,27 +36,6 @@ class Premises:
     instrument: Instrument = PENCIL
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
-
-    @property
-    def others(self) -> list[tuple[float, Setting, Instrument]]:
-        """What else may be the case within the ranges, with its weight in a mean over them."""
-        found: list[tuple[float, dict[str, float]]] = [(1.0, {})]
-        for name, (low, high) in self.ranges.items():
-            values = low + (high - low) * 0.5 * (1.0 + POINTS)
-            found = [
-                (weight * 0.5 * share, {**one, name: float(value)})
-                for weight, one in found
-                for share, value in zip(WEIGHTS, values, strict=True)
-            ]
-        each = [
-            (
-                weight,
-                Setting.of(self.setting.as_table() | {name: one[name] for name in MEDIUM if name in one}),
-                replace(self.instrument, beam=Gaussian(one["beam"])) if "beam" in one else self.instrument,
-            )
-            for weight, one in found
-        ]
-        return [one for one in each if one[1:] != (self.setting, self.instrument)]
 
 
 def premises(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import jax
 import jax.numpy as jnp
@@ -11,11 +11,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.measured.beam import Gaussian
+from profilefit.measured.exact_light import exact_light
 from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import NAMES, Light, u_of
+from profilefit.measured.model import NAMES, Light, U, u_of
 
 Floats = NDArray[np.float64]
+MEDIUM = ("n", "g")
 LEAST, MOST = 1e-9, 1.0 - 1e-9  # albedos that can be held
 
 
@@ -32,10 +36,10 @@ class Question:
     """What to fit: exact light or a law, by the albedo, the transport mean free path and the scale of the values.
 
     instrument  the beam, and what a row is averaged over
-    others  (weight, light, instrument) under other values of what is known as a range: their mean square is an error
-    ranges  those ranges, of n, g and the beam; assumed which of n and g nobody named
-    held    coordinates that stay where they are, by name: alpha, l, scale, as values (not logarithms)
+    held    what stays where it is, by name: alpha or A, l, scale, as values (not logarithms)
     total   the total reflectance A [-], if that was measured as well; scale known to within an error
+    ranges  (low, high) of what is known no better: n, g, a Gaussian beam's 1/e^2 radius; assumed those of n and g that
+            nobody named
     """
 
     law: Light
@@ -43,23 +47,31 @@ class Question:
     total: Known | None = None
     scale: Known | None = None
     instrument: Instrument = PENCIL
-    others: tuple[tuple[float, Light, Instrument], ...] = ()
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
 
     @property
     def free(self) -> tuple[int, ...]:
         """Which of the three coordinates move."""
-        return tuple(at for at, name in enumerate(NAMES) if name not in self.held)
+        held = {"alpha" if name == "A" else name for name in self.held}
+        return tuple(at for at, name in enumerate(NAMES) if name not in held)
 
     @property
     def base(self) -> Floats:
         """(3,) the held coordinates; 0 for free ones."""
         point = np.zeros(len(NAMES))
-        for at, name in enumerate(NAMES):
-            if name in self.held:
-                point[at] = u_of(self.held[name]) if name == "alpha" else np.log(self.held[name])
+        for name, value in self.held.items():
+            if name in ("alpha", "A"):
+                point[U] = u_of(held_albedo(self.law, name, value))
+            else:
+                point[NAMES.index(name)] = np.log(value)
         return point
+
+    def under(self, values: Mapping[str, float]) -> Question:
+        """The same where those of the ranges have these values."""
+        setting = Setting.of(self.law.setting.as_table() | {name: values[name] for name in MEDIUM if name in values})
+        seen = replace(self.instrument, beam=Gaussian(values["beam"])) if "beam" in values else self.instrument
+        return replace(self, law=self.law if setting == self.law.setting else exact_light(setting), instrument=seen)
 
 
 def held_albedo(law: Light, name: str, value: float) -> float:

@@ -22,7 +22,7 @@ from profilefit.measured.fitting import LEVEL, MediumFit
 from profilefit.measured.identifiability import Identifiability, Interval, identifiability
 from profilefit.measured.model import FLOCK, NAMES, U, u_of
 from profilefit.measured.optimal_design import Advice, advised
-from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended
+from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended, likelihood
 from profilefit.recipes import record
 
 Floats = NDArray[np.float64]
@@ -53,13 +53,6 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
     spread = np.minimum(np.sqrt(np.diag(found.likely)[free]), WIDEST)
     start = centre[free] + spread * np.random.default_rng(seed).standard_normal((WALKERS, len(free)))
     return walk(log_density, start, centre[free], seed, max_steps, KEPT)
-
-
-def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
-    """ln likelihood (m,) where chi-square has risen by `rise` (m,): normal, or Student's in `free` coordinates."""
-    if np.isinf(pooled):
-        return -0.5 * rise
-    return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
 def points(found: MediumFit, samples: Floats) -> Floats:
@@ -102,7 +95,7 @@ class Answer:
         """Posterior draws (k,) of every quantity; empty without a chain."""
         if self.walk is None:
             return {}
-        return self._quantities(points(self.found, self.walk.samples))
+        return self._quantities(self._sampled)
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
@@ -116,11 +109,19 @@ class Answer:
         if not found.misfit.detected:
             return self.draws
         free = list(found.question.free)
-        moved = points(found, self.walk.samples)
+        moved = self._sampled.copy()
         generator = np.random.default_rng(len(moved))
         zero, joint = np.zeros(len(free)), found.of_misfit[np.ix_(free, free)]
         moved[:, free] += generator.multivariate_normal(zero, joint, len(moved), method="eigh")
         return self._quantities(moved)
+
+    @cached_property
+    def _sampled(self) -> Floats:
+        """Posterior draws (k, 3) of the coordinates: those of the chain, each moved by what is open of ranges."""
+        if self.walk is None:
+            return np.zeros((0, len(NAMES)))
+        sampled = points(self.found, self.walk.samples)
+        return sampled if self.found.open is None else sampled + self.found.open.offsets[: len(sampled)]
 
     def _quantities(self, points: Floats) -> dict[str, Floats]:
         data = self.found.data
@@ -281,6 +282,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         "beam": None if question.instrument.beam is None else question.instrument.beam.words,
         "fibre": question.instrument.fibre,
         "ranges": question.ranges,
+        "of_ranges": None if found.open is None else {"mean": found.open.mean, "error": found.open.error},
         "free": [NAMES[at] for at in question.free],
         "held": question.held,
         "known": {"A": question.total, "scale": question.scale},

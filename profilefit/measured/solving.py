@@ -7,6 +7,7 @@ A failure is a result: `Minimum.result` is "converged" or says what happened and
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -75,6 +76,10 @@ class Problem:
         if (known := self.question.scale) is not None:
             cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
         return cost
+
+    def under(self, values: Mapping[str, float]) -> Problem:
+        """The same where those of the question's ranges have these values."""
+        return replace(self, question=self.question.under(values))
 
     @property
     def lengths(self) -> tuple[float, float]:
@@ -156,6 +161,13 @@ def minimised(problem: Problem) -> Minimum:
 def are_apart(one: Minimum, other: Minimum) -> bool:
     """Whether two ends of descents are two minima: their coordinates differ by more than a search leaves open."""
     return bool(np.max(np.abs(one.point - other.point)) > APART)
+
+
+def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
+    """ln likelihood (m,) where chi-square has risen by `rise` (m,): normal, or Student's in `free` coordinates."""
+    if np.isinf(pooled):
+        return -0.5 * rise
+    return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
 def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum:

@@ -60,9 +60,8 @@ def fit(
     measured = _noted(measured, where)
     chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
-    others = tuple((weight, chosen if one == where else exact_light(one), seen) for weight, one, seen in told.others)
     question = Question(
-        chosen, _held(chosen, held or {}, scale), total, known, told.instrument, others, told.ranges, told.assumed
+        chosen, _held(chosen, held or {}, scale), total, known, told.instrument, told.ranges, told.assumed
     )
     return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 
@@ -90,14 +89,14 @@ def _held(law: Light, held: Mapping[str, float], scale: float | Known | None) ->
         raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
     if {"alpha", "A"} <= set(held):
         raise InputError("held must have one of alpha and A, which say the same, got both")
-    values = {"l" if name == "l" else "alpha": _value(law, name, value) for name, value in held.items()}
+    for name, value in held.items():
+        if name == "l":
+            _positive("held l", value)
+        else:
+            held_albedo(law, name, value)
     if scale is None or isinstance(scale, Known):
-        return values
-    return {**values, "scale": _positive("scale", scale)}
-
-
-def _value(law: Light, name: str, value: float) -> float:
-    return _positive("held l", value) if name == "l" else held_albedo(law, name, value)
+        return {**held}
+    return {**held, "scale": _positive("scale", scale)}
 
 
 def _positive(name: str, value: float) -> float:

@@ -53,9 +53,14 @@ def light(setting: Setting, coarse: bool = False) -> ExactLight:
     """Of a half space that the table has (`Setting.is_solved`); `coarse` as in `curves`."""
     own, whole = curves(setting, coarse), 0.5 * (1.0 + nodes(S.size))
     share = np.polynomial.chebyshev.chebval(2.0 * whole / np.sqrt(1.0 - LEAST) - 1.0, coefficients(own.share))
-    kappa = high_orders.decay_rates(1.0 - S**2, setting.g)
-    tables = map(coefficients, (pieces(own.rest), kappa, share))
+    tables = map(coefficients, (pieces(own.rest), _decay_rates(setting.g), share))
     return tabulated(setting, FIRST, STEP, *tables)
+
+
+@lru_cache(maxsize=32)
+def _decay_rates(g: float) -> Floats:
+    """kappa at the nodes of s, which no surface changes."""
+    return high_orders.decay_rates(1.0 - S**2, g)
 
 
 def curves(setting: Setting, coarse: bool = False) -> SplinedLight:

@@ -9,6 +9,7 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.measured.fitting import MediumFit
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
@@ -259,12 +260,24 @@ def _beam(result: Answer) -> Iterator[str]:
         )
 
 
+def _narrowed(found: MediumFit) -> str:
+    """What the data say of ranges."""
+    if found.open is None:
+        return "no value of theirs gives a fit with errors, so the middle is fitted"
+    units = {"beam": f" {found.data.unit or 'units of r'}"}
+    told = ", ".join(
+        f"{name} {value:.3g} ± {found.open.error[name]:.2g}{units.get(name, '')}"
+        for name, value in found.open.mean.items()
+    )
+    return f"the data and the ranges together say {told}, and what this leaves open is in the intervals"
+
+
 def _medium(result: Answer) -> Iterator[str]:
     """What is open of n and g, or assumed."""
     question, there, unit = result.found.question, result.tissue, result.found.data.unit
     if question.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in question.ranges.items())
-        yield f"known as ranges: {known}; the middle is fitted, and what it leaves open is in the intervals"
+        yield f"known as ranges: {known}; {_narrowed(result.found)}"
     if there is not None:
         names = question.assumed
         here, other = (_named(names, one) for one in (question.law.setting, there.setting))

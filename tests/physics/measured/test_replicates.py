@@ -6,7 +6,7 @@ from scipy import stats
 
 from profilefit.measured.misfit import alone, gaussianised, scatter_chance
 from profilefit.measured.replicates import moderated_variances, trend_freedom, widening
-from profilefit.measured.result import likelihood
+from profilefit.measured.solving import likelihood
 
 ROWS, COUNT = 40, 3
 

@@ -42,7 +42,7 @@ def test_what_is_known_goes_in(near):
     assert fit(near, held={"l": 1.1}, walk=False).found.values["l"] == pytest.approx(1.1, rel=1e-12)
     free = fit(near, held={"A": 0.53}, scale=None, walk=False).found
     assert free.values["A"] == pytest.approx(0.53, rel=1e-6)
-    assert free.question.held.keys() == {"alpha"}
+    assert free.question.held.keys() == {"A"}
     measured = fit(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).found
     assert measured.question.held == {}
     assert measured.values["alpha"] == pytest.approx(0.95, abs=4 * measured.errors(measured.statistical)["alpha"])

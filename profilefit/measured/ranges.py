@@ -1,0 +1,179 @@
+"""What the data say of what is known as a range only (n, g, the width of a beam), and what they leave open of it.
+
+The best fit within the ranges is found from coarse nodes of them. In the box of so many standard errors about it the
+fit is repeated at Gauss and Legendre's nodes; between these its coordinates, chi-square and the volume of its errors
+are polynomials. The posterior is flat within the ranges and, as the chain's, in sqrt(1 - alpha), ln l and ln k: at each
+place these have the errors of the fit there (Laplace).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.polynomial.legendre import leggauss, legvander
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from profilefit.measured.model import U
+from profilefit.measured.solving import Minimum, Problem, descended, likelihood
+
+Floats = NDArray[np.float64]
+NODES = {"n": 3, "g": 6, "beam": 5}
+PLACES = {"n": 15, "g": 121, "beam": 61}  # between the nodes, where the polynomials are evaluated
+COARSE = 3  # nodes of each range from which the search begins
+REACH = 5.0  # standard errors of a range's value to either side of the best, beyond which it is not looked for
+STEP, MAX_STEPS = 1e-3, 60  # of a range, for derivatives; of the search
+DRAWS, SEED = 4000, 0
+
+
+@dataclass(frozen=True)
+class Opened:
+    """What is left open of ranges.
+
+    mean     of each, by name, and error the standard deviation about it
+    offsets  (k, 3) draws: coordinates where the ranges have other values than their means, less those at the means
+    """
+
+    mean: Mapping[str, float]
+    error: Mapping[str, float]
+    offsets: Floats
+
+    @property
+    def covariance(self) -> Floats:
+        """(3, 3) of the coordinates, by the ranges alone."""
+        found: Floats = self.offsets.T @ self.offsets / len(self.offsets)
+        return found
+
+
+def opened(problem: Problem, start: Minimum) -> Opened | None:
+    """Of the ranges of a problem; None where the fit has no errors anywhere in them."""
+    whole = dict(problem.question.ranges)
+    rough = [_scaled(leggauss(COARSE)[0], ends) for ends in whole.values()]
+    start, values = min(_fits(problem, tuple(whole), rough, start), key=lambda one: _cost(one[0]))
+    if not np.isfinite(_cost(start)):
+        return None
+    start, ranges = _box(problem, start, values)
+    nodes = [_scaled(leggauss(NODES[name])[0], ends) for name, ends in ranges.items()]
+    fits = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
+    rise = np.array([_cost(one) - _cost(start) for one in fits])
+    if not np.all(np.isfinite(rise)):
+        return None
+    theta, log = np.array([one.point for one in fits]), _log_volumes(problem, fits)
+    if np.all(np.isfinite(log)):  # errors at every node
+        between = _product([_polynomials(NODES[name], PLACES[name]) for name in ranges])
+        theta, log = between @ theta, between @ log
+        log += likelihood(between @ rise, len(problem.question.free), problem.data.pooled)
+        places = [_scaled(_middles(PLACES[name]), ends) for name, ends in ranges.items()]
+    else:
+        log += likelihood(rise, len(problem.question.free), problem.data.pooled)
+        log += np.log(_product([leggauss(NODES[name])[1] for name in ranges]))
+        places = nodes
+    share = np.exp(log - log.max())
+    share /= share.sum()
+    at = np.array(list(product(*places)))
+    mean = share @ at
+    means = dict(zip(ranges, map(float, mean), strict=True))
+    errors = dict(zip(ranges, map(float, np.sqrt(share @ (at - mean) ** 2)), strict=True))
+    drawn = theta[np.random.default_rng(SEED).choice(share.size, DRAWS, p=share)]
+    return Opened(means, errors, drawn - fitted_under(problem, means, start).point)
+
+
+def fitted_under(problem: Problem, values: Mapping[str, float], start: Minimum) -> Minimum:
+    """The minimum where the ranges have these values."""
+    there = problem.under(values)
+    point, free = there.question.base, list(there.question.free)
+    point[free] = start.point[free]
+    return descended(there, point, there.question.free)
+
+
+def _fits(
+    problem: Problem, names: Sequence[str], nodes: Sequence[Floats], start: Minimum
+) -> list[tuple[Minimum, dict[str, float]]]:
+    """At all combinations of the nodes, each from where the one before it ended, the first from `start`."""
+    fits: list[tuple[Minimum, dict[str, float]]] = []
+    for each in product(*nodes):
+        values = dict(zip(names, map(float, each), strict=True))
+        one = fitted_under(problem, values, start)
+        fits.append((one, values))
+        start = one if one.converged else start
+    return fits
+
+
+def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Minimum, dict[str, tuple[float, float]]]:
+    """The best fit within the ranges, and what of them is within REACH of it; begun at the fit under some values."""
+    free, ranges = list(problem.question.free), problem.question.ranges
+    low, high = np.array(list(ranges.values())).T
+    step = STEP * (high - low)
+
+    def at(x: Floats) -> tuple[Problem, Floats]:
+        there = problem.under(dict(zip(ranges, map(float, x[len(free) :]), strict=True)))
+        point = there.question.base
+        point[free] = x[: len(free)]
+        return there, point
+
+    def rows(x: Floats) -> Floats:
+        there, point = at(x)
+        found = there.residuals(point)[0]
+        return np.where(np.isfinite(found), found, np.sqrt(np.finfo(float).max) * STEP)
+
+    def slopes(x: Floats) -> Floats:
+        there, point = at(x)
+        here, by_point = there.residuals(point)
+        ways = np.where(x[len(free) :] + step > high, -step, step)
+        by_range = [(rows(x + np.append(np.zeros(len(free)), way)) - here) / way.sum() for way in np.diag(ways)]
+        return np.column_stack([by_point[:, free], *by_range])
+
+    first, last = (end[free] for end in problem.bounds(start.point))
+    bounds = np.append(first, low), np.append(last, high)
+    inside = np.clip(np.append(start.point[free], list(values.values())), *bounds)
+    done = least_squares(rows, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=MAX_STEPS)
+    best = done.x[len(free) :]
+    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(done.jac.T @ done.jac))[len(free) :], 0.0))
+    errors = np.where(np.any(done.jac[:, len(free) :] != 0, axis=0), errors, np.inf)
+    ends = zip(np.maximum(best - REACH * errors, low), np.minimum(best + REACH * errors, high), strict=True)
+    box = dict(zip(ranges, ((float(a), float(b)) for a, b in ends), strict=True))
+    return fitted_under(problem, dict(zip(ranges, map(float, best), strict=True)), start), box
+
+
+def _cost(one: Minimum) -> float:
+    return one.cost if np.isfinite(one.cost) else np.inf
+
+
+def _log_volumes(problem: Problem, fits: Sequence[Minimum]) -> Floats:
+    """ln of the prior's share within the errors of each fit, up to a constant; -inf where it has none."""
+    free = list(problem.question.free)
+    found = np.full(len(fits), -np.inf)
+    for at, one in enumerate(fits):
+        sign, log = np.linalg.slogdet(one.jacobian[:, free].T @ one.jacobian[:, free])
+        if one.converged and sign > 0:
+            flat = -np.logaddexp(0.0, one.point[U]) - np.logaddexp(0.0, -one.point[U]) if U in free else 0.0
+            found[at] = flat - 0.5 * log
+    return found
+
+
+def _scaled(t: Floats, ends: tuple[float, float]) -> Floats:
+    """From (-1, 1) to a range."""
+    found: Floats = 0.5 * (ends[0] + ends[1]) + 0.5 * (ends[1] - ends[0]) * t
+    return found
+
+
+def _product(each: Sequence[Floats]) -> Floats:
+    """Kronecker's, of all."""
+    found: Floats = each[0]
+    for one in each[1:]:
+        found = np.asarray(np.kron(found, one), float)
+    return found
+
+
+def _middles(count: int) -> Floats:
+    """Of as many equal parts of (-1, 1)."""
+    return (2.0 * np.arange(count) + 1.0) / count - 1.0
+
+
+def _polynomials(nodes: int, places: int) -> Floats:
+    """Values at `_middles` from values at Legendre's nodes, (places, nodes)."""
+    found: Floats = legvander(_middles(places), nodes - 1) @ np.linalg.inv(legvander(leggauss(nodes)[0], nodes - 1))
+    return found

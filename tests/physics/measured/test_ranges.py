@@ -1,0 +1,85 @@
+"""What data leave open of ranges, against fits at many values one by one."""
+
+import numpy as np
+import pytest
+
+from benchmarks import own_data
+from mcml_sim import Setting
+from profilefit.measured import model
+from profilefit.measured.beam import Gaussian
+from profilefit.measured.exact_light import exact_light
+from profilefit.measured.fitting import fitted
+from profilefit.measured.instrument import Instrument
+from profilefit.measured.problem import Known, Question
+from profilefit.measured.solving import descended
+
+ONE = own_data.TISSUE
+RANGE = (0.3, 0.95)
+EDGES = np.array([1.0]), np.array([2.0])
+
+
+def asked(ranges, **known) -> Question:
+    setting = Setting(n=1.4, g=float(np.mean(ranges["g"])) if "g" in ranges else ONE.setting.g)
+    return Question(exact_light(setting), known.pop("held", own_data.SCALE), ranges=ranges, **known)
+
+
+@pytest.fixture(scope="module")
+def measured():
+    return own_data.rows(ONE, np.random.default_rng(3))
+
+
+@pytest.mark.parametrize("nearest", [0.1, 2.0], ids=["narrowed", "hardly narrowed"])
+def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
+    """Mean and error of g, and the covariance of the coordinates, are those of sixty fits."""
+    question = asked({"g": RANGE})
+    found = fitted(measured.within(nearest, None), question)
+    ends = np.clip(found.open.mean["g"] + 6.0 * found.open.error["g"] * np.array([-1.0, 1.0]), *RANGE)
+    g = ends[0] + (ends[1] - ends[0]) * (np.arange(60) + 0.5) / 60
+    fits, start = [], found.minimum
+    for value in g:
+        start = descended(found.problem.under({"g": float(value)}), start.point, question.free)
+        fits.append(start)
+    volumes = [np.linalg.slogdet(one.jacobian[:, :2].T @ one.jacobian[:, :2])[1] for one in fits]
+    s = np.array([np.sqrt(1.0 - model.alpha_of(one.point[0])) for one in fits])
+    log = -0.5 * (np.array([one.cost for one in fits]) + volumes) + np.log(s * (1.0 - s))
+    share = np.exp(log - log.max())
+    share /= share.sum()
+    mean = share @ g
+    assert found.open.mean["g"] == pytest.approx(mean, abs=0.02 * found.open.error["g"])
+    assert found.open.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
+    points = np.array([one.point[:2] for one in fits])
+    off = points - share @ points
+    np.testing.assert_allclose(
+        np.diag(np.cov(found.open.offsets[:, :2].T)), np.diag((share[:, None] * off).T @ off), rtol=0.1
+    )
+    assert (found.open.error["g"] < 0.5 * (RANGE[1] - RANGE[0]) / 12**0.5) == (nearest < 1.0)
+
+
+def test_data_find_the_width_of_a_beam(measured):
+    instrument = Instrument(Gaussian(0.5))
+    data = own_data.rows(ONE, np.random.default_rng(5), instrument)
+    question = asked({"beam": (0.1, 2.0)}, instrument=Instrument(Gaussian(1.05)))
+    found = fitted(data, question)
+    assert found.open.error["beam"] < 0.05
+    assert abs(found.open.mean["beam"] - 0.5) < 3 * found.open.error["beam"]
+    assert found.question.instrument.beam.w == found.open.mean["beam"]
+
+
+def test_a_known_reflectance_counts_at_every_value(measured):
+    """What is known of A is no new fact about g where A alone is held: alpha follows g."""
+    held = fitted(measured, asked({"n": (1.33, 1.45)}, held={"A": 0.4, "scale": 1.0}))
+    for n in (1.34, 1.44):
+        there = held.problem.under({"n": n})
+        assert there.model.predicted(there.question.base[None], *EDGES)[0, -1] == pytest.approx(0.4, abs=1e-9)
+    loose = fitted(measured, asked({"g": RANGE}))
+    total = Known(loose.values["A"], 0.002)
+    tight = fitted(measured, asked({"g": RANGE}, total=total))
+    assert tight.open.covariance[0, 0] <= loose.open.covariance[0, 0] * 1.05
+    assert tight.errors(tight.likely)["A"] < 0.0022
+
+
+def test_what_is_held_is_not_moved_by_ranges(measured):
+    question = asked({"g": RANGE}, held={"alpha": 0.98, "l": 1.0, "scale": 1.0})
+    found = fitted(measured, question)
+    np.testing.assert_allclose(found.open.offsets, 0.0, atol=1e-12)
+    assert found.open.error["g"] < 0.1, "the data say what g must be then"
