@@ -13,14 +13,17 @@ from functools import lru_cache
 import jax
 import jax.numpy as jnp
 import numpy as np
+from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mcml_sim import exact
 from mcml_sim.exact.anisotropic import table
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
+from mcml_sim.files.kept import kept
 from mcml_sim.media.setting import Setting
 
+Floats = NDArray[np.float64]
 EXACT = "exact"  # its name among laws
 DEGREES = 64  # Chebyshev polynomials in s
 STEP = 0.06  # of ln x
@@ -29,12 +32,23 @@ NEAREST, FARTHEST = 1e-4, 1e3  # mfp, of f
 SOLVED, SOLVED_WHITE, WHITE = 28.0, 12.0, 0.06
 
 
-@lru_cache(maxsize=8)
+VERSION = 1  # of what `_solved` gives
+
+
+@lru_cache(maxsize=64)
 def exact_light(setting: Setting) -> ExactLight:
-    """Of a half space that `mcml_sim.exact` solves; SettingError of another. Seconds where g = 0."""
+    """Of a half space that `mcml_sim.exact` solves; SettingError of another. Seconds where g = 0, the first time."""
     require_solved(setting)
     if not setting.is_isotropic:
         return _filled(table.light(setting))
+    parts = ("rest", "kappa", "share")
+    name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
+    found = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
+    return tabulated(setting, NEAREST, STEP, *(found[part] for part in parts))
+
+
+def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
+    """The spline of f, kappa and A / alpha in Chebyshev polynomials of s."""
     s = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(DEGREES))
     alpha = 1.0 - s**2
     log = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP)
@@ -47,7 +61,7 @@ def exact_light(setting: Setting) -> ExactLight:
     whole = nodes(DEGREES) * 0.5 + 0.5
     share = coefficients(np.asarray(exact.reflectance(1.0 - whole**2, setting=setting)) / (1.0 - whole**2))
     rest = coefficients(CubicSpline(log, f, axis=1).c.transpose(2, 1, 0))
-    return tabulated(setting, NEAREST, STEP, rest, coefficients(kappa[:, 0]), share)
+    return rest, coefficients(kappa[:, 0]), share
 
 
 def _filled(light: ExactLight) -> ExactLight:

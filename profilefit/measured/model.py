@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import lru_cache, partial
+from functools import cached_property, lru_cache, partial
 
 import equinox as eqx
 import jax
@@ -48,9 +48,18 @@ class Model:
     law: Light
     instrument: Instrument = PENCIL
 
+    @cached_property
+    def traced(self) -> Light:
+        """The light as compiled functions take it: one that is exact without its setting, which nothing there needs."""
+        with jax.enable_x64(True):
+            traced: Light = jax.tree.map(
+                jnp.asarray, self.law.unlabelled if isinstance(self.law, ExactLight) else self.law
+            )
+        return traced
+
     def linearised(self, point: Floats, inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
         """Predictions (n + 1,) at one point (3,), the last being A, and their derivatives (n + 1, 3)."""
-        values, slopes = _linearised(self.law, point, *self._nodes(inner, outer))
+        values, slopes = _linearised(self.traced, point, *self._nodes(inner, outer))
         rows = np.append(np.arange(inner.size), -1)
         return np.asarray(values)[rows], np.asarray(slopes)[:, rows].T
 
@@ -59,12 +68,12 @@ class Model:
         flocks = -(-len(points) // FLOCK)
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
         nodes, rows = self._nodes(inner, outer), np.append(np.arange(inner.size), -1)
-        light = [np.asarray(_predicted(self.law, flock, *nodes))[:, rows] for flock in np.split(filled, flocks)]
+        light = [np.asarray(_predicted(self.traced, flock, *nodes))[:, rows] for flock in np.split(filled, flocks)]
         return np.concatenate(light)[: len(points)]
 
     def shares(self, point: Floats, r: Floats) -> Floats:
         """Shares of the reflected energy within radii (n,) [-]."""
-        return np.concatenate([np.asarray(_shares(self.law, point, one)) for one in blocks(r, BLOCK)])[: r.size]
+        return np.concatenate([np.asarray(_shares(self.traced, point, one)) for one in blocks(r, BLOCK)])[: r.size]
 
     def _nodes(self, inner: Floats, outer: Floats) -> tuple[Array, Array]:
         """Those of the rows, and of more like the last up to a multiple of BLOCK."""
@@ -107,10 +116,8 @@ def _double(function):
     compiled = eqx.filter_jit(function)
 
     def call(law, *arrays):
-        law = law.unlabelled if isinstance(law, ExactLight) else law
         with jax.enable_x64(True):
-            doubles = jax.tree.map(jnp.asarray, (law, arrays))
-            return compiled(doubles[0], *doubles[1])
+            return compiled(law, *arrays)
 
     return call
 

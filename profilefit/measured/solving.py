@@ -49,7 +49,7 @@ class Problem:
     question: Question
     noise: Noise
 
-    @property
+    @cached_property
     def model(self) -> Model:
         return Model(self.question.law, self.question.instrument)
 

@@ -1,11 +1,13 @@
 """The model against the law itself, its derivatives against differences, and rings against a quadrature."""
 
+import jax
 import numpy as np
 import pytest
 
 from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.measured import model
+from profilefit.measured.exact_light import exact_light
 from profilefit.measured.model import BLOCK, Model, alpha_of, u_of
 from profilefit.measured.problem import held_albedo
 from profilefit.recipes import catalogue
@@ -72,3 +74,16 @@ def test_a_held_reflectance_is_an_albedo():
         held_albedo(refracting, "A", 0.99)
     with pytest.raises(InputError, match=r"^held alpha must be a single-scattering albedo in \(0, 1\), got 1"):
         held_albedo(LAW, "alpha", 1.0)
+
+
+def test_exact_light_is_kept_for_the_next_process(monkeypatch, tmp_path):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    exact_light.cache_clear()
+    first = exact_light(Setting())
+    (path,) = tmp_path.rglob("light-searchlight-n1.0-*.npz")
+    written = path.stat().st_mtime_ns
+    exact_light.cache_clear()
+    again = exact_light(Setting())
+    assert path.stat().st_mtime_ns == written
+    assert all(np.array_equal(*pair) for pair in zip(*map(jax.tree.leaves, (first, again)), strict=True))
+    exact_light.cache_clear()
