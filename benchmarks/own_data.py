@@ -1,7 +1,7 @@
 """How often intervals of `profilefit fit` hold the truth, and what a measurement can know at all.
 
-    python -m benchmarks.own_data                          # 200 media, n and g given and open: four minutes
-    python -m benchmarks.own_data --count 1000
+    python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
+    python -m benchmarks.own_data --beams                  # under beams of .25 to 1 mm, given or not: an hour
     python -m benchmarks.own_data --chart own-data.png     # a minute: error by r_min, r_max, noise, beam, n and g
 
 Media are drawn from what a fit takes for possible: n from 1.33 to 1.45, g from 0 to .95, alpha' flat in sqrt(1 -
@@ -19,6 +19,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.stats import multivariate_t
 
 from benchmarks.render_figure import save
 from mcml_sim import Setting
@@ -29,12 +30,13 @@ from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import MediumFit, fitted
-from profilefit.measured.identifiability import LOOSE, relative_errors
 from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
+from profilefit.measured.model import Model, U, u_of
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Question
 from profilefit.measured.ranges import DRAWS
+from profilefit.measured.result import Answer, judged
+from profilefit.measured.solving import FARTHEST_U, likelihood
 from profilefit.report.figures.canvas import BLUE, GREEN, ORANGE, VERMILION, WIDTH, canvas, plain_log, styled
 
 Floats = NDArray[np.float64]
@@ -103,8 +105,16 @@ def coverage(count: int, opened: bool, seed: int = 1) -> dict[str, Coverage]:
 
 
 def _draws(fit: MediumFit, rng: np.random.Generator) -> dict[str, Floats]:
-    """Those that intervals are of, the chain's by its limit of small errors."""
-    points = rng.multivariate_normal(fit.point, fit.conditional, DRAWS, method="eigh")
+    """Those that intervals are of; the chain's by importance sampling from Student's t of five degrees of freedom."""
+    free = list(fit.question.free)
+    spread = multivariate_t(fit.point[free], fit.conditional[np.ix_(free, free)], df=5, seed=rng)
+    points = np.repeat(fit.point[None], DRAWS, axis=0)
+    points[:, free] = spread.rvs(DRAWS)
+    reached = np.abs(points[:, U]) < FARTHEST_U
+    log = likelihood(fit.problem.costs(np.where(reached[:, None], points, fit.point)), len(free), fit.data.pooled)
+    log -= np.logaddexp(0.0, points[:, U]) + np.logaddexp(0.0, -points[:, U]) + spread.logpdf(points[:, free])
+    share = np.where(reached & np.isfinite(log), np.exp(log - np.max(log[reached & np.isfinite(log)])), 0.0)
+    points = points[rng.choice(DRAWS, DRAWS, p=share / share.sum())]
     points += 0.0 if fit.open is None else fit.open.offsets
     return model.quantities(points, np.zeros(DRAWS))
 
@@ -181,17 +191,17 @@ def beams(count: int, seed: int = 1) -> Beams:
         edges, known = BEAM_EDGES[rng.uniform(0.0, 4.0) * w <= BEAM_EDGES], SCALE if at % 2 else {}
         seen = Instrument(Gaussian(w))
         data = rows(one, rng, seen, edges)
-        given = fitted(data, Question(light, known, instrument=seen))
-        inside = _holds(given, one, rng)
-        answered.append(inside is not None and not given.rivals)
-        if answered[-1]:
+        given = judged(fitted(data, Question(light, known, instrument=seen)))
+        inside = _holds(given, one)
+        answered.append(inside is not None and not given.found.rivals)
+        if inside is not None and answered[-1]:
             held.append(inside)
-        blind = fitted(data, Question(light, known))
-        inside = _holds(blind, one, rng)
+        blind = judged(fitted(data, Question(light, known)))
+        inside = _holds(blind, one)
         wrong.append(inside is not None and not all(inside))
         if wrong[-1]:
-            width = beam_width(blind)
-            noticed.append(blind.misfit.detected or (width is not None and width.noticed))
+            width = blind.width
+            noticed.append(blind.found.misfit.detected or (width is not None and width.noticed))
             told = width is not None and width.telling is not None and width.telling < w
             warned.append(noticed[-1] or told)
         width = beam_width(fitted(rows(one, rng, PENCIL, edges), Question(light, known)))
@@ -201,13 +211,16 @@ def beams(count: int, seed: int = 1) -> Beams:
     return Beams(shares, *(float(np.mean(each)) for each in (answered, wrong, warned, noticed, accused)))
 
 
-def _holds(fit: MediumFit, one: Medium, rng: np.random.Generator) -> tuple[bool, ...] | None:
-    """Whether the intervals hold the truth; None where a quantity has none within a factor of two or so."""
-    if not fit.minimum.converged or any(relative_errors(fit, fit.likely)[name] > LOOSE for name in NAMES):
-        return None
-    truth, draws = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}, _draws(fit, rng)
-    ends = {name: np.quantile(draws[name], [0.025, 0.975]) for name in NAMES}
-    return tuple(bool(low < truth[name] < high) for name, (low, high) in ends.items())
+def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
+    """Whether the intervals hold the truth; None where a quantity has none with two ends."""
+    truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
+    inside = []
+    for name in NAMES:
+        low, high = answer.interval(name) or (None, None)
+        if low is None or high is None:
+            return None
+        inside.append(low < truth[name] < high)
+    return tuple(inside)
 
 
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm
