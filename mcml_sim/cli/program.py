@@ -23,7 +23,7 @@ from pathlib import Path
 import typer
 from rich.console import Console
 from rich.text import Text
-from typer.core import TyperGroup
+from typer.core import TyperCommand, TyperGroup
 
 from mcml_sim.cli.lazy import INTERRUPTED, interruptible
 from mcml_sim.cli.terminal import mend_streams
@@ -60,11 +60,17 @@ class FirstScreen(TyperGroup):
         ]
 
 
-def add(app: typer.Typer, command: Callable[..., None], panel: str | None = None) -> None:
+def add(
+    app: typer.Typer,
+    command: Callable[..., None],
+    panel: str | None = None,
+    kind: type[TyperCommand] | None = None,
+) -> None:
     """Add a subcommand; the examples at the end of its docstring come last in its --help, below the options."""
     help_text, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
     paragraphs = [" ".join(one.split()) for one in help_text.split("\n\n")]  # rich would keep the source's line breaks
-    app.command(help="\n\n".join(paragraphs), epilog=f"\b\n{examples}", rich_help_panel=panel)(command)
+    epilog = f"\b\n{examples}"
+    app.command(cls=kind, help="\n\n".join(paragraphs), epilog=epilog, rich_help_panel=panel)(command)
 
 
 def add_version(app: typer.Typer, package: str) -> None:

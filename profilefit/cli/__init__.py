@@ -14,6 +14,7 @@ from profilefit.cli.examples import examples
 from profilefit.cli.export import export
 from profilefit.cli.fit import fit
 from profilefit.cli.options import in_options
+from profilefit.cli.photo import SeveralFiles, photo
 from profilefit.cli.regenerate import regenerate
 from profilefit.cli.report import report
 from profilefit.cli.scene import scene
@@ -28,20 +29,19 @@ HELP = """
 Closed-form profiles of subsurface scattering, fitted with error bars.
 
   profilefit regenerate hazard --out mine  simulate, and fit anew: a minute
-  profilefit report --fits mine            constants, errors and quality
   profilefit export hazard --lang hlsl     the most accurate law, as a shader
   profilefit fit FILE.csv                  alpha and l of a measured profile"""
 PANELS = {
     "Make laws": (regenerate, report),
     "Use laws": (export, choose, convert, scene),
-    "Your own data": (fit, examples),
+    "Your own data": (fit, photo, examples),
     "What to trust": (check, stability, tradeoff),
 }
 
 app = typer.Typer(cls=FirstScreen, help=HELP, no_args_is_help=True, pretty_exceptions_enable=False)
 for panel, commands in PANELS.items():
     for command in commands:
-        add(app, command, panel)
+        add(app, command, panel, SeveralFiles if command is photo else None)
 add_version(app, "profilefit")
 
 

@@ -43,6 +43,7 @@ OPTIONS = {
     "part": "PART",
     "r_max": "--r-max",
     "r_min": "--r-min",
+    "scale": "--scale",
     "scaled": "--scale free",
     "unit": "--unit",
 }

@@ -37,17 +37,18 @@ class Instrument:
     beam: Irradiance | None = None
     fibre: float = 0.0
 
-    def nodes(self, inner: Floats, outer: Floats) -> Nodes:
+    def nodes(self, inner: Floats, outer: Floats, farthest: float = 0.0) -> Nodes:
         """Radii and weights [1/unit^2 per D drho] of rows from `inner` to `outer` (n,).
 
-        The radii (m,) are those of all rows, and the weights (n, m).
+        The radii (m,) are those of all rows, at least up to `farthest`, and the weights (n, m).
         """
         d, mean = self._distances(inner, outer)
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
-            return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True))
+            return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)
         beams = (self.beam.nodes(one) for one in d)
-        return _shared((rho, share[:, None] * weight) for (rho, weight), share in zip(beams, mean, strict=True))
+        rows = ((rho, share[:, None] * weight) for (rho, weight), share in zip(beams, mean, strict=True))
+        return _shared(rows, farthest)
 
     def _distances(self, inner: Floats, outer: Floats) -> Nodes:
         """Distances (n, M) from the axis, and how much each counts in the mean over the row's area."""
@@ -70,10 +71,10 @@ class Instrument:
 PENCIL = Instrument()
 
 
-def _shared(each: Iterable[Nodes]) -> Nodes:
+def _shared(each: Iterable[Nodes], farthest: float) -> Nodes:
     """The nodes and weights of all rows on common nodes, as many for any beam."""
     rows = list(each)
-    grain = max(float(rho.max()) for rho, _ in rows) / GRAINS
+    grain = max(farthest, *(float(rho.max()) for rho, _ in rows)) / GRAINS
     weights = np.zeros((len(rows), COUNT))
     for row, (rho, weight) in enumerate(rows):
         at = (np.maximum(_straight(rho / grain), FIRST).ravel() - FIRST) / STEP

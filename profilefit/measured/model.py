@@ -63,6 +63,11 @@ class Model:
         rows = np.append(np.arange(inner.size), -1)
         return np.asarray(values)[rows], np.asarray(slopes)[:, rows].T
 
+    def weighed(self, point: Floats, rho: Floats, weights: Floats) -> tuple[Floats, Floats]:
+        """Sums (n,) over radii (m,) of weights (n, m) times 2 pi rho R_d at one point (3,), and derivatives (n, 3)."""
+        values, slopes = _linearised(self.traced, point, rho, weights)
+        return np.asarray(values)[:-1], np.asarray(slopes)[:, :-1].T
+
     def predicted(self, points: Floats, inner: Floats, outer: Floats) -> Floats:
         """Predictions (m, n + 1) at points (m, 3), the last column being A."""
         flocks = -(-len(points) // FLOCK)
@@ -93,7 +98,8 @@ def u_of(alpha: float) -> float:
 
 @lru_cache(maxsize=32)
 def _nodes(instrument: Instrument, inner: bytes, outer: bytes) -> tuple[Array, Array]:
-    nodes = instrument.nodes(*(np.concatenate(blocks(np.frombuffer(one), BLOCK)) for one in (inner, outer)))
+    near, far = (np.concatenate(blocks(np.frombuffer(one), BLOCK)) for one in (inner, outer))
+    nodes = instrument.nodes(near, far)
     with jax.enable_x64(True):
         return jnp.asarray(nodes[0]), jnp.asarray(nodes[1])
 

@@ -30,6 +30,7 @@ HELP = Path(__file__).parent / "data" / "help.txt"
 LANGUAGES = ("glsl", "glsl-es", "hlsl", "python", "json")
 SUBCOMMANDS = (
     "fit",
+    "photo",
     "choose",
     "convert",
     "scene",

@@ -163,7 +163,7 @@ def test_python_m_profilefit_ends_with_the_right_status(words, status, said, tmp
         ("[weighting]|[weighting", "is not TOML"),
         (
             'objective = "albedo"|objective = "energy"',
-            "must be one of albedo, reflectance, relative_reflectance 'energy'",
+            "must be one of albedo, reflectance, relative_reflectance, got",
         ),
         (
             'truth = "orders"|truth = "orders"\nmfp = [0.0]',

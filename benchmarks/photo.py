@@ -1,0 +1,179 @@
+"""How well `profilefit photo` does on photographs whose truth is known: `python -m benchmarks.photo [--count 200]`.
+
+Each is a bracket of five 12-bit exposures of a spot on a medium of n 1.4 and g 0.8, with every nuisance drawn anew from
+what the fit believes: beam, surface, glare and its width, darkened corners, speckle, uneven pixels, wrong times, a
+correlated error of 1 %; with cards, a white one and a grey one of reflectance .18 +- .004 likewise. Errors are over the
+Fisher bound of the same rings at the truth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim import Setting
+from mcml_sim.files.whole_file import write_whole
+from profilefit.measured import law_error
+from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import u_of
+from profilefit.measured.photo import bracket, medium, rings, simulated, spot
+from profilefit.measured.photo.exposure import BayerPlane, Exposure
+from profilefit.measured.photo.medium import Beliefs, Card, Shot
+from profilefit.measured.photo.pixel_scale import PixelScale
+from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
+from profilefit.measured.problem import Known
+
+Floats = NDArray[np.float64]
+SETTING = Setting(n=1.4, g=0.8)
+NAMES = ("mu_s'", "mu_a")
+GREY = Known(0.18, 0.004)
+BEAM = Known(0.5, 0.05)
+CAMERA = SpotCamera(sides=(800, 600), pitch=0.06)
+STEPS = 5  # exposures, by a factor of four each
+FULL = 0.5  # of the sensor's range, that the shortest one reaches
+LATE = 0.03  # relative error of a stated time
+FARTHEST = 40.0  # mm
+
+
+class Truth(NamedTuple):
+    """What is photographed; lengths in mm."""
+
+    alpha: float
+    length: float
+    optics: SpotOptics
+    camera: SpotCamera
+    grey: float
+
+
+class Outcome(NamedTuple):
+    """Of one photograph, by quantity: relative error, stated, and Fisher's."""
+
+    off: Floats
+    stated: Floats
+    bound: Floats
+
+
+def drawn(rng: np.random.Generator) -> Truth:
+    """From what a fit believes, of media such as skin, wax and milk."""
+    mu_s, mu_a = np.exp(rng.uniform(np.log(0.6), np.log(2.0))), np.exp(rng.uniform(np.log(0.01), np.log(0.15)))
+    beam, core = BEAM.value * (1.0 + BEAM.error / BEAM.value * rng.standard_normal()), 0.03
+    glare = float(np.abs(0.02 + 0.02 * rng.standard_normal()))
+    optics = SpotOptics(
+        beam=float(2.0 * np.sqrt(max(0.25 * beam**2 - core**2, 1e-4))), core=core,
+        surface=float(np.abs(0.01 + 0.01 * rng.standard_normal())), glare=glare,
+        width=float(np.exp(rng.uniform(np.log(1.0), np.log(16.0)))),
+    )  # fmt: skip
+    camera = replace(
+        CAMERA, corner=float(np.clip(0.05 + 0.05 * rng.standard_normal(), 0.0, 0.3)),
+        centre=tuple(rng.uniform(-20.0, 20.0, 2).tolist()),
+    )  # fmt: skip
+    length = 1.0 / (mu_s + mu_a)
+    return Truth(float(mu_s * length), float(length), optics, camera, GREY.value + GREY.error * rng.standard_normal())
+
+
+def exposures(radii: Floats, light: Floats, camera: SpotCamera, rng: np.random.Generator) -> list[Exposure]:
+    """A bracket, its times off by LATE; its light off by a correlated 1 %."""
+    smooth = law_error.waves(np.maximum(radii, 0.1)) + 1e-9 * np.eye(radii.size)
+    wavy = light * (1.0 + medium.UNEVEN * np.linalg.cholesky(smooth) @ rng.standard_normal(radii.size))
+    first = FULL * camera.gain * (camera.white - camera.black) / float(light[0])
+    stated = [first * 4.0**step for step in range(STEPS)]
+    times = {one: one * (1.0 + LATE * rng.standard_normal()) for one in stated}
+    taken = simulated.taken(
+        dict.fromkeys(simulated.CHANNELS, (radii, wavy)), camera, 1.0, times, int(rng.integers(2**31))
+    )
+    return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
+
+
+def as_read(one: simulated.Taken, source: str) -> Exposure:
+    """As a raw file of it would be read."""
+    places = [(row, column) for row in (0, 1) for column in (0, 1)]
+    planes = tuple(
+        BayerPlane(
+            one.pattern[row][column], one.counts[row::2, column::2].astype(np.float32) - one.black,
+            float(one.white - one.black), (row, column), 2,
+        )
+        for row, column in places
+    )  # fmt: skip
+    return Exposure(source, planes, (one.counts.shape[1], one.counts.shape[0]), one.seconds, True)
+
+
+def ringed(shots: list[Exposure], pixel: float) -> tuple[rings.SpotRings, float]:
+    """SpotRings of a bracket's green, in counts a second of its longest exposure's stated time; and the border."""
+    times = bracket.times(shots)
+    pictures = bracket.merged(shots, times, bracket.sensor(shots, times))
+    greens = [one for one, plane in zip(pictures, shots[0].planes, strict=True) if plane.colour == "green"]
+    plate = PixelScale(np.diag([pixel, pixel, 1.0]), "known")
+    where = spot.spot(greens, shots[0].sides, plate, shots[0].source)
+    found = rings.rings(greens, where.centre, rings.edges_of(where.reach * pixel, 2 * pixel), plate)
+    per_second = 1.0 / max(one.seconds or 1.0 for one in shots)
+    scaled = rings.SpotRings(found.inner, found.outer, found.value * per_second, found.covariance * per_second**2)
+    return scaled, pixel * float(np.hypot(*shots[0].sides)) / 2.0
+
+
+def outcome(one: Truth, cards: bool, rng: np.random.Generator) -> Outcome:
+    """Of one photograph, and where there are `cards`, of theirs."""
+    radii = simulated.radii(FARTHEST, one.optics)
+    light = simulated.light(one.alpha, one.length, SETTING, one.optics, radii)
+    seen, border = ringed(exposures(radii, light, one.camera, rng), one.camera.pitch)
+    shown: tuple[Card, ...] = ()
+    if cards:
+        white = simulated.card(one.optics, radii)
+        pairs = ((0.9 * white, None), (one.grey * white, Known(GREY.value, float(np.hypot(GREY.error, LATE * 0.18)))))
+        shown = tuple(
+            Card(ringed(exposures(radii, each, one.camera, rng), one.camera.pitch)[0], known) for each, known in pairs
+        )
+    beliefs = Beliefs(beam=BEAM, border=border)
+    shot = Shot(seen, shown, exact_light(SETTING), beliefs)
+    fit = medium.fitted(shot)
+    truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
+    bound = medium.fisher(shot, _coordinates(one, shot, fit.x))
+    return Outcome(
+        np.array([fit.values[name] / truth[name] - 1.0 for name in NAMES]),
+        np.array([fit.errors[name] / fit.values[name] for name in NAMES]),
+        np.array([bound[name] for name in NAMES]),
+    )
+
+
+def _coordinates(one: Truth, shot: Shot, found: Floats) -> Floats:
+    """The truth, in the fit's coordinates; scales as fitted, and glare shared out among its halos."""
+    x = found.copy()
+    x[:2], x[3], x[4] = (u_of(one.alpha), np.log(one.length)), np.log(one.optics.sigma), one.optics.surface
+    near = np.abs(np.log(np.array(shot.beliefs.halos) / one.optics.width))
+    x[5 : 5 + near.size] = one.optics.glare * np.exp(-near) / np.exp(-near).sum()
+    return x
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", type=int, default=200, help="photographs")
+    parser.add_argument("--json", type=Path, help="also write the numbers into this file")
+    given = parser.parse_args()
+    found: dict[str, dict[str, dict[str, float]]] = {}
+    for cards in (False, True):
+        rng = np.random.default_rng(11)
+        each = [outcome(drawn(rng), cards, rng) for _ in range(given.count)]
+        off, stated, bound = (np.array([getattr(one, name) for one in each]) for name in Outcome._fields)
+        setup = "a white and a grey card" if cards else "no cards"
+        found[setup] = {}
+        for at, name in enumerate(NAMES):
+            row = {
+                "rms": float(np.sqrt(np.mean(off[:, at] ** 2))),
+                "bound": float(np.sqrt(np.mean(bound[:, at] ** 2))),
+                "over": float(np.sqrt(np.mean((off[:, at] / bound[:, at]) ** 2))),
+                "held": float(np.mean(np.abs(np.log1p(off[:, at])) < 1.96 * stated[:, at])),
+            }
+            found[setup][name] = row
+            print(f"{setup}, {name}: rms {row['rms']:.1%}, bound {row['bound']:.1%}, {row['over']:.2f} x the bound; "
+                  f"95 % hold {row['held']:.1%}")  # fmt: skip
+    if given.json is not None:
+        write_whole(given.json, json.dumps(found, indent=1) + "\n")
+
+
+if __name__ == "__main__":
+    main()

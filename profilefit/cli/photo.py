@@ -1,0 +1,176 @@
+"""profilefit photo: photographs of a laser spot, and the medium behind it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand
+
+from mcml_sim.cli.lazy import interruptible
+from profilefit.cli.options import AsJson, Quiet
+from profilefit.errors import InputError
+
+if TYPE_CHECKING:
+    from profilefit.measured import Known
+    from profilefit.measured.photo.workflow import Photo
+
+FAILED = 1  # exit status
+SEVERAL = ("--card", "--grey", "--dark")
+
+
+class SeveralFiles(TyperCommand):
+    """A command some of whose options take every file that follows, as a shell writes out card-*.dng."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """With the option before each of its files."""
+        written: list[str] = []
+        option: str | None = None
+        for at, one in enumerate(args):
+            if one in SEVERAL:
+                option = one
+                if at + 1 == len(args) or args[at + 1].startswith("-"):
+                    written.append(one)
+            elif one.startswith("-"):
+                option = None
+                written.append(one)
+            else:
+                written.extend([one] if option is None else [option, one])
+        return super().parse_args(ctx, written)
+
+
+def photo(
+    shots: Annotated[
+        list[Path] | None, typer.Argument(help="Exposures of a bracket: raw files, or 16-bit linear TIFF or EXR.")
+    ] = None,
+    card: Annotated[list[Path] | None, typer.Option(help="Exposures of the beam on a white opaque card.")] = None,
+    grey: Annotated[
+        list[Path] | None, typer.Option(help="Exposures of it on a grey card, timed as the spot's.")
+    ] = None,
+    dark: Annotated[list[Path] | None, typer.Option(help="Frames with the lens covered.")] = None,
+    scale: Annotated[
+        str | None, typer.Option(help="0.05mm/px, a ruler's two points X,Y:X,Y=10mm, or aruco:20mm, a marker's side.")
+    ] = None,
+    beam: Annotated[str | None, typer.Option(help="1/e² radius, as far as known: 0.5mm+-0.05mm.")] = None,
+    surface: Annotated[str, typer.Option(help="Share of the light that the surface scatters.")] = "0.01+-0.01",
+    glare: Annotated[str, typer.Option(help="Share of the light that the lens scatters.")] = "0.02+-0.02",
+    reflectance: Annotated[str, typer.Option(help="Of the grey card.")] = "0.18+-0.005",
+    n: Annotated[float, typer.Option(help="Refractive index of the medium.")] = 1.4,
+    g: Annotated[float, typer.Option(help="Mean cosine of its scattering.")] = 0.8,
+    simulate: Annotated[
+        Path | None, typer.Option(help="SETUP.toml: write its photographs into --out, and what they could tell.")
+    ] = None,
+    out: Annotated[Path | None, typer.Option(help="Folder for photo.json and the figures.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Measure a medium by photographs of a laser spot.
+
+    A bracket of exposures is merged, and rings about the spot are fitted by exact light under the beam, with what
+    surface and lens add; red, green and blue apart. Cards tell what the spot alone does not: a white one beam and
+    glare, a grey one the scale. The answer names the errors that such photographs can have at best. Exit status 1 if a
+    fit fails. From a clone, pip install ".[photo]".
+
+    \b
+    Examples:
+      profilefit photo --simulate SETUP.toml --out shots
+      profilefit photo shots/spot-*.dng --scale 0.04mm/px --beam 0.5mm+-0.05mm
+      profilefit photo spot-*.dng --card card-*.dng --scale aruco:20mm
+    """
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, screen, show
+        from mcml_sim.files.text_file import as_json as json_text
+        from mcml_sim.files.whole_file import require_folder, write_whole
+        from mcml_sim.media.setting import Setting
+        from mcml_sim.runs.progress import working
+        from profilefit.measured.photo.medium import Beliefs
+        from profilefit.measured.photo.workflow import photo as measured
+        from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
+
+    if simulate is not None:
+        _simulate(simulate, shots or [], out, as_json, quiet)
+        return
+    if not shots:
+        raise InputError("SHOT must be a photograph, or several of a bracket, got none")
+    if scale is None:
+        raise InputError("--scale must be given: 0.05mm/px, a ruler's two points X,Y:X,Y=10mm, or aruco:20mm, got none")
+    if grey is None and reflectance != "0.18+-0.005":
+        raise InputError("--reflectance must be left out where there is no --grey card")
+    beliefs = Beliefs(
+        beam=None if beam is None else _known("--beam", beam, lengths=True),
+        surface=_known("--surface", surface), glare=_known("--glare", glare),
+    )  # fmt: skip
+    with working("measuring", quiet):
+        found = measured(
+            shots, scale, card or [], grey or [], dark or [], Setting(n=n, g=g), beliefs,
+            _known("--reflectance", reflectance),
+        )  # fmt: skip
+    body = photo_content(found)
+    if out is not None:  # after photographs that cannot be measured, which leave no folder
+        require_folder(out)
+        figures = _figures(found, out)
+        write_whole(out / "photo.json", json_text(body))
+        notes(quiet).print(f"wrote photo.json and {figures} figures into {out}", markup=False)
+    if as_json:
+        print_json(body)
+    else:
+        console = screen()
+        show(photo_tables(found), console)
+        for line in photo_lines(found):
+            console.print(line, markup=False, emoji=False)
+    if not all(one.converged for one in found.fits.values()):
+        raise typer.Exit(FAILED)
+
+
+def _figures(found: Photo, out: Path) -> int:
+    with interruptible(__name__):
+        from profilefit.report.figures.photo_figures import rings_figure, spot_figure
+
+    return len([*spot_figure(found, out), *rings_figure(found, out)])
+
+
+def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, quiet: bool) -> None:
+    with interruptible(__name__):
+        from mcml_sim.cli.screen import notes, print_json, screen, show
+        from mcml_sim.files.whole_file import require_folder
+        from mcml_sim.runs.progress import working
+        from profilefit.measured.photo.setup import read_setup, told, written
+        from profilefit.report.tables.photo_tables import setup_tables
+
+    if shots:
+        raise InputError("SHOT must be left out where photographs are simulated")
+    if out is None:
+        raise InputError("--out must be a folder for the simulated photographs, got none")
+    setup = read_setup(file)
+    require_folder(out)
+    with working("simulating", quiet):
+        files = written(setup, out)
+        bounds = told(setup)
+    notes(quiet).print(f"wrote {len(files)} photographs into {out}", markup=False)
+    if as_json:
+        print_json(bounds)
+    else:
+        show(setup_tables(bounds), screen())
+
+
+def _known(option: str, text: str, lengths: bool = False) -> Known:
+    """A value and its error, 0.18+-0.005; of lengths, in mm."""
+    with interruptible(__name__):
+        from profilefit.cli.fit import WITH_ERROR
+        from profilefit.measured import Known
+        from profilefit.measured.lengths import length
+
+    match = WITH_ERROR.fullmatch(text.strip())
+    example = "0.5mm+-0.05mm" if lengths else "0.02+-0.02"
+    if match is None:
+        raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}")
+    try:
+        value, error = (
+            length(option, match[name], "mm") if lengths else float(match[name]) for name in ("value", "error")
+        )
+    except ValueError:
+        raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}") from None
+    if not (0 < value < 1e6 and 0 < error < 1e6):
+        raise InputError(f"{option} must be a value > 0 with an error > 0, got {text!r}")
+    return Known(value, error)

@@ -1,0 +1,140 @@
+"""A bracket of exposures as one picture: counts a second by Bayer plane, with variances; what is clipped is left out.
+
+An exposure of relative time t records y = t x + noise of variance y / gain + read^2 [steps^2] (photon transfer). Times
+are fitted, not believed: of each pair of neighbours the ratio is that of the sums over pixels that both record well.
+Gain and read noise are fitted to the scatter of those pixels about it. The picture is the mean of y / t by inverse
+variance, at a light that neighbouring pixels share: by its own noise, a pixel that is dark by chance would count for
+more. Clipped pixels and their neighbours do not count, nor does what spills along a column of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import binary_dilation, uniform_filter
+
+from profilefit.errors import InputError
+from profilefit.measured.photo.exposure import Exposure
+
+Floats = NDArray[np.float64]
+Plane = NDArray[np.float32]
+FULL = 0.9  # of the range between black and white, from where a pixel counts as clipped
+REACH = 2  # pixels of a plane about a clipped one that are left out, too
+SHARED = 5  # pixels across, over which light is shared for the weights
+DIM = 0.02  # of the range, from where a pixel says something of ratios
+LEAST_PAIRS = 50  # pixels, for a ratio or a bin
+BINS = 24  # of light, for photon transfer
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """gain [electrons a step], read noise [steps]; each with its standard error where the bracket tells."""
+
+    gain: float
+    read: float
+
+
+@dataclass(frozen=True)
+class Picture:
+    """One Bayer plane of a bracket: light [steps a unit of time] and its variance, nan where no exposure has it.
+
+    offset  (row, column) of the plane's first pixel in the whole picture, step between its pixels
+    """
+
+    light: Plane
+    variance: Plane
+    offset: tuple[int, int]
+    step: int
+
+
+def times(shots: Sequence[Exposure]) -> Floats:
+    """Of each exposure relative to the last, from what they record; InputError where neighbours share no pixels."""
+    order = np.argsort([one.seconds or float(np.mean(one.planes[0].counts)) for one in shots])
+    found = np.ones(len(shots))
+    for shorter, longer in zip(order[-2::-1], order[:0:-1], strict=True):
+        found[shorter] = found[longer] * _ratio(shots[shorter], shots[longer])
+    return found
+
+
+def _ratio(shorter: Exposure, longer: Exposure) -> float:
+    """Of two exposures' times, the shorter one's first."""
+    above = below = pairs = 0.0
+    for one, other in zip(shorter.planes, longer.planes, strict=True):
+        good = (other.counts < FULL * other.range) & (other.counts > DIM * other.range)
+        above += float(one.counts[good].sum(dtype=float))
+        below += float(other.counts[good].sum(dtype=float))
+        pairs += int(good.sum())
+    if pairs < LEAST_PAIRS or not 0 < above < below:
+        raise InputError(
+            f"{shorter.source}: expected a scene that {longer.source} shares with it, neither dark nor clipped, in "
+            f"{LEAST_PAIRS} pixels, got {pairs:.0f}; take exposures in steps of a factor of eight or less"
+        )
+    return above / below
+
+
+def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
+    """Photon transfer: the variance of y_a - (t_a / t_b) y_b over bins of light, against what electrons would have."""
+    rows, squares, weights = [], [], []
+    order = np.argsort(relative)
+    for a, b in pairwise(order):
+        ratio = relative[a] / relative[b]
+        for one, other in zip(shots[a].planes, shots[b].planes, strict=True):
+            good = (other.counts < FULL * other.range) & (other.counts > 0)
+            light, off = other.counts[good], one.counts[good] - ratio * other.counts[good]
+            edges = np.unique(np.quantile(light, np.linspace(0.0, 1.0, BINS + 1)))
+            at = np.clip(np.searchsorted(edges, light, side="right") - 1, 0, edges.size - 2)
+            for each in range(edges.size - 1):
+                inside = off[at == each]
+                if inside.size < LEAST_PAIRS:
+                    continue
+                middle = float(light[at == each].mean())
+                rows.append((ratio * middle + ratio**2 * middle, 1.0 + ratio**2))
+                squares.append(float(np.mean((inside - inside.mean()) ** 2)))
+                weights.append(np.sqrt(inside.size) / squares[-1])
+    if len(rows) < 2:
+        return Sensor(1.0, 1.0)
+    matrix, weight = np.array(rows), np.array(weights)
+    found, *_ = np.linalg.lstsq(matrix * weight[:, None], np.array(squares) * weight, rcond=None)
+    return Sensor(1.0 / max(float(found[0]), 1e-9), float(np.sqrt(max(found[1], 1.0 / 12.0))))
+
+
+def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Picture]:
+    """The planes of a bracket, light in steps of the longest exposure."""
+    pictures = []
+    for at, plane in enumerate(shots[0].planes):
+        total = np.zeros(plane.counts.shape, np.float32)
+        precision = np.zeros(plane.counts.shape, np.float32)
+        light = _rough(shots, relative, at)
+        for shot, time in zip(shots, relative, strict=True):
+            one = shot.planes[at]
+            good = ~binary_dilation(one.counts >= FULL * one.range, iterations=REACH)
+            variance = np.maximum(light * time, 0.0) / own.gain + own.read**2
+            weight = np.where(good, time**2 / variance, 0.0).astype(np.float32)
+            total += weight * one.counts / np.float32(time)
+            precision += weight
+        with np.errstate(divide="ignore", invalid="ignore"):
+            pictures.append(Picture(total / precision, 1.0 / precision, plane.offset, plane.step))
+    return pictures
+
+
+def _rough(shots: Sequence[Exposure], relative: Floats, at: int) -> Plane:
+    """Light that neighbouring pixels share, of the longest exposure that has it."""
+    found: Plane = np.full(shots[0].planes[at].counts.shape, np.nan, np.float32)
+    for shot, time in sorted(zip(shots, relative, strict=True), key=lambda pair: pair[1]):
+        one = shot.planes[at]
+        good = ~binary_dilation(one.counts >= FULL * one.range, iterations=REACH + SHARED // 2)
+        smooth = uniform_filter(one.counts, SHARED, mode="nearest") / np.float32(time)
+        found = np.where(good | np.isnan(found), smooth, found)
+    return found
+
+
+def by_channel(pictures: Sequence[Picture], names: Sequence[str]) -> Mapping[str, list[Picture]]:
+    """The planes of each colour."""
+    found: dict[str, list[Picture]] = {}
+    for one, name in zip(pictures, names, strict=True):
+        found.setdefault(name, []).append(one)
+    return found

@@ -1,0 +1,175 @@
+"""One photograph as the sensor counted: Bayer planes apart, black taken off, nothing interpolated, no curve.
+
+Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG is not, is
+taken for sRGB, and the answer says so. What is read is bounded before it is read.
+"""
+
+from __future__ import annotations
+
+import importlib
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from profilefit.errors import InputError
+
+Plane = NDArray[np.float32]
+RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
+TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
+MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
+COLOURS = ("red", "green", "blue")
+PACKAGES = {"cv2": "opencv-python-headless", "OpenEXR": "OpenEXR", "rawpy": "rawpy", "tifffile": "tifffile"}
+
+
+@dataclass(frozen=True, eq=False)
+class BayerPlane:
+    """Counts above black (rows, columns) of one filter's pixels; range is white less black.
+
+    offset  (row, column) of the first one in the whole picture; step from one to the next
+    """
+
+    colour: str
+    counts: Plane
+    range: float
+    offset: tuple[int, int]
+    step: int
+
+
+@dataclass(frozen=True, eq=False)
+class Exposure:
+    """A photograph. seconds is None where the file does not state them; sides are columns and rows of the whole."""
+
+    source: str
+    planes: tuple[BayerPlane, ...]
+    sides: tuple[int, int]
+    seconds: float | None
+    linear: bool
+
+
+def read(path: Path) -> Exposure:
+    """InputError, in one line, of what is no photograph that can be measured."""
+    kind = path.suffix.lower()
+    if kind not in (*RAW, *TIFF, *EXR, *JPEG):
+        accepted = f"a raw file ({', '.join(RAW[:4])} ...), a TIFF, an EXR or a JPEG"
+        raise InputError(f"{path}: expected {accepted}, got {kind or 'no suffix'!r}")
+    try:
+        size = path.stat().st_size
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror}") from None
+    if not 0 < size <= MOST_BYTES:
+        raise InputError(f"{path}: expected a photograph of 1 byte to {MOST_BYTES >> 20} MiB, got {size} bytes")
+    return _raw(path) if kind in RAW else _plain(path, kind)
+
+
+def _raw(path: Path) -> Exposure:
+    rawpy = library("rawpy")
+    try:
+        with rawpy.imread(str(path)) as raw:
+            _require_size(path, raw.sizes.width, raw.sizes.height)
+            if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
+                raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
+            counts, pattern = raw.raw_image_visible, raw.raw_pattern
+            names = {"R": "red", "G": "green", "B": "blue"}
+            colours = [names.get(chr(code), "") for code in raw.color_desc]
+            black, white, seconds = raw.black_level_per_channel, raw.white_level, float(raw.other.shutter_speed)
+            planes = []
+            for row in (0, 1):
+                for column in (0, 1):
+                    which = int(pattern[row, column])
+                    level = float(black[which])
+                    plane = counts[row::2, column::2].astype(np.float32) - np.float32(level)
+                    planes.append(BayerPlane(colours[which], plane, float(white) - level, (row, column), 2))
+            sides = counts.shape[1], counts.shape[0]
+    except rawpy.LibRawError as error:
+        raise InputError(f"{path}: cannot be read as a raw file: {_first_line(error)}") from None
+    return Exposure(str(path), tuple(_even(planes)), sides, seconds or None, True)
+
+
+def _even(planes: list[BayerPlane]) -> list[BayerPlane]:
+    """All of as many pixels."""
+    rows, columns = np.min([one.counts.shape for one in planes], axis=0)
+    return [BayerPlane(one.colour, one.counts[:rows, :columns], one.range, one.offset, one.step) for one in planes]
+
+
+def _plain(path: Path, kind: str) -> Exposure:
+    """A picture of one or three values a pixel."""
+    values = _decoded(path, kind)
+    values = values[..., None] if values.ndim == 2 else values
+    if values.ndim != 3 or values.shape[2] not in (1, 3):
+        raise InputError(f"{path}: expected one or three values a pixel, got an array of shape {values.shape}")
+    if kind in JPEG and values.dtype == np.uint8:
+        counts, most = _decode_srgb(values.astype(np.float32) / 255.0), 1.0
+    elif kind in TIFF and values.dtype == np.uint16:
+        counts, most = values.astype(np.float32), 65535.0
+    elif values.dtype in (np.float32, np.float16):
+        counts = values.astype(np.float32)
+        if not np.all(np.isfinite(counts)):
+            raise InputError(f"{path}: expected finite numbers, got others")
+        most = float(counts.max())
+    else:
+        raise InputError(
+            f"{path}: expected linear values, 16 bits or floats each, got {values.dtype} of an unknown curve"
+        )
+    names = COLOURS if values.shape[2] == 3 else ("grey",)
+    planes = tuple(BayerPlane(name, counts[..., at], most, (0, 0), 1) for at, name in enumerate(names))
+    return Exposure(str(path), planes, (values.shape[1], values.shape[0]), None, kind not in JPEG)
+
+
+def _decoded(path: Path, kind: str) -> NDArray[Any]:
+    if kind in TIFF:
+        tifffile = library("tifffile")
+        try:
+            with tifffile.TiffFile(path) as file:
+                page = file.pages[0]
+                _require_size(path, int(page.imagewidth), int(page.imagelength))
+                return np.asarray(page.asarray())
+        except (tifffile.TiffFileError, ValueError, OSError) as error:
+            raise InputError(f"{path}: cannot be read as a TIFF: {_first_line(error)}") from None
+    if kind in EXR:
+        exr = library("OpenEXR")
+        try:
+            (left, top), (right, bottom) = exr.File(str(path), header_only=True).header()["dataWindow"]
+            _require_size(path, int(right - left) + 1, int(bottom - top) + 1)
+            channels = exr.File(str(path)).channels()
+            return np.asarray(next(iter(channels.values())).pixels)
+        except (RuntimeError, ValueError, KeyError, StopIteration) as error:
+            raise InputError(f"{path}: cannot be read as an EXR: {_first_line(error)}") from None
+    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MOST_PIXELS))
+    cv2 = library("cv2")
+    try:
+        found = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    except cv2.error as error:
+        raise InputError(f"{path}: cannot be read: {_first_line(error)}") from None
+    if found is None:
+        raise InputError(f"{path}: cannot be read as a picture: is it truncated?")
+    return np.asarray(found[..., ::-1])
+
+
+def _decode_srgb(value: Plane) -> Plane:
+    found: Plane = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    return found
+
+
+def _require_size(path: Path, columns: int, rows: int) -> None:
+    if columns * rows > MOST_PIXELS:
+        raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got {columns} x {rows}")
+
+
+def library(name: str) -> Any:
+    """One that not every installation has, or an InputError that says how to install it."""
+    try:
+        return importlib.import_module(name)
+    except ImportError:
+        package = PACKAGES[name]
+        raise InputError(f"this photograph needs the package {package}: pip install {package}") from None
+
+
+def _first_line(error: Exception) -> str:
+    text = str(error.args[0] if error.args else error)
+    if isinstance(error.args[0] if error.args else None, bytes):
+        text = error.args[0].decode("utf-8", "replace")
+    return (text.splitlines() or [type(error).__name__])[0][:100]

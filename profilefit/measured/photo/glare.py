@@ -1,0 +1,68 @@
+"""What beam and lens make of a point of light, and rings of a medium seen so.
+
+A point is spread over a core, a Gaussian of standard deviation sigma (the beam, its 1/e^2 radius being 2 sigma, and
+what a lens blurs), and over halos, h_a(r) = a / (2 pi (r^2 + a^2)^{3/2}), whose transform is e^{-ka}: glare of any
+shape that falls outwards is near some mixture of them. Of light of profile R_d under a beam of power one, and a share S
+of it that never enters the medium but is scattered by its surface, a picture shows
+
+    I = k sum_c share_c (R_d + S delta) * spread_c + dark,     sum_c share_c = 1,
+
+as means over rings. The mean of h_a over a circle of radius rho, at a distance d from its centre, is
+a E(m) / (pi^2 (A - B) sqrt(A + B)), A = d^2 + rho^2 + a^2, B = 2 d rho, m = 2 B / (A + B), E the complete elliptic
+integral.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+from scipy.special import ellipe
+
+from profilefit.measured.beam import Floats, Gaussian
+from profilefit.measured.instrument import RING, Instrument
+
+FARTHER = 5.0  # of the last ring, from where halos still bring light
+
+
+def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+    """Radii rho (m,) and weights (1 + halos, n, m) of 2 pi rho R_d(rho) in the mean over each ring, by spread."""
+    rings = inner.tobytes(), outer.tobytes()
+    rho, core = _core(sigma, *rings)
+    return rho, np.concatenate([core[None], _halos(tuple(halos), *rings)])
+
+
+@lru_cache(maxsize=4)
+def _core(sigma: float, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
+    ends = np.frombuffer(inner), np.frombuffer(outer)
+    return Instrument(Gaussian(2.0 * sigma)).nodes(*ends, farthest=FARTHER * float(ends[1][-1]))
+
+
+@lru_cache(maxsize=8)
+def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> Floats:
+    rho, _ = _core(float(np.frombuffer(outer)[0]), inner, outer)  # radii are those of any core
+    steps = np.gradient(rho)  # even in a smooth function of rho, so this sum is a trapezoidal one
+    d, share = _over_rings(np.frombuffer(inner), np.frombuffer(outer))
+    return np.stack([np.einsum("q,nqm->nm", share, halo(a, d[..., None], rho)) * steps for a in halos])
+
+
+def ring_means(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Floats:
+    """Each spread's own mean over rings (1 + halos, n) [1/area]."""
+    areas = np.pi * (outer - inner) * (outer + inner)
+    core = (np.exp(-0.5 * (inner / sigma) ** 2) - np.exp(-0.5 * (outer / sigma) ** 2)) / areas
+    return np.stack([core, *((a / np.hypot(inner, a) - a / np.hypot(outer, a)) / areas for a in halos)])
+
+
+def halo(a: float, d: Floats, rho: Floats) -> Floats:
+    """Mean of h_a over a circle of radius rho about a point at the distance d."""
+    whole, cross = d * d + rho * rho + a * a, 2.0 * d * rho
+    elliptic = ellipe(2.0 * cross / (whole + cross))
+    found: Floats = a * elliptic / (np.pi**2 * (whole - cross) * np.sqrt(whole + cross))
+    return found
+
+
+def _over_rings(inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+    """Distances (n, q) and shares (q,) of a ring's area."""
+    t, share = 0.5 * (1.0 + RING[0]), 0.5 * RING[1]
+    return np.sqrt(inner[:, None] ** 2 + ((outer - inner) * (outer + inner))[:, None] * t), share

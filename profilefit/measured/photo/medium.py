@@ -1,0 +1,268 @@
+"""The medium behind a spot: exact light under beam, lens and surface, fitted to rings, and to those of cards.
+
+Coordinates: those of `model` (alpha, l*, scale), ln of the core's sigma, the surface's share, the share of each halo,
+the dark level, what a lens darkens; and ln of each card's scale. What is known of them beforehand is normal. A card
+that light does not enter shows beam and lens alone; of a known reflectance, and exposed alike, it gives the scale.
+
+Errors are those of the normal approximation at the best fit; the same of a truth is the Fisher bound of a setup.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import stats
+from scipy.linalg import block_diag, solve_triangular
+from scipy.optimize import least_squares
+
+from mcml_sim.exact.light import ExactLight
+from profilefit.measured import law_error, model
+from profilefit.measured.model import Model, u_of
+from profilefit.measured.photo.glare import ring_means, ring_weights
+from profilefit.measured.photo.rings import SpotRings
+from profilefit.measured.problem import Known
+
+Floats = NDArray[np.float64]
+UNEVEN = 0.01  # relative error in waves along ln r that neither sectors nor brackets show
+STEP = 1e-4  # of ln sigma, for derivatives
+ALBEDOS = (0.5, 0.8, 0.95, 0.99)
+LENGTHS = (0.02, 0.05, 0.12, 0.3)  # of the last ring's radius
+MAX_STEPS = 200
+
+
+@dataclass(frozen=True)
+class Beliefs:
+    """What is known beforehand, as values with errors; lengths in the unit of the rings. None: nothing.
+
+    beam     1/e^2 radius that beam and lens make together; surface and glare shares of light
+    scale    of the counts, per light that falls on the medium
+    corner   share of light that a lens loses at `border`, growing as r^2
+    halos    widths of the halos that glare is a mixture of
+    """
+
+    beam: Known | None = None
+    surface: Known = field(default_factory=lambda: Known(0.01, 0.01))
+    glare: Known = field(default_factory=lambda: Known(0.02, 0.02))
+    scale: Known | None = None
+    corner: Known = field(default_factory=lambda: Known(0.05, 0.05))
+    border: float = 20.0
+    halos: tuple[float, ...] = (1.0, 4.0, 16.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Card:
+    """Rings of a card; reflectance is None where it is not known, or where the card was not exposed as the medium."""
+
+    rings: SpotRings
+    reflectance: Known | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Shot:
+    """What is fitted: rings of the medium, and of cards."""
+
+    medium: SpotRings
+    cards: tuple[Card, ...]
+    light: ExactLight
+    beliefs: Beliefs
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Of the coordinates."""
+        halos = tuple(f"glare {a:g}" for a in self.beliefs.halos)
+        own = ("alpha", "l", "scale", "core", "surface", *halos, "dark", "corner")
+        return own + tuple(f"card {at + 1}" for at in range(len(self.cards)))
+
+    @property
+    def size(self) -> float:
+        """Of the counts: what ln's and shares leave as the largest number."""
+        return float(np.max(self.medium.value))
+
+    def rows(self, x: Floats) -> tuple[Floats, Floats]:
+        """Light of all rings (n,), and its derivatives (n, p)."""
+        halos = len(self.beliefs.halos)
+        sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
+        scale, share, corner = np.exp(x[2]), np.append(1.0 - glare.sum(), glare), x[6 + halos]
+        light, by_medium, own = self._spread(x, sigma)
+        seen = light + surface * own
+        value = scale * share @ seen + dark * self.size
+        slopes = np.zeros((value.size, x.size))
+        slopes[:, :2] = scale * np.einsum("c,cnp->np", share, by_medium)
+        slopes[:, 2] = scale * share @ seen
+        moved, _, further = self._spread(x, sigma * np.exp(STEP))
+        slopes[:, 3] = scale * share @ (moved + surface * further - seen) / STEP
+        slopes[:, 4] = scale * share @ own
+        slopes[:, 5 : 5 + halos] = scale * (seen[1:] - seen[0]).T
+        slopes[:, 5 + halos] = self.size
+        of_medium = self._darkened(self.medium, value, slopes, corner)
+        values, each = [of_medium[0]], [of_medium[1]]
+        for at, card in enumerate(self.cards, start=7 + halos):
+            rings, scale = card.rings, np.exp(x[at])
+            alone, wider = (ring_means(s, self.beliefs.halos, rings.inner, rings.outer)
+                            for s in (sigma, sigma * np.exp(STEP)))  # fmt: skip
+            bright, slopes = scale * share @ alone, np.zeros((rings.value.size, x.size))
+            slopes[:, 3] = scale * share @ (wider - alone) / STEP
+            slopes[:, 5 : 5 + halos] = scale * (alone[1:] - alone[0]).T
+            slopes[:, at] = bright
+            bright, slopes = self._darkened(rings, bright, slopes, corner)
+            values.append(bright)
+            each.append(slopes)
+        return np.concatenate(values), np.vstack(each)
+
+    def _darkened(self, rings: SpotRings, value: Floats, slopes: Floats, corner: float) -> tuple[Floats, Floats]:
+        """As a lens darkens it outwards."""
+        outwards = (rings.r / self.beliefs.border) ** 2
+        slopes = slopes * (1.0 - corner * outwards)[:, None]
+        slopes[:, 6 + len(self.beliefs.halos)] = -value * outwards
+        return value * (1.0 - corner * outwards), slopes
+
+    def _spread(self, x: Floats, sigma: float) -> tuple[Floats, Floats, Floats]:
+        """By spread: light (c, n) of the medium, its derivatives (c, n, 2), and the spread's own means (c, n)."""
+        halos, rings = self.beliefs.halos, self.medium
+        rho, weights = ring_weights(sigma, halos, rings.inner, rings.outer)
+        shape = weights.shape[:2]
+        point = np.array([x[0], x[1], 0.0])
+        light, slopes = Model(self.light).weighed(point, rho, weights.reshape(-1, rho.size))
+        return (
+            light.reshape(shape),
+            slopes[:, :2].reshape(*shape, 2),
+            ring_means(sigma, halos, rings.inner, rings.outer),
+        )
+
+    @cached_property
+    def prior(self) -> tuple[Floats, Floats]:
+        """Means and standard deviations of the coordinates; infinite of what nothing is known of."""
+        given, halos = self.beliefs, len(self.beliefs.halos)
+        mean, error = np.zeros(len(self.names)), np.full(len(self.names), np.inf)
+        if given.scale is not None:
+            mean[2], error[2] = np.log(given.scale.value), given.scale.error / given.scale.value
+        if given.beam is not None:
+            mean[3], error[3] = np.log(0.5 * given.beam.value), given.beam.error / given.beam.value
+        mean[4], error[4] = given.surface.value, given.surface.error
+        mean[5 : 5 + halos], error[5 : 5 + halos] = given.glare.value / halos, given.glare.error
+        error[5 + halos] = 1e-5
+        mean[6 + halos], error[6 + halos] = given.corner.value, given.corner.error
+        return mean, error
+
+    @cached_property
+    def whitening(self) -> Floats:
+        """Lower root of the rows' covariance."""
+        blocks = [self._covariance(one) for one in (self.medium, *(card.rings for card in self.cards))]
+        found: Floats = np.linalg.cholesky(block_diag(*blocks))
+        return found
+
+    def _covariance(self, one: SpotRings) -> Floats:
+        size = UNEVEN * one.value
+        smooth = law_error.waves(one.r) * np.outer(size, size)
+        return one.covariance + smooth + np.diag((1e-4 * one.value) ** 2 + (1e-9 * self.size) ** 2)
+
+    def residuals(self, x: Floats) -> tuple[Floats, Floats]:
+        """In standard errors (m,), those of what is known beforehand last, and their derivatives (m, p)."""
+        value, slopes = self.rows(x)
+        data = np.concatenate([self.medium.value, *(card.rings.value for card in self.cards)])
+        mean, error = self.prior
+        known = np.isfinite(error)
+        rows = solve_triangular(self.whitening, np.column_stack([value - data, slopes]), lower=True)
+        off, ways = ((x - mean) / error)[known], np.diag(1.0 / error)[known]
+        glare, each = self.beliefs.glare, np.zeros(x.size)
+        each[5 : 5 + len(self.beliefs.halos)] = 1.0 / glare.error  # one halo may have it all
+        off, ways = np.append(off, each @ x - glare.value / glare.error), np.vstack([ways, each])
+        for at, card in enumerate(self.cards, start=x.size - len(self.cards)):
+            if (known_as := card.reflectance) is not None:
+                relative = known_as.error / known_as.value
+                off = np.append(off, (x[at] - x[2] - np.log(known_as.value)) / relative)
+                ways = np.vstack([ways, (np.eye(x.size)[at] - np.eye(x.size)[2]) / relative])
+        return np.append(rows[:, 0], off), np.vstack([rows[:, 1:], ways])
+
+    def start(self) -> Floats:
+        """The best of a coarse search in albedo and length."""
+        halos = len(self.beliefs.halos)
+        mean, _ = self.prior
+        x = mean.copy()
+        if self.beliefs.beam is None:
+            near = self.cards[0].rings if self.cards else self.medium
+            half = near.r[int(np.argmax(near.value < 0.5 * near.value[0]))]
+            x[3] = np.log(half / 1.18)
+        for at, card in enumerate(self.cards, start=x.size - len(self.cards)):
+            first = ring_means(float(np.exp(x[3])), (), card.rings.inner[:1], card.rings.outer[:1])
+            x[at] = np.log(card.rings.value[0] / first[0, 0])
+        found = []
+        last = float(self.medium.outer[-1])
+        for alpha in ALBEDOS:
+            for share in LENGTHS:
+                x[:2] = u_of(alpha), np.log(share * last)
+                if self.beliefs.scale is None:
+                    x[2] = 0.0
+                    light = self.rows(x)[0][: self.medium.value.size] - x[5 + halos] * self.size
+                    x[2] = float(np.median(np.log(np.maximum(self.medium.value, 1e-12 * self.size) / light)))
+                found.append((float(np.sum(self.residuals(x)[0] ** 2)), x.copy()))
+        return min(found, key=lambda one: one[0])[1]
+
+
+@dataclass(frozen=True, eq=False)
+class PhotoFit:
+    """Where it ended: coordinates (p,) and their covariance (p, p); chi-square, and its degrees of freedom."""
+
+    shot: Shot
+    x: Floats
+    covariance: Floats
+    chi2: float
+    freedom: int
+    converged: bool
+
+    @property
+    def chance(self) -> float:
+        """p-value of chi-square."""
+        return float(stats.chi2.sf(self.chi2, self.freedom))
+
+    @cached_property
+    def values(self) -> dict[str, float]:
+        """alpha, l, mu_s', mu_a, scale."""
+        found = model.quantities(self.x[None, :3], np.full(1, np.nan))
+        return {name: float(value[0]) for name, value in found.items() if name != "A"}
+
+    @cached_property
+    def errors(self) -> dict[str, float]:
+        """Standard errors of the values."""
+        gradients = model.slopes(self.x[:3], np.zeros(3))
+        return {name: model.errors(gradients, self.covariance[:3, :3])[name] for name in self.values}
+
+
+def fitted(shot: Shot) -> PhotoFit:
+    """The least squares fit of a shot."""
+    start = shot.start()
+    seen: dict[bytes, tuple[Floats, Floats]] = {}
+
+    def at(x: Floats) -> tuple[Floats, Floats]:
+        if (key := x.tobytes()) not in seen:
+            seen.clear()
+            seen[key] = shot.residuals(x)
+        return seen[key]
+
+    low = np.full(start.size, -np.inf)
+    low[0], low[4 : 5 + len(shot.beliefs.halos)] = -12.0, 0.0
+    high = np.full(start.size, np.inf)
+    high[0] = 12.0
+    done = least_squares(
+        lambda x: at(x)[0], np.clip(start, low + 1e-6, high), lambda x: at(x)[1], bounds=(low, high), x_scale="jac",
+        max_nfev=MAX_STEPS,
+    )  # fmt: skip
+    rows, slopes = at(done.x)
+    free = len(rows) - start.size
+    return PhotoFit(shot, done.x, bound(slopes), float(rows @ rows), free, done.status > 0)
+
+
+def bound(slopes: Floats) -> Floats:
+    """Covariance (p, p) of the coordinates from derivatives (m, p) in standard errors: at a truth, Fisher's bound."""
+    return np.asarray(np.linalg.pinv(slopes.T @ slopes), float)
+
+
+def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:
+    """Relative errors of mu_s' and mu_a that no unbiased estimate from such rings undercuts."""
+    covariance = bound(truth.residuals(x)[1])
+    one = PhotoFit(truth, x, covariance, 0.0, 1, True)
+    return {name: one.errors[name] / one.values[name] for name in ("mu_s'", "mu_a")}

@@ -1,0 +1,221 @@
+"""A setup for photographs that are simulated: its file, its photographs as raw files, and what they could tell.
+
+[medium]                          # by colour: red, green, blue
+mu_s = [1.2, 1.0, 0.8]            # reduced, 1/mm
+mu_a = [0.02, 0.05, 0.1]          # 1/mm
+n = 1.4
+g = 0.8
+[optics]                          # lengths in mm, shares of the light
+beam = 0.5
+surface = 0.01
+glare = 0.02
+[camera]
+sides = [1200, 900]
+pitch = 0.04                      # mm a pixel
+exposures = 5                     # a factor of four apart
+[cards]
+white = true
+grey = 0.18
+"""
+
+from __future__ import annotations
+
+import io
+import tomllib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from mcml_sim.exact.half_space import require_solved
+from mcml_sim.files.whole_file import read_whole, write_whole
+from mcml_sim.media.checks import is_number
+from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
+from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import u_of
+from profilefit.measured.photo import medium, simulated
+from profilefit.measured.photo.exposure import library
+from profilefit.measured.photo.medium import Beliefs, Card, Shot
+from profilefit.measured.photo.rings import SpotRings, edges_of
+from profilefit.measured.photo.simulated import CHANNELS, SpotCamera, SpotOptics, Taken
+from profilefit.measured.problem import Known
+from profilefit.recipes.toml_tables import Table, Tables
+
+Floats = NDArray[np.float64]
+KEYS = {
+    "": ("medium", "optics", "camera", "cards"),
+    "medium": ("mu_s", "mu_a", "n", "g"),
+    "optics": ("beam", "core", "surface", "glare", "width", "falling"),
+    "camera": ("sides", "pitch", "gain", "read", "bits", "black", "well", "uneven", "corner", "tilt", "speckle",
+               "grain", "exposures", "late", "seed"),
+    "cards": ("white", "grey"),
+}  # fmt: skip
+MAX_BYTES, MOST_SIDE = 1 << 16, 12_000
+MOST = 1e6  # 1/mm
+STEP = 4.0  # from one exposure to the next
+FULL = 0.5  # of the sensor's range, that the shortest one reaches
+CFA = {"red": 0, "green": 1, "blue": 2}
+GREY_ERROR, BEAM_ERROR = 0.03, 0.1  # relative, of what is told
+SCATTER = 0.003  # of a ring, by speckle and noise
+
+
+@dataclass(frozen=True)
+class Setup:
+    """What is photographed, and how. late is the relative error of stated times; white says whether there is such a
+    card, grey the reflectance of the other, if there is one."""
+
+    mu_s: tuple[float, float, float]
+    mu_a: tuple[float, float, float]
+    setting: Setting
+    optics: SpotOptics
+    camera: SpotCamera
+    exposures: int
+    late: float
+    seed: int
+    white: bool
+    grey: float | None
+
+
+def read_setup(path: Path) -> Setup:
+    """InputError, in one line, of what is no setup."""
+    content = read_whole(path, MAX_BYTES)
+    try:
+        tables = tomllib.loads(content.decode("utf-8"))
+    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise InputError(f"{path} is not TOML: {error}") from None
+    read = Tables(str(path), KEYS)
+    read.known("", tables, KEYS[""])
+    of, lens, camera, cards = (read.table(tables, name, {} if name != "medium" else None) for name in KEYS[""])
+    own = SpotCamera()
+    numbers: dict[str, Any] = {
+        name: read.number("camera", name, camera, getattr(own, name))
+        for name in ("pitch", "gain", "read", "well", "uneven", "corner", "speckle", "grain")
+    }
+    shown = replace(
+        own, **numbers,
+        sides=read.sides("camera", "sides", camera, (1200, 900), MOST_SIDE),
+        bits=read.whole("camera", "bits", camera, own.bits, 8, 14),
+        black=read.whole("camera", "black", camera, own.black, 0, 4000),
+        tilt=_within(read, "camera", "tilt", camera, 0.0, -60.0, 60.0),
+    )  # fmt: skip
+    optics = SpotOptics(
+        **{name: read.number("optics", name, lens, getattr(SpotOptics(), name)) for name in KEYS["optics"]}
+    )
+    setting = Setting(n=read.number("medium", "n", of, 1.4), g=_within(read, "medium", "g", of, 0.8, 0.0, 1.0))
+    read.made("medium", lambda: require_solved(setting))
+    return Setup(
+        read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST),
+        read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST),
+        setting, optics, shown,
+        read.whole("camera", "exposures", camera, 5, 1, 12),
+        read.number("camera", "late", camera, 0.02, 1.0),
+        read.whole("camera", "seed", camera, 0, 0, 2**31 - 1),
+        cards.get("white", False) is True,
+        read.number("cards", "grey", cards, most=1.0) if "grey" in cards else None,
+    )  # fmt: skip
+
+
+def _within(read: Tables, where: str, key: str, table: Table, default: float, least: float, most: float) -> float:
+    value = table.get(key, default)
+    if not is_number(value) or not least <= value <= most:
+        raise read.bad(where, key, f"a number in {least:g} ... {most:g}", value)
+    return float(value)
+
+
+def brackets(setup: Setup) -> dict[str, list[Taken]]:
+    """Exposures of the spot, and of the cards that there are, by what they show."""
+    far = 1.2 * setup.camera.pitch * float(np.hypot(*setup.camera.sides))
+    radii = simulated.radii(far, setup.optics)
+    spot = {
+        colour: (radii, simulated.light(mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.setting, setup.optics, radii))
+        for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
+    }
+    card = simulated.card(setup.optics, radii)
+    scenes = {"spot": spot}
+    if setup.white:
+        scenes["card"] = dict.fromkeys(CHANNELS, (radii, 0.9 * card))
+    if setup.grey is not None:
+        scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.grey * card))
+    rng = np.random.default_rng(setup.seed)
+    found = {}
+    for name, radial in scenes.items():
+        brightest = max(float(light[0]) for _, light in radial.values())
+        first = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black) / brightest
+        stated = [first * STEP**at for at in range(setup.exposures)]
+        times = {one: one * (1.0 + setup.late * rng.standard_normal()) for one in stated}
+        found[name] = simulated.taken(radial, setup.camera, 1.0, times, int(rng.integers(2**31)))
+    return found
+
+
+def written(setup: Setup, out: Path) -> list[Path]:
+    """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are."""
+    files = []
+    for name, bracket in brackets(setup).items():
+        for at, one in enumerate(bracket, start=1):
+            files.append(out / f"{name}-{at}.dng")
+            write_whole(files[-1], as_dng(one))
+    return files
+
+
+def as_dng(one: Taken) -> bytes:
+    """A raw file of Adobe's format."""
+    tifffile = library("tifffile")
+    codes = tuple(CFA[colour] for row in one.pattern for colour in row)
+    identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
+    tags: list[tuple[int, str, int, Any, bool]] = [
+        (50706, "B", 4, (1, 4, 0, 0), True), (50707, "B", 4, (1, 1, 0, 0), True),  # versions
+        (50708, "s", 0, "profilefit", True), (271, "s", 0, "profilefit", True), (272, "s", 0, "simulated", True),
+        (33421, "H", 2, (2, 2), True), (33422, "B", 4, codes, True),  # the pattern
+        (50713, "H", 2, (2, 2), True), (50714, "H", 4, (one.black,) * 4, True), (50717, "I", 1, one.white, True),
+        (50721, "2i", 9, identity, True), (50778, "H", 1, 21, True), (50728, "2I", 3, (1, 1, 1, 1, 1, 1), True),
+        (33434, "2I", 1, _ratio(one.seconds), True),
+    ]  # fmt: skip
+    file = io.BytesIO()
+    tifffile.imwrite(
+        file, one.counts, photometric=32803, compression=None, metadata=None, extratags=tags, subfiletype=0,
+        rowsperstrip=one.counts.shape[0],
+    )  # fmt: skip
+    return file.getvalue()
+
+
+def _ratio(seconds: float) -> tuple[int, int]:
+    below = 10 ** int(np.clip(9 - np.ceil(np.log10(max(seconds, 1e-9))), 0, 9))
+    return round(seconds * below), below
+
+
+def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+    """Errors of mu_s' and mu_a that no fit undercuts, by colour: without cards, with either, with both."""
+    grey = setup.grey or 0.18
+    known = Known(grey, GREY_ERROR * grey)
+    of: dict[str, tuple[Known | None, ...]]
+    of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
+    return {
+        label: {
+            colour: _told(setup, mu_s, mu_a, cards)
+            for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
+        }
+        for label, cards in of.items()
+    }
+
+
+def _told(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
+    pixel, core = setup.camera.pitch, setup.optics.sigma
+    edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
+    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
+    beliefs = Beliefs(
+        beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core), border=0.5 * pixel * float(np.hypot(*setup.camera.sides))
+    )
+    shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.setting), beliefs)
+    x = shot.prior[0].copy()
+    x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)
+    x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
+    seen = [
+        replace(blank, value=one, covariance=np.diag((SCATTER * one) ** 2))
+        for one in np.split(shot.rows(x)[0], 1 + len(cards))
+    ]
+    shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
+    return dict(medium.fisher(replace(shot, medium=seen[0], cards=shown), x))

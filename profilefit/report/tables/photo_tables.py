@@ -1,0 +1,114 @@
+"""What photographs of a spot tell, as tables, as sentences, and as JSON content."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+from rich.console import RenderableType
+
+from profilefit.measured.misfit import DETECTED
+from profilefit.measured.photo.workflow import Photo
+from profilefit.recipes import record
+from profilefit.report.tables.cells import column_table, interval, significant, to_error
+from profilefit.report.tables.fit_tables import p_value
+
+NAMES = ("mu_s'", "mu_a", "alpha", "l")
+UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm"}
+REMEDY = "photograph cards, or expose longer"
+CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
+LOOSE = 0.5  # relative error beyond which a quantity is not identified
+
+
+def photo_tables(found: Photo) -> list[RenderableType]:
+    """A line a colour and quantity, with what such photographs can know at best."""
+    columns: dict[str, list[str]] = {name: [] for name in ("colour", "", "value", "±", "95 %", "at best", "unit")}
+    for colour, fit in found.fits.items():
+        for name in NAMES:
+            value, error = fit.values[name], fit.errors[name]
+            ends = value * np.exp(1.96 * error / value * np.array([-1.0, 1.0]))
+            best = found.bounds[colour].get(name)
+            cells = (
+                colour if name == NAMES[0] else "", name, to_error(value, error), significant(error),
+                interval((float(ends[0]), float(ends[1]))), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+            )  # fmt: skip
+            for column, cell in zip(columns.values(), cells, strict=True):
+                column.append(cell)
+    title = f"{found.shot.sources[0]}: {len(found.shot.sources)} exposures, exact light, {found.setting}"
+    caption = (
+        "±: from the scatter over sectors, a correlated 1 %, and what is known of beam, surface, glare and scale; "
+        "at best: the error that no fit of such rings undercuts"
+    )
+    return [column_table(title, columns, caption, left=("colour", "", "unit"))]
+
+
+def photo_lines(found: Photo) -> Iterator[str]:
+    """A sentence each on sensor, spot, what surface and lens add, the goodness of fit, and what is not identified."""
+    shot = found.shot
+    yield f"scale: {found.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
+    yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
+    if len(shot.times) > 1:
+        yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times))
+    yield from found.notes
+    for colour, fit in found.fits.items():
+        x = dict(zip(fit.shot.names, fit.x, strict=True))
+        glare = sum(value for name, value in x.items() if name.startswith("glare"))
+        told = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
+        verdict = "MISFIT" if fit.chance < DETECTED else "no misfit is detected"
+        yield (
+            f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {told}; chi-square {fit.chi2:.1f} "
+            f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
+        )
+        for name in NAMES[:2]:
+            if not fit.errors[name] < LOOSE * fit.values[name]:
+                yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
+    if not found.cards:
+        yield f"no card was photographed: {CARDS}"
+
+
+def photo_content(found: Photo) -> dict[str, Any]:
+    """Everything, as JSON content."""
+    plain: dict[str, Any] = record.plain(
+        {
+            "shots": found.shot.sources,
+            "times": found.shot.times,
+            "sensor": vars(found.shot.sensor),
+            "spot": vars(found.shot.spot),
+            "scale": {"matrix": found.plate.matrix, "words": found.plate.words},
+            "setting": found.setting,
+            "notes": found.notes,
+            "colours": {
+                colour: {
+                    "values": fit.values,
+                    "errors": fit.errors,
+                    "at_best": found.bounds[colour],
+                    "coordinates": dict(zip(fit.shot.names, fit.x.tolist(), strict=True)),
+                    "chi2": fit.chi2,
+                    "freedom": fit.freedom,
+                    "chance": fit.chance,
+                    "converged": fit.converged,
+                    "inner": fit.shot.medium.inner,
+                    "outer": fit.shot.medium.outer,
+                    "value": fit.shot.medium.value,
+                    "covariance": fit.shot.medium.covariance,
+                }
+                for colour, fit in found.fits.items()
+            },
+            "versions": record.versions(),
+        }
+    )
+    return plain
+
+
+def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[RenderableType]:
+    """What a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
+    columns: dict[str, list[str]] = {"photographs": [], "colour": [], "mu_s'": [], "mu_a": []}
+    for setup, by_colour in bounds.items():
+        for colour, errors in by_colour.items():
+            columns["photographs"].append(setup)
+            columns["colour"].append(colour)
+            for name in NAMES[:2]:
+                columns[name].append(f"{100 * errors[name]:.1f} %")
+    caption = "errors that no fit of such photographs undercuts"
+    return [column_table("At best", columns, caption, left=("photographs", "colour"))]

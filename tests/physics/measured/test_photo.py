@@ -1,0 +1,184 @@
+"""Photographs of a spot: what is simulated by another way, each step against what it must find, and the whole."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks import photo as bench
+from profilefit.errors import InputError
+from profilefit.measured import model
+from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import u_of
+from profilefit.measured.photo import bracket, medium, rings, simulated, spot
+from profilefit.measured.photo.glare import halo, ring_means, ring_weights
+from profilefit.measured.photo.medium import Beliefs, Card, Shot
+from profilefit.measured.photo.pixel_scale import PixelScale
+from profilefit.measured.photo.rings import SpotRings
+from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
+from profilefit.measured.problem import Known
+
+SETTING = bench.SETTING
+OPTICS = SpotOptics()
+ALPHA, LENGTH = 1.0 / 1.05, 1.0 / 1.05  # mu_s' 1, mu_a .05 per mm
+PITCH = 0.06
+SQUARE = PixelScale(np.diag([PITCH, PITCH, 1.0]), "known")
+CAMERA = SpotCamera(sides=(800, 600), pitch=PITCH, centre=(13.3, -7.7), corner=0.0, speckle=0.05)
+
+
+@pytest.fixture(scope="module")
+def light():
+    radii = simulated.radii(bench.FARTHEST, OPTICS)
+    return radii, simulated.light(ALPHA, LENGTH, SETTING, OPTICS, radii)
+
+
+@pytest.fixture(scope="module")
+def shots(light):
+    first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
+    times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step)) for step in range(5)}
+    taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, times, 3)
+    return [bench.as_read(one, str(at)) for at, one in enumerate(taken)], np.array(list(times.values()))
+
+
+def test_a_halos_mean_over_a_circle_is_that_of_points():
+    turn = 2.0 * np.pi * (np.arange(4000) + 0.5) / 4000
+    for d, rho in ((0.0, 1.0), (2.0, 0.5), (3.0, 3.0)):
+        r2 = d * d + rho * rho - 2.0 * d * rho * np.cos(turn)
+        expected = np.mean(4.0 / (2.0 * np.pi * (r2 + 16.0) ** 1.5))
+        assert halo(4.0, np.array(d), np.array(rho)) == pytest.approx(expected, rel=1e-9)
+
+
+def test_light_by_rings_is_that_by_hankels_integrals():
+    """Thin rings from the axis to 30 mm; halos are not blurred by the core, which 12 mm away is worth 5e-4."""
+    r = np.geomspace(0.02, 30.0, 60)
+    inner, outer = r * (1.0 - 1e-3), r * (1.0 + 1e-3)
+    rho, weights = ring_weights(OPTICS.sigma, [OPTICS.width], inner, outer)
+    point = np.array([u_of(ALPHA), np.log(LENGTH), 0.0])
+    seen = model.Model(exact_light(SETTING)).weighed(point, rho, weights.reshape(-1, rho.size))[0].reshape(2, -1)
+    share = np.array([1.0 - OPTICS.glare, OPTICS.glare])
+    own = ring_means(OPTICS.sigma, [OPTICS.width], inner, outer)
+    found = share @ (seen + OPTICS.surface * own)
+    np.testing.assert_allclose(found, simulated.light(ALPHA, LENGTH, SETTING, OPTICS, r), rtol=6e-4)
+    without = (seen + OPTICS.surface * own)[0]
+    assert np.abs(without / found - 1.0).max() > 0.1, "a negative control: no glare"
+
+
+def test_a_brackets_times_gain_and_light_are_those_of_the_camera(shots, light):
+    exposures, real = shots
+    times = bracket.times(exposures)
+    np.testing.assert_allclose(times / times[-1], real / real[-1], rtol=5e-3)
+    own = bracket.sensor(exposures, times)
+    assert own.gain == pytest.approx(CAMERA.gain, rel=0.1)
+    assert own.read == pytest.approx(CAMERA.read / CAMERA.gain, rel=0.25)
+    merged = bracket.merged(exposures, times, own)[0]
+    exact = replace(CAMERA, speckle=0.0, uneven=0.0)
+    row, column = np.indices(merged.light.shape) * 2.0
+    r = PITCH * np.hypot(column - 399.5 - CAMERA.centre[0], row - 299.5 - CAMERA.centre[1])
+    expected = np.interp(r, *light) * real[-1] / exact.gain
+    far = (r > 6.0) & np.isfinite(merged.light)
+    off = (merged.light - expected)[far] / np.sqrt(merged.variance[far] + ((CAMERA.speckle * expected[far]) ** 2))
+    assert abs(off.mean()) < 0.05
+    assert off.std() == pytest.approx(1.0, abs=0.08)
+
+
+def test_a_spots_centre_is_found(shots):
+    exposures, _ = shots
+    times = bracket.times(exposures)
+    greens = bracket.merged(exposures, times, bracket.sensor(exposures, times))[1:3]
+    found = spot.spot(greens, exposures[0].sides, SQUARE, "shot")
+    assert found.centre == pytest.approx((399.5 + 13.3, 299.5 - 7.7), abs=0.5)
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda light: np.zeros_like(light), "a spot of light, got darkness"),
+        (lambda light: np.maximum(light, np.roll(light, 150, axis=1)), "one spot of light, got 2, apart"),
+        (lambda light: np.roll(light, 190, axis=1), "from every border, got"),
+        (lambda light: np.where(light > 0.2 * np.nanmax(light), np.nan, light), "does not clip, got"),
+    ],
+    ids=["dark", "two", "border", "clipped"],
+)
+def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, said):
+    row, column = np.indices((300, 400))
+    r = 2.0 * PITCH * np.hypot(row - 150.0, column - 200.0)
+    picture = change(np.interp(r, *light).astype(np.float32))
+    with pytest.raises(InputError, match=said) as caught:
+        spot.spot([bracket.Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
+    assert "\n" not in str(caught.value)
+
+
+def test_rings_err_as_they_say(light):
+    """Of twelve pictures, the scatter of each ring over its stated error; the mean of the ratios' squares."""
+    squares = []
+    edges = rings.edges_of(15.0, 2 * PITCH)
+    found = []
+    for seed in range(12):
+        (one,) = simulated.taken(
+            dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {1.0: 2000.0 / light[1][0]}, seed
+        )
+        exposure = bench.as_read(one, "one")
+        greens = bracket.merged([exposure], np.ones(1), bracket.Sensor(CAMERA.gain, 0.75))[1:3]
+        found.append(rings.rings(greens, (399.5 + 13.3, 299.5 - 7.7), edges, SQUARE))
+    values = np.array([one.value for one in found])
+    stated = np.mean([np.diag(one.covariance) for one in found], axis=0)
+    squares = values.var(axis=0, ddof=1) / stated
+    assert 0.6 < squares.mean() < 1.5
+
+
+def made(cards=(), **beliefs) -> tuple[Shot, np.ndarray]:
+    """A shot of rings without noise, and its coordinates."""
+    edges = rings.edges_of(20.0, 0.1)
+    blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
+    shot = Shot(blank, tuple(Card(blank, one) for one in cards), exact_light(SETTING), Beliefs(**beliefs))
+    x = shot.prior[0].copy()
+    x[:4] = u_of(ALPHA), np.log(LENGTH), 0.0, np.log(0.25)
+    x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
+    parts = np.split(shot.rows(x)[0], 1 + len(cards))
+    seen = [replace(blank, value=one, covariance=np.diag((0.003 * one) ** 2)) for one in parts]
+    shown = tuple(Card(one, known) for one, known in zip(seen[1:], cards, strict=True))
+    return replace(shot, medium=seen[0], cards=shown), x
+
+
+BEAM = Known(0.5, 0.05)
+GREY = Known(0.18, 0.005)
+
+
+def test_derivatives_are_differences():
+    shot, x = made((None, GREY), beam=BEAM)
+    slopes = shot.residuals(x)[1]
+    moved = np.stack(
+        [(shot.residuals(x + 1e-5 * way)[0] - shot.residuals(x - 1e-5 * way)[0]) / 2e-5 for way in np.eye(x.size)]
+    )
+    np.testing.assert_allclose(moved.T, slopes, rtol=1e-3, atol=1e-4 * np.abs(slopes).max())
+
+
+def test_light_without_noise_gives_its_medium():
+    shot, x = made((None, GREY), beam=BEAM)
+    fit = medium.fitted(shot)
+    assert fit.converged
+    assert fit.values["mu_s'"] == pytest.approx(1.0, rel=1e-4)
+    assert fit.values["mu_a"] == pytest.approx(0.05, rel=1e-4)
+    assert fit.chi2 < 1e-3
+    np.testing.assert_allclose(fit.x, x, atol=1e-3)
+
+
+def test_cards_are_worth_what_is_said_and_glare_costs_it():
+    bounds = {len(cards): medium.fisher(*made(cards, beam=BEAM)) for cards in ((), (None, GREY))}
+    assert bounds[2]["mu_s'"] < 0.7 * bounds[0]["mu_s'"]
+    assert bounds[2]["mu_a"] < 0.6 * bounds[0]["mu_a"]
+    shot, _ = made((), beam=BEAM)
+    blind = replace(shot, beliefs=replace(shot.beliefs, glare=Known(1e-6, 1e-6)))
+    off = medium.fitted(blind).values["mu_a"] / 0.05 - 1.0
+    assert off < -0.25, "glare that is not thought of reads as less absorption"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("cards", [False, True])
+def test_whole_photographs_give_their_medium(cards):
+    """Twelve with every nuisance: errors over the stated ones."""
+    rng = np.random.default_rng(5)
+    found = [bench.outcome(bench.drawn(rng), cards, rng) for _ in range(12)]
+    z = np.array([np.log1p(one.off) / one.stated for one in found])
+    assert np.abs(z).max() < 4.0
+    assert np.sqrt(np.mean(z**2)) < 1.5

@@ -1,0 +1,126 @@
+"""`profilefit photo` as a user meets it."""
+
+import json
+from pathlib import Path
+
+import cv2
+import numpy as np
+import pytest
+import rawpy
+import tifffile
+
+from profilefit.measured.photo import setup
+
+SETUP = """
+[medium]
+mu_s = [1.0, 1.0, 1.0]
+mu_a = [0.05, 0.05, 0.05]
+[camera]
+sides = [400, 300]
+pitch = 0.1
+exposures = 4
+[cards]
+white = true
+grey = 0.18
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Photographs of a spot and of two cards."""
+    out = tmp_path_factory.mktemp("shots")
+    (out / "SETUP.toml").write_text(SETUP)
+    setup.written(setup.read_setup(out / "SETUP.toml"), out)
+    return out
+
+
+def several(folder, name):
+    return [str(path) for path in sorted(folder.glob(f"{name}-*.dng"))]
+
+
+def test_a_setup_becomes_photographs_and_what_they_could_tell(command, tmp_path):
+    (tmp_path / "SETUP.toml").write_text(SETUP)
+    status, out, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
+    assert (status, err) == (0, "wrote 12 photographs into shots\n")
+    assert len(list((tmp_path / "shots").glob("*.dng"))) == 12
+    best = {line.split("  ")[0]: line for line in out.splitlines() if "green" in line}
+    alone, both = (float(best[name].split()[-2]) for name in ("no cards", "both"))
+    assert both < 0.7 * alone
+
+
+def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
+    """Every option that takes files takes all that follow it, as a shell writes them out."""
+    cards = ["--card", *several(folder, "card"), "--grey", *several(folder, "grey")]
+    words = ["--scale", "0.1mm/px", "--beam", "0.5mm+-0.05mm", "--out", "skin"]
+    status, out, err = command("photo", *several(folder, "spot"), *cards, *words)
+    assert (status, err) == (0, "wrote photo.json and 4 figures into skin\n")
+    assert max(map(len, out.splitlines())) <= 100
+    found = json.loads((tmp_path / "skin" / "photo.json").read_text())
+    for one in found["colours"].values():
+        for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
+            assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
+            assert one["at_best"][name] < 0.1
+    assert {one.name for one in (tmp_path / "skin").iterdir()} == {
+        "photo.json", "photo-spot.png", "photo-spot.svg", "photo-rings.png", "photo-rings.svg",
+    }  # fmt: skip
+    assert "no card was photographed" not in out
+
+
+SCALE = ("--scale", "0.1mm/px")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("SPOT",), "--scale must be given: 0.05mm/px"),
+        (("SPOT", "--scale", "5"), "--scale must be 0.05mm/px, two points"),
+        (("SPOT", "--scale", "aruco:20mm"), "--scale must be a marker that"),
+        (("SPOT", "--scale", "1,1:1,1=5mm"), "--scale must have two points that are apart"),
+        (SCALE, "SHOT must be a photograph"),
+        (("missing.dng", *SCALE), "missing.dng: cannot be read"),
+        (("notes.txt", *SCALE), "expected a raw file"),
+        (("cut.dng", *SCALE), "cut.dng: cannot be read as a raw file"),
+        (("empty.dng", *SCALE), "expected a photograph of 1 byte"),
+        (("eight.tif", *SCALE), "of an unknown curve"),
+        (("big.tif", *SCALE), "expected at most 120000000 pixels, got"),
+        (("SPOT", "other.tif", *SCALE), "expected 400 x 300 pixels"),
+        (("SPOT", *SCALE, "--beam", "0.5mm"), "--beam must be a value with its error"),
+        (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
+        (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
+        (("SPOT", *SCALE, "--n", "3"), "n = 3"),
+        (("--simulate", "SETUP.toml"), "--out must be a folder"),
+        (("SPOT", "--simulate", "SETUP.toml", "--out", "out"), "SHOT must be left out"),
+    ],
+    ids=str,
+)
+def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, words, said):
+    shot = several(folder, "spot")[0]
+    whole = Path(shot).read_bytes()
+    (tmp_path / "cut.dng").write_bytes(whole[: len(whole) // 2])
+    (tmp_path / "empty.dng").write_bytes(b"")
+    (tmp_path / "notes.txt").write_text("spot")
+    tifffile.imwrite(tmp_path / "eight.tif", np.zeros((30, 40), np.uint8))
+    tifffile.imwrite(tmp_path / "other.tif", np.zeros((30, 40), np.uint16))
+    tifffile.imwrite(tmp_path / "big.tif", np.zeros((2, 2), np.uint16))
+    with tifffile.TiffFile(tmp_path / "big.tif", mode="r+b") as file:
+        for name, value in (("ImageWidth", 25_000), ("ImageLength", 20_000)):  # as a header may claim
+            file.pages[0].tags[name].overwrite(value)
+    (tmp_path / "SETUP.toml").write_text(SETUP)
+    before = {path.name for path in tmp_path.iterdir()}
+    out = () if "--out" in words or "--simulate" in words else ("--out", "out")
+    status, printed, err = command("photo", *(shot if one == "SPOT" else one for one in words), *out)
+    assert (status, printed) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
+    """Of a spot that eight bits hold; the answer says that it is no measurement."""
+    with rawpy.imread(several(folder, "spot")[0]) as raw:
+        linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
+    coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+    cv2.imwrite(str(tmp_path / "spot.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
+    status, out, err = command("photo", "spot.jpg", *SCALE)
+    assert (status, err) == (0, "")
+    assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())
