@@ -50,7 +50,7 @@ class Beliefs:
     scale: Known | None = None
     corner: Known = field(default_factory=lambda: Known(0.05, 0.05))
     border: float = 20.0
-    halos: tuple[float, ...] = (1.0, 4.0, 16.0)
+    halos: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 
 @dataclass(frozen=True, eq=False)
