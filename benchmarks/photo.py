@@ -22,8 +22,8 @@ from mcml_sim.files.whole_file import write_whole
 from profilefit.measured import law_error
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.model import u_of
-from profilefit.measured.photo import bracket, medium, rings, simulated, spot
-from profilefit.measured.photo.exposure import BayerPlane, Exposure
+from profilefit.measured.photo import medium, rings, simulated, workflow
+from profilefit.measured.photo.exposure import Exposure, of_sensor
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.pixel_scale import PixelScale
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
@@ -92,28 +92,14 @@ def exposures(radii: Floats, light: Floats, camera: SpotCamera, rng: np.random.G
 
 def as_read(one: simulated.Taken, source: str) -> Exposure:
     """As a raw file of it would be read."""
-    places = [(row, column) for row in (0, 1) for column in (0, 1)]
-    planes = tuple(
-        BayerPlane(
-            one.pattern[row][column], one.counts[row::2, column::2].astype(np.float32) - one.black,
-            float(one.white - one.black), (row, column), 2,
-        )
-        for row, column in places
-    )  # fmt: skip
-    return Exposure(source, planes, (one.counts.shape[1], one.counts.shape[0]), one.seconds, True)
+    return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
 
 
 def ringed(shots: list[Exposure], pixel: float) -> tuple[rings.SpotRings, float]:
-    """SpotRings of a bracket's green, in counts a second of its longest exposure's stated time; and the border."""
-    times = bracket.times(shots)
-    pictures = bracket.merged(shots, times, bracket.sensor(shots, times))
-    greens = [one for one, plane in zip(pictures, shots[0].planes, strict=True) if plane.colour == "green"]
-    plate = PixelScale(np.diag([pixel, pixel, 1.0]), "known")
-    where = spot.spot(greens, shots[0].sides, plate, shots[0].source)
-    found = rings.rings(greens, where.centre, rings.edges_of(where.reach * pixel, 2 * pixel), plate)
-    per_second = 1.0 / max(one.seconds or 1.0 for one in shots)
-    scaled = rings.SpotRings(found.inner, found.outer, found.value * per_second, found.covariance * per_second**2)
-    return scaled, pixel * float(np.hypot(*shots[0].sides)) / 2.0
+    """Rings of a bracket's green, and the border."""
+    size = PixelScale(np.diag([pixel, pixel, 1.0]), "known")
+    seen = workflow.bracketed(shots, size)
+    return workflow.ringed(seen, "green", size), pixel * float(np.hypot(*shots[0].sides)) / 2.0
 
 
 def outcome(one: Truth, cards: bool, rng: np.random.Generator) -> Outcome:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -139,7 +138,7 @@ def fit(
     known = None if total is None else _total(total)
     factor = _scale(scale)
     if layers is not None:
-        _require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
+        options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
         fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
         return
     if free is not None:
@@ -164,14 +163,6 @@ def fit(
         raise typer.Exit(FAILED)
 
 
-def _require_left_out(context: typer.Context, names: Iterable[str], where: str) -> None:
-    """InputError of an option that was given although it says nothing there."""
-    for name in names:
-        source = context.get_parameter_source(name)
-        if source is not None and source.name == "COMMANDLINE":
-            raise InputError(f"--{name.replace('_', '-')} must be left out where {where}")
-
-
 def _of_phase(
     context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
 ) -> None:
@@ -187,7 +178,7 @@ def _of_phase(
         from profilefit.report.tables.phase_table import phase_tables, premise_lines
 
     taken = {"data", "kind", "angles", "out", "as_json", "quiet"}
-    _require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
+    options.require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
     table = read_phase(table_of(str(data)) or data)
     if out is not None:
         require_folder(out)

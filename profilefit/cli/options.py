@@ -14,6 +14,7 @@ import typer
 
 from mcml_sim.cli.lazy import interruptible
 from profilefit.cli.folders import known_folder, known_stacks
+from profilefit.errors import InputError
 from profilefit.laws import MAPS, PROFILES
 from profilefit.recipes.folder import fits_folder
 
@@ -48,6 +49,14 @@ OPTIONS = {
     "unit": "--unit",
 }
 ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
+
+
+def require_left_out(context: typer.Context, names: Iterable[str], where: str) -> None:
+    """InputError of an option that was given although it says nothing there."""
+    for name in names:
+        source = context.get_parameter_source(name)
+        if source is not None and source.name == "COMMANDLINE":
+            raise InputError(f"--{name.replace('_', '-')} must be left out where {where}")
 
 
 def in_options(text: Any) -> Any:

@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperCommand
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import AsJson, Quiet
+from profilefit.cli.options import AsJson, Quiet, require_left_out
 from profilefit.errors import InputError
 
 if TYPE_CHECKING:
@@ -41,6 +41,7 @@ class SeveralFiles(TyperCommand):
 
 
 def photo(
+    context: typer.Context,
     shots: Annotated[
         list[Path] | None, typer.Argument(help="Exposures of a bracket: raw files, or 16-bit linear TIFF or EXR.")
     ] = None,
@@ -89,14 +90,16 @@ def photo(
         from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
+        taken = {"simulate", "out", "as_json", "quiet", "shots"}
+        require_left_out(context, (name for name in context.params if name not in taken), "photographs are simulated")
         _simulate(simulate, shots or [], out, as_json, quiet)
         return
     if not shots:
         raise InputError("SHOT must be a photograph, or several of a bracket, got none")
     if scale is None:
         raise InputError("--scale must be given: 0.05mm/px, a ruler's two points X,Y:X,Y=10mm, or aruco:20mm, got none")
-    if grey is None and reflectance != "0.18+-0.005":
-        raise InputError("--reflectance must be left out where there is no --grey card")
+    if grey is None:
+        require_left_out(context, ("reflectance",), "there is no --grey card")
     beliefs = Beliefs(
         beam=None if beam is None else _known("--beam", beam, lengths=True),
         surface=_known("--surface", surface), glare=_known("--glare", glare),

@@ -18,7 +18,7 @@ from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.problem import Question
-from profilefit.measured.ranges import Opened, fitted_under, opened
+from profilefit.measured.ranges import Opened, opened
 from profilefit.measured.replicates import widening
 from profilefit.measured.solving import Minimum, Problem, are_apart, descended, minimised
 
@@ -211,8 +211,7 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     for _ in range(reweighted):
         found = _reweighted(found)
     if question.ranges and (left := opened(found.problem, found.minimum)) is not None:
-        there = found.problem.under(left.mean)
-        found = replace(found, problem=there, minimum=fitted_under(found.problem, left.mean, found.minimum), open=left)
+        found = replace(found, problem=found.problem.under(left.mean), minimum=left.there, open=left)
         found = _reweighted(found) if reweighted else found
     return replace(found, rivals=_rivals(found, first.others))
 

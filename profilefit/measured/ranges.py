@@ -34,11 +34,13 @@ class Opened:
     """What is left open of ranges.
 
     mean     of each, by name, and error the standard deviation about it
+    there    the fit where the ranges have their means
     offsets  (k, 3) draws: coordinates where the ranges have other values than their means, less those at the means
     """
 
     mean: Mapping[str, float]
     error: Mapping[str, float]
+    there: Minimum
     offsets: Floats
 
     @property
@@ -78,7 +80,8 @@ def opened(problem: Problem, start: Minimum) -> Opened | None:
     means = dict(zip(ranges, map(float, mean), strict=True))
     errors = dict(zip(ranges, map(float, np.sqrt(share @ (at - mean) ** 2)), strict=True))
     drawn = theta[np.random.default_rng(SEED).choice(share.size, DRAWS, p=share)]
-    return Opened(means, errors, drawn - fitted_under(problem, means, start).point)
+    there = fitted_under(problem, means, start)
+    return Opened(means, errors, there, drawn - there.point)
 
 
 def fitted_under(problem: Problem, values: Mapping[str, float], start: Minimum) -> Minimum:

@@ -9,7 +9,7 @@ more. Clipped pixels and their neighbours do not count, nor does what spills alo
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -129,12 +129,4 @@ def _rough(shots: Sequence[Exposure], relative: Floats, at: int) -> Plane:
         good = ~binary_dilation(one.counts >= FULL * one.range, iterations=REACH + SHARED // 2)
         smooth = uniform_filter(one.counts, SHARED, mode="nearest") / np.float32(time)
         found = np.where(good | np.isnan(found), smooth, found)
-    return found
-
-
-def by_channel(pictures: Sequence[Picture], names: Sequence[str]) -> Mapping[str, list[Picture]]:
-    """The planes of each colour."""
-    found: dict[str, list[Picture]] = {}
-    for one, name in zip(pictures, names, strict=True):
-        found.setdefault(name, []).append(one)
     return found

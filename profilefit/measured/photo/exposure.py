@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib
 import os
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -75,24 +76,35 @@ def _raw(path: Path) -> Exposure:
             counts, pattern = raw.raw_image_visible, raw.raw_pattern
             names = {"R": "red", "G": "green", "B": "blue"}
             colours = [names.get(chr(code), "") for code in raw.color_desc]
-            black, white, seconds = raw.black_level_per_channel, raw.white_level, float(raw.other.shutter_speed)
-            planes = []
-            for row in (0, 1):
-                for column in (0, 1):
-                    which = int(pattern[row, column])
-                    level = float(black[which])
-                    plane = counts[row::2, column::2].astype(np.float32) - np.float32(level)
-                    planes.append(BayerPlane(colours[which], plane, float(white) - level, (row, column), 2))
-            sides = counts.shape[1], counts.shape[0]
+            own = [[colours[int(which)] for which in row] for row in pattern]
+            black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
+            seconds = float(raw.other.shutter_speed)
+            found = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
     except rawpy.LibRawError as error:
         raise InputError(f"{path}: cannot be read as a raw file: {_first_line(error)}") from None
-    return Exposure(str(path), tuple(_even(planes)), sides, seconds or None, True)
+    return found
 
 
-def _even(planes: list[BayerPlane]) -> list[BayerPlane]:
-    """All of as many pixels."""
-    rows, columns = np.min([one.counts.shape for one in planes], axis=0)
-    return [BayerPlane(one.colour, one.counts[:rows, :columns], one.range, one.offset, one.step) for one in planes]
+def of_sensor(
+    source: str,
+    counts: NDArray[Any],
+    pattern: Sequence[Sequence[str]],
+    black: Sequence[Sequence[float]],
+    white: float,
+    seconds: float | None,
+) -> Exposure:
+    """From what a sensor of a Bayer pattern counted (rows, columns); colours and black levels by row and column."""
+    rows, columns = counts.shape[0] // 2 * 2, counts.shape[1] // 2 * 2  # planes of as many pixels each
+    planes = tuple(
+        BayerPlane(
+            pattern[row][column],
+            counts[row:rows:2, column:columns:2].astype(np.float32) - np.float32(black[row][column]),
+            white - black[row][column], (row, column), 2,
+        )
+        for row in (0, 1)
+        for column in (0, 1)
+    )  # fmt: skip
+    return Exposure(source, planes, (counts.shape[1], counts.shape[0]), seconds, True)
 
 
 def _plain(path: Path, kind: str) -> Exposure:

@@ -40,6 +40,11 @@ class Bracket:
         return [one for name, one in self.planes if name == colour]
 
     @property
+    def seconds(self) -> float | None:
+        """Of the longest exposure, as stated."""
+        return self.stated[int(np.argmax(self.times))]
+
+    @property
     def colours(self) -> tuple[str, ...]:
         return tuple(dict.fromkeys(name for name, _ in self.planes))
 
@@ -76,8 +81,8 @@ def photo(
     level = _level([read(path) for path in dark])
     exposures = _read(shots, level)
     size = pixel_scale("scale", scale, exposures, UNIT)
-    seen = _bracket(exposures, size)
-    shown = [(_bracket(_read(each, level), size), known)
+    seen = bracketed(exposures, size)
+    shown = [(bracketed(_read(each, level), size), known)
              for each, known in ((cards, None), (greys, reflectance or Known(0.18, 0.005))) if each]  # fmt: skip
     for one, _ in shown:
         if one.sides != seen.sides:
@@ -89,15 +94,17 @@ def photo(
     fits, bounds = {}, {}
     for colour in seen.colours:
         of_cards = tuple(
-            Card(_rings(one, colour, size), known if colour in one.colours else None)
+            Card(ringed(one, colour, size), known if seen.seconds and one.seconds else None)
             for one, known in shown if colour in one.colours
         )  # fmt: skip
-        shot = Shot(_rings(seen, colour, size), of_cards, exact_light(where), believed)
+        shot = Shot(ringed(seen, colour, size), of_cards, exact_light(where), believed)
         fits[colour] = medium.fitted(shot)
         bounds[colour] = dict(medium.fisher(shot, fits[colour].x))
-    notes = (
-        [] if all(one.linear for one in exposures) else [f"{shots[0]}: eight bits, taken for sRGB: not a measurement"]
-    )
+    notes = []
+    if not all(one.linear for one in exposures):
+        notes.append(f"{shots[0]}: eight bits, taken for sRGB: not a measurement")
+    if any(known and not (seen.seconds and one.seconds) for one, known in shown):
+        notes.append("no exposure time is stated, so the grey card tells beam and glare, and no scale")
     return Photo(seen, tuple(one for one, _ in shown), size, where, fits, bounds, tuple(notes))
 
 
@@ -130,7 +137,8 @@ def _sides(sides: tuple[int, int]) -> str:
     return f"{sides[0]} x {sides[1]}"
 
 
-def _bracket(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
+def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
+    """Exposures merged, with the spot of their brightest colour."""
     times = bracket.times(shots)
     own = bracket.sensor(shots, times)
     pictures = bracket.merged(shots, times, own)
@@ -144,10 +152,10 @@ def _bracket(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
     )  # fmt: skip
 
 
-def _rings(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
-    """In counts a second of the longest exposure, where it states its time."""
+def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
+    """Rings of a colour, in counts a second of the longest exposure, where it states its time."""
     pictures, pixel = one.pictures(colour), size.pixel(one.spot.centre)
     edges = rings.edges_of(one.spot.reach * pixel, pictures[0].step * pixel)
     found = rings.rings(pictures, one.spot.centre, edges, size)
-    seconds = one.stated[int(np.argmax(one.times))] or 1.0
+    seconds = one.seconds or 1.0
     return replace(found, value=found.value / seconds, covariance=found.covariance / seconds**2)

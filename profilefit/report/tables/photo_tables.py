@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from rich.console import RenderableType
 
+from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes import record
@@ -18,7 +19,6 @@ NAMES = ("mu_s'", "mu_a", "alpha", "l")
 UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm"}
 REMEDY = "photograph cards, or expose longer"
 CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
-LOOSE = 0.5  # relative error beyond which a quantity is not identified
 
 
 def photo_tables(found: Photo) -> list[RenderableType]:

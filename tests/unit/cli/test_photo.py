@@ -89,6 +89,10 @@ SCALE = ("--scale", "0.1mm/px")
         (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
         (("SPOT", *SCALE, "--n", "3"), "n = 3"),
         (("--simulate", "SETUP.toml"), "--out must be a folder"),
+        (
+            ("--simulate", "SETUP.toml", *SCALE, "--out", "out"),
+            "--scale must be left out where photographs",
+        ),
         (("SPOT", "--simulate", "SETUP.toml", "--out", "out"), "SHOT must be left out"),
     ],
     ids=str,
@@ -121,6 +125,7 @@ def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
         linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
     coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
     cv2.imwrite(str(tmp_path / "spot.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
-    status, out, err = command("photo", "spot.jpg", *SCALE)
+    status, out, err = command("photo", "spot.jpg", "--grey", "spot.jpg", *SCALE)
     assert (status, err) == (0, "")
+    assert "no exposure time is stated" in " ".join(out.split())
     assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())
