@@ -28,6 +28,7 @@ def photo_tables(found: Photo) -> list[RenderableType]:
         for name in NAMES:
             value, error = fit.values[name], fit.errors[name]
             ends = value * np.exp(1.96 * error / value * np.array([-1.0, 1.0]))
+            ends = np.minimum(ends, 1.0) if name == "alpha" else ends
             best = found.bounds[colour].get(name)
             cells = (
                 colour if name == NAMES[0] else "", name, to_error(value, error), significant(error),
@@ -47,8 +48,10 @@ def photo_lines(found: Photo) -> Iterator[str]:
     """A sentence each on sensor, spot, what surface and lens add, the goodness of fit, and what is not identified."""
     shot = found.shot
     yield f"scale: {found.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
-    yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
-    if len(shot.times) > 1:
+    if len(shot.times) == 1:
+        yield "one exposure does not tell gain and read noise: one electron a step is taken for both"
+    else:
+        yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
         yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times))
     yield from found.notes
     for colour, fit in found.fits.items():

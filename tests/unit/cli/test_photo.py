@@ -128,4 +128,5 @@ def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
     status, out, err = command("photo", "spot.jpg", "--grey", "spot.jpg", *SCALE)
     assert (status, err) == (0, "")
     assert "no exposure time is stated" in " ".join(out.split())
+    assert "one exposure does not tell gain" in " ".join(out.split())
     assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())
