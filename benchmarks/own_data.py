@@ -14,6 +14,9 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Mapping
+from concurrent.futures import ProcessPoolExecutor
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -86,22 +89,28 @@ def rows(one: Medium, rng: np.random.Generator, seen: Instrument = PENCIL, edges
     return whole.chosen(keep)
 
 
-def coverage(count: int, opened: bool, seed: int = 1) -> dict[str, Coverage]:
+def coverage(count: int, opened: bool, jobs: int) -> dict[str, Coverage]:
     """Over so many media, n and g given or `opened`."""
-    rng, found = np.random.default_rng(seed), {name: [] for name in NAMES}
-    for _ in range(count):
-        one = drawn(rng)
-        data, premises = rows(one, rng), _premises(one, opened)
-        question = _question(premises)
-        fit = fitted(data, question)
-        truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
-        draws = _draws(fit, rng) if fit.minimum.converged else dict.fromkeys(NAMES, np.full(2, np.nan))
-        bound = _fisher(one, data, premises.instrument, premises.ranges)
-        for name in NAMES:
-            low, high = np.quantile(draws[name], [0.025, 0.975])
-            ratio = (high - low) / 3.92 / fit.values[name]
-            found[name].append((low < truth[name] < high, ratio < 0.5, ratio / bound[name]))
-    return {name: _summary(np.array(each, float)) for name, each in found.items()}
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        each = np.array(list(pool.map(partial(covered, opened), range(count))), float)
+    return {name: _summary(each[:, at]) for at, name in enumerate(NAMES)}
+
+
+def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
+    """Of one medium of the series, by quantity: the truth is held; there is an answer; half-width over Fisher's."""
+    rng = np.random.default_rng([1, at])
+    one = drawn(rng)
+    data, premises = rows(one, rng), _premises(one, opened)
+    fit = fitted(data, _question(premises))
+    truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
+    draws = _draws(fit, rng) if fit.minimum.converged else dict.fromkeys(NAMES, np.full(2, np.nan))
+    bound = _fisher(one, data, premises.instrument, premises.ranges)
+    found = []
+    for name in NAMES:
+        low, high = np.quantile(draws[name], [0.025, 0.975])
+        ratio = (high - low) / 3.92 / fit.values[name]
+        found.append((bool(low < truth[name] < high), bool(ratio < 0.5), float(ratio / bound[name])))
+    return found
 
 
 def _draws(fit: MediumFit, rng: np.random.Generator) -> dict[str, Floats]:
@@ -180,35 +189,53 @@ class Beams(NamedTuple):
     """Of media under a pencil beam those where a width is noticed."""
 
 
-def beams(count: int, seed: int = 1) -> Beams:
+class Beamed(NamedTuple):
+    """One medium under a beam; as `Beams`, None where the share is not of it."""
+
+    held: tuple[bool, ...] | None
+    answered: bool
+    wrong: bool
+    warned: bool | None
+    noticed: bool | None
+    accused: bool | None
+
+
+def beams(count: int, jobs: int) -> Beams:
     """Over so many media; isotropic, n = 1, errors of .2 to 2 %."""
-    rng, light = np.random.default_rng(seed), exact_light(Setting())
-    held, answered, wrong, warned, noticed, accused = [], [], [], [], [], []
-    for at in range(count):
-        s, length = rng.uniform(0.05, 0.8), np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
-        one = Medium(Setting(), 1.0 - s * s, float(length), float(np.exp(rng.uniform(np.log(0.002), np.log(0.02)))))
-        w = float(np.exp(rng.uniform(np.log(0.25), np.log(1.0))))
-        edges, known = BEAM_EDGES[rng.uniform(0.0, 4.0) * w <= BEAM_EDGES], SCALE if at % 2 else {}
-        seen = Instrument(Gaussian(w))
-        data = rows(one, rng, seen, edges)
-        given = judged(fitted(data, Question(light, known, instrument=seen)))
-        inside = _holds(given, one)
-        answered.append(inside is not None and not given.found.rivals)
-        if inside is not None and answered[-1]:
-            held.append(inside)
-        blind = judged(fitted(data, Question(light, known)))
-        inside = _holds(blind, one)
-        wrong.append(inside is not None and not all(inside))
-        if wrong[-1]:
-            width = blind.width
-            noticed.append(blind.found.misfit.detected or (width is not None and width.noticed))
-            told = width is not None and width.telling is not None and width.telling < w
-            warned.append(noticed[-1] or told)
-        width = beam_width(fitted(rows(one, rng, PENCIL, edges), Question(light, known)))
-        if width is not None:
-            accused.append(width.noticed)
-    shares = dict(zip(NAMES, np.mean(held, axis=0).tolist(), strict=True))
-    return Beams(shares, *(float(np.mean(each)) for each in (answered, wrong, warned, noticed, accused)))
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        return shares(list(pool.map(beamed, range(count))))
+
+
+def shares(each: list[Beamed]) -> Beams:
+    """Of many media."""
+    held = np.mean([one.held for one in each if one.held is not None], axis=0)
+    columns = ([getattr(one, name) for one in each] for name in Beamed._fields[1:])
+    rest = (float(np.mean([one for one in column if one is not None])) for column in columns)
+    return Beams(dict(zip(NAMES, held.tolist(), strict=True)), *rest)
+
+
+def beamed(at: int) -> Beamed:
+    """One medium of the series; the scale is known of every other."""
+    rng, light = np.random.default_rng([2, at]), exact_light(Setting())
+    s, length = rng.uniform(0.05, 0.8), np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
+    one = Medium(Setting(), 1.0 - s * s, float(length), float(np.exp(rng.uniform(np.log(0.002), np.log(0.02)))))
+    w = float(np.exp(rng.uniform(np.log(0.25), np.log(1.0))))
+    edges, known = BEAM_EDGES[rng.uniform(0.0, 4.0) * w <= BEAM_EDGES], SCALE if at % 2 else {}
+    seen = Instrument(Gaussian(w))
+    data = rows(one, rng, seen, edges)
+    given = judged(fitted(data, Question(light, known, instrument=seen)))
+    held = _holds(given, one)
+    answered = held is not None and not given.found.rivals
+    blind = judged(fitted(data, Question(light, known)))
+    inside, width = _holds(blind, one), blind.width
+    wrong = inside is not None and not all(inside)
+    noticed = blind.found.misfit.detected or (width is not None and width.noticed)
+    told = width is not None and width.telling is not None and width.telling < w
+    of_pencil = beam_width(fitted(rows(one, rng, PENCIL, edges), Question(light, known)))
+    return Beamed(
+        held if answered else None, answered, wrong, noticed or told if wrong else None, noticed if wrong else None,
+        None if of_pencil is None else of_pencil.noticed,
+    )  # fmt: skip
 
 
 def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
@@ -274,6 +301,7 @@ def chart(path: Path) -> None:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200, help="media")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--beams", action="store_true", help="of media under beams of a width instead")
     parser.add_argument("--chart", type=Path, help="draw the chart there instead")
     given = parser.parse_args()
@@ -281,14 +309,14 @@ def main() -> None:
         chart(given.chart)
         return
     if given.beams:
-        one = beams(given.count)
+        one = beams(given.count, given.jobs)
         print(f"beams of .25 to 1 mm, given: held {one.held}, answered {one.answered:.1%}")
         print(f"not given: wrong {one.wrong:.1%}, of these warned {one.warned:.1%}, width or misfit {one.noticed:.1%}")
         print(f"pencil beams accused: {one.accused:.1%}")
         return
     for opened in (False, True):
         print(f"n and g {'open' if opened else 'given'}, {given.count} media")
-        for name, one in coverage(given.count, opened).items():
+        for name, one in coverage(given.count, opened, given.jobs).items():
             print(f"  {name:6} held {one.held:.1%}, answered {one.answered:.1%}, {one.wider:.2f} x the Fisher bound")
 
 

@@ -1,4 +1,4 @@
-"""How well `profilefit photo` does on photographs whose truth is known: `python -m benchmarks.photo [--count 200]`.
+"""How well `profilefit photo` does on photographs whose truth is known: `python -m benchmarks.photo [--jobs 2]`.
 
 Each is a bracket of five 12-bit exposures of a spot on a medium of n 1.4 and g 0.8, with every nuisance drawn anew from
 what the fit believes: beam, surface, glare and its width, darkened corners, speckle, uneven pixels, wrong times, a
@@ -10,7 +10,10 @@ from __future__ import annotations
 
 import argparse
 import json
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import replace
+from functools import partial
+from multiprocessing import get_context
 from pathlib import Path
 from typing import NamedTuple
 
@@ -22,7 +25,7 @@ from mcml_sim.files.whole_file import write_whole
 from profilefit.measured import law_error
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.model import u_of
-from profilefit.measured.photo import medium, rings, simulated, workflow
+from profilefit.measured.photo import medium, simulated, workflow
 from profilefit.measured.photo.exposure import Exposure, of_sensor
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.pixel_scale import PixelScale
@@ -95,27 +98,24 @@ def as_read(one: simulated.Taken, source: str) -> Exposure:
     return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
 
 
-def ringed(shots: list[Exposure], pixel: float) -> tuple[rings.SpotRings, float]:
-    """Rings of a bracket's green, and the border."""
-    size = PixelScale(np.diag([pixel, pixel, 1.0]), "known")
-    seen = workflow.bracketed(shots, size)
-    return workflow.ringed(seen, "green", size), pixel * float(np.hypot(*shots[0].sides)) / 2.0
+def outcome(cards: bool, at: int) -> Outcome:
+    """Of one photograph of the series, and where there are `cards`, of theirs."""
+    rng = np.random.default_rng([11, at])
+    one = drawn(rng)
+    radii, pitch = simulated.radii(FARTHEST, one.optics), one.camera.pitch
+    size = PixelScale(np.diag([pitch, pitch, 1.0]), "known")
 
+    def seen(light: Floats) -> workflow.Bracket:
+        return workflow.bracketed(exposures(radii, light, one.camera, rng), size)
 
-def outcome(one: Truth, cards: bool, rng: np.random.Generator) -> Outcome:
-    """Of one photograph, and where there are `cards`, of theirs."""
-    radii = simulated.radii(FARTHEST, one.optics)
-    light = simulated.light(one.alpha, one.length, SETTING, one.optics, radii)
-    seen, border = ringed(exposures(radii, light, one.camera, rng), one.camera.pitch)
+    spot = seen(simulated.light(one.alpha, one.length, SETTING, one.optics, radii))
     shown: tuple[Card, ...] = ()
     if cards:
         white = simulated.card(one.optics, radii)
-        pairs = ((0.9 * white, None), (one.grey * white, Known(GREY.value, float(np.hypot(GREY.error, LATE * 0.18)))))
-        shown = tuple(
-            Card(ringed(exposures(radii, each, one.camera, rng), one.camera.pitch)[0], known) for each, known in pairs
-        )
-    beliefs = Beliefs(beam=BEAM, border=border)
-    shot = Shot(seen, shown, exact_light(SETTING), beliefs)
+        pairs = ((0.9 * white, None), (one.grey * white, GREY))
+        shown = tuple(workflow.carded(seen(light), "green", size, known, spot) for light, known in pairs)
+    beliefs = Beliefs(beam=BEAM, border=0.5 * pitch * float(np.hypot(*one.camera.sides)))
+    shot = Shot(workflow.ringed(spot, "green", size), shown, exact_light(SETTING), beliefs)
     fit = medium.fitted(shot)
     truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
     bound = medium.fisher(shot, _coordinates(one, shot, fit.x))
@@ -138,12 +138,13 @@ def _coordinates(one: Truth, shot: Shot, found: Floats) -> Floats:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=200, help="photographs")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--json", type=Path, help="also write the numbers into this file")
     given = parser.parse_args()
     found: dict[str, dict[str, dict[str, float]]] = {}
     for cards in (False, True):
-        rng = np.random.default_rng(11)
-        each = [outcome(drawn(rng), cards, rng) for _ in range(given.count)]
+        with ProcessPoolExecutor(given.jobs, get_context("spawn")) as pool:
+            each = list(pool.map(partial(outcome, cards), range(given.count)))
         off, stated, bound = (np.array([getattr(one, name) for one in each]) for name in Outcome._fields)
         setup = "a white and a grey card" if cards else "no cards"
         found[setup] = {}

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import lru_cache
+from typing import NamedTuple
 
 import numpy as np
 from scipy.special import ellipe
@@ -24,16 +25,35 @@ from profilefit.measured.beam import Floats, Gaussian
 from profilefit.measured.instrument import RING, Instrument
 
 FARTHER = 5.0  # of the last ring, from where halos still bring light
+APART = 0.05  # in ln sigma, of cores whose weights are known
+POLYNOMIALS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True)).T  # (4, 4) Lagrange's, lowest power first
 
 
-def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
-    """Radii rho (m,) and weights (1 + halos, n, m) of 2 pi rho R_d(rho) in the mean over each ring, by spread."""
+class Spread(NamedTuple):
+    """Radii (m,) and weights (1 + halos, n, m) of 2 pi rho R_d(rho) in the mean over each ring, of core and halos.
+
+    widening  (n, m) derivative of the core's by ln sigma
+    """
+
+    rho: Floats
+    weights: Floats
+    widening: Floats
+
+
+def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Spread:
+    """Of a core and halos; the core's weights lie on cubics between those of sigmas APART."""
     rings = inner.tobytes(), outer.tobytes()
-    rho, core = _core(sigma, *rings)
-    return rho, np.concatenate([core[None], _halos(tuple(halos), *rings)])
+    place = float(np.log(sigma)) / APART
+    first = int(np.floor(place)) - 1
+    share = POLYNOMIALS @ (place - first) ** np.arange(4.0)
+    slope = POLYNOMIALS[:, 1:] @ (np.arange(1.0, 4.0) * (place - first) ** np.arange(3.0)) / APART
+    cores = [_core(float(np.exp(APART * (first + at))), *rings) for at in range(4)]
+    rho, near = cores[0][0], np.stack([one for _, one in cores])
+    core, widening = np.tensordot([share, slope], near, axes=1)
+    return Spread(rho, np.concatenate([core[None], _halos(tuple(halos), *rings)]), widening)
 
 
-@lru_cache(maxsize=4)
+@lru_cache(maxsize=24)
 def _core(sigma: float, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
     ends = np.frombuffer(inner), np.frombuffer(outer)
     return Instrument(Gaussian(2.0 * sigma)).nodes(*ends, farthest=FARTHER * float(ends[1][-1]))

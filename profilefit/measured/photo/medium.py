@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import block_diag, solve_triangular
-from scipy.optimize import least_squares
+from scipy.optimize import lsq_linear
 
 from mcml_sim.exact.light import ExactLight
 from profilefit.measured import law_error, model
@@ -31,7 +31,10 @@ UNEVEN = 0.01  # relative error in waves along ln r that neither sectors nor bra
 STEP = 1e-4  # of ln sigma, for derivatives
 ALBEDOS = (0.5, 0.8, 0.95, 0.99)
 LENGTHS = (0.02, 0.05, 0.12, 0.3)  # of the last ring's radius
-MAX_STEPS = 200
+MAX_STEPS = 80
+FARTHEST = 1.0  # step of what light is not straight in
+TINY = 1e-15  # between the bounds of a step that cannot be
+ENOUGH = 1e-3  # of chi-square, that another step must gain
 
 
 @dataclass(frozen=True)
@@ -50,7 +53,7 @@ class Beliefs:
     scale: Known | None = None
     corner: Known = field(default_factory=lambda: Known(0.05, 0.05))
     border: float = 20.0
-    halos: tuple[float, ...] = (1.0, 2.0, 4.0, 8.0, 16.0)
+    halos: tuple[float, ...] = tuple(np.geomspace(1.0, 16.0, 9).tolist())
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,14 +90,13 @@ class Shot:
         halos = len(self.beliefs.halos)
         sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
         scale, share, corner = np.exp(x[2]), np.append(1.0 - glare.sum(), glare), x[6 + halos]
-        light, by_medium, own = self._spread(x, sigma)
-        seen = light + surface * own
+        light, by_medium, own, wider = self._spread(x, sigma)
+        seen = light[:-1] + surface * own
         value = scale * share @ seen + dark * self.size
         slopes = np.zeros((value.size, x.size))
         slopes[:, :2] = scale * np.einsum("c,cnp->np", share, by_medium)
         slopes[:, 2] = scale * share @ seen
-        moved, _, further = self._spread(x, sigma * np.exp(STEP))
-        slopes[:, 3] = scale * share @ (moved + surface * further - seen) / STEP
+        slopes[:, 3] = scale * share[0] * (light[-1] + surface * wider)
         slopes[:, 4] = scale * share @ own
         slopes[:, 5 : 5 + halos] = scale * (seen[1:] - seen[0]).T
         slopes[:, 5 + halos] = self.size
@@ -102,10 +104,9 @@ class Shot:
         values, each = [of_medium[0]], [of_medium[1]]
         for at, card in enumerate(self.cards, start=7 + halos):
             rings, scale = card.rings, np.exp(x[at])
-            alone, wider = (ring_means(s, self.beliefs.halos, rings.inner, rings.outer)
-                            for s in (sigma, sigma * np.exp(STEP)))  # fmt: skip
+            alone, wider = self._alone(rings, sigma)
             bright, slopes = scale * share @ alone, np.zeros((rings.value.size, x.size))
-            slopes[:, 3] = scale * share @ (wider - alone) / STEP
+            slopes[:, 3] = scale * share[0] * wider
             slopes[:, 5 : 5 + halos] = scale * (alone[1:] - alone[0]).T
             slopes[:, at] = bright
             bright, slopes = self._darkened(rings, bright, slopes, corner)
@@ -120,18 +121,22 @@ class Shot:
         slopes[:, 6 + len(self.beliefs.halos)] = -value * outwards
         return value * (1.0 - corner * outwards), slopes
 
-    def _spread(self, x: Floats, sigma: float) -> tuple[Floats, Floats, Floats]:
-        """By spread: light (c, n) of the medium, its derivatives (c, n, 2), and the spread's own means (c, n)."""
-        halos, rings = self.beliefs.halos, self.medium
-        rho, weights = ring_weights(sigma, halos, rings.inner, rings.outer)
-        shape = weights.shape[:2]
-        point = np.array([x[0], x[1], 0.0])
-        light, slopes = Model(self.light).weighed(point, rho, weights.reshape(-1, rho.size))
-        return (
-            light.reshape(shape),
-            slopes[:, :2].reshape(*shape, 2),
-            ring_means(sigma, halos, rings.inner, rings.outer),
-        )
+    def _spread(self, x: Floats, sigma: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of the medium: light (c + 1, n) by spread and, last, the core's derivative by ln sigma; slopes (c, n, 2).
+
+        Of what the surface scatters: means (c, n) by spread, and the core's derivative (n,).
+        """
+        rings, shape = self.medium, (len(self.beliefs.halos) + 2, self.medium.value.size)
+        rho, weights, widening = ring_weights(sigma, self.beliefs.halos, rings.inner, rings.outer)
+        rows = np.concatenate([weights, widening[None]]).reshape(-1, rho.size)
+        light, slopes = Model(self.light).weighed(np.array([x[0], x[1], 0.0]), rho, rows)
+        return light.reshape(shape), slopes[:, :2].reshape(*shape, 2)[:-1], *self._alone(rings, sigma)
+
+    def _alone(self, rings: SpotRings, sigma: float) -> tuple[Floats, Floats]:
+        """Means (c, n) of each spread over rings, and the core's derivative (n,) by ln sigma."""
+        means, wider = (ring_means(one, self.beliefs.halos, rings.inner, rings.outer)
+                        for one in (sigma, sigma * np.exp(STEP)))  # fmt: skip
+        return means, (wider[0] - means[0]) / STEP
 
     @cached_property
     def prior(self) -> tuple[Floats, Floats]:
@@ -178,8 +183,8 @@ class Shot:
                 ways = np.vstack([ways, (np.eye(x.size)[at] - np.eye(x.size)[2]) / relative])
         return np.append(rows[:, 0], off), np.vstack([rows[:, 1:], ways])
 
-    def start(self) -> Floats:
-        """The best of a coarse search in albedo and length."""
+    def starts(self) -> list[Floats]:
+        """The best of a coarse search in length, for each of some albedos, the best first."""
         halos = len(self.beliefs.halos)
         mean, _ = self.prior
         x = mean.copy()
@@ -190,9 +195,10 @@ class Shot:
         for at, card in enumerate(self.cards, start=x.size - len(self.cards)):
             first = ring_means(float(np.exp(x[3])), (), card.rings.inner[:1], card.rings.outer[:1])
             x[at] = np.log(card.rings.value[0] / first[0, 0])
-        found = []
+        best = []
         last = float(self.medium.outer[-1])
         for alpha in ALBEDOS:
+            found = []
             for share in LENGTHS:
                 x[:2] = u_of(alpha), np.log(share * last)
                 if self.beliefs.scale is None:
@@ -200,7 +206,8 @@ class Shot:
                     light = self.rows(x)[0][: self.medium.value.size] - x[5 + halos] * self.size
                     x[2] = float(np.median(np.log(np.maximum(self.medium.value, 1e-12 * self.size) / light)))
                 found.append((float(np.sum(self.residuals(x)[0] ** 2)), x.copy()))
-        return min(found, key=lambda one: one[0])[1]
+            best.append(min(found, key=lambda one: one[0]))
+        return [x for _, x in sorted(best, key=lambda one: one[0])]
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,27 +240,36 @@ class PhotoFit:
 
 
 def fitted(shot: Shot) -> PhotoFit:
-    """The least squares fit of a shot."""
-    start = shot.start()
-    seen: dict[bytes, tuple[Floats, Floats]] = {}
+    """The least squares fit of a shot: the best of those from every start."""
+    ends = [_descended(shot, start) for start in shot.starts()]
+    return min(ends, key=lambda one: (not one.converged, one.chi2))
 
-    def at(x: Floats) -> tuple[Floats, Floats]:
-        if (key := x.tobytes()) not in seen:
-            seen.clear()
-            seen[key] = shot.residuals(x)
-        return seen[key]
 
-    low = np.full(start.size, -np.inf)
-    low[0], low[4 : 5 + len(shot.beliefs.halos)] = -12.0, 0.0
-    high = np.full(start.size, np.inf)
-    high[0] = 12.0
-    done = least_squares(
-        lambda x: at(x)[0], np.clip(start, low + 1e-6, high), lambda x: at(x)[1], bounds=(low, high), x_scale="jac",
-        max_nfev=MAX_STEPS,
-    )  # fmt: skip
-    rows, slopes = at(done.x)
-    free = len(rows) - start.size
-    return PhotoFit(shot, done.x, bound(slopes), float(rows @ rows), free, done.status > 0)
+def _descended(shot: Shot, start: Floats) -> PhotoFit:
+    """Where damped least squares ends from a start; each step is the best within bounds (`lsq_linear`)."""
+    halos = len(shot.beliefs.halos)
+    low, high, most = np.full((3, start.size), np.inf) * [[-1.0], [1.0], [1.0]]
+    low[0], low[4 : 5 + halos], high[0] = -12.0, 0.0, 12.0
+    most[:4], most[7 + halos :] = FARTHEST, FARTHEST
+    x, damping, converged = np.clip(start, low, high), 0.01, False
+    rows, slopes = shot.residuals(x)
+    for _ in range(MAX_STEPS):
+        damped = np.sqrt(damping) * np.diag(np.linalg.norm(slopes, axis=0))
+        ends = np.maximum(low - x, -most) - TINY, np.minimum(high - x, most) + TINY
+        system = np.vstack([slopes, damped]), np.append(-rows, np.zeros(x.size))
+        step = lsq_linear(*system, bounds=ends, method="bvls").x
+        hoped = rows @ rows - np.sum((rows + slopes @ step) ** 2)
+        there = np.clip(x + step, low, high)
+        new_rows, new_slopes = shot.residuals(there)
+        gained = rows @ rows - new_rows @ new_rows
+        converged = bool(hoped < ENOUGH and gained < ENOUGH)
+        if gained > 0:
+            x, rows, slopes, damping = there, new_rows, new_slopes, 0.2 * damping
+        else:
+            damping *= 4.0
+        if converged:
+            break
+    return PhotoFit(shot, x, bound(slopes), float(rows @ rows), len(rows) - x.size, converged)
 
 
 def bound(slopes: Floats) -> Floats:

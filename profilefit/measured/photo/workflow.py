@@ -22,6 +22,7 @@ from profilefit.measured.problem import Known
 
 MOST_SHOTS = 20
 UNIT = "mm"
+LATE, WORTH = 0.03, 2  # relative error of a stated time, and of how many exposures that is worth
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,9 +41,14 @@ class Bracket:
         return [one for name, one in self.planes if name == colour]
 
     @property
-    def seconds(self) -> float | None:
-        """Of the longest exposure, as stated."""
-        return self.stated[int(np.argmax(self.times))]
+    def seconds(self) -> Known | None:
+        """Of the longest exposure: the mean of what all state, and the error that their scatter says."""
+        off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times, strict=True) if said])
+        if off.size == 0:
+            return None
+        scatter = (WORTH * LATE**2 + np.sum((off - off.mean()) ** 2)) / (WORTH + off.size - 1)
+        value = float(np.exp(off.mean()))
+        return Known(value, value * float(np.sqrt(scatter / off.size)))
 
     @property
     def colours(self) -> tuple[str, ...]:
@@ -94,8 +100,7 @@ def photo(
     fits, bounds = {}, {}
     for colour in seen.colours:
         of_cards = tuple(
-            Card(ringed(one, colour, size), known if seen.seconds and one.seconds else None)
-            for one, known in shown if colour in one.colours
+            carded(one, colour, size, known, seen) for one, known in shown if colour in one.colours
         )  # fmt: skip
         shot = Shot(ringed(seen, colour, size), of_cards, exact_light(where), believed)
         fits[colour] = medium.fitted(shot)
@@ -157,5 +162,14 @@ def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
     pictures, pixel = one.pictures(colour), size.pixel(one.spot.centre)
     edges = rings.edges_of(one.spot.reach * pixel, pictures[0].step * pixel)
     found = rings.rings(pictures, one.spot.centre, edges, size)
-    seconds = one.seconds or 1.0
+    seconds = 1.0 if one.seconds is None else one.seconds.value
     return replace(found, value=found.value / seconds, covariance=found.covariance / seconds**2)
+
+
+def carded(card: Bracket, colour: str, size: PixelScale, reflectance: Known | None, seen: Bracket) -> Card:
+    """A card beside the spot that was `seen`; what their times leave open is in the error of its reflectance."""
+    own, other = card.seconds, seen.seconds
+    if reflectance is not None and own is not None and other is not None:
+        relative = np.hypot.reduce([one.error / one.value for one in (reflectance, own, other)])
+        return Card(ringed(card, colour, size), Known(reflectance.value, reflectance.value * float(relative)))
+    return Card(ringed(card, colour, size))

@@ -30,7 +30,7 @@ from profilefit.laws.hazard import Hazard
 from profilefit.laws.liang import Liang
 from profilefit.laws.quantile import Quantile, radius
 from profilefit.laws.rational import Normalisation
-from profilefit.laws.refracting_hazard import RefractingHazard
+from profilefit.laws.two_parts import TwoPartHazard
 from profilefit.recipes import catalogue
 from profilefit.scenes.stage.exact_table import FARTHEST, NEAREST, STEP, Curves, exact_table
 
@@ -39,12 +39,13 @@ YARDSTICK = "normalized diffusion"
 
 
 class Wanted(NamedTuple):
-    """A law with its constants, and the refractive index that it is timed and judged at."""
+    """A law with its constants, and the refractive index and mean cosine that it is timed and judged at."""
 
     label: str
     law: str
     constants: str
     n: float = 1.0
+    g: float = 0.0
 
 
 class Fast(NormalizedDiffusion):
@@ -159,6 +160,7 @@ WANTED: tuple[Wanted, ...] = (
     Wanted("quantile", "quantile", "regenerated"),
     Wanted("hazard", "hazard", "regenerated"),
     Wanted("hazard, n = 1.4", "hazard", "regenerated", 1.4),
+    Wanted("hazard, n = 1.4, g = 0.8", "hazard", "regenerated", 1.4, 0.8),
 )
 
 
@@ -170,7 +172,7 @@ def contenders(folder: Path | None = None, wanted: Sequence[Wanted] | None = Non
     found: list[Contender] = []
     left_out = []
     for one in wanted or WANTED:
-        setting = None if one.n == 1.0 else Setting(n=one.n)
+        setting = None if (one.n, one.g) == (1.0, 0.0) else Setting(n=one.n, g=one.g)
         try:
             law = catalogue.load(one.law, one.constants, setting, folder)
         except (InputError, RecordError) as error:
@@ -194,7 +196,7 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
     elif isinstance(law, BurleyDiffuseMfp):
         own = FastBurleyDiffuseMfp(law.setting, law.albedo, **law.constants())
         yield _contender(label, own, own.sampler, partial(_burley_setup, own), law.sampler)
-    elif isinstance(law, Hazard | RefractingHazard):
+    elif isinstance(law, Hazard | TwoPartHazard):
         of_alpha: Setup = law.shape if isinstance(law, Hazard) else law.parts
         yield _contender(label, law, law.sampler, of_alpha)
         for steps, other in law.samplers.items():
@@ -250,13 +252,14 @@ class TabulatedRadii:
         """The cubics of one albedo."""
         return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
 
-    def profile(self, r: ArrayLike, alpha: float) -> Floats:
-        """R_d [1/mfp^2] at radii (n,) [mfp], looked up in float32: its rounding is nearly all of the error."""
-        return np.asarray(looked_up(self.curves(alpha), jnp.asarray(r, jnp.float32)), float)
+    def profile(self, r: ArrayLike, alpha: float, mfp: float = 1.0) -> Floats:
+        """R_d [1/length^2] at radii (n,), looked up in float32: its rounding is nearly all of the error."""
+        x = np.asarray(r, float) / mfp
+        return np.asarray(looked_up(self.curves(alpha), jnp.asarray(x, jnp.float32)), float) / mfp**2
 
-    def cdf(self, r: ArrayLike, alpha: float) -> Floats:
-        """Share of the energy within radii (n,) [mfp] [-]."""
-        return self.curves(alpha).share(np.asarray(r, float)[None])[0]
+    def cdf(self, r: ArrayLike, alpha: float, mfp: float = 1.0) -> Floats:
+        """Share of the energy within radii (n,) [-]."""
+        return self.curves(alpha).share((np.asarray(r, float) / mfp)[None])[0]
 
 
 def looked_up(curves: Curves, x: Array) -> Array:

@@ -8,6 +8,7 @@ import pytest
 import profilefit
 from mcml_sim import exact
 from profilefit.errors import InputError
+from profilefit.fitting.quality import profile_quality
 from profilefit.studies.tradeoff import contenders, laws
 from profilefit.studies.tradeoff.contenders import Wanted, table_contender
 
@@ -65,3 +66,4 @@ def test_table_is_the_exact_profile_to_rounding():
     np.testing.assert_allclose(table.law.cdf(x, laws.MATERIAL), exact.cdf(x, laws.MATERIAL), rtol=1e-5)
     assert np.max(np.abs(looked_up / truth - 1.0)) > 1e-9  # in float32 it is
     assert set(table.parts) == {"profile"}
+    assert profile_quality(table.law, laws.judged_albedos(2)).rel.max() < 1e-5
