@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcml_sim import __version__
 from mcml_sim.media.setting import Setting
@@ -24,6 +25,7 @@ from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
 
+Floats = NDArray[np.float64]
 LANGUAGES = ("glsl", "hlsl", "glsl-es", "python", "json")
 ENDINGS = {"glsl": "glsl", "hlsl": "hlsl", "glsl-es": "glsl", "python": "py", "json": "json"}
 MARKS = {"python": "#"}
@@ -76,6 +78,16 @@ def export(named: Named, folder: Folder, lang: str = "glsl", name: str | None = 
     body = make(named.law, TRANSLATED.get(lang, lang), name, _remarks(named, sources))
     head = commented(_head(named, sources, lang, name), MARKS.get(lang, "//"))
     return head + "\n" + (ES_HEAD if lang == "glsl-es" else "") + body
+
+
+def export_medium(named: Named, folder: Folder, start: str, head: Sequence[str], values: Mapping[str, Floats]) -> str:
+    """The GLSL file of a law, with one medium's values and their errors (2, colours) after it, as START_NAME."""
+    lines = []
+    for name, (each, errors) in values.items():
+        kind = "float" if each.size == 1 else f"vec{each.size}"
+        told = f"{kind} {start}_{name} = {kind}({', '.join(f'{one:.6g}' for one in each)});"
+        lines.append(f"const {told} // +- {', '.join(f'{one:.2g}' for one in errors)}\n")
+    return f"{export(named, folder, name=start)}\n{commented(head, '//')}{''.join(lines)}"
 
 
 def require_language(lang: str, name: str | None) -> None:

@@ -18,7 +18,13 @@ from profilefit.shader.context import opened
 FOLDER = Path(__file__).resolve().parents[2] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 SECONDS = 120  # of a cell, which takes a tenth of that: what hangs is ended
-NEEDS_OPENGL = ("04-check-the-shader", "08-texture-or-screen", "09-under-the-sea", "10-how-many-layers")
+NEEDS_OPENGL = (
+    "04-check-the-shader",
+    "08-texture-or-screen",
+    "09-under-the-sea",
+    "10-how-many-layers",
+    "11-from-photographs-to-a-ball",
+)
 EXPLORE = FOLDER / "05-explore.ipynb"
 LONGEST = 12  # lines of a function that a notebook may define: a longer one belongs in the package
 
@@ -85,8 +91,8 @@ def definitions(source: str) -> Iterator[list[str]]:
         yield block.rstrip().splitlines()
 
 
-def test_there_are_ten_and_a_table_of_them():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08", "09", "10"]
+def test_there_are_eleven_and_a_table_of_them():
+    assert [path.stem[:2] for path in NOTEBOOKS] == [f"{number:02d}" for number in range(1, 12)]
     assert re.findall(r"\((\S+\.ipynb)\)", (FOLDER / "README.md").read_text()) == [path.name for path in NOTEBOOKS]
 
 
@@ -290,3 +296,15 @@ def test_swept_slabs_need_the_fewest_layers():
     assert other < one <= 16
     linear, quadratic, two = numbers(r"error (\S+) of the mean", text)
     assert two < 0.5 * quadratic < 0.5 * linear
+
+
+@pytest.mark.slow
+def test_cards_make_the_medium_surer_and_the_ball_with_it():
+    text = printed("11-from-photographs-to-a-ball")
+    assert max(numbers(r"off by (\S+) of its errors", text)) < 3.5
+    alone, cards = ([float(one) for one in re.findall(rf"{label} +\S+ +known to (\S+)%", text)]
+                    for label in ("alone", "with cards"))  # fmt: skip
+    assert max(cards) < 0.5 * max(alone)
+    blind, sure = numbers(r"spread (\S+) of", text)
+    assert sure < 0.7 * blind
+    assert max(numbers(r"ball is off by (\S+) steps", text)) < 4.0

@@ -29,7 +29,7 @@ APART = 0.05  # in ln sigma, of cores whose weights are known
 POLYNOMIALS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True)).T  # (4, 4) Lagrange's, lowest power first
 
 
-class Spread(NamedTuple):
+class RingWeights(NamedTuple):
     """Radii (m,) and weights (1 + halos, n, m) of 2 pi rho R_d(rho) in the mean over each ring, of core and halos.
 
     widening  (n, m) derivative of the core's by ln sigma
@@ -40,7 +40,7 @@ class Spread(NamedTuple):
     widening: Floats
 
 
-def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Spread:
+def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> RingWeights:
     """Of a core and halos; the core's weights lie on cubics between those of sigmas APART."""
     rings = inner.tobytes(), outer.tobytes()
     place = float(np.log(sigma)) / APART
@@ -50,7 +50,7 @@ def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Flo
     cores = [_core(float(np.exp(APART * (first + at))), *rings) for at in range(4)]
     rho, near = cores[0][0], np.stack([one for _, one in cores])
     core, widening = np.tensordot([share, slope], near, axes=1)
-    return Spread(rho, np.concatenate([core[None], _halos(tuple(halos), *rings)]), widening)
+    return RingWeights(rho, np.concatenate([core[None], _halos(tuple(halos), *rings)]), widening)
 
 
 @lru_cache(maxsize=24)

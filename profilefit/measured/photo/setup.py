@@ -56,6 +56,7 @@ KEYS = {
 }  # fmt: skip
 MAX_BYTES, MOST_SIDE = 1 << 16, 12_000
 MOST = 1e6  # 1/mm
+SHORTEST = 1e-3  # seconds, of the spot: its light is as bright as that
 STEP = 4.0  # from one exposure to the next
 FULL = 0.5  # of the sensor's range, that the shortest one reaches
 CFA = {"red": 0, "green": 1, "blue": 2}
@@ -142,12 +143,14 @@ def brackets(setup: Setup) -> dict[str, list[Taken]]:
         scenes["grey"] = dict.fromkeys(CHANNELS, (radii, setup.grey * card))
     rng = np.random.default_rng(setup.seed)
     found = {}
+    enough = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black)
+    brightest = {name: max(float(light[0]) for _, light in radial.values()) for name, radial in scenes.items()}
+    electrons = enough / (SHORTEST * brightest["spot"])
     for name, radial in scenes.items():
-        brightest = max(float(light[0]) for _, light in radial.values())
-        first = FULL * setup.camera.gain * (setup.camera.white - setup.camera.black) / brightest
+        first = enough / (electrons * brightest[name])
         stated = [first * STEP**at for at in range(setup.exposures)]
         times = {one: one * (1.0 + setup.late * rng.standard_normal()) for one in stated}
-        found[name] = simulated.taken(radial, setup.camera, 1.0, times, int(rng.integers(2**31)))
+        found[name] = simulated.taken(radial, setup.camera, electrons, times, int(rng.integers(2**31)))
     return found
 
 

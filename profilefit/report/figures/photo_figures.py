@@ -23,13 +23,14 @@ from profilefit.report.figures.canvas import (
 )
 
 COLOURS = {"red": VERMILION, "green": GREEN, "blue": BLUE, "grey": GREY}
+SPOT, RINGS = "photo-spot", "photo-rings"  # their files
 DECADES = 5  # of light that a picture shows
 SHOWN = 800  # pixels of a picture's longer side
 EVERY = 4  # rings of which one is drawn
 
 
 @styled
-def spot_figure(found: Photo, out: Path, name: str = "photo-spot") -> list[Path]:
+def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
     """The merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
     figure = canvas(5.4)
     axes = figure.subplots()
@@ -53,7 +54,7 @@ def spot_figure(found: Photo, out: Path, name: str = "photo-spot") -> list[Path]
 
 
 @styled
-def rings_figure(found: Photo, out: Path, name: str = "photo-rings") -> list[Path]:
+def rings_figure(found: Photo, out: Path, name: str = RINGS) -> list[Path]:
     """Light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))

@@ -66,7 +66,7 @@ $style
 <header>
 <h1>$title</h1>
 <p class="lead">$lead</p>
-<p class="dim">$count. $conventions</p>
+<p class="dim">$told</p>
 <button id="theme" type="button" hidden>light or dark</button>
 </header>
 <nav aria-label="Contents"><ul>$links</ul></nav>
@@ -121,14 +121,19 @@ def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Calla
 def _document(made: Mapping[str, str], count: int) -> str:
     records = "\n".join(text for key, text in made.items() if key.startswith(RECORD))
     inside = {**made, "records": records}
-    shown = {key: title for key, title in PARTS.items() if inside[key]}
-    rules, sections = classed("\n".join(section(key, title, [inside[key]]) for key, title in shown.items()))
-    links = "".join(element("li", element("a", escape(title), href=f"#{key}")) for key, title in shown.items())
+    parts = {key: (title, inside[key]) for key, title in PARTS.items() if inside[key]}
+    told = f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}. {CONVENTIONS}"
+    return document(TITLE, LEAD, told, parts)
+
+
+def document(title: str, lead: str, told: str, parts: Mapping[str, tuple[str, str]]) -> str:
+    """A page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
+    rules, sections = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
+    links = "".join(element("li", element("a", escape(head), href=f"#{key}")) for key, (head, _) in parts.items())
     return PAGE.substitute(
-        title=escape(TITLE),
-        lead=escape(LEAD),
-        conventions=escape(CONVENTIONS),
-        count=f"{count} record{'s' if count != 1 else ''}, profilefit {__version__}",
+        title=escape(title),
+        lead=escape(lead),
+        told=escape(told),
         style=_asset("page.css") + rules,
         script=_asset("page.js"),
         links=links,

@@ -67,7 +67,12 @@ def photo_lines(found: Photo) -> Iterator[str]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
     if not found.cards:
-        yield f"no card was photographed: {CARDS}"
+        first, *_ = found.fits.values()
+        halos = first.shot.beliefs.halos
+        yield (
+            f"no card was photographed, so the shape of glare is not known: it is a mixture of halos {halos[0]:g} to "
+            f"{halos[-1]:g} mm wide; {CARDS}"
+        )
 
 
 def photo_content(found: Photo) -> dict[str, Any]:

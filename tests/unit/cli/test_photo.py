@@ -1,6 +1,8 @@
 """`profilefit photo` as a user meets it."""
 
 import json
+import re
+from html import escape
 from pathlib import Path
 
 import cv2
@@ -10,7 +12,9 @@ import rawpy
 import tifffile
 
 from profilefit.measured.photo import setup
+from profilefit.shader import opened
 
+EMPTY = "#version 330\nvoid main() { gl_Position = vec4(0.0); }"
 SETUP = """
 [medium]
 mu_s = [1.0, 1.0, 1.0]
@@ -53,17 +57,30 @@ def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
     cards = ["--card", *several(folder, "card"), "--grey", *several(folder, "grey")]
     words = ["--scale", "0.1mm/px", "--beam", "0.5mm+-0.05mm", "--out", "skin"]
     status, out, err = command("photo", *several(folder, "spot"), *cards, *words)
-    assert (status, err) == (0, "wrote photo.json and 4 figures into skin\n")
+    assert (status, err) == (0, "wrote photo.html, photo.json, medium.glsl and 4 figures into skin\n")
     assert max(map(len, out.splitlines())) <= 100
     found = json.loads((tmp_path / "skin" / "photo.json").read_text())
     for one in found["colours"].values():
         for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
             assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
             assert one["at_best"][name] < 0.1
-    assert {one.name for one in (tmp_path / "skin").iterdir()} == {
-        "photo.json", "photo-spot.png", "photo-spot.svg", "photo-rings.png", "photo-rings.svg",
-    }  # fmt: skip
+    drawings = {f"photo-{name}.{kind}" for name in ("spot", "rings") for kind in ("png", "svg")}
+    files = {one.name for one in (tmp_path / "skin").iterdir()}
+    assert files == {"photo.html", "photo.json", "medium.glsl", *drawings}
     assert "no card was photographed" not in out
+    page = (tmp_path / "skin" / "photo.html").read_text()
+    assert page.count("<svg") == 2
+    told = (tmp_path / "skin" / "medium.glsl").read_text()
+    assert escape(told) in page
+    for name, of in (("albedo", "alpha"), ("mfp", "l")):
+        constants = re.search(rf"const vec3 medium_{name} = vec3\((.*)\); // \+- (.*)\n", told).groups()
+        for text, kind, digits in zip(constants, ("values", "errors"), (1e-5, 0.1), strict=True):
+            expected = [one[kind][of] for one in found["colours"].values()]
+            np.testing.assert_allclose([float(number) for number in text.split(", ")], expected, rtol=digits)
+    with opened() as context:
+        main = "out float y; void main() { y = medium_profile(1.0, medium_albedo.g, medium_mfp.g); }"
+        program = context.program(EMPTY, "\n".join(["#version 330", told, main]))
+        program.release()
 
 
 SCALE = ("--scale", "0.1mm/px")
