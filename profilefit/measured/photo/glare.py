@@ -9,7 +9,7 @@ of it that never enters the medium but is scattered by its surface, a picture sh
 
 as means over rings. The mean of h_a over a circle of radius rho, at a distance d from its centre, is
 a E(m) / (pi^2 (A - B) sqrt(A + B)), A = d^2 + rho^2 + a^2, B = 2 d rho, m = 2 B / (A + B), E the complete elliptic
-integral.
+integral. The core blurs a halo, too: by sigma^2 / 2 times its Laplacian, which is -d^2 h_a / da^2.
 """
 
 from __future__ import annotations
@@ -19,12 +19,14 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from scipy.interpolate import CubicSpline
 from scipy.special import ellipe
 
 from profilefit.measured.beam import Floats, Gaussian
 from profilefit.measured.instrument import RING, Instrument
 
 FARTHER = 5.0  # of the last ring, from where halos still bring light
+NEAR = 0.1  # of a, between halos whose difference is a derivative
 APART = 0.05  # in ln sigma, of cores whose weights are known
 POLYNOMIALS = np.linalg.inv(np.vander(np.arange(4.0), increasing=True)).T  # (4, 4) Lagrange's, lowest power first
 
@@ -50,7 +52,14 @@ def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Flo
     cores = [_core(float(np.exp(APART * (first + at))), *rings) for at in range(4)]
     rho, near = cores[0][0], np.stack([one for _, one in cores])
     core, widening = np.tensordot([share, slope], near, axes=1)
-    return RingWeights(rho, np.concatenate([core[None], _halos(tuple(halos), *rings)]), widening)
+    sharp, bend = _halos(tuple(halos), *rings)
+    blurred = sharp - 0.5 * _blur(sigma, halos)[:, None, None] ** 2 * bend
+    return RingWeights(rho, np.concatenate([core[None], blurred]), widening)
+
+
+def _blur(sigma: float, halos: Sequence[float]) -> Floats:
+    """Of each halo by the core; where that is no small part of it, as much as the second order gives."""
+    return np.minimum(sigma, 0.5 * np.array(halos))
 
 
 @lru_cache(maxsize=24)
@@ -60,18 +69,26 @@ def _core(sigma: float, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
 
 
 @lru_cache(maxsize=8)
-def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> Floats:
+def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
+    """Weights (halos, n, m) of halos that no core blurs, and their second derivatives by a."""
     rho, _ = _core(float(np.frombuffer(outer)[0]), inner, outer)  # radii are those of any core
-    steps = np.gradient(rho)  # even in a smooth function of rho, so this sum is a trapezoidal one
+    steps = CubicSpline(np.arange(rho.size), rho)(np.arange(rho.size), 1)  # a sum is a trapezoidal integral
     d, share = _over_rings(np.frombuffer(inner), np.frombuffer(outer))
-    return np.stack([np.einsum("q,nqm->nm", share, halo(a, d[..., None], rho)) * steps for a in halos])
+
+    def weights(by: float) -> Floats:
+        return np.stack([np.einsum("q,nqm->nm", share, halo(by * a, d[..., None], rho)) * steps for a in halos])
+
+    less, own, more = weights(1.0 - NEAR), weights(1.0), weights(1.0 + NEAR)
+    return own, (more + less - 2.0 * own) / (NEAR * np.array(halos)[:, None, None]) ** 2
 
 
 def ring_means(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Floats:
     """Each spread's own mean over rings (1 + halos, n) [1/area]."""
     areas = np.pi * (outer - inner) * (outer + inner)
     core = (np.exp(-0.5 * (inner / sigma) ** 2) - np.exp(-0.5 * (outer / sigma) ** 2)) / areas
-    return np.stack([core, *((a / np.hypot(inner, a) - a / np.hypot(outer, a)) / areas for a in halos)])
+    z = np.array(halos) + 1j * _blur(sigma, halos)  # e^{-ka} cos(k sigma) is as much blurred to third order
+    means = [(one / np.sqrt(inner**2 + one**2) - one / np.sqrt(outer**2 + one**2)).real / areas for one in z]
+    return np.stack([core, *means])
 
 
 def halo(a: float, d: Floats, rho: Floats) -> Floats:
