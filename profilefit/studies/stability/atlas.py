@@ -134,9 +134,11 @@ def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> 
     def job() -> Findings:
         limits = law_cells.limits_of(one, folder)
         arithmetics = QUICK_ARITHMETICS if quick else law_cells.COMPUTED
-        cells = [*law_cells.cells_of(one, limits, arithmetics), *model_cells.cells_of(one, limits), *misuse.of_law(one)]
+        text = map_cells.in_reduced(one)
+        cells = [*law_cells.cells_of(text, limits, arithmetics), *model_cells.cells_of(one, limits)]
+        cells += misuse.of_law(text)
         if one.label in DERIVED and not quick:
-            cells += gradients.of_law(one, (*DERIVED[one.label], *also), limits.valid.alpha or EVERYWHERE)
+            cells += gradients.of_law(text, (*DERIVED[one.label], *also), limits.valid.alpha or EVERYWHERE)
         return _part(one.label, cells)
 
     return job
@@ -144,9 +146,10 @@ def _of_law(one: Named, folder: Records, quick: bool, also: tuple[str, ...]) -> 
 
 def _of_map(one: Named, folder: Records, quick: bool) -> Callable[[], Findings]:
     def job() -> Findings:
-        cells = [*map_cells.cells_of(one, folder), *misuse.of_map(one)]
+        text = map_cells.in_reduced(one)
+        cells = [*map_cells.cells_of(one, folder), *misuse.of_map(text)]
         if one.label in DERIVED_MAPS and not quick:
-            cells += gradients.of_map(one, validity.of_map(one, folder))
+            cells += gradients.of_map(text, validity.of_map(one, folder))
         return _part(_map_label(one), cells)
 
     return job

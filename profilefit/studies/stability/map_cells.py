@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
 from profilefit.convert import LENGTHS, Optical, alpha_of, reflectance_of
 from profilefit.errors import InputError
 from profilefit.laws.base import AlbedoLaw
@@ -57,15 +58,20 @@ WAYS = {ALPHA_OF: ("delta_alpha", "alpha"), REFLECTANCE_OF: ("delta_A", "map_ref
 
 
 def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
-    """Both directions in every arithmetic, then what keeping alpha or its root in half costs."""
-    model, spans = bounds.of_map(one, folder), validity.of_map(one, folder)
+    """Both directions in every arithmetic, then what keeping alpha or its root in half costs; of reduced albedos."""
+    text, model, spans = in_reduced(one), bounds.of_map(one, folder), validity.of_map(one, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
         for arithmetic in (FLOAT64, FLOAT32, TEXT32, TEXT16):
-            yield _computed(one, name, arithmetic, limit, span)
-    yield from _kept_in_half(one, spans[1])
+            yield _computed(text, name, arithmetic, limit, span)
+    yield from _kept_in_half(text, spans[1])
     if one.setting.is_solved:
         yield from _against_exact(one, *spans, model)
+
+
+def in_reduced(one: Named) -> Named:
+    """As a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
+    return replace(one, law=one.law.in_reduced())
 
 
 def _computed(one: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
@@ -141,10 +147,11 @@ def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bo
     """In A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = ArgumentAxis("α", "-", 1.0 - root**2)
-    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(alpha.values, setting=one.setting)))
+    own = unreduced(alpha.values, one.setting.g)
+    reflectance = ArgumentAxis("A", "-", np.asarray(exact.reflectance(own, setting=one.setting)))
+    law = one.law.in_reduced()
     with np.errstate(all="ignore"):
-        back = np.asarray(one.law.alpha(reflectance.values))
-        there = np.asarray(one.law.reflectance(alpha.values))
+        back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
     in_a, in_alpha = (model.get(measure) or np.nan for measure, _ in reversed(WAYS.values()))
     bound = min(MODEL_BOUND, FACTOR * in_a) if one.law.entry.own else MODEL_BOUND  # ours as their records
     yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha, in_a)

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.liang import Liang
 from profilefit.recipes.inventory import Named
@@ -37,17 +38,19 @@ def cells_of(one: Named, limits: Limits) -> Iterator[Cells]:
 def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
     alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
     albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
-    law, setting = one.law, one.setting
-    within = np.asarray(exact.cdf(r, albedo, setting=setting))
+    law, setting = one.law.in_reduced(), one.setting
+    own = np.asarray(unreduced(albedo, setting.g))  # of the medium that has this reduced albedo, and l* = 1
+    medium = own, 1.0 - own * setting.g, setting
+    within = np.asarray(exact.cdf(r, *medium))
     with np.errstate(all="ignore"):
         drawn = np.asarray(law.sampler.sample(share, albedo))
         profile, cdf = np.asarray(law.profile(r, albedo)), np.asarray(law.cdf(r, albedo))
-    reached = np.asarray(exact.cdf(np.where(drawn >= 0, drawn, np.inf), albedo, setting=setting))
+    reached = np.asarray(exact.cdf(np.where(drawn >= 0, drawn, np.inf), *medium))
     if np.any(
         law.sampler.jump(alpha.values) < 1.0
     ):  # two shares of the light draw one radius: the law's own nearer one
         reached += np.asarray(law.sampler.undone(drawn, share, albedo)) - np.asarray(law.cdf(drawn, albedo))
-    truth = np.asarray(exact.profile(r, albedo, setting=setting))
+    truth = np.asarray(exact.profile(r, *medium))
     held = limits.valid.alpha.holds(albedo) if limits.valid.alpha else np.zeros_like(albedo, bool)
     draws = limits.valid.drawn.holds(albedo) if limits.valid.drawn else np.zeros_like(albedo, bool)
     seen = (within <= ENERGY_WITHIN) & law.entry.profile.holds(albedo)
