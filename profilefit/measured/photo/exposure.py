@@ -8,7 +8,8 @@ from __future__ import annotations
 
 import importlib
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -69,7 +70,7 @@ def read(path: Path) -> Exposure:
 def _raw(path: Path) -> Exposure:
     rawpy = library("rawpy")
     try:
-        with rawpy.imread(str(path)) as raw:
+        with _without_words(), rawpy.imread(str(path)) as raw:
             _require_size(path, raw.sizes.width, raw.sizes.height)
             if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
                 raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
@@ -83,6 +84,19 @@ def _raw(path: Path) -> Exposure:
     except rawpy.LibRawError as error:
         raise InputError(f"{path}: cannot be read as a raw file: {_first_line(error)}") from None
     return found
+
+
+@contextmanager
+def _without_words() -> Iterator[None]:
+    """LibRaw writes to standard error by itself what its error says again."""
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
 
 
 def of_sensor(

@@ -11,7 +11,9 @@ import pytest
 import rawpy
 import tifffile
 
+from profilefit.errors import InputError
 from profilefit.measured.photo import setup
+from profilefit.measured.photo.exposure import read
 from profilefit.shader import opened
 
 EMPTY = "#version 330\nvoid main() { gl_Position = vec4(0.0); }"
@@ -147,3 +149,11 @@ def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
     assert "no exposure time is stated" in " ".join(out.split())
     assert "one exposure does not tell gain" in " ".join(out.split())
     assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())
+
+
+def test_a_truncated_raw_file_is_one_line(folder, tmp_path, capfd):
+    """LibRaw itself would write another to standard error."""
+    (tmp_path / "cut.dng").write_bytes((folder / "spot-1.dng").read_bytes()[:20_000])
+    with pytest.raises(InputError, match=r"cut.dng: cannot be read as a raw file: [^\n]*$"):
+        read(tmp_path / "cut.dng")
+    assert capfd.readouterr().err == ""
