@@ -132,10 +132,18 @@ def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
 
 
 @pytest.mark.slow
+def _law(name, liang, normalisation):
+    """One that the objective is of."""
+    maps = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84)} | dict.fromkeys(
+        ("reflectance", "relative_reflectance"), normalisation
+    )
+    return maps.get(name, liang)
+
+
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisation, x64):
     """The Jacobian in a constant that is not seen is zero, and in one that is seen it is not."""
-    law = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}.get(name, liang)
+    law = _law(name, liang, normalisation)
     rings = of_law(liang, xi=np.linspace(0.1, 0.9, 5), limits=np.ones(3))
     # At alpha near 1 the term of a that a3 governs is not zero.
     rings = made(rings.energy, rings.beyond, alpha=np.array([0.3, 0.6, 0.97]), xi=rings.xi, limits=rings.limits)
@@ -149,7 +157,7 @@ def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisat
 @pytest.mark.parametrize("name", OBJECTIVES)
 def test_every_objective_has_a_derivative_in_its_data(name, liang, normalisation, x64):
     """Photon noise goes to the constants through it: finite everywhere, and the finite difference."""
-    law = {"albedo": LiangAlbedo(Setting(), 5.67, 3.84, 0.84), "reflectance": normalisation}.get(name, liang)
+    law = _law(name, liang, normalisation)
     base = of_law(liang, xi=np.linspace(0.13, 0.91, 5), limits=np.ones(3))
 
     def cost(energy):

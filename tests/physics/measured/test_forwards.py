@@ -75,6 +75,6 @@ def test_what_nobody_said_is_said_to_be_assumed():
 @pytest.mark.slow
 def test_intervals_hold_the_truth():
     """In 100 media, n and g given; 95 % of them within the binomial's 1e-3."""
-    for one in own_data.coverage(100, False, seed=4).values():
+    for one in own_data.coverage(100, False, jobs=2).values():
         assert one.held > 0.86
         assert one.wider < 3
