@@ -87,7 +87,7 @@ def photo(
         from mcml_sim.runs.progress import working
         from profilefit.measured.photo.medium import Beliefs
         from profilefit.measured.photo.workflow import photo as measured
-        from profilefit.report.page.photo import photo_page
+        from profilefit.report.page.photo import medium_text, photo_page
         from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
@@ -114,7 +114,7 @@ def photo(
     if out is not None:  # after photographs that cannot be measured, which leave no folder
         require_folder(out)
         figures = _figures(found, out)
-        text = _shader(found)
+        text = medium_text(found)
         write_whole(out / "medium.glsl", text)
         write_whole(out / "photo.html", photo_page(found, out, text))
         write_whole(out / "photo.json", json_text(body))
@@ -135,29 +135,6 @@ def _figures(found: Photo, out: Path) -> int:
         from profilefit.report.figures.photo_figures import rings_figure, spot_figure
 
     return len([*spot_figure(found, out), *rings_figure(found, out)])
-
-
-def _shader(found: Photo) -> str:
-    """The law at the medium's index and cosine, and the medium."""
-    with interruptible(__name__):
-        import numpy as np
-
-        from profilefit.recipes.folder import fits_folder
-        from profilefit.recipes.inventory import find
-        from profilefit.shader.law_file import export_medium
-
-    folder, fits = fits_folder(), list(found.fits.values())
-    law = find("hazard-diffuse", folder, None, found.setting.n, found.setting.g)
-    kinds = {"albedo": "alpha", "mfp": "l"}
-    values = {
-        name: np.array([[getattr(fit, kind)[of] for fit in fits] for kind in ("values", "errors")])
-        for name, of in kinds.items()
-    }
-    head = [
-        f"by photographs from {found.shot.sources[0]} on, {', '.join(found.fits)}: as alpha and mfp above",
-        "mfp in mm; errors of one standard deviation",
-    ]
-    return export_medium(law, folder, "medium", head, values)
 
 
 def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, quiet: bool) -> None:

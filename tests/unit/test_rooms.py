@@ -33,7 +33,6 @@ SHORT, LONG = 60, 350  # lines: a shorter file needs a second importer, a longer
 EXCEPTIONS = {
     "profilefit.laws.van_de_hulst": "one of a shelf",
     "profilefit.measured.table_file": "one format, and what is wrong with it",
-    "profilefit.report.page.photo": "one page",
     "profilefit.recipes.paper.reproduction": "three lines over: the readings of one paper",
 }
 

@@ -1,21 +1,6 @@
 """A setup for photographs that are simulated: its file, its photographs as raw files, and what they could tell.
 
-[medium]                          # by colour: red, green, blue
-mu_s = [1.2, 1.0, 0.8]            # reduced, 1/mm
-mu_a = [0.02, 0.05, 0.1]          # 1/mm
-n = 1.4
-g = 0.8
-[optics]                          # lengths in mm, shares of the light
-beam = 0.5
-surface = 0.01
-glare = 0.02
-[camera]
-sides = [1200, 900]
-pitch = 0.04                      # mm a pixel
-exposures = 5                     # a factor of four apart
-[cards]
-white = true
-grey = 0.18
+`KEYS` are those of its file, and `examples/photo.toml` is one.
 """
 
 from __future__ import annotations

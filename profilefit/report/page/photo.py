@@ -1,18 +1,23 @@
-"""The page of a photograph: the medium, the spot, the fit of its rings, and the medium for a shader."""
+"""What a photograph leaves behind: the medium as a shader's text, and a page of it, of the spot and of the fit."""
 
 from __future__ import annotations
 
 from html import escape
 from pathlib import Path
 
+import numpy as np
+
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import read_whole
 from profilefit.measured.photo.workflow import Photo
+from profilefit.recipes.folder import fits_folder
+from profilefit.recipes.inventory import find
 from profilefit.report.drawing import inline
 from profilefit.report.figures.photo_figures import RINGS, SPOT
 from profilefit.report.page.document import document
 from profilefit.report.page.markup import command, details, element, figure, markup, paragraph
 from profilefit.report.tables.photo_tables import photo_lines, photo_tables
+from profilefit.shader.law_file import export_medium
 
 MOST_DRAWING = 2**24  # bytes
 TITLE = "A medium, by photographs of a laser spot"
@@ -26,6 +31,21 @@ SHADER = (
     "irradiance wants them, and after them albedo and mean free path of this medium. Another language, and the law "
     "under a pencil beam:"
 )
+
+
+def medium_text(found: Photo) -> str:
+    """GLSL of the law for diffuse light at the medium's n and g, and after it albedo and mean free path by colour."""
+    folder, fits = fits_folder(), list(found.fits.values())
+    law = find("hazard-diffuse", folder, None, found.setting.n, found.setting.g)
+    values = {
+        name: np.array([[one.values[of] for one in fits], [one.errors[of] for one in fits]])
+        for name, of in (("albedo", "alpha"), ("mfp", "l"))
+    }
+    head = [
+        f"by photographs from {found.shot.sources[0]} on, {', '.join(found.fits)}: as alpha and mfp above",
+        "mfp in mm; errors of one standard deviation",
+    ]
+    return export_medium(law, folder, "medium", head, values)
 
 
 def photo_page(found: Photo, folder: Path, text: str) -> str:
