@@ -1,6 +1,9 @@
 """Means over rings about the spot, and their covariance by sectors: noise, speckle and unevenness alike.
 
-Each ring is divided into sectors. The scatter of their means over the sectors gives the covariance of the rings, which
+A ring has few pixels near the centre, and where these lie in it is chance: its mean is that of the polynomial in the
+square of the radius that fits its pixels, which is even over its area.
+
+Each ring is divided into sectors. The scatter of what they differ from that by gives the covariance of the rings, which
 are correlated where something is uneven over many of them; with fewer sectors than rings it is shrunk towards its
 diagonal by as much as its correlations are noise (Schaefer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005).
 """
@@ -21,6 +24,8 @@ Floats = NDArray[np.float64]
 SECTORS = 24
 FACTOR = 1.12  # of the radii of neighbouring edges
 FINEST = 3.0  # pixels, of a ring's width
+DEGREE = 2  # in the square of the radius, of the light within a ring
+INTEGRAL = np.array([1.0, 0.0, 1.0 / 3.0])  # means of the powers over -1 ... 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,19 +59,38 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
     """Of the planes of one colour, between edges [unit]."""
     count = edges.size - 1
     cells = count * SECTORS
-    sums = np.zeros((2, cells))
+    kept = []
+    powers, products = np.zeros((2 * DEGREE + 1, count)), np.zeros((DEGREE + 1, count))
+    squares = edges**2
     for one in pictures:
         x, y, light = places(one, plate, centre)
         ring = np.digitize(np.hypot(x, y), edges) - 1
-        sector = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2.0 * np.pi))).astype(int) % SECTORS
         good = (ring >= 0) & (ring < count) & np.isfinite(light)
-        cell = (ring * SECTORS + sector)[good]
-        sums += np.bincount(cell, minlength=cells), np.bincount(cell, light[good], cells)
+        x, y, light, ring = x[good], y[good], light[good], ring[good]
+        across = 2.0 * (x * x + y * y - squares[ring]) / np.diff(squares)[ring] - 1.0
+        sector = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2.0 * np.pi))).astype(int) % SECTORS
+        kept.append((ring, across, ring * SECTORS + sector, light))
+        for power in range(2 * DEGREE + 1):
+            powers[power] += np.bincount(ring, across**power, count)
+        for power in range(DEGREE + 1):
+            products[power] += np.bincount(ring, light * across**power, count)
+    polynomials = _polynomials(powers, products)
+    sums = np.zeros((2, cells))
+    for ring, across, cell, light in kept:
+        off = light - np.sum(polynomials[:, ring] * across ** np.arange(DEGREE + 1)[:, None], axis=0)
+        sums += np.bincount(cell, minlength=cells), np.bincount(cell, off, cells)
     many, total = sums.reshape(2, count, SECTORS)
     whole = np.all(many > 0, axis=1)
-    mean = total[whole] / many[whole]
-    value = mean.mean(axis=1)
-    return SpotRings(edges[:-1][whole], edges[1:][whole], value, shrunk(mean - value[:, None]))
+    off = total[whole] / many[whole]
+    value = (INTEGRAL @ polynomials)[whole]
+    return SpotRings(edges[:-1][whole], edges[1:][whole], value, shrunk(off - off.mean(axis=1)[:, None]))
+
+
+def _polynomials(powers: Floats, products: Floats) -> Floats:
+    """Of each ring, by least squares (DEGREE + 1, n), lowest power first; from sums over its pixels."""
+    at = np.add.outer(np.arange(DEGREE + 1), np.arange(DEGREE + 1))
+    found: Floats = np.einsum("nij,jn->in", np.linalg.pinv(np.moveaxis(powers[at], 2, 0)), products)
+    return found
 
 
 def shrunk(off: Floats) -> Floats:

@@ -12,6 +12,7 @@ from profilefit.measured import model
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.model import u_of
 from profilefit.measured.photo import bracket, medium, rings, simulated, spot
+from profilefit.measured.photo.bracket import Picture
 from profilefit.measured.photo.exposure import BayerPlane, Exposure
 from profilefit.measured.photo.glare import halo, ring_means, ring_weights
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
@@ -209,3 +210,18 @@ def test_whole_photographs_give_their_medium(cards):
     z = np.array([np.log1p(one.off) / one.stated for one in found])
     assert np.abs(z).max() < 4.0
     assert np.sqrt(np.mean(z**2)) < 1.5
+
+
+def test_where_pixels_lie_in_a_ring_does_not_change_its_mean():
+    sigma, middle = 4.2, (50.0, 50.0)  # pixels of a plane
+    y, x = np.mgrid[:101, :101]
+    light = np.exp(-0.5 * ((x - middle[0]) ** 2 + (y - middle[1]) ** 2) / sigma**2).astype(np.float32)
+    edges = rings.edges_of(4.0 * sigma, 1.0)
+    found = rings.rings([Picture(light, light, (0, 0), 1)], middle, edges, PixelScale(np.eye(3), "told"))
+    ends = np.exp(-0.5 * np.array([found.inner, found.outer]) ** 2 / sigma**2)
+    expected = 2.0 * sigma**2 * (ends[0] - ends[1]) / (found.outer**2 - found.inner**2)
+    assert found.value == pytest.approx(expected, rel=0.01)
+    # The means of the pixels are not those of the areas.
+    r = np.hypot(x - middle[0], y - middle[1])
+    means = [light[(r >= a) & (r < b)].mean() for a, b in zip(found.inner, found.outer, strict=True)]
+    assert np.all(means / expected > 1.03)
