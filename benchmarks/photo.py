@@ -6,7 +6,7 @@
 Each is a bracket of five 12-bit exposures of a spot on a medium of n 1.4 and g 0.8, with every nuisance drawn anew from
 what the fit believes: beam, surface, glare and its width, darkened corners, speckle, uneven pixels, wrong times, a
 correlated error of 1 %; with cards, a white one and a grey one of reflectance .18 +- .004 likewise; once more
-with glare of a shape that is no mixture of the fit's halos, falling as r^-2.4 to r^-5. Errors are over the Fisher bound
+with glare that falls as r^-2.4 to r^-5 in place of r^-3. Errors are over the Fisher bound
 of the same rings at the truth.
 """
 

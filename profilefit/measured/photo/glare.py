@@ -1,15 +1,16 @@
 """What beam and lens make of a point of light, and rings of a medium seen so.
 
 A point is spread over a core, a Gaussian of standard deviation sigma (the beam, its 1/e^2 radius being 2 sigma, and
-what a lens blurs), and over halos, h_a(r) = a / (2 pi (r^2 + a^2)^{3/2}), whose transform is e^{-ka}: glare of any
-shape that falls outwards is near some mixture of them. Of light of profile R_d under a beam of power one, and a share S
-of it that never enters the medium but is scattered by its surface, a picture shows
+what a lens blurs), and over halos, h_a(r) = 3 a^3 / (2 pi (r^2 + a^2)^{5/2}), whose transform is (1 + ka) e^{-ka}:
+glare that falls outwards more slowly is a mixture of them. Of light of profile R_d under a beam of power one, and a
+share S of it that never enters the medium but is scattered by its surface, a picture shows
 
     I = k sum_c share_c (R_d + S delta) * spread_c + dark,     sum_c share_c = 1,
 
 as means over rings. The mean of h_a over a circle of radius rho, at a distance d from its centre, is
-a E(m) / (pi^2 (A - B) sqrt(A + B)), A = d^2 + rho^2 + a^2, B = 2 d rho, m = 2 B / (A + B), E the complete elliptic
-integral. The core blurs a halo, too: by sigma^2 / 2 times its Laplacian, which is -d^2 h_a / da^2.
+2 a^3 (E(m) / (A - B) + (2 E(m) - K(m)) / (2 (A + B))) / (pi^2 (A - B) sqrt(A + B)), A = d^2 + rho^2 + a^2, B = 2 d rho,
+m = 2 B / (A + B), E and K the complete elliptic integrals. The core blurs a halo, too: by sigma^2 / 2 times its
+Laplacian, which is -d^2 h_a / da^2 + (2 / a) dh_a / da.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.interpolate import CubicSpline
-from scipy.special import ellipe
+from scipy.special import ellipe, ellipk
 
 from profilefit.measured.beam import Floats, Gaussian
 from profilefit.measured.instrument import RING, Instrument
@@ -70,7 +71,7 @@ def _core(sigma: float, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
 
 @lru_cache(maxsize=8)
 def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
-    """Weights (halos, n, m) of halos that no core blurs, and their second derivatives by a."""
+    """Weights (halos, n, m) of halos that no core blurs, and minus their Laplacians."""
     rho, _ = _core(float(np.frombuffer(outer)[0]), inner, outer)  # radii are those of any core
     steps = CubicSpline(np.arange(rho.size), rho)(np.arange(rho.size), 1)  # a sum is a trapezoidal integral
     d, share = _over_rings(np.frombuffer(inner), np.frombuffer(outer))
@@ -79,23 +80,28 @@ def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> tuple[Floats
         return np.stack([np.einsum("q,nqm->nm", share, halo(by * a, d[..., None], rho)) * steps for a in halos])
 
     less, own, more = weights(1.0 - NEAR), weights(1.0), weights(1.0 + NEAR)
-    return own, (more + less - 2.0 * own) / (NEAR * np.array(halos)[:, None, None]) ** 2
+    slope, bend = 0.5 * (more - less) / NEAR, (more + less - 2.0 * own) / NEAR**2  # times a, a^2
+    return own, (bend - 2.0 * slope) / np.array(halos)[:, None, None] ** 2
 
 
 def ring_means(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Floats:
     """Each spread's own mean over rings (1 + halos, n) [1/area]."""
     areas = np.pi * (outer - inner) * (outer + inner)
     core = (np.exp(-0.5 * (inner / sigma) ** 2) - np.exp(-0.5 * (outer / sigma) ** 2)) / areas
-    z = np.array(halos) + 1j * _blur(sigma, halos)  # e^{-ka} cos(k sigma) is as much blurred to third order
-    means = [(one / np.sqrt(inner**2 + one**2) - one / np.sqrt(outer**2 + one**2)).real / areas for one in z]
+    # (1 + ka) e^{-ka} cos(k sigma), as much blurred to third order, is (1 - a d/da) of e^{-kz} at z = a + i sigma.
+    means = []
+    for a, z in zip(halos, np.array(halos) + 1j * _blur(sigma, halos), strict=True):
+        near, far = (z / np.sqrt(r**2 + z**2) - a * r**2 / (r**2 + z**2) ** 1.5 for r in (inner, outer))
+        means.append((near - far).real / areas)
     return np.stack([core, *means])
 
 
 def halo(a: float, d: Floats, rho: Floats) -> Floats:
     """Mean of h_a over a circle of radius rho about a point at the distance d."""
     whole, cross = d * d + rho * rho + a * a, 2.0 * d * rho
-    elliptic = ellipe(2.0 * cross / (whole + cross))
-    found: Floats = a * elliptic / (np.pi**2 * (whole - cross) * np.sqrt(whole + cross))
+    m, less, more = 2.0 * cross / (whole + cross), whole - cross, whole + cross
+    e, k = ellipe(m), ellipk(m)
+    found: Floats = 2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more))
     return found
 
 

@@ -53,7 +53,7 @@ class Beliefs:
     scale: Known | None = None
     corner: Known = field(default_factory=lambda: Known(0.05, 0.05))
     border: float = 20.0
-    halos: tuple[float, ...] = tuple(np.geomspace(1.0, 16.0, 9).tolist())
+    halos: tuple[float, ...] = tuple(np.geomspace(1.0, 32.0, 11).tolist())
 
 
 @dataclass(frozen=True, eq=False)
