@@ -25,7 +25,8 @@ SECTORS = 24
 FACTOR = 1.12  # of the radii of neighbouring edges
 FINEST = 3.0  # pixels, of a ring's width
 DEGREE = 2  # in the square of the radius, of the light within a ring
-INTEGRAL = np.array([1.0, 0.0, 1.0 / 3.0])  # means of the powers over -1 ... 1
+POWERS = np.arange(DEGREE + 1)
+EVEN = np.where(POWERS % 2 == 0, 1.0 / (POWERS + 1.0), 0.0)  # means of the powers over -1 ... 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,18 +78,18 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
     polynomials = _polynomials(powers, products)
     sums = np.zeros((2, cells))
     for ring, across, cell, light in kept:
-        off = light - np.sum(polynomials[:, ring] * across ** np.arange(DEGREE + 1)[:, None], axis=0)
+        off = light - np.sum(polynomials[:, ring] * across ** POWERS[:, None], axis=0)
         sums += np.bincount(cell, minlength=cells), np.bincount(cell, off, cells)
     many, total = sums.reshape(2, count, SECTORS)
     whole = np.all(many > 0, axis=1)
     off = total[whole] / many[whole]
-    value = (INTEGRAL @ polynomials)[whole]
+    value = (EVEN @ polynomials)[whole]
     return SpotRings(edges[:-1][whole], edges[1:][whole], value, shrunk(off - off.mean(axis=1)[:, None]))
 
 
 def _polynomials(powers: Floats, products: Floats) -> Floats:
     """Of each ring, by least squares (DEGREE + 1, n), lowest power first; from sums over its pixels."""
-    at = np.add.outer(np.arange(DEGREE + 1), np.arange(DEGREE + 1))
+    at = np.add.outer(POWERS, POWERS)
     found: Floats = np.einsum("nij,jn->in", np.linalg.pinv(np.moveaxis(powers[at], 2, 0)), products)
     return found
 

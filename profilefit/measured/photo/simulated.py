@@ -5,7 +5,7 @@ Hankel's integrals. The camera sees it tilted, darker towards its corners, throu
 spills what is too much over its neighbours in a column, and is read with noise, in steps, up to its white level.
 
 Halos are Moffat's, h = (b - 1) / (pi a^2) (1 + r^2 / a^2)^-b, whose transform is
-2 (ka / 2)^{b-1} K_{b-1}(ka) / Gamma(b - 1); b = 3/2 are those of `glare`.
+2 (ka / 2)^{b-1} K_{b-1}(ka) / Gamma(b - 1); b = 5/2 are those of `glare`.
 """
 
 from __future__ import annotations
