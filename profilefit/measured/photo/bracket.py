@@ -12,20 +12,21 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import binary_dilation, uniform_filter
 
 from profilefit.errors import InputError
-from profilefit.measured.photo.exposure import Exposure
+from profilefit.measured.photo.exposure import BayerPlane, Exposure
 
 Floats = NDArray[np.float64]
 Plane = NDArray[np.float32]
 FULL = 0.9  # of the range between black and white, from where a pixel counts as clipped
 REACH = 2  # pixels of a plane about a clipped one that are left out, too
 SHARED = 5  # pixels across, over which light is shared for the weights
-DIM = 0.02  # of the range, from where a pixel says something of ratios
+DIM, UNCLIPPED = 0.02, 0.7  # of the range, between which a pixel says something of ratios
 LEAST_PAIRS = 50  # pixels, for a ratio or a bin
 BINS = 24  # of light, for photon transfer
 
@@ -51,29 +52,56 @@ class Picture:
     step: int
 
 
-def times(shots: Sequence[Exposure]) -> Floats:
-    """Of each exposure relative to the last, from what they record; InputError where neighbours share no pixels."""
+class Times(NamedTuple):
+    """Of exposures (m,), relative to the longest, and the covariance (m, m) of their logarithms."""
+
+    value: Floats
+    covariance: Floats
+
+
+def times(shots: Sequence[Exposure]) -> Times:
+    """From what the exposures record; InputError where neighbours share no pixels."""
     order = np.argsort([one.seconds or float(np.mean(one.planes[0].counts)) for one in shots])
-    found = np.ones(len(shots))
-    for shorter, longer in zip(order[-2::-1], order[:0:-1], strict=True):
-        found[shorter] = found[longer] * _ratio(shots[shorter], shots[longer])
-    return found
+    found, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
+    for at in range(len(shots) - 2, -1, -1):
+        shorter, longer = order[at], order[at + 1]
+        ratio, error = _ratio(shots[shorter], shots[longer])
+        found[shorter] = found[longer] * ratio
+        covariance[np.ix_(order[: at + 1], order[: at + 1])] += error**2
+    return Times(found, covariance)
 
 
-def _ratio(shorter: Exposure, longer: Exposure) -> float:
-    """Of two exposures' times, the shorter one's first."""
+def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
+    """Of two exposures' times, the shorter one's first, and its relative error.
+
+    Pixels are chosen by what their neighbourhood records: by their own, those that are bright by chance would be.
+    """
     above = below = pairs = 0.0
+    chosen = []
     for one, other in zip(shorter.planes, longer.planes, strict=True):
-        good = (other.counts < FULL * other.range) & (other.counts > DIM * other.range)
-        above += float(one.counts[good].sum(dtype=float))
-        below += float(other.counts[good].sum(dtype=float))
+        level = uniform_filter(other.counts, SHARED, mode="nearest")
+        good = (level < UNCLIPPED * other.range) & (level > DIM * other.range) & _unclipped(other, REACH)
+        chosen.append((one.counts[good].astype(float), other.counts[good].astype(float)))
+        above += float(chosen[-1][0].sum())
+        below += float(chosen[-1][1].sum())
         pairs += int(good.sum())
     if pairs < LEAST_PAIRS or not 0 < above < below:
         raise InputError(
             f"{shorter.source}: expected a scene that {longer.source} shares with it, neither dark nor clipped, in "
             f"{LEAST_PAIRS} pixels, got {pairs:.0f}; take exposures in steps of a factor of eight or less"
         )
-    return above / below
+    ratio = above / below
+    scatter = sum(float(np.sum((one - ratio * other) ** 2)) for one, other in chosen)
+    return ratio, float(np.sqrt(scatter)) / above
+
+
+def shares(light: Floats, relative: Floats, own: Sensor, most: float) -> Floats:
+    """Of exposures (m,) in a picture of so much light (n,), where more than `most` steps clip: (n, m)."""
+    steps = np.maximum(np.multiply.outer(light, relative), 0.0)
+    weight = np.where(steps < most, relative**2 / (steps / own.gain + own.read**2), 0.0)
+    total = weight.sum(axis=1, keepdims=True)
+    found: Floats = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
+    return found
 
 
 def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
@@ -111,7 +139,7 @@ def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Pic
         light = _rough(shots, relative, at)
         for shot, time in zip(shots, relative, strict=True):
             one = shot.planes[at]
-            good = ~binary_dilation(one.counts >= FULL * one.range, iterations=REACH)
+            good = _unclipped(one, REACH)
             variance = np.maximum(light * time, 0.0) / own.gain + own.read**2
             weight = np.where(good, time**2 / variance, 0.0).astype(np.float32)
             total += weight * one.counts / np.float32(time)
@@ -121,12 +149,17 @@ def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Pic
     return pictures
 
 
+def _unclipped(plane: BayerPlane, reach: int) -> NDArray[np.bool_]:
+    """Pixels so far from those that clip."""
+    return ~binary_dilation(plane.counts >= FULL * plane.range, iterations=reach)
+
+
 def _rough(shots: Sequence[Exposure], relative: Floats, at: int) -> Plane:
     """Light that neighbouring pixels share, of the longest exposure that has it."""
     found: Plane = np.full(shots[0].planes[at].counts.shape, np.nan, np.float32)
     for shot, time in sorted(zip(shots, relative, strict=True), key=lambda pair: pair[1]):
         one = shot.planes[at]
-        good = ~binary_dilation(one.counts >= FULL * one.range, iterations=REACH + SHARED // 2)
+        good = _unclipped(one, REACH + SHARED // 2)
         smooth = uniform_filter(one.counts, SHARED, mode="nearest") / np.float32(time)
         found = np.where(good | np.isnan(found), smooth, found)
     return found

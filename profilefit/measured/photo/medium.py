@@ -27,6 +27,8 @@ from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.problem import Known
 
 Floats = NDArray[np.float64]
+HALO, ALIKE = 0.5, np.log(2.0)  # error of a halo's share over that of all glare; ln a within which shares are alike
+DARK = 1e-5  # error of the dark level
 UNEVEN = 0.01  # relative error in waves along ln r that neither sectors nor brackets show
 STEP = 1e-4  # of ln sigma, for derivatives
 ALBEDOS = (0.5, 0.8, 0.95, 0.99)
@@ -138,20 +140,38 @@ class Shot:
                         for one in (sigma, sigma * np.exp(STEP)))  # fmt: skip
         return means, (wider[0] - means[0]) / STEP
 
-    @cached_property
-    def prior(self) -> tuple[Floats, Floats]:
-        """Means and standard deviations of the coordinates; infinite of what nothing is known of."""
+    @property
+    def middle(self) -> Floats:
+        """What the coordinates (p,) are thought to be beforehand; 0 of which nothing is."""
         given, halos = self.beliefs, len(self.beliefs.halos)
-        mean, error = np.zeros(len(self.names)), np.full(len(self.names), np.inf)
+        found = np.zeros(len(self.names))
         if given.scale is not None:
-            mean[2], error[2] = np.log(given.scale.value), given.scale.error / given.scale.value
+            found[2] = np.log(given.scale.value)
         if given.beam is not None:
-            mean[3], error[3] = np.log(0.5 * given.beam.value), given.beam.error / given.beam.value
-        mean[4], error[4] = given.surface.value, given.surface.error
-        mean[5 : 5 + halos], error[5 : 5 + halos] = given.glare.value / halos, given.glare.error
-        error[5 + halos] = 1e-5
-        mean[6 + halos], error[6 + halos] = given.corner.value, given.corner.error
-        return mean, error
+            found[3] = np.log(0.5 * given.beam.value)
+        found[4], found[6 + halos] = given.surface.value, given.corner.value
+        found[5 : 5 + halos] = given.glare.value / halos
+        return found
+
+    @cached_property
+    def knowledge(self) -> tuple[Floats, Floats]:
+        """Rows (k, p) of sums of the coordinates, and what these are thought to be (k,), in standard errors."""
+        given, halos, unit = self.beliefs, len(self.beliefs.halos), np.eye(len(self.names))
+        rows = [unit[4] / given.surface.error, unit[5 + halos] / DARK, unit[6 + halos] / given.corner.error]
+        if given.scale is not None:
+            rows.append(unit[2] * given.scale.value / given.scale.error)
+        if given.beam is not None:
+            rows.append(unit[3] * given.beam.value / given.beam.error)
+        glare = unit[5 : 5 + halos]
+        apart = np.abs(np.subtract.outer(np.log(given.halos), np.log(given.halos)))
+        root = HALO * given.glare.error * np.linalg.cholesky(np.exp(-apart / ALIKE))
+        rows = [*rows, glare.sum(axis=0) / given.glare.error, *solve_triangular(root, glare, lower=True)]
+        values = [row @ self.middle for row in rows]
+        for own, card in zip(unit[unit.shape[0] - len(self.cards) :], self.cards, strict=True):
+            if (known := card.reflectance) is not None:
+                rows.append((own - unit[2]) * known.value / known.error)
+                values.append(np.log(known.value) * known.value / known.error)
+        return np.stack(rows), np.array(values)
 
     @cached_property
     def whitening(self) -> Floats:
@@ -169,25 +189,14 @@ class Shot:
         """In standard errors (m,), those of what is known beforehand last, and their derivatives (m, p)."""
         value, slopes = self.rows(x)
         data = np.concatenate([self.medium.value, *(card.rings.value for card in self.cards)])
-        mean, error = self.prior
-        known = np.isfinite(error)
+        ways, thought = self.knowledge
         rows = solve_triangular(self.whitening, np.column_stack([value - data, slopes]), lower=True)
-        off, ways = ((x - mean) / error)[known], np.diag(1.0 / error)[known]
-        glare, each = self.beliefs.glare, np.zeros(x.size)
-        each[5 : 5 + len(self.beliefs.halos)] = 1.0 / glare.error  # one halo may have it all
-        off, ways = np.append(off, each @ x - glare.value / glare.error), np.vstack([ways, each])
-        for at, card in enumerate(self.cards, start=x.size - len(self.cards)):
-            if (known_as := card.reflectance) is not None:
-                relative = known_as.error / known_as.value
-                off = np.append(off, (x[at] - x[2] - np.log(known_as.value)) / relative)
-                ways = np.vstack([ways, (np.eye(x.size)[at] - np.eye(x.size)[2]) / relative])
-        return np.append(rows[:, 0], off), np.vstack([rows[:, 1:], ways])
+        return np.append(rows[:, 0], ways @ x - thought), np.vstack([rows[:, 1:], ways])
 
     def starts(self) -> list[Floats]:
         """The best of a coarse search in length, for each of some albedos, the best first."""
         halos = len(self.beliefs.halos)
-        mean, _ = self.prior
-        x = mean.copy()
+        x = self.middle
         if self.beliefs.beam is None:
             near = self.cards[0].rings if self.cards else self.medium
             half = near.r[int(np.argmax(near.value < 0.5 * near.value[0]))]

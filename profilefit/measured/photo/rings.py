@@ -5,7 +5,9 @@ square of the radius that fits its pixels, which is even over its area.
 
 Each ring is divided into sectors. The scatter of what they differ from that by gives the covariance of the rings, which
 are correlated where something is uneven over many of them; with fewer sectors than rings it is shrunk towards its
-diagonal by as much as its correlations are noise (Schaefer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005).
+diagonal by as much as its correlations are noise (Schaefer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005). Near
+the centre a grain of speckle is wider than a sector, and sectors that share it do not scatter: there a ring's relative
+variance is at least that of the next ones, by area.
 """
 
 from __future__ import annotations
@@ -24,7 +26,8 @@ Floats = NDArray[np.float64]
 SECTORS = 24
 FACTOR = 1.12  # of the radii of neighbouring edges
 FINEST = 3.0  # pixels, of a ring's width
-DEGREE = 2  # in the square of the radius, of the light within a ring
+GRAIN, NEXT = 8.0, 5  # pixels, of a sector that no grain fills; rings with such sectors that tell of the narrower
+DEGREE = 4  # in the square of the radius, of the light within a ring
 POWERS = np.arange(DEGREE + 1)
 EVEN = np.where(POWERS % 2 == 0, 1.0 / (POWERS + 1.0), 0.0)  # means of the powers over -1 ... 1
 
@@ -84,7 +87,21 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
     whole = np.all(many > 0, axis=1)
     off = total[whole] / many[whole]
     value = (EVEN @ polynomials)[whole]
-    return SpotRings(edges[:-1][whole], edges[1:][whole], value, shrunk(off - off.mean(axis=1)[:, None]))
+    inner, outer = edges[:-1][whole], edges[1:][whole]
+    covariance = shrunk(off - off.mean(axis=1)[:, None])
+    widening = _of_grains(np.diag(covariance) / value**2, inner, outer, GRAIN * plate.pixel(centre))
+    return SpotRings(inner, outer, value, covariance * np.outer(widening, widening))
+
+
+def _of_grains(variance: Floats, inner: Floats, outer: Floats, grain: float) -> Floats:
+    """Factor (n,) on errors of relative variance (n,), of rings whose sectors are narrower than `grain`."""
+    areas, narrow = np.pi * (outer - inner) * (outer + inner), np.pi * (inner + outer) < SECTORS * grain
+    if np.all(narrow) or not np.any(narrow):
+        return np.ones(areas.size)
+    by_area = float(np.median((variance * areas)[~narrow][:NEXT]))
+    with np.errstate(divide="ignore"):
+        wanted = np.sqrt(by_area / (variance * areas))
+    return np.where(narrow, np.maximum(wanted, 1.0), 1.0)
 
 
 def _polynomials(powers: Floats, products: Floats) -> Floats:

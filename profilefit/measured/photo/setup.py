@@ -198,7 +198,7 @@ def _told(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None])
         beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core), border=0.5 * pixel * float(np.hypot(*setup.camera.sides))
     )
     shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.setting), beliefs)
-    x = shot.prior[0].copy()
+    x = shot.middle
     x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)
     x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
     seen = [

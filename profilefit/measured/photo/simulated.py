@@ -18,6 +18,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter
 from scipy.special import gamma, j0, kv
 
@@ -153,7 +154,7 @@ def taken(
 ) -> list[Taken]:
     """A bracket of exposures.
 
-    radial     radii [mm] and light (n,) [1/mm^2] by channel
+    radial     radii [mm], out to the corners, and light (n,) [1/mm^2] by channel
     electrons  a second where light is 1 [1/mm^2]; times: seconds that it took, by those that the camera states
     """
     rng = np.random.default_rng(seed)
@@ -169,8 +170,7 @@ def taken(
     for row in (0, 1):
         for column in (0, 1):
             at = (slice(row, None, 2), slice(column, None, 2))
-            radii, values = radial[PATTERN[row][column]]
-            expected[at] = np.interp(r[at], radii, values)
+            expected[at] = CubicSpline(*radial[PATTERN[row][column]])(r[at])
     expected *= np.float32(electrons) * sees
     return [
         Taken(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)

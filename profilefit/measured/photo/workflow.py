@@ -12,7 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.photo import bracket, medium, rings
-from profilefit.measured.photo.bracket import Picture, Sensor
+from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, read
 from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
 from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
@@ -27,11 +27,15 @@ LATE, WORTH = 0.03, 2  # relative error of a stated time, and of how many exposu
 
 @dataclass(frozen=True, eq=False)
 class Bracket:
-    """A merged bracket: its exposures' names, times relative to the longest, sensor, and where the spot is."""
+    """A merged bracket: its exposures' names, times relative to the longest, sensor, and where the spot is.
+
+    most  steps that an exposure records unclipped
+    """
 
     sources: tuple[str, ...]
-    times: tuple[float, ...]
+    times: Times
     stated: tuple[float | None, ...]
+    most: float
     sensor: Sensor
     planes: tuple[tuple[str, Picture], ...]
     spot: Spot
@@ -43,7 +47,7 @@ class Bracket:
     @property
     def seconds(self) -> Known | None:
         """Of the longest exposure: the mean of what all state, and the error that their scatter says."""
-        off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times, strict=True) if said])
+        off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said])
         if off.size == 0:
             return None
         scatter = (WORTH * LATE**2 + np.sum((off - off.mean()) ** 2)) / (WORTH + off.size - 1)
@@ -145,25 +149,31 @@ def _sides(sides: tuple[int, int]) -> str:
 def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
     """Exposures merged, with the spot of their brightest colour."""
     times = bracket.times(shots)
-    own = bracket.sensor(shots, times)
-    pictures = bracket.merged(shots, times, own)
+    own = bracket.sensor(shots, times.value)
+    pictures = bracket.merged(shots, times.value, own)
     names = [one.colour for one in shots[0].planes]
     brightest = max(dict.fromkeys(names), key=lambda name: sum(
         float(np.nansum(one.light)) for one, each in zip(pictures, names, strict=True) if each == name))  # fmt: skip
     lit = [one for one, name in zip(pictures, names, strict=True) if name == brightest]
     return Bracket(
-        tuple(one.source for one in shots), tuple(map(float, times)), tuple(one.seconds for one in shots), own,
+        tuple(one.source for one in shots), times, tuple(one.seconds for one in shots),
+        FULL * min(plane.range for one in shots for plane in one.planes), own,
         tuple(zip(names, pictures, strict=True)), spot(lit, shots[0].sides, size, shots[0].source), shots[0].sides,
     )  # fmt: skip
 
 
 def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
-    """Rings of a colour, in counts a second of the longest exposure, where it states its time."""
+    """Rings of a colour, in counts a second of the longest exposure, where it states its time.
+
+    What the times of the bracket leave open is an error that rings of one exposure share.
+    """
     pictures, pixel = one.pictures(colour), size.pixel(one.spot.centre)
     edges = rings.edges_of(one.spot.reach * pixel, pictures[0].step * pixel)
     found = rings.rings(pictures, one.spot.centre, edges, size)
+    share = found.value[:, None] * bracket.shares(found.value, one.times.value, one.sensor, one.most)
+    covariance = found.covariance + share @ one.times.covariance @ share.T
     seconds = 1.0 if one.seconds is None else one.seconds.value
-    return replace(found, value=found.value / seconds, covariance=found.covariance / seconds**2)
+    return replace(found, value=found.value / seconds, covariance=covariance / seconds**2)
 
 
 def carded(card: Bracket, colour: str, size: PixelScale, reflectance: Known | None, seen: Bracket) -> Card:

@@ -48,11 +48,11 @@ def photo_lines(found: Photo) -> Iterator[str]:
     """A sentence each on sensor, spot, what surface and lens add, the goodness of fit, and what is not identified."""
     shot = found.shot
     yield f"scale: {found.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
-    if len(shot.times) == 1:
+    if len(shot.sources) == 1:
         yield "one exposure does not tell gain and read noise: one electron a step is taken for both"
     else:
         yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
-        yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times))
+        yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times.value))
     yield from found.notes
     for colour, fit in found.fits.items():
         x = dict(zip(fit.shot.names, fit.x, strict=True))
@@ -80,7 +80,7 @@ def photo_content(found: Photo) -> dict[str, Any]:
     plain: dict[str, Any] = record.plain(
         {
             "shots": found.shot.sources,
-            "times": found.shot.times,
+            "times": found.shot.times.value,
             "sensor": vars(found.shot.sensor),
             "spot": vars(found.shot.spot),
             "scale": {"matrix": found.plate.matrix, "words": found.plate.words},

@@ -95,7 +95,7 @@ def test_light_by_rings_is_that_by_hankels_integrals():
 
 def test_a_brackets_times_gain_and_light_are_those_of_the_camera(shots, light):
     exposures, real = shots
-    times = bracket.times(exposures)
+    times, _ = bracket.times(exposures)
     np.testing.assert_allclose(times / times[-1], real / real[-1], rtol=5e-3)
     own = bracket.sensor(exposures, times)
     assert own.gain == pytest.approx(CAMERA.gain, rel=0.1)
@@ -111,9 +111,29 @@ def test_a_brackets_times_gain_and_light_are_those_of_the_camera(shots, light):
     assert off.std() == pytest.approx(1.0, abs=0.08)
 
 
+def test_what_spills_out_of_full_pixels_does_not_change_times():
+    """A card's spot is so steep that pixels that count lie beside those that overflow."""
+    off = []
+    for seed in range(6):
+        optics = SpotOptics(core=0.0)
+        radii = simulated.radii(bench.FARTHEST, optics)
+        light = simulated.card(optics, radii)
+        camera = replace(CAMERA, well=2.0e4)
+        first = 0.5 * camera.gain * (camera.white - camera.black) / light[0]
+        times = {first * 4.0**step: first * 4.0**step * (1.0 + 0.05 * np.sin(step + seed)) for step in range(5)}
+        taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, (radii, light)), camera, 1.0, times, seed)
+        found = bracket.times([bench.as_read(one, "card") for one in taken])
+        real = np.array(list(times.values()))
+        errors = np.sqrt(np.diag(found.covariance))[:-1]
+        assert np.all(errors < 0.03)
+        off.append((np.log(found.value[:-1] / found.value[-1]) - np.log(real[:-1] / real[-1])) / errors)
+    assert np.sqrt(np.mean(np.square(off))) < 1.6
+    assert abs(np.mean(off)) < 1.2
+
+
 def test_a_spots_centre_is_found(shots):
     exposures, _ = shots
-    times = bracket.times(exposures)
+    times, _ = bracket.times(exposures)
     greens = bracket.merged(exposures, times, bracket.sensor(exposures, times))[1:3]
     found = spot.spot(greens, exposures[0].sides, SQUARE, "shot")
     assert found.centre == pytest.approx((399.5 + 13.3, 299.5 - 7.7), abs=0.5)
@@ -140,20 +160,20 @@ def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, s
 
 def test_rings_err_as_they_say(light):
     """Of twelve pictures, the scatter of each ring over its stated error; the mean of the ratios' squares."""
-    squares = []
-    edges = rings.edges_of(15.0, 2 * PITCH)
+    edges, camera = rings.edges_of(15.0, 2 * PITCH), replace(CAMERA, grain=2.5)
     found = []
     for seed in range(12):
         (one,) = simulated.taken(
-            dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {1.0: 2000.0 / light[1][0]}, seed
+            dict.fromkeys(simulated.CHANNELS, light), camera, 1.0, {1.0: 2000.0 / light[1][0]}, seed
         )
         exposure = bench.as_read(one, "one")
-        greens = bracket.merged([exposure], np.ones(1), bracket.Sensor(CAMERA.gain, 0.75))[1:3]
+        greens = bracket.merged([exposure], np.ones(1), bracket.Sensor(camera.gain, 0.75))[1:3]
         found.append(rings.rings(greens, (399.5 + 13.3, 299.5 - 7.7), edges, SQUARE))
     values = np.array([one.value for one in found])
     stated = np.mean([np.diag(one.covariance) for one in found], axis=0)
     squares = values.var(axis=0, ddof=1) / stated
     assert 0.6 < squares.mean() < 1.5
+    assert 0.4 < squares[:2].mean() < 2.4, "though a grain of speckle is wider than a sector there"
 
 
 def made(cards=(), **beliefs) -> tuple[Shot, np.ndarray]:
@@ -161,7 +181,7 @@ def made(cards=(), **beliefs) -> tuple[Shot, np.ndarray]:
     edges = rings.edges_of(20.0, 0.1)
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
     shot = Shot(blank, tuple(Card(blank, one) for one in cards), exact_light(SETTING), Beliefs(**beliefs))
-    x = shot.prior[0].copy()
+    x = shot.middle
     x[:4] = u_of(ALPHA), np.log(LENGTH), 0.0, np.log(0.25)
     x[x.size - len(cards) :] = [0.0 if one is None else np.log(one.value) for one in cards]
     parts = np.split(shot.rows(x)[0], 1 + len(cards))
@@ -221,7 +241,7 @@ def test_where_pixels_lie_in_a_ring_does_not_change_its_mean():
     found = rings.rings([Picture(light, light, (0, 0), 1)], middle, edges, PixelScale(np.eye(3), "told"))
     ends = np.exp(-0.5 * np.array([found.inner, found.outer]) ** 2 / sigma**2)
     expected = 2.0 * sigma**2 * (ends[0] - ends[1]) / (found.outer**2 - found.inner**2)
-    assert found.value == pytest.approx(expected, rel=0.01)
+    assert found.value == pytest.approx(expected, rel=2e-3)
     # The means of the pixels are not those of the areas.
     r = np.hypot(x - middle[0], y - middle[1])
     means = [light[(r >= a) & (r < b)].mean() for a, b in zip(found.inner, found.outer, strict=True)]
