@@ -20,13 +20,14 @@ from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
     from profilefit.measured import Answer, Known
+    from profilefit.measured.oblique import Oblique
 
 FAILED = 1  # exit status
 FIXED = re.compile(r"(l|alpha|A)\s*=\s*(.+)")
 WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
 PROFILE, PHASE = KINDS = ("profile", "phase")
-OF_HALF_SPACE = ("law", "constants", "fix", "total", "n", "g", "seed")
+OF_HALF_SPACE = ("law", "constants", "fix", "total", "oblique", "n", "g", "seed")
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 
@@ -56,6 +57,14 @@ def fit(
     ] = "1",
     total: Annotated[
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")
+    ] = None,
+    oblique: Annotated[
+        str | None,
+        typer.Option(
+            help="Of a beam aslant: its angle in air, a circle's radius, and how far the circle's centre lies from the "
+            "entry: 45:4mm:0.52mm+-0.01mm.",
+            metavar="ANGLE:R:SHIFT+-ERROR",
+        ),
     ] = None,
     light: Annotated[
         str | None, typer.Option(help=f"{options.LIGHTS_HELP}.", show_default=f"the file's, else {options.LIGHTS[0]}")
@@ -137,6 +146,7 @@ def fit(
     held = _held(fix or [], measured.unit)
     known = None if total is None else _total(total)
     factor = _scale(scale)
+    slanted = None if oblique is None else _oblique(oblique, measured.unit)
     if layers is not None:
         options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
         fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
@@ -147,7 +157,7 @@ def fit(
         require_folder(out)
     try:
         with working("fitting", quiet):
-            result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder)
+            result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=slanted)
     except SettingError as error:
         raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
     body = options.in_options(content(result, law, constants))
@@ -265,6 +275,23 @@ def _total(text: str) -> Known:
     if known.error == 0 or known.value >= 1:
         raise InputError(f"--total must be a reflectance in (0, 1) with its error, such as 0.52+-0.01, got {text!r}")
     return known
+
+
+def _oblique(text: str, unit: str) -> Oblique:
+    with interruptible(__name__):
+        from profilefit.measured.lengths import length
+        from profilefit.measured.oblique import Oblique
+
+    angle, r, shift = text.split(":") if text.count(":") == 2 else ("", "", "")
+    match = WITH_ERROR.fullmatch(shift.strip())
+    if match is None:
+        accepted = "an angle in degrees, a radius and a shift with its error, such as 45:4mm:0.52mm+-0.01mm"
+        raise InputError(f"--oblique must be {accepted}, got {text!r}")
+    degrees = _number("--oblique's angle", angle)
+    if not 0 < degrees < 90:
+        raise InputError(f"--oblique's angle must lie between 0 and 90 degrees, got {angle!r}")
+    values = (("radius", r), ("shift", match["value"]), ("error", match["error"]))
+    return Oblique(degrees, *(length(f"--oblique's {name}", one, unit) for name, one in values))
 
 
 def _known(option: str, text: str) -> Known:

@@ -17,6 +17,7 @@ from profilefit.measured.beam import Gaussian
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.model import NAMES, Light, U, u_of
+from profilefit.measured.oblique import Oblique
 
 Floats = NDArray[np.float64]
 MEDIUM = ("n", "g")
@@ -37,7 +38,8 @@ class Question:
 
     instrument  the beam, and what a row is averaged over
     held    what stays where it is, by name: alpha or A, l, scale, as values (not logarithms)
-    total   the total reflectance A [-], if that was measured as well; scale known to within an error
+    total   the total reflectance A [-], if that was measured as well; scale known to within an error; oblique the
+            centre of light that fell in aslant
     ranges  (low, high) of what is known no better: n, g, a Gaussian beam's 1/e^2 radius; assumed those of n and g that
             nobody named
     """
@@ -46,6 +48,7 @@ class Question:
     held: dict[str, float] = field(default_factory=dict)
     total: Known | None = None
     scale: Known | None = None
+    oblique: Oblique | None = None
     instrument: Instrument = PENCIL
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()

@@ -285,7 +285,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         "of_ranges": None if found.open is None else {"mean": found.open.mean, "error": found.open.error},
         "free": [NAMES[at] for at in question.free],
         "held": question.held,
-        "known": {"A": question.total, "scale": question.scale},
+        "known": {"A": question.total, "scale": question.scale, "oblique": question.oblique},
         "result": found.minimum.result,
         "steps": found.minimum.steps,
         "widening": found.widening,

@@ -54,7 +54,7 @@ class Problem:
         return Model(self.question.law, self.question.instrument)
 
     def residuals(self, point: Floats) -> tuple[Floats, Floats]:
-        """Residuals in standard errors (m,) and their derivatives (m, 3): the n rows, then A and scale where known."""
+        """Residuals in standard errors (m,) and their derivatives (m, 3): the n rows, then what else is known."""
         light, slope = self.model.linearised(point, self.data.inner, self.data.outer)
         rows, slopes = self.noise.whitened(light[:-1] - self.data.value), self.noise.whitened(slope[:-1])
         if (total := self.question.total) is not None:
@@ -64,6 +64,9 @@ class Problem:
             scale = np.exp(point[SCALE])
             rows = np.append(rows, (scale - known.value) / known.error)
             slopes = np.vstack([slopes, scale / known.error * np.eye(len(NAMES))[SCALE]])
+        if (oblique := self.question.oblique) is not None:
+            off, slope = oblique.residuals(self.question.law.setting, point[None])
+            rows, slopes = np.append(rows, off), np.vstack([slopes, slope])
         return rows, slopes
 
     def costs(self, points: Floats) -> Floats:
@@ -75,6 +78,8 @@ class Problem:
             cost += ((light[:, -1] - total.value) / total.error) ** 2
         if (known := self.question.scale) is not None:
             cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
+        if (oblique := self.question.oblique) is not None:
+            cost += oblique.residuals(self.question.law.setting, points)[0] ** 2
         return cost
 
     def under(self, values: Mapping[str, float]) -> Problem:

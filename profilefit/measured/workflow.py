@@ -15,6 +15,7 @@ from profilefit.measured.exact_light import EXACT, exact_light
 from profilefit.measured.fitting import fitted
 from profilefit.measured.law_error import origin
 from profilefit.measured.model import Light
+from profilefit.measured.oblique import Oblique
 from profilefit.measured.premises import Premises, premises
 from profilefit.measured.problem import Known, Question, held_albedo
 from profilefit.measured.reading import read
@@ -35,6 +36,7 @@ def fit(
     seed: int = 0,
     walk: bool = True,
     folder: Path | None = None,
+    oblique: Oblique | None = None,
 ) -> Answer:
     """Fit a medium to a measured or simulated profile, and judge the fit.
 
@@ -47,6 +49,7 @@ def fit(
     scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
     seed       of the posterior's walkers; walk whether to sample it: else intervals are of the statistical error alone
     folder     of the records, by default the ones shipped
+    oblique    the centre of a circle of the same medium's light, where a beam fell in aslant
 
     InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is an Answer that says so.
     """
@@ -57,11 +60,13 @@ def fit(
     if measured.illumination not in (None, where.illumination):
         got = f"{measured.illumination} light, got {where.illumination} light to fit"
         raise InputError(f"{measured.source}: a simulation of {got}")
+    if oblique is not None and where.illumination != Setting().illumination:
+        raise InputError(f"oblique light must be a {Setting().illumination}, got {where.illumination} light to fit")
     measured = _noted(measured, where)
     chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
     question = Question(
-        chosen, _held(chosen, held or {}, scale), total, known, told.instrument, told.ranges, told.assumed
+        chosen, _held(chosen, held or {}, scale), total, known, oblique, told.instrument, told.ranges, told.assumed
     )
     return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
 

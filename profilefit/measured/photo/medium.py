@@ -21,6 +21,7 @@ from scipy.optimize import lsq_linear
 
 from mcml_sim.exact.light import ExactLight
 from profilefit.measured import law_error, model
+from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.photo.glare import ring_means, ring_weights
 from profilefit.measured.photo.rings import SpotRings
@@ -235,6 +236,11 @@ class PhotoFit:
         """p-value of chi-square."""
         return float(stats.chi2.sf(self.chi2, self.freedom))
 
+    @property
+    def widening(self) -> float:
+        """Factor on the errors, by how much residuals exceed theirs where that is no chance (Birge)."""
+        return float(np.sqrt(self.chi2 / self.freedom)) if self.chance < DETECTED else 1.0
+
     @cached_property
     def values(self) -> dict[str, float]:
         """alpha, l, mu_s', mu_a, scale."""
@@ -245,7 +251,8 @@ class PhotoFit:
     def errors(self) -> dict[str, float]:
         """Standard errors of the values."""
         gradients = model.slopes(self.x[:3], np.zeros(3))
-        return {name: model.errors(gradients, self.covariance[:3, :3])[name] for name in self.values}
+        found = model.errors(gradients, self.widening**2 * self.covariance[:3, :3])
+        return {name: found[name] for name in self.values}
 
 
 def fitted(shot: Shot) -> PhotoFit:

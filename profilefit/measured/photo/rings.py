@@ -89,19 +89,19 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
     value = (EVEN @ polynomials)[whole]
     inner, outer = edges[:-1][whole], edges[1:][whole]
     covariance = shrunk(off - off.mean(axis=1)[:, None])
-    widening = _of_grains(np.diag(covariance) / value**2, inner, outer, GRAIN * plate.pixel(centre))
+    widening = _of_grains(np.diag(covariance), value, inner, outer, GRAIN * plate.pixel(centre))
     return SpotRings(inner, outer, value, covariance * np.outer(widening, widening))
 
 
-def _of_grains(variance: Floats, inner: Floats, outer: Floats, grain: float) -> Floats:
-    """Factor (n,) on errors of relative variance (n,), of rings whose sectors are narrower than `grain`."""
+def _of_grains(variance: Floats, value: Floats, inner: Floats, outer: Floats, grain: float) -> Floats:
+    """Factor (n,) on the errors of rings whose sectors are narrower than `grain`, from their variances (n,)."""
     areas, narrow = np.pi * (outer - inner) * (outer + inner), np.pi * (inner + outer) < SECTORS * grain
-    if np.all(narrow) or not np.any(narrow):
+    tells = ~narrow & (value > 0)
+    if not np.any(tells):
         return np.ones(areas.size)
-    by_area = float(np.median((variance * areas)[~narrow][:NEXT]))
-    with np.errstate(divide="ignore"):
-        wanted = np.sqrt(by_area / (variance * areas))
-    return np.where(narrow, np.maximum(wanted, 1.0), 1.0)
+    by_area = float(np.median((variance[tells] * areas[tells] / value[tells] ** 2)[:NEXT]))
+    least = by_area * value**2 / areas
+    return np.where(narrow & (least > variance), np.sqrt(least / np.maximum(variance, np.finfo(float).tiny)), 1.0)
 
 
 def _polynomials(powers: Floats, products: Floats) -> Floats:

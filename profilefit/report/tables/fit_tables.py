@@ -12,6 +12,7 @@ from mcml_sim.media.setting import Setting
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
+from profilefit.measured.oblique import NEAR
 from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
 from profilefit.measured.result import Answer, known_medium, rival_values
 from profilefit.report.tables.cells import (
@@ -30,6 +31,7 @@ SHARES = ("A", "alpha")  # which end at 1
 HELD_IN = "checked on simulated replicates, such intervals cover the truth in 93 to 98 %"
 RIVALLED = ("mu_s'", "mu_a", "scale")
 ODD = (0.5, 2.0)  # scales between these are a calibration's
+UNLIKELY = 3.0  # standard errors
 REACHED = 0.1  # of the first radius
 TINIEST = 1e-16  # p-value that is worth printing
 ANYTHING, WIDE = "anything", 1e4  # of an interval, and from which ratio of its ends
@@ -159,6 +161,7 @@ def _lines(result: Answer) -> Iterator[str]:
     yield from _goodness(result)
     yield from _rivals(result)
     yield from _beam(result)
+    yield from _oblique(result)
     yield from _medium(result)
     yield from _scale(result)
     yield from _identifiability(result)
@@ -235,6 +238,23 @@ def _rivals(result: Answer) -> Iterator[str]:
         yield (
             f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - found.minimum.cost:+.1f}. No interval holds "
             "both: measure nearer to the beam, or the total reflectance, or the scale"
+        )
+
+
+def _oblique(result: Answer) -> Iterator[str]:
+    """Whether the centre of light aslant is explained, and known well where it was measured."""
+    found, unit = result.found, result.found.data.unit or "units of r"
+    one = found.question.oblique
+    if one is None:
+        return
+    (off,), _ = one.residuals(found.question.law.setting, found.point[None])
+    yield f"centre of oblique light: the fit has it {off:+.1f} of its errors from {one.centre:g} {unit}" + (
+        ": IT CONTRADICTS THE PROFILE under this n, g and beam" if abs(off) > UNLIKELY else ""
+    )
+    if one.r < (near := NEAR * found.values["l"]):
+        yield (
+            f"at r = {one.r:g} {unit} a centre of oblique light is known less well than is taken for granted: measure "
+            f"it beyond {near:.2g} {unit}"
         )
 
 

@@ -58,7 +58,8 @@ def photo_lines(found: Photo) -> Iterator[str]:
         x = dict(zip(fit.shot.names, fit.x, strict=True))
         glare = sum(value for name, value in x.items() if name.startswith("glare"))
         told = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
-        verdict = "MISFIT" if fit.chance < DETECTED else "no misfit is detected"
+        widened = f"MISFIT, for which errors are widened by a factor of {fit.widening:.1f}"
+        verdict = widened if fit.chance < DETECTED else "no misfit is detected"
         yield (
             f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {told}; chi-square {fit.chi2:.1f} "
             f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"

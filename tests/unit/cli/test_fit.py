@@ -191,6 +191,12 @@ def test_light_that_no_medium_gives_is_a_misfit_at_the_edge(command):
         ((PHANTOM, "--scale", "1e300"), "--scale must lie between 1e-40 and 1e+40, got '1e300'"),
         ((PHANTOM, "--scale", "1+-0"), "--scale must be a number > 0, free, or a number with its error"),
         ((PHANTOM, "--total", "0.5"), "--total must be a reflectance in (0, 1) with its error"),
+        (
+            (PHANTOM, "--oblique", "45:4mm:0.5mm"),
+            "--oblique must be an angle in degrees, a radius and a shift with its",
+        ),
+        ((PHANTOM, "--oblique", "95:4mm:0.5mm+-.1mm"), "--oblique's angle must lie between 0 and 90 degrees, got '95'"),
+        ((PHANTOM, "--oblique", "45:4ly:0.5mm+-.1mm"), "--oblique's radius must be a length > 0 such as 1.2mm"),
         ((PHANTOM, "--r-min", "1furlong"), "--r-min must be a length > 0 such as 1.2mm"),
         ((PHANTOM, "--r-min", "1m"), "no row is left between --r-min and --r-max"),
         ((PHANTOM, "--r-max", "0.26mm", "--scale", "free"), "expected more than 3 rows, one more than is free, got 2"),

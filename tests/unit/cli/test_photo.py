@@ -140,15 +140,17 @@ def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, wor
 
 def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
     """Of a spot that eight bits hold; the answer says that it is no measurement."""
-    with rawpy.imread(several(folder, "spot")[0]) as raw:
-        linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
-    coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
-    cv2.imwrite(str(tmp_path / "spot.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
-    status, out, err = command("photo", "spot.jpg", "--grey", "spot.jpg", *SCALE)
+    for name in ("spot", "grey"):
+        with rawpy.imread(several(folder, name)[0]) as raw:
+            linear = np.clip((raw.raw_image_visible.astype(float) - 256) / 3839, 0, 1)
+        coded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+        cv2.imwrite(str(tmp_path / f"{name}.jpg"), np.repeat((255 * coded).astype(np.uint8)[..., None], 3, axis=2))
+    status, out, err = command("photo", "spot.jpg", "--grey", "grey.jpg", *SCALE)
     assert (status, err) == (0, "")
     assert "no exposure time is stated" in " ".join(out.split())
     assert "one exposure does not tell gain" in " ".join(out.split())
     assert "eight bits, taken for sRGB: not a measurement" in " ".join(out.split())
+    assert "MISFIT, for which errors are widened by a factor of" in " ".join(out.split())
 
 
 def test_a_truncated_raw_file_is_one_line(folder, tmp_path, capfd):
