@@ -33,13 +33,14 @@ from profilefit.recipes.toml_tables import Table, Tables
 Floats = NDArray[np.float64]
 KEYS = {
     "": ("medium", "optics", "camera", "cards"),
-    "medium": ("mu_s", "mu_a", "n", "g"),
+    "medium": ("mu_s", "mu_a", "n", "g", "photons"),
     "optics": ("beam", "core", "surface", "glare", "width", "falling"),
     "camera": ("sides", "pitch", "gain", "read", "bits", "black", "well", "uneven", "corner", "tilt", "speckle",
                "grain", "exposures", "late", "seed"),
     "cards": ("white", "grey"),
 }  # fmt: skip
 MAX_BYTES, MOST_SIDE = 1 << 16, 12_000
+MOST_PHOTONS = 10**9
 MOST = 1e6  # 1/mm
 SHORTEST = 1e-3  # seconds, of the spot: its light is as bright as that
 STEP = 4.0  # from one exposure to the next
@@ -51,12 +52,17 @@ SCATTER = 0.003  # of a ring, by speckle and noise
 
 @dataclass(frozen=True)
 class Setup:
-    """What is photographed, and how. late is the relative error of stated times; white says whether there is such a
-    card, grey the reflectance of the other, if there is one."""
+    """What is photographed, and how.
+
+    photons  that are traced for each colour; 0: light is exact
+    late     relative error of stated times
+    white    whether there is such a card; grey the reflectance of the other, if there is one
+    """
 
     mu_s: tuple[float, float, float]
     mu_a: tuple[float, float, float]
     setting: Setting
+    photons: int
     optics: SpotOptics
     camera: SpotCamera
     exposures: int
@@ -96,7 +102,7 @@ def read_setup(path: Path) -> Setup:
     return Setup(
         read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST),
         read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST),
-        setting, optics, shown,
+        setting, read.whole("medium", "photons", of, 0, 0, MOST_PHOTONS), optics, shown,
         read.whole("camera", "exposures", camera, 5, 1, 12),
         read.number("camera", "late", camera, 0.02, 1.0),
         read.whole("camera", "seed", camera, 0, 0, 2**31 - 1),
@@ -116,10 +122,10 @@ def brackets(setup: Setup) -> dict[str, list[Taken]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     far = 1.2 * setup.camera.pitch * float(np.hypot(*setup.camera.sides))
     radii = simulated.radii(far, setup.optics)
-    spot = {
-        colour: (radii, simulated.light(mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.setting, setup.optics, radii))
-        for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
-    }
+    spot = {}
+    for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)):
+        medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.setting, setup.optics, radii
+        spot[colour] = radii, simulated.light(*medium, setup.photons, len(CHANNELS) * setup.seed + at)
     card = simulated.card(setup.optics, radii)
     scenes = {"spot": spot}
     if setup.white:

@@ -1,8 +1,9 @@
 """Photographs of a laser spot that were never taken: what a camera would record of a medium, a card, or nothing.
 
-Light about the spot is round: its transform is that of the profile, times those of beam and lens, by quadrature of
-Hankel's integrals. The camera sees it tilted, darker towards its corners, through speckle; a pixel counts electrons,
-spills what is too much over its neighbours in a column, and is read with noise, in steps, up to its white level.
+Light about the spot is round: its transform is that of the profile, exact or of traced photons, times those of beam and
+lens, by quadrature of Hankel's integrals. The camera sees it tilted, darker towards its corners, through speckle; a
+pixel counts electrons, spills what is too much over its neighbours in a column, and is read with noise, in steps, up to
+its white level.
 
 Halos are Moffat's, h = (b - 1) / (pi a^2) (1 + r^2 / a^2)^-b, whose transform is
 2 (ka / 2)^{b-1} K_{b-1}(ka) / Gamma(b - 1); b = 5/2 are those of `glare`.
@@ -20,9 +21,12 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter
-from scipy.special import gamma, j0, kv
+from scipy.special import gamma, j0, j1, kv
 
+from mcml_sim.media.grid import Grid
+from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
+from mcml_sim.runs.simulation import simulate
 from profilefit.measured.exact_light import exact_light
 
 Floats = NDArray[np.float64]
@@ -33,6 +37,7 @@ PANELS, ORDER = 260, 10  # of the quadratures
 PANEL = np.polynomial.legendre.leggauss(ORDER)
 CUT = 8.0  # k sigma beyond which the core's transform is nothing
 NEAR, FAR = 1e-5, 80.0  # l*, of the profile's
+TRACED_NEAR, TRACED_RINGS = 0.01, 250  # l*, of rings that photons are counted in
 RADII = 400  # at which a picture's light is found
 SPILLS = 200  # pixels along a column that an overfull one may reach
 
@@ -106,11 +111,16 @@ class Taken:
     pattern: tuple[tuple[str, str], tuple[str, str]] = field(default=PATTERN)
 
 
-def light(alpha: float, length: float, setting: Setting, optics: SpotOptics, r: Floats) -> Floats:
-    """I(r) [1/mm^2] of a medium of reduced albedo and l* [mm], per light that falls on it."""
+def light(
+    alpha: float, length: float, setting: Setting, optics: SpotOptics, r: Floats, photons: int = 0, seed: int = 0
+) -> Floats:
+    """I(r) [1/mm^2] of a medium of reduced albedo and l* [mm], per light that falls on it.
+
+    photons  to trace; 0: light is exact
+    """
     k, weight = _panels(np.linspace(0.0, CUT / optics.sigma, PANELS + 1))
-    medium = transform(alpha, length, setting, k) + optics.surface
-    return _inverse(medium * optics.transform(k), k, weight, r)
+    medium = traced(alpha, length, setting, k, photons, seed) if photons else transform(alpha, length, setting, k)
+    return _inverse((medium + optics.surface) * optics.transform(k), k, weight, r)
 
 
 def card(optics: SpotOptics, r: Floats) -> Floats:
@@ -122,6 +132,16 @@ def card(optics: SpotOptics, r: Floats) -> Floats:
 def transform(alpha: float, length: float, setting: Setting, k: Floats) -> Floats:
     """int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
     return _transform(alpha, length, setting, k.tobytes())
+
+
+def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
+    """The same of traced photons, whose light is even over a ring."""
+    layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
+    edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
+    tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
+    disc = 2.0 * np.pi * edges * j1(np.multiply.outer(np.maximum(k, 1e-12), edges)) / np.maximum(k, 1e-12)[:, None]
+    found: Floats = np.diff(disc, axis=1) @ tally.reflectance_r.value
+    return found
 
 
 @lru_cache(maxsize=8)

@@ -11,7 +11,7 @@ from profilefit.errors import InputError
 from profilefit.measured import model
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.model import u_of
-from profilefit.measured.photo import bracket, medium, rings, simulated, spot
+from profilefit.measured.photo import bracket, medium, rings, simulated, spot, workflow
 from profilefit.measured.photo.bracket import Picture
 from profilefit.measured.photo.exposure import BayerPlane, Exposure
 from profilefit.measured.photo.glare import halo, ring_means, ring_weights
@@ -231,6 +231,24 @@ def test_whole_photographs_give_their_medium(cards):
     z = np.array([np.log1p(one.off) / one.stated for one in found])
     assert np.abs(z).max() < 4.0
     assert np.sqrt(np.mean(z**2)) < 1.5
+
+
+@pytest.mark.slow
+def test_photons_that_a_camera_sees_give_their_medium():
+    """Light that no table knows: traced, of a medium whose g is the fit's, photographed with cards."""
+    radii = simulated.radii(bench.FARTHEST, OPTICS)
+    traced = simulated.light(ALPHA, LENGTH, SETTING, OPTICS, radii, photons=2**23, seed=7)
+    card, rng = simulated.card(OPTICS, radii), np.random.default_rng(5)
+    seen, white, grey = (workflow.bracketed(bench.exposures(radii, light, CAMERA, rng), SQUARE)
+                         for light in (traced, 0.9 * card, 0.18 * card))  # fmt: skip
+    cards = tuple(workflow.carded(one, "green", SQUARE, known, seen) for one, known in ((white, None), (grey, GREY)))
+    shot = Shot(workflow.ringed(seen, "green", SQUARE), cards, exact_light(SETTING), Beliefs(beam=BEAM))
+    fit = medium.fitted(shot)
+    for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
+        assert fit.errors[name] < 0.06 * fit.values[name]
+        assert abs(fit.values[name] - truth) < 3.0 * fit.errors[name]
+    wrong = medium.fitted(replace(shot, light=exact_light(replace(SETTING, g=0.0))))
+    assert wrong.chance < 1e-6, "a negative control: light of another g"
 
 
 def test_where_pixels_lie_in_a_ring_does_not_change_its_mean():
