@@ -62,8 +62,8 @@ def fit(
         str | None,
         typer.Option(
             help="Of a beam aslant: its angle in air, a circle's radius, and how far the circle's centre lies from the "
-            "entry: 45:4mm:0.52mm+-0.01mm.",
-            metavar="ANGLE:R:SHIFT+-ERROR",
+            "entry, such as 45:4mm:0.52mm+-0.01mm.",
+            metavar="ANGLE:R:D",
         ),
     ] = None,
     light: Annotated[

@@ -31,7 +31,7 @@ from profilefit.laws.diffusion import exitance_factors
 from profilefit.measured import model
 
 Floats = NDArray[np.float64]
-FORWARD, ISOTROPIC, NEAR = 0.02, 0.08, 2.5  # relative errors of a centre where g = 1 and 0, from so many l* outwards
+FORWARD, ISOTROPIC, NEAR = 0.02, 0.1, 2.5  # relative errors of a centre where g = 1 and 0, from so many l* outwards
 DEGREE = 200  # of phi
 SOURCES, AZIMUTHS = 12, 24
 S = np.linspace(0.01, 0.85, 22)  # sqrt(1 - alpha), and
@@ -54,11 +54,6 @@ class Oblique:
 
     def residuals(self, setting: Setting, points: Floats) -> tuple[Floats, Floats]:
         """In standard errors (m,) at points (m, 3) of `model`'s coordinates, and their derivatives (m, 3)."""
-        value, slopes = self._expected(setting, points)
-        error = np.hypot(self.error, model_error(setting.g) * self.centre)
-        return (value - self.centre) / error, slopes / error
-
-    def _expected(self, setting: Setting, points: Floats) -> tuple[Floats, Floats]:
         spline = _spline(setting.n, setting.g, self.angle)
         length = np.exp(points[:, model.LENGTH])
         s = 1.0 / (1.0 + np.exp(-points[:, model.U]))
@@ -67,7 +62,8 @@ class Oblique:
         slopes = np.zeros((len(points), len(model.NAMES)))
         slopes[:, model.U] = length * by_s * s * (1.0 - s)
         slopes[:, model.LENGTH] = length * (value - by_x)
-        return length * value, slopes
+        error = np.hypot(self.error, model_error(setting.g) * self.centre)
+        return (length * value - self.centre) / error, slopes / error
 
 
 def model_error(g: float) -> float:

@@ -167,7 +167,8 @@ class Shot:
         apart = np.abs(np.subtract.outer(np.log(given.halos), np.log(given.halos)))
         root = HALO * given.glare.error * np.linalg.cholesky(np.exp(-apart / ALIKE))
         rows = [*rows, glare.sum(axis=0) / given.glare.error, *solve_triangular(root, glare, lower=True)]
-        values = [row @ self.middle for row in rows]
+        middle = self.middle
+        values = [row @ middle for row in rows]
         for own, card in zip(unit[unit.shape[0] - len(self.cards) :], self.cards, strict=True):
             if (known := card.reflectance) is not None:
                 rows.append((own - unit[2]) * known.value / known.error)

@@ -190,7 +190,8 @@ def taken(
     for row in (0, 1):
         for column in (0, 1):
             at = (slice(row, None, 2), slice(column, None, 2))
-            expected[at] = CubicSpline(*radial[PATTERN[row][column]])(r[at])
+            # That of few photons rings about zero where there is none.
+            expected[at] = np.maximum(CubicSpline(*radial[PATTERN[row][column]])(r[at]), 0.0)
     expected *= np.float32(electrons) * sees
     return [
         Taken(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import cv2
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 from benchmarks import photo as bench
 from profilefit.errors import InputError
@@ -231,6 +232,15 @@ def test_whole_photographs_give_their_medium(cards):
     z = np.array([np.log1p(one.off) / one.stated for one in found])
     assert np.abs(z).max() < 4.0
     assert np.sqrt(np.mean(z**2)) < 1.5
+
+
+def test_few_photons_are_a_picture_too():
+    optics = replace(OPTICS, glare=1e-9)
+    radii = simulated.radii(bench.FARTHEST, optics)
+    light = simulated.light(ALPHA, LENGTH, SETTING, optics, radii, photons=1000)
+    assert CubicSpline(radii, light)(np.linspace(0.0, radii[-1], 100_000)).min() < 0.0, "a control"
+    (one,) = simulated.taken(dict.fromkeys(simulated.CHANNELS, (radii, light)), CAMERA, 1e4 / light[0], {1.0: 1.0}, 3)
+    assert np.median(one.counts) == CAMERA.black < CAMERA.black + 2000 < one.counts.max()
 
 
 @pytest.mark.slow
