@@ -1,13 +1,14 @@
 """One photograph as the sensor counted: Bayer planes apart, black taken off, nothing interpolated, no curve.
 
-Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG is not, is
-taken for sRGB, and the answer says so. What is read is bounded before it is read.
+Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG, by Pillow,
+is not, is taken for sRGB, and the answer says so. What is read is bounded before it is read.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
+import warnings
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,6 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from PIL import Image, ImageOps
 
 from profilefit.errors import InputError
 
@@ -64,13 +66,14 @@ def read(path: Path) -> Exposure:
         raise InputError(f"{path}: cannot be read: {error.strerror}") from None
     if not 0 < size <= MOST_BYTES:
         raise InputError(f"{path}: expected a photograph of 1 byte to {MOST_BYTES >> 20} MiB, got {size} bytes")
-    return _raw(path) if kind in RAW else _plain(path, kind)
+    with _without_words():
+        return _raw(path) if kind in RAW else _plain(path, kind)
 
 
 def _raw(path: Path) -> Exposure:
     rawpy = library("rawpy")
     try:
-        with _without_words(), rawpy.imread(str(path)) as raw:
+        with rawpy.imread(str(path)) as raw:
             _require_size(path, raw.sizes.width, raw.sizes.height)
             if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
                 raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
@@ -88,7 +91,7 @@ def _raw(path: Path) -> Exposure:
 
 @contextmanager
 def _without_words() -> Iterator[None]:
-    """LibRaw writes to standard error by itself what its error says again."""
+    """Libraries write to standard error by themselves what their errors say again."""
     kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     os.dup2(nowhere, 2)
     try:
@@ -153,6 +156,8 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
                 page = file.pages[0]
                 _require_size(path, int(page.imagewidth), int(page.imagelength))
                 return np.asarray(page.asarray())
+        except InputError:
+            raise
         except (tifffile.TiffFileError, ValueError, OSError) as error:
             raise InputError(f"{path}: cannot be read as a TIFF: {_first_line(error)}") from None
     if kind in EXR:
@@ -162,17 +167,23 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             _require_size(path, int(right - left) + 1, int(bottom - top) + 1)
             channels = exr.File(str(path)).channels()
             return np.asarray(next(iter(channels.values())).pixels)
+        except InputError:
+            raise
         except (RuntimeError, ValueError, KeyError, StopIteration) as error:
             raise InputError(f"{path}: cannot be read as an EXR: {_first_line(error)}") from None
-    os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MOST_PIXELS))
-    cv2 = library("cv2")
     try:
-        found = cv2.imread(str(path), cv2.IMREAD_COLOR)
-    except cv2.error as error:
-        raise InputError(f"{path}: cannot be read: {_first_line(error)}") from None
-    if found is None:
-        raise InputError(f"{path}: cannot be read as a picture: is it truncated?")
-    return np.asarray(found[..., ::-1])
+        with (
+            warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
+            Image.open(path, formats=["jpeg"]) as file,
+        ):
+            _require_size(path, *file.size)
+            return np.asarray(ImageOps.exif_transpose(file).convert("RGB"))
+    except Image.DecompressionBombError:
+        raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got more") from None
+    except InputError:
+        raise
+    except (OSError, ValueError, SyntaxError) as error:
+        raise InputError(f"{path}: cannot be read as a picture: {_first_line(error)}") from None
 
 
 def _decode_srgb(value: Plane) -> Plane:

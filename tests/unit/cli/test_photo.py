@@ -2,6 +2,7 @@
 
 import json
 import re
+import struct
 from html import escape
 from pathlib import Path
 
@@ -101,7 +102,11 @@ SCALE = ("--scale", "0.1mm/px")
         (("cut.dng", *SCALE), "cut.dng: cannot be read as a raw file"),
         (("empty.dng", *SCALE), "expected a photograph of 1 byte"),
         (("eight.tif", *SCALE), "of an unknown curve"),
-        (("big.tif", *SCALE), "expected at most 120000000 pixels, got"),
+        (("big.tif", *SCALE), "big.tif: expected at most 120000000 pixels, got 25000 x 20000"),
+        (("big.jpg", *SCALE), "big.jpg: expected at most 120000000 pixels, got"),
+        (("bigger.jpg", *SCALE), "bigger.jpg: expected at most 120000000 pixels, got"),
+        (("cut.jpg", *SCALE), "cut.jpg: cannot be read as a picture: image file is truncated"),
+        (("none.jpg", *SCALE), "none.jpg: cannot be read as a picture: cannot identify image file"),
         (("SPOT", "other.tif", *SCALE), "expected 400 x 300 pixels"),
         (("SPOT", *SCALE, "--beam", "0.5mm"), "--beam must be a value with its error"),
         (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
@@ -128,6 +133,13 @@ def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, wor
     with tifffile.TiffFile(tmp_path / "big.tif", mode="r+b") as file:
         for name, value in (("ImageWidth", 25_000), ("ImageLength", 20_000)):  # as a header may claim
             file.pages[0].tags[name].overwrite(value)
+    cv2.imwrite(str(tmp_path / "whole.jpg"), np.zeros((300, 400), np.uint8))
+    coded = (tmp_path / "whole.jpg").read_bytes()
+    (tmp_path / "cut.jpg").write_bytes(coded[:-40])
+    (tmp_path / "none.jpg").write_bytes(whole[:1000])
+    sides = coded.index(b"\xff\xc0") + 5  # rows, columns
+    for name, columns in (("big", 12_500), ("bigger", 25_000)):
+        (tmp_path / f"{name}.jpg").write_bytes(coded[:sides] + struct.pack(">HH", 10_000, columns) + coded[sides + 4 :])
     (tmp_path / "SETUP.toml").write_text(SETUP)
     before = {path.name for path in tmp_path.iterdir()}
     out = () if "--out" in words or "--simulate" in words else ("--out", "out")
