@@ -17,9 +17,9 @@ STEP = 1e-3  # in ln of amplitude and lengths, between gradients that make a cur
 
 
 def apart(one: Floats, other: Floats) -> Floats:
-    """Distances (k, l) of numbers, or of points in a plane."""
+    """Distances (k, l) of numbers, or of points in a plane or in space."""
     between = one[:, None] - other
-    return np.abs(between) if one.ndim == 1 else np.hypot(between[..., 0], between[..., 1])
+    return np.abs(between) if one.ndim == 1 else np.linalg.norm(between, axis=-1)
 
 
 def kernel(x: Floats, length: float) -> Floats:

@@ -3,13 +3,17 @@
 import numpy as np
 import pytest
 
-from mcml_sim import InputError, exact
+from mcml_sim import InputError, Setting, exact
+from mcml_sim.exact.light import unreduced
 from profilefit.fitting import derived
 from profilefit.fitting.derived import AtAlbedo, LawWithErrors, Quantity
 from profilefit.fitting.discrepancy import discrepancy
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
+from profilefit.recipes import catalogue
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import plain
+from profilefit.recipes.record_folder import Records
 
 pytestmark = pytest.mark.slow
 
@@ -128,3 +132,20 @@ def test_misuse_is_named(known):
     with pytest.raises(InputError, match="known must be of a map between alpha and A, got Burley"):
         derived.reflectance(known, 0.5)
     assert AtAlbedo(known, 0.5).energy.sum() == pytest.approx(float(known.law.albedo.reflectance(0.5)), rel=1e-6)
+
+
+@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+@pytest.mark.parametrize(("n", "g"), [(1.0, 0.0), (1.4, 0.0), (1.4, 0.5), (1.4, 0.9)])
+def test_shipped_records_state_the_error_that_their_law_has(light, n, g):
+    """Against exact light at albedos between those of the fit, within 99 % of the energy."""
+    setting = Setting(light, n, g)
+    law, records = catalogue.load("hazard", setting=setting), Records.of(fits_folder())
+    path = records.path("hazard", setting)
+    known, z = LawWithErrors.of_record(law, records.read(path), dict(np.load(path.with_suffix(".npz")))), []
+    for alpha in (0.15, 0.45, 0.75, 0.93, 0.99):
+        full = unreduced(alpha, g)
+        r = np.geomspace(0.05, float(derived.radius(known, alpha, 0.99).value[0]), 15)
+        found, mfp = derived.profile(known, r, alpha), 1.0 / (1.0 - full * g)
+        z.append((found.value - exact.profile(r * mfp, full, setting=setting) * mfp**2) / found.model)
+    assert 0.5 < np.sqrt(np.mean(np.square(z))) < 2.0
+    assert np.mean(np.abs(z) < 2.0) > 0.85

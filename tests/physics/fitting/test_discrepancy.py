@@ -7,6 +7,7 @@ import pytest
 
 from profilefit.fitting import discrepancy
 from profilefit.fitting.discrepancy import FOUND, NOT_SEEN, Discrepancy, Residuals, of_residuals
+from profilefit.fitting.gaussian_process import apart
 
 U, S = np.linspace(-4.0, 2.5, 14), np.linspace(0.08, 0.97, 12)
 AMPLITUDE, LENGTH_U, LENGTH_S, NOISE = 0.03, 1.2, 0.3, 0.002
@@ -104,6 +105,10 @@ def test_the_band_of_a_law_holds_the_truth_where_nothing_was_fitted():
     # Negative control: as if the fit had not followed.
     plain = AMPLITUDE**2 * np.eye(3)
     assert np.abs((off.T @ off / number - plain) / error).max() > 8
+
+
+def test_places_are_apart_in_albedo_surface_and_direction_alike():
+    np.testing.assert_array_equal(apart(np.eye(3), np.zeros((1, 3))), np.ones((3, 1)))
 
 
 @pytest.mark.slow
