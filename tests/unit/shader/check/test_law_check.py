@@ -10,7 +10,7 @@ from profilefit.recipes import catalogue, inventory
 from profilefit.shader import emit
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import Bound
-from profilefit.shader.check.chosen import INDICES, chosen, printed, regenerated
+from profilefit.shader.check.chosen import COSINES, INDICES, chosen, printed, regenerated
 from profilefit.shader.check.half import ALPHA, REFLECTANCE, check_half
 from profilefit.shader.check.law_check import OWN, check_law, check_laws
 from profilefit.shader.check.law_cost import WORKS, costs
@@ -142,11 +142,11 @@ def test_names_choose_laws_and_maps():
     assert {"hazard", "hazard-diffuse-refracting", "liang-whole", "liang-inverse-as-published"} <= {
         o.label for o in laws
     }
-    assert len({(one.label, one.setting.n) for one in (*laws, *maps)}) == len(laws) + len(maps)
+    assert len({(one.label, one.setting.n, one.setting.g) for one in (*laws, *maps)}) == len(laws) + len(maps)
     assert {one.setting.n for one in chosen(["hazard"], "regenerated", FITS)[0]} == {1.0, *INDICES}
     assert [one.setting.n for one in chosen(["hazard-refracting"], None, FITS)[0]] == list(INDICES)
     assert [one.label for one in chosen(["gaussians"], "regenerated", FITS)[0]] == ["gaussians-6"]
-    assert len(chosen(["rational"], "regenerated", FITS)[1]) == 2 + 2 * len(INDICES)
+    assert len(chosen(["rational"], "regenerated", FITS)[1]) == 2 + 2 * len(INDICES) + 2 * len(COSINES), "one n has g"
     assert {one.name for one in printed("published", FITS)[0]} == {"liang", "burley", "burley_diffuse_mfp"}
     with pytest.raises(InputError, match="name must be a law, map or record"):
         chosen(["nothing"], "regenerated", FITS)
