@@ -85,7 +85,7 @@ def _raw(path: Path) -> Exposure:
             seconds = float(raw.other.shutter_speed)
             found = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
     except rawpy.LibRawError as error:
-        raise InputError(f"{path}: cannot be read as a raw file: {_first_line(error)}") from None
+        raise _refused(path, "a raw file", error) from None
     return found
 
 
@@ -156,10 +156,8 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
                 page = file.pages[0]
                 _require_size(path, int(page.imagewidth), int(page.imagelength))
                 return np.asarray(page.asarray())
-        except InputError:
-            raise
         except (tifffile.TiffFileError, ValueError, OSError) as error:
-            raise InputError(f"{path}: cannot be read as a TIFF: {_first_line(error)}") from None
+            raise _refused(path, "a TIFF", error) from None
     if kind in EXR:
         exr = library("OpenEXR")
         try:
@@ -167,10 +165,8 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             _require_size(path, int(right - left) + 1, int(bottom - top) + 1)
             channels = exr.File(str(path)).channels()
             return np.asarray(next(iter(channels.values())).pixels)
-        except InputError:
-            raise
         except (RuntimeError, ValueError, KeyError, StopIteration) as error:
-            raise InputError(f"{path}: cannot be read as an EXR: {_first_line(error)}") from None
+            raise _refused(path, "an EXR", error) from None
     try:
         with (
             warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
@@ -180,10 +176,8 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
             return np.asarray(ImageOps.exif_transpose(file).convert("RGB"))
     except Image.DecompressionBombError:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got more") from None
-    except InputError:
-        raise
     except (OSError, ValueError, SyntaxError) as error:
-        raise InputError(f"{path}: cannot be read as a picture: {_first_line(error)}") from None
+        raise _refused(path, "a picture", error) from None
 
 
 def _decode_srgb(value: Plane) -> Plane:
@@ -203,6 +197,13 @@ def library(name: str) -> Any:
     except ImportError:
         package = PACKAGES[name]
         raise InputError(f"this photograph needs the package {package}: pip install {package}") from None
+
+
+def _refused(path: Path, kind: str, error: Exception) -> InputError:
+    """In a library's words, where none of ours say it already."""
+    if isinstance(error, InputError):
+        return error
+    return InputError(f"{path}: cannot be read as {kind}: {_first_line(error)}")
 
 
 def _first_line(error: Exception) -> str:
