@@ -137,7 +137,7 @@ def early_share(x: Array, q: Array, per_h: Array, rest: Array) -> tuple[Array, A
     s = jnp.minimum(q, SERIES)
     series = 1.0 / 2 - s * (1.0 / 3 - s * (1.0 / 4 - s * (1.0 / 5 - s * (1.0 / 6 - s * (1.0 / 7)))))
     slope_series = s * s * (1.0 / 3 - s * (1.0 / 2 - s * (3.0 / 5 - s * (2.0 / 3 - s * (5.0 / 7)))))
-    far = q < SERIES
+    far = jnp.abs(q) < SERIES  # not q < SERIES: h < 0 is no law, and its light next to the source not finite
     return jnp.where(far, series, z * (1.0 - log)), jnp.where(far, slope_series, 1.0 - 2.0 * log + rest)
 
 

@@ -18,7 +18,6 @@ import math
 from dataclasses import dataclass
 from functools import cached_property, lru_cache, partial
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -119,7 +118,7 @@ def _alpha(u):
 
 def _double(function):
     """Compile a function of numpy arrays in double precision; the law's class and its setting select it."""
-    compiled = eqx.filter_jit(function)
+    compiled = jax.jit(function)
 
     def call(law, *arrays):
         with jax.enable_x64(True):

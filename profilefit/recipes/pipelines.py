@@ -35,7 +35,7 @@ EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
 QUALITY_ALBEDOS = Albedos(0.05, 0.995, 24)
 # Indices that a law which spans them is judged at, fitted or not: from next to none to glass. And mean cosines.
 JUDGED = (1.001, 1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6)
-JUDGED_COSINES = (0.2, 0.5, 0.8, 0.9, 0.95)
+JUDGED_COSINES = (0.05, 0.2, 0.5, 0.8, 0.9, 0.95)
 
 
 def needs_photons(recipe: Recipe) -> bool:

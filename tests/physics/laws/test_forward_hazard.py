@@ -73,6 +73,13 @@ def test_similarity_is_told_from_it():
         assert isotropic / exact.reflectance(unreduced(0.3, 0.8), Setting(light, 1.4, 0.8)) > 5 / 3
 
 
+def test_a_negative_h_is_not_finite_next_to_the_source():
+    """A fit takes a step to there back: one that stayed ended at 17 times the least cost, and said that it converged."""
+    law = replace(load("hazard", setting=Setting(n=1.4, g=0.05)), once_h0=9.6, once_hg=-10.4)
+    assert float(law.coefficients().once_h) < 0
+    assert not np.any(np.isfinite(law.profile(np.array([1e-3, 1e-2]), 0.5)))
+
+
 @pytest.mark.parametrize("setting", [TISSUE, Setting("diffuse", 1.31, 0.95), Setting(n=1.5, g=0.1)], ids=str)
 def test_the_ends_are_exact(setting):
     law, nearest = load("hazard", setting=setting), 1e-9
