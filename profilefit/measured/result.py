@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.chains import Walk, walk
+from profilefit.fitting.chains import LAPLACE_LOOK, Walk, default_moves, walk
 from profilefit.measured import model
 from profilefit.measured.assumed import BeamWidth, Tissue, as_tissue, beam_width
 from profilefit.measured.data import Measured
@@ -50,9 +50,13 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
             value = value - np.logaddexp(0.0, full[:, U]) - np.logaddexp(0.0, -full[:, U])
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
-    spread = np.minimum(np.sqrt(np.diag(found.likely)[free]), WIDEST)
-    start = centre[free] + spread * np.random.default_rng(seed).standard_normal((WALKERS, len(free)))
-    return walk(log_density, start, centre[free], seed, max_steps, KEPT)
+    likely = found.likely[np.ix_(free, free)]
+    narrowed = WIDEST / np.maximum(np.sqrt(np.diag(likely)), WIDEST)
+    covariance = likely * np.outer(narrowed, narrowed)
+    start = np.random.default_rng(seed).multivariate_normal(centre[free], covariance, WALKERS)
+    return walk(
+        log_density, start, centre[free], seed, max_steps, KEPT, default_moves(centre[free], covariance), LAPLACE_LOOK
+    )
 
 
 def points(found: MediumFit, samples: Floats) -> Floats:
