@@ -58,5 +58,10 @@ def test_a_broken_promise_ends_with_status_1_after_all_is_written(monkeypatch, t
     assert [one.value for one in read_claims(tmp_path)[1]] == [0.05, rows[1].value]
     written["made"]["sha256"] = "0" * 64
     (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
-    claims.main(["--only", "map-error", "--out", str(tmp_path)])
-    assert [one.name for one in read_claims(tmp_path)[1]] == ["map-error"]
+    kept = claims.RECORDS._replace(promises=(BROKEN,), fitted=False)
+    monkeypatch.setattr(claims, "RUNS", (kept, claims.RECORDS._replace(promises=claims.RECORDS.promises[:2])))
+    for left in (["broken", "map-error"], ["map-error"]):
+        (tmp_path / FILE).write_text(json.dumps(written), encoding="utf-8")
+        claims.main(["--only", "map-error", "--out", str(tmp_path)])
+        assert [one.name for one in read_claims(tmp_path)[1]] == left
+        monkeypatch.setattr(claims, "RUNS", (kept._replace(fitted=True), claims.RUNS[1]))
