@@ -27,7 +27,7 @@ evidence: $(VENV)/.installed programs  ## measure what reports show beside the f
 	$(VENV)/bin/profilefit stability --fits fits --out fits/evidence
 	$(VENV)/bin/profilefit tradeoff --fits fits --out fits/evidence
 
-claims: $(VENV)/.installed-test programs  ## measure what README and guides promise, on an idle machine: forty-five minutes; ARGS=--quick: ten, noisier
+claims: $(VENV)/.installed-test programs  ## measure what README and guides promise, on an idle machine: two hours; ARGS=--quick: less, noisier
 	@$(PIP) install --editable '.[benchmark]'
 	$(PY) -m benchmarks.claims $(ARGS)
 	$(VENV)/bin/profilefit report --fits fits --markdown docs/guide/claims.md
