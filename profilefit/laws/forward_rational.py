@@ -18,22 +18,22 @@ INDICES, COSINES = (
 class ForwardRational(FoldedRational):
     """`FoldedRational` with g as an argument: similarity in the reduced albedo holds next to white only.
 
-    c = c0 + cg (1 - g) + cgg (1 - g)^2 + cn rho, d and f likewise: 12 constants [-] for n from 1.3 to 1.5, g up to .95,
-    under either light. A_1 is that of the phase function.
+    c = c0 + c2 (1 - g)^2 + c3 (1 - g)^3 + cn rho, d and f likewise: 12 constants [-] for n from 1.3 to 1.5, g up to
+    .95, under either light. A_1 is that of the phase function.
     """
 
     setting: Setting = eqx.field(static=True)
     c0: float
-    cg: float
-    cgg: float
+    c2: float
+    c3: float
     cn: float
     d0: float
-    dg: float
-    dgg: float
+    d2: float
+    d3: float
     dn: float
     f0: float
-    fg: float
-    fgg: float
+    f2: float
+    f3: float
     fn: float
     entry = Entry(
         "rational",
@@ -41,9 +41,9 @@ class ForwardRational(FoldedRational):
         is_map=True,
         records=("albedo-rational",),
         start={  # within a tenth of the exact map
-            **{"c0": -0.2, "cg": 2.0, "cgg": 0.1, "cn": 0.1},
-            **{"d0": -0.2, "dg": 2.5, "dgg": 0.1, "dn": 0.1},
-            **{"f0": 0.7, "fg": -0.7, "fgg": -0.1, "fn": 0.01},
+            **{"c0": -0.2, "c2": 6.7, "c3": -4.6, "cn": -0.1},
+            **{"d0": -0.9, "d2": 4.5, "d3": -1.7, "dn": 1.3},
+            **{"f0": 0.8, "f2": -5.8, "f3": 5.0, "fn": -0.2},
         },
         n=INDICES,
         g=COSINES,
@@ -58,14 +58,14 @@ class ForwardRational(FoldedRational):
     def folds(self) -> dict[str, dict[str, float]]:
         here = self.here()
         forward = 1.0 - float(here.g)
-        terms = {"0": 1.0, "g": forward, "gg": forward**2, "n": float(here.trapped)}
+        terms = {"0": 1.0, "2": forward**2, "3": forward**3, "n": float(here.trapped)}
         return {letter: {letter + name: value for name, value in terms.items()} for letter in "cdf"}
 
     def folded(self) -> tuple[Number, Number, Number]:
         here = self.here()
         z, rho = 1.0 - here.g, here.trapped
         return (
-            self.c0 + z * (self.cg + z * self.cgg) + rho * self.cn,
-            self.d0 + z * (self.dg + z * self.dgg) + rho * self.dn,
-            self.f0 + z * (self.fg + z * self.fgg) + rho * self.fn,
+            self.c0 + z**2 * (self.c2 + z * self.c3) + rho * self.cn,
+            self.d0 + z**2 * (self.d2 + z * self.d3) + rho * self.dn,
+            self.f0 + z**2 * (self.f2 + z * self.f3) + rho * self.fn,
         )
