@@ -100,9 +100,7 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
         for one, axes in ((MATCHED, AXES), (REFRACTING, AXES), (STACK, STACK_AXES))
     ]
     traced = tuple(replace(point, panel="tracers") for point in panels[0].points if point.method != EXACT)
-    panels.insert(
-        1, Panel("tracers", "the same without the exact solution, which no other g has", *AXES, traced, joined=True)
-    )
+    panels.insert(1, Panel("tracers", "the same without the exact solution", *AXES, traced, joined=True))
     return TradeoffPart("truth", title, tuple(panels), (*notes, f"compiling, not in the times [s]: {compiling}"))
 
 
