@@ -8,6 +8,8 @@ O'Hagan, J. R. Statist. Soc. B 63, 2001), with Matern's covariance (nu = 3/2) al
 
 Amplitude sigma and both lengths are those of greatest likelihood, the photons' noise known and the constants of the law
 free (restricted maximum likelihood: Patterson and Thompson, Biometrika 58, 1971, since a fit bends into its residuals).
+Waves that a law leaves in exact light are smoother than this process, and its fine scales, most in number, then ask for
+too small a sigma: it is at least the one that leaves residuals of their own mean square (method of moments).
 Another draw of that process would have led the fit elsewhere: the derivative of the optimum turns its covariance into
 the constants' model error, and the law that was fitted is off by what remains of delta after the fit has followed it.
 A fit to r R_d unweighted (objective "radial") lets the law go where the profile fades: there delta counts in units of
@@ -17,7 +19,7 @@ the profile's source limit, alpha / 4 pi r, instead of the profile itself.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import equinox as eqx
@@ -150,12 +152,12 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
 
 
 def of_residuals(data: Residuals) -> Discrepancy:
-    """The process that makes these residuals likeliest."""
+    """The process that makes these residuals likeliest, and not smaller than they are."""
     u, s, y, slope, noise = _flat(data)
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = likeliest(begin, limits, (apart(u, u), apart(s, s), y, slope, noise))
+    found, curved, worth, converged = likeliest(begin, limits, (apart(u, u), apart(s, s), y, _unit(slope), noise))
     amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
@@ -164,7 +166,22 @@ def of_residuals(data: Residuals) -> Discrepancy:
     result = (FOUND if gain > SEEN else NOT_SEEN) if converged else FAILED
     shown_u = length_u if data.u.size > 1 else np.nan
     facts = amplitude, amplitude * _error(curved), shown_u, length_s, gain, float(np.sqrt(np.mean(y**2))), result
-    return Discrepancy(*facts, covariance, data.u, data.s, data.influence)
+    one = Discrepancy(*facts, covariance, data.u, data.s, data.influence)
+    if result == NOT_SEEN:
+        return one
+    return _as_large(one, one.law_covariance(u, s, slope), float(y @ y - np.trace(noise)))
+
+
+def _as_large(one: Discrepancy, left: Floats, squares: float) -> Discrepancy:
+    """`one`, or if it leaves residuals of a smaller sum of squares than `squares`, with the amplitude that does not.
+
+    left  (k, k) covariance of the residuals that it leaves
+    """
+    more = squares / np.trace(left)
+    if more <= 1.0:
+        return one
+    amplitude, relative = one.amplitude * float(np.sqrt(more)), float(np.sqrt(0.5 * np.sum(left**2)) / np.trace(left))
+    return replace(one, amplitude=amplitude, amplitude_error=amplitude * relative, covariance=more * one.covariance)
 
 
 def residuals(fit: Fit, profiles: Profiles) -> Residuals:
@@ -256,14 +273,18 @@ def _root(covariance: Floats) -> Floats:
 
 
 def _flat(data: Residuals):
-    """Live points in one row: u, s, residual (n,), slope (n, p) with columns of unit length, noise (n, n)."""
+    """Live points in one row: u, s, residual (n,), slope (n, p), noise (n, n)."""
     a, g = np.nonzero(data.live)
-    slope = data.slope[a, g]
-    length = np.linalg.norm(slope, axis=0)
     noise = np.einsum("gak,gbk->gab", data.noise, data.noise)
     full = np.where(g[:, None] == g, noise[g[:, None], a[:, None], a], 0.0)
     full += LEFT_OUT * np.diag(np.diag(full))
-    return data.u[g], data.s[a], data.table[a, g], slope / np.where(length > 0, length, 1.0), full
+    return data.u[g], data.s[a], data.table[a, g], data.slope[a, g], full
+
+
+def _unit(slope: Floats) -> Floats:
+    """With columns of unit length."""
+    length = np.linalg.norm(slope, axis=0)
+    return slope / np.where(length > 0, length, 1.0)
 
 
 def _scales(x: Floats) -> Floats:

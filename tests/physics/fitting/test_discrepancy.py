@@ -79,6 +79,31 @@ def test_constants_scatter_as_the_model_error_says(drawn):
     assert np.all(white < 0.4 * error)
 
 
+@pytest.mark.slow
+def test_smooth_residuals_are_as_large_as_they_are(monkeypatch):
+    """Draws of a process without fine scales, and no noise, as of a law fitted to exact light."""
+    rng, roots = np.random.default_rng(16), []
+    for x, length in ((S, 0.5), (U, 2.0)):
+        value, vector = np.linalg.eigh(np.exp(-0.5 * ((x[:, None] - x) / length) ** 2))
+        roots.append(vector * np.sqrt(np.maximum(value, 0.0)))
+    delta = AMPLITUDE * roots[0] @ rng.standard_normal((2000, S.size, U.size)) @ roots[1].T
+    scatter = np.std(np.einsum("pai,rai->rp", true_process().influence, delta), axis=0)
+
+    def stated():
+        found = [of_residuals(residuals(table, noise=0.0)) for table in delta[:DRAWS]]
+        z = [(one.amplitude - AMPLITUDE) / one.amplitude_error for one in found]
+        return np.sqrt(np.mean([np.diag(one.covariance) for one in found], axis=0)) / scatter, np.abs(z).max()
+
+    errors, farthest = stated()
+    np.testing.assert_allclose(errors, 1.0, atol=0.5)
+    assert farthest < 4
+    # Negative control: what is likeliest alone.
+    monkeypatch.setattr(discrepancy, "_as_large", lambda one, *_: one)
+    errors, farthest = stated()
+    assert np.all(errors < 0.4)
+    assert farthest > 8
+
+
 def true_process():
     """The process itself, as `discrepancy` would describe it."""
     data = residuals(np.zeros((S.size, U.size)))
