@@ -75,7 +75,7 @@ class SamplerQuality:
 
 
 class Target(Protocol):
-    """The light that is to be gathered; x = r/l."""
+    """The light that is to be gathered; x = r/l, alpha and l the medium's own, not its reduced ones."""
 
     def density(self, x: Floats, alpha: float) -> Floats:
         """2 pi x R_d / A [1/mfp]."""
@@ -166,7 +166,7 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
         return _called(_pdf, sampler, x, alpha)
 
     with jax.enable_x64(True):
-        jump = float(sampler.jump(jnp.asarray(alpha)))
+        jump = float(sampler.jump(jnp.asarray(sampler.law.similar(alpha, 1.0)[0])))
     shape = _map(radius, edge, -np.log1p(-jump) if jump < 1.0 else np.inf)
     t, dt = _rule(shape.breaks)
     share = np.exp(-t) * dt
@@ -327,19 +327,19 @@ def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alp
 
 @eqx.filter_jit
 def _sample(sampler: Sampler, xi: Array, alpha: Array) -> Array:
-    return sampler.scaled_sample(xi, alpha)
+    return sampler.sample(xi, alpha)
 
 
 @eqx.filter_jit
 def _pdf(sampler: Sampler, x: Array, alpha: Array) -> Array:
-    return sampler.scaled_pdf(x, alpha)
+    return sampler.pdf(x, alpha)
 
 
 @eqx.filter_jit
 def _share(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return law.scaled_cdf(x, alpha)
+    return law.cdf(x, alpha)
 
 
 @eqx.filter_jit
 def _slope(law: ProfileLaw, x: Array, alpha: Array) -> Array:
-    return jax.jvp(lambda y: law.scaled_cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]
+    return jax.jvp(lambda y: law.cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]

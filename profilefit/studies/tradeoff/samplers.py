@@ -23,6 +23,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from mcml_sim.exact.light import unreduced
+from mcml_sim.media.setting import Setting
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
@@ -43,7 +45,7 @@ from profilefit.studies.tradeoff.stopwatch import Track
 Floats = NDArray[np.float64]
 SAMPLES = 16  # of one estimate
 BLOCKS = 5  # of trials: how far the variance itself is known
-PLACES = (-3.0, -1.0, -0.3, -0.1)  # on the dark side of the edge [mfp]
+PLACES = np.array([-3.0, -1.0, -0.3, -0.1])  # on the dark side of the edge [l*]
 APART = 1e-3  # a bias that distinguishes a sampler's density from its law's
 ROUNDING = 1e-6  # share of A: what xi beyond 1 - 2^-24, never drawn, and the quadrature leave unknown
 QUICKLY = (YARDSTICK, "quantile")
@@ -58,7 +60,7 @@ LIKE_OTHERS = (
 
 @dataclass(frozen=True)
 class SamplerSizes:
-    """Albedos, distances of the edges [mfp], trials of a block; points of one timed call, of a costly law; turns."""
+    """Reduced albedos, distances of edges [l*], trials of a block; points of one timed call, of a costly law; turns."""
 
     alphas: tuple[float, ...] = (0.3, 0.8, 0.97)
     edges: tuple[float, ...] = (0.3, 1.0, 3.0)
@@ -167,14 +169,22 @@ def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
     """Light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
 
-    With weights by the sampler's own density, and by its law's.
+    With weights by the sampler's own density, and by its law's. alpha is the reduced albedo, the edge in l*.
     """
+    alpha, length = _own(alpha, sampler.law.setting)
+    edge *= length
     quality = sampler_quality(sampler, alpha, edge=edge)
     of_law = edge_light(LawTarget(sampler.law), alpha, edge)
     truth = edge_light(ExactTarget(sampler.law.setting), alpha, edge)
     own = of_law * (1.0 + quality.edge_bias[0]) / (1.0 + quality.bias[0])
     by_law_density = of_law * (1.0 + quality.edge_bias_by_law_pdf[0]) / (1.0 + quality.bias_by_law_pdf[0])
     return float(own - truth), float(by_law_density - truth)
+
+
+def _own(alpha: float, setting: Setting) -> tuple[float, float]:
+    """The medium's own albedo, of a reduced one, and l* in its mean free paths."""
+    own = float(unreduced(alpha, setting.g))
+    return own, 1.0 / (1.0 - own * setting.g)
 
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
@@ -186,7 +196,7 @@ def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
     rows = []
-    for alpha in sizes.alphas:
+    for alpha in (_own(one, sampler.law.setting)[0] for one in sizes.alphas):
         ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)
         rows.append([error_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
     return np.moveaxis(np.array(rows), 2, 0)
@@ -196,7 +206,8 @@ def error_ratios(
     way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
 ) -> tuple[float, float]:
     points = random_points(SAMPLES, trials, seed=block + 1)
-    mine, best = (edge_estimate(g, points, PLACES, alpha, law.setting) for g in (way, over))
+    places = PLACES / (1.0 - alpha * law.setting.g)
+    mine, best = (edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
     square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
     return float(square), float(mine.variance.mean() / best.variance.mean())
 

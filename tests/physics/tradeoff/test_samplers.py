@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import profilefit
+from mcml_sim import Setting
 from profilefit.scenes.stage.step_edge import by_law, by_quantile, edge_estimate, random_points
 from profilefit.studies.tradeoff import samplers
 from profilefit.studies.tradeoff.contenders import YARDSTICK, made
@@ -40,6 +41,13 @@ def test_an_exact_inverse_has_its_laws_bias_only():
     (of_law,) = edge_estimate(by_law(law, ALPHA), random_points(2, 2, 1), [-EDGE], ALPHA, law.setting, law).law_bias
     assert own == pytest.approx(of_law, abs=samplers.ROUNDING)
     assert by_law_density == pytest.approx(own, abs=samplers.ROUNDING)
+
+
+def test_a_law_with_g_is_judged_by_light_that_scatters_forwards():
+    law = profilefit.load("hazard", setting=Setting(n=1.4, g=0.8))
+    own, by_law_density = samplers.asymptotic_bias(law.sampler, ALPHA, EDGE)
+    assert abs(own) < 1e-3  # .08 of light that scatters evenly
+    assert by_law_density == pytest.approx(own, abs=1e-5)  # one step of the inverse, not two
 
 
 @pytest.mark.slow

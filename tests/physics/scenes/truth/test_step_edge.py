@@ -77,7 +77,7 @@ def test_bias_of_the_project_law_is_small():
     """Within 4 mfp of the edge, at most 0.3 % of A; a published law has more."""
     x = np.linspace(-4.0, 4.0, 41)
     alphas = np.array([[0.5], [0.8], [0.95], [0.99]])
-    for setting in (Setting(), DIFFUSE):
+    for setting in (Setting(), DIFFUSE, Setting(n=1.4, g=0.8)):
         truth = step_response(x, alphas, setting=setting)
         assert np.max(np.abs(step_response(x, alphas, law=profilefit.load("hazard", setting=setting)) - truth)) < 0.003
     published = profilefit.load("burley", "published")
