@@ -48,7 +48,7 @@ class Fineness(NamedTuple):
 
 
 DEGREES = ((0.25, 8), (0.45, 10), (0.65, 12), (0.85, 14), (1.0, 16))
-"""By g up to: more change the orders that the table takes from here by 3e-4 and less, 1e-3 where g = .95."""
+"""By g up to: four more change light from .05 to 15 l* by 4e-6 at g = .58, 9e-4 at g = .9 (`half_spaces --finer`)."""
 
 
 def fine(g: float) -> Fineness:
