@@ -24,7 +24,6 @@ from jax import Array
 from numpy.typing import NDArray
 
 from mcml_sim.exact.light import unreduced
-from mcml_sim.media.setting import Setting
 from profilefit.fitting.sampling import ExactTarget, LawTarget, edge_light, sampler_quality
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.hazard import Hazard
@@ -171,20 +170,14 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
     With weights by the sampler's own density, and by its law's. alpha is the reduced albedo, the edge in l*.
     """
-    alpha, length = _own(alpha, sampler.law.setting)
-    edge *= length
+    alpha = float(unreduced(alpha, sampler.law.setting.g))
+    edge *= sampler.law.similar(alpha, 1.0)[1]
     quality = sampler_quality(sampler, alpha, edge=edge)
     of_law = edge_light(LawTarget(sampler.law), alpha, edge)
     truth = edge_light(ExactTarget(sampler.law.setting), alpha, edge)
     own = of_law * (1.0 + quality.edge_bias[0]) / (1.0 + quality.bias[0])
     by_law_density = of_law * (1.0 + quality.edge_bias_by_law_pdf[0]) / (1.0 + quality.bias_by_law_pdf[0])
     return float(own - truth), float(by_law_density - truth)
-
-
-def _own(alpha: float, setting: Setting) -> tuple[float, float]:
-    """The medium's own albedo, of a reduced one, and l* in its mean free paths."""
-    own = float(unreduced(alpha, setting.g))
-    return own, 1.0 / (1.0 - own * setting.g)
 
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
@@ -196,7 +189,7 @@ def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
     """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
     rows = []
-    for alpha in (_own(one, sampler.law.setting)[0] for one in sizes.alphas):
+    for alpha in unreduced(np.array(sizes.alphas), sampler.law.setting.g).tolist():
         ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)
         rows.append([error_ratios(*ways, alpha, sampler.law, block, sizes.trials) for block in range(BLOCKS)])
     return np.moveaxis(np.array(rows), 2, 0)
@@ -206,7 +199,7 @@ def error_ratios(
     way: EdgeGather, over: EdgeGather, alpha: float, law: ProfileLaw, block: int, trials: int
 ) -> tuple[float, float]:
     points = random_points(SAMPLES, trials, seed=block + 1)
-    places = PLACES / (1.0 - alpha * law.setting.g)
+    places = PLACES * law.similar(alpha, 1.0)[1]
     mine, best = (edge_estimate(g, points, places, alpha, law.setting) for g in (way, over))
     square = np.mean(mine.rmse**2) / np.mean(best.rmse**2)
     return float(square), float(mine.variance.mean() / best.variance.mean())
