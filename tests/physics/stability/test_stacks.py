@@ -62,7 +62,8 @@ def test_constants_of_other_layers_are_a_failure():
     """Negative control: a law whose R_d is below 0 is red, for no cause but that its constants are foreign."""
     one = stacks.borrower()
     owned = replace(one, own=True, errors=stacks.ORDINARY)
-    found = reds(*stacks.of_law(owned, FLOAT64, (PROFILE,)))
+    # Without a first layer R_d is a difference of equals, whose rounding far out may have either sign: not promised.
+    found = [each for each in reds(*stacks.of_law(owned, FLOAT64, (PROFILE,))) if each.inside]
     assert {(each.verdict, each.is_failure, each.is_unexplained) for each in found} == {(Verdict.NEGATIVE, True, True)}
     told = reds(*stacks.of_law(one, FLOAT64, (PROFILE, CDF)))
     assert {each.cause.key for each in told} == {"borrowed constants"}
