@@ -53,7 +53,7 @@ def fit(
     ] = None,
     colour: Annotated[str | None, typer.Option(help="Of a TLS850's records: red, green or blue.")] = None,
     scale: Annotated[
-        str, typer.Option(help="What the values are multiplied by: a number, 1.0+-0.02 if known so well, or free.")
+        str, typer.Option(help="The values are light times this: a number, 1.0+-0.02 if known so well, or free.")
     ] = "1",
     total: Annotated[
         str | None, typer.Option(help="Total reflectance, if measured too, such as 0.52+-0.01.", metavar="A+-ERROR")

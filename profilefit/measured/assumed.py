@@ -17,11 +17,12 @@ from scipy import stats
 
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.setting import Setting
+from profilefit.errors import InputError
 from profilefit.measured import model
 from profilefit.measured.beam import Gaussian
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.solving import Minimum, Problem, descended
+from profilefit.measured.solving import Minimum, Problem, descended, descended_from
 
 HALVINGS = 9  # of the widths that are tried, from half the last radius
 FINER = 3  # further trials between the best and its neighbours
@@ -93,7 +94,10 @@ def as_tissue(found: MediumFit) -> Tissue | None:
     if not (question.assumed and there.is_solved and isinstance(question.law, ExactLight) and found.minimum.converged):
         return None
     problem = replace(found.problem, question=replace(question, law=exact_light(there)))
-    end = descended(problem, found.point, question.free)
+    try:
+        end = descended_from(problem, found.point)
+    except InputError:  # a total reflectance is held that such a medium has not
+        return None
     values = model.quantities(end.point[None], np.zeros(1))
     return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - found.minimum.cost)
 

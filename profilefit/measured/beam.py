@@ -29,7 +29,8 @@ PANEL = np.polynomial.legendre.leggauss(6)
 PANELS, REACH = 12, 6.0  # of a Gaussian beam: as wide as its standard deviation twice, so many w to either side
 GRADED, FINER = 9, 3.0  # panels into which the nearest one is divided, each that much narrower than the next
 EDGE = np.polynomial.legendre.leggauss(40)  # where a circle crosses the rim of a top hat
-AROUND = 64  # points on a circle that crosses a measured beam
+OCTAVES, STEEPEST = 10, 3  # of a measured beam's radii, down from its last; its straight pieces that are panels, too
+AROUND = np.polynomial.legendre.leggauss(8)  # of a circle, in each panel
 TOPHAT = "tophat:"
 MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
 CELLS = re.compile(r"[\s,;]+")
@@ -94,33 +95,45 @@ class Profiled:
     r: Floats
     value: Floats
 
-    @cached_property
-    def power(self) -> float:
-        """int 2 pi r b dr of the given irradiance, exact for straight pieces."""
-        a, b, u, v = self.r[:-1], self.r[1:], self.value[:-1], self.value[1:]
-        return float(np.pi / 3.0 * np.sum((b - a) * (u * (2.0 * a + b) + v * (a + 2.0 * b))))
-
     @property
     def words(self) -> str:
         return f"a measured beam out to {self.r[-1]:g}"
 
     def nodes(self, d: Floats) -> Nodes:
-        rho, weight = _panels(np.maximum(d - self.r[-1], 0.0), d + self.r[-1])
-        turn = np.pi * (np.arange(AROUND) + 0.5) / AROUND
-        far = np.sqrt(
-            (d[..., None, None] - rho[..., None]) ** 2
-            + 4.0 * d[..., None, None] * rho[..., None] * np.sin(0.5 * turn) ** 2
-        )
-        return rho, weight * np.interp(far, self.r, self.value, right=0.0).mean(axis=-1) / self.power
+        at, low = d[..., None], np.maximum(d - self.r[-1], 0.0)[..., None]
+        edges = np.concatenate([low + self._edges, np.abs(at - self._edges), at + self._edges], axis=-1)
+        rho, weight = _between(np.sort(edges, axis=-1))
+        weight *= self._around(at, rho)
+        return rho, weight / (2.0 * np.pi * np.sum(rho * weight, axis=-1))[..., None]
+
+    @cached_property
+    def _edges(self) -> Floats:
+        """Radii between which b is smooth, or little of the light."""
+        octaves = self.r[-1] * 0.5 ** np.arange(OCTAVES)
+        steep = np.argsort(np.abs(np.diff(self.value)) * (self.r[1:] + self.r[:-1]))[-STEEPEST:]
+        return np.unique(np.concatenate([[0.0], octaves, self.r[steep], self.r[steep + 1]]))
+
+    def _around(self, d: Floats, rho: Floats) -> Floats:
+        """The mean of b over circles, panel by panel of the distance s from the axis: no circle steps over a beam."""
+        nearest, across = np.abs(d - rho)[..., None], (4.0 * d * rho)[..., None]
+        s = np.maximum(self._edges, nearest)
+        with np.errstate(divide="ignore", invalid="ignore"):  # circles about the axis, or of no radius
+            turn = 2.0 * np.arcsin(np.sqrt(np.clip((s - nearest) * (s + nearest) / across, 0.0, 1.0)))
+        turn = np.where(across > 0, turn, np.linspace(0.0, np.pi, s.shape[-1]))
+        nodes, weights = _between(turn, AROUND)
+        far = np.sqrt(nearest**2 + across * np.sin(0.5 * nodes) ** 2)
+        found: Floats = np.sum(weights * np.interp(far, self.r, self.value, right=0.0), axis=-1) / np.pi
+        return found
 
 
-def beam_of(option: str, text: str, unit: str) -> Irradiance:
+def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
     """A beam from words: 0.5mm, a Gaussian one's 1/e^2 radius; tophat:0.5mm, a radius; or a file of irradiances.
 
     unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.
+    folder  where the file lies, if its path is not absolute
     """
     if text.lower().endswith((".csv", ".tsv", ".txt")):
-        return _read(Path(text))
+        return _read(folder / text)
     if text.startswith(TOPHAT):
         return TopHat(length(option, text.removeprefix(TOPHAT), unit))
     return Gaussian(length(option, text, unit))
@@ -131,7 +144,7 @@ def _read(path: Path) -> Profiled:
     content = read_whole(path, MAX_BYTES)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a beam of at most {MAX_BYTES} bytes, got a longer file")
-    text = content.decode("utf-8", "replace")
+    text = content.decode("utf-8-sig", "replace")
     lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
     lines = [(at, line) for at, line in lines if line]
     rows: list[list[float]] = []
@@ -145,6 +158,8 @@ def _read(path: Path) -> Profiled:
         if rows and found[0] <= rows[-1][0]:
             raise InputError(f"{path}:{at}: expected radii that rise above {rows[-1][0]:g}, got {found[0]:g}")
         rows.append(found)
+    while len(rows) > 2 and rows[-1][1] == rows[-2][1] == 0.0:  # darkness beyond the beam
+        rows.pop()
     if not 2 <= len(rows) <= MOST_ROWS or not any(value > 0 for _, value in rows[:-1]):
         raise InputError(
             f"{path}: expected 2 to {MOST_ROWS} rows of radius and irradiance, with light, got {len(rows)}"
@@ -166,12 +181,15 @@ def _panels(low: Floats, high: Floats) -> Nodes:
     """Of PANELS equal panels, the first of them graded towards its lower end."""
     edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
     first, d_first = _graded(low, edges[..., 1])
-    half = 0.5 * np.diff(edges[..., 1:], axis=-1)[..., None]
-    middle = 0.5 * (edges[..., 1:-1] + edges[..., 2:])[..., None]
-    rest, d_rest = middle + half * PANEL[0], half * PANEL[1]
-    flat = (*low.shape, -1)
-    rho = np.concatenate([first, rest.reshape(flat)], axis=-1)
-    return rho, np.concatenate([d_first, d_rest.reshape(flat)], axis=-1)
+    rest, d_rest = _between(edges[..., 1:])
+    return np.concatenate([first, rest], axis=-1), np.concatenate([d_first, d_rest], axis=-1)
+
+
+def _between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
+    """Of the panels between edges (..., k) that rise, some of them without width."""
+    half, middle = 0.5 * np.diff(edges)[..., None], 0.5 * (edges[..., 1:] + edges[..., :-1])[..., None]
+    flat = (*edges.shape[:-1], -1)
+    return (middle + half * panel[0]).reshape(flat), (half * panel[1]).reshape(flat)
 
 
 def _graded(low: Floats, high: Floats) -> Nodes:
@@ -184,5 +202,4 @@ def _graded(low: Floats, high: Floats) -> Nodes:
 def _grades() -> Nodes:
     """Nodes and weights in (0, 1), finer towards 0."""
     edges = np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5))
-    half, middle = 0.5 * np.diff(edges)[:, None], 0.5 * (edges[1:] + edges[:-1])[:, None]
-    return (middle + half * PANEL[0]).ravel(), (half * PANEL[1]).ravel()
+    return _between(edges)

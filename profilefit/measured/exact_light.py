@@ -21,7 +21,7 @@ from mcml_sim.exact.anisotropic import table
 from mcml_sim.exact.half_space import require_solved
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
 from mcml_sim.files.kept import kept
-from mcml_sim.media.setting import Setting
+from mcml_sim.media.setting import FORWARD_N, Setting
 
 Floats = NDArray[np.float64]
 EXACT = "exact"  # its name among laws
@@ -45,6 +45,13 @@ def exact_light(setting: Setting) -> ExactLight:
     name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
     found = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
     return tabulated(setting, NEAREST, STEP, *(found[part] for part in parts))
+
+
+def light_at_hand(setting: Setting) -> ExactLight:
+    """The same of one of many settings that a search tries: that of the table, to 3e-4, where it has these n."""
+    if setting.is_isotropic and FORWARD_N[0] <= setting.n <= FORWARD_N[1]:
+        return _filled(table.light(setting))
+    return exact_light(setting)
 
 
 def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:

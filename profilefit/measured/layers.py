@@ -20,13 +20,15 @@ from scipy.optimize import least_squares
 
 from mcml_sim import exact
 from mcml_sim.media.medium import Medium
+from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.data import Measured, require_workable
 from profilefit.measured.instrument import Instrument
-from profilefit.measured.misfit import DETECTED
+from profilefit.measured.misfit import DETECTED, alone, gaussianised, scatter_chance
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Known
+from profilefit.measured.replicates import widening
 
 Floats = NDArray[np.float64]
 NAME = re.compile(r"(d|mu_a|mu_s)([1-9][0-9]?)")
@@ -69,8 +71,9 @@ class LayersFit:
 
     @property
     def intervals(self) -> Floats:
-        """(p, 2) of 95 %, as of normal errors of the logarithms."""
-        return self.values[:, None] * np.exp(1.96 * np.outer(self.errors, [-1.0, 1.0]))
+        """(p, 2) of 95 %, as of normal errors of the logarithms, or Student's where the data's are estimates."""
+        quantile = stats.t.ppf(0.975, self.data.pooled)
+        return self.values[:, None] * np.exp(quantile * np.outer(self.errors, [-1.0, 1.0]))
 
     @property
     def loose(self) -> tuple[str, ...]:
@@ -94,11 +97,11 @@ def fit_layers(
 ) -> LayersFit:
     """Fit the free quantities of a stack, from where `medium` has them; lengths in the unit of the data. Minutes.
 
-    scale  as in `workflow.fit`. InputError of a medium that `exact.solve` has not, and of names that it has not
+    scale  as in `workflow.fit`; n and g are those of the layers. InputError of a medium that `exact.solve` has not, of
+           names that it has not, and of data that state another n, or a g
     """
     require_workable(data)
-    if "beam" in premises.ranges:
-        raise InputError("beam must be one width where layers are fitted, got a range")
+    premises = replace(premises, setting=_setting(data, medium, premises))
     names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
     _require_free(medium, free)
     if data.value.size <= len(names):
@@ -107,17 +110,31 @@ def fit_layers(
     light.rows(np.zeros(len(free)))  # what cannot be solved fails here
     held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     known = scale if isinstance(scale, Known) else None
-    start = np.zeros(len(names))
-    if scale is None:
-        rows, own = light.rows(start[:-1]), noise(data)
-        white = own.whitened(rows)
-        start[-1] = math.log(max(float(white @ own.whitened(data.value) / (white @ white)), 1e-30))
-    weights = noise(data)
+    wider = widening(data.freedom, len(names))
+    weights, start = noise(data, widening=wider), np.zeros(len(names))
+    if known is not None:
+        start[-1] = math.log(known.value)
+    elif scale is None:
+        white = weights.whitened(light.rows(start[:-1]))
+        start[-1] = math.log(max(float(white @ weights.whitened(data.value) / (white @ white)), 1e-30))
     for _ in range(ROUNDS if data.counted else 1):
         done = _least(light, weights, start, held, known)
         start, expected = done.x, _rows(light, done.x, held)
-        weights = noise(data, np.maximum(expected, 0.01 * data.value))
+        weights = noise(data, np.maximum(expected, 0.01 * data.value), wider)
     return _judged(light, names, done, expected, weights, held, known)
+
+
+def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
+    """That of the layers; InputError where a table states another, or what is open is more than the layers."""
+    for name in told.ranges:
+        raise InputError(f"{data.source}: {name} must be one number where layers are fitted, got a range")
+    own = Setting(told.setting.illumination, medium.layers[0].n / medium.n_above)
+    for name, value in (("n", own.n), ("g", own.g)):
+        if name in data.stated and not math.isclose(got := getattr(told.setting, name), value):
+            raise InputError(
+                f"{data.source}: {name} must be {value:g} or left out, as of the layers that are fitted, got {got:g}"
+            )
+    return own
 
 
 @dataclass(frozen=True)
@@ -185,8 +202,11 @@ def _judged(
     light: _Light, names: tuple[str, ...], done: Any, expected: Floats, weights: Noise, held: float, known: Known | None
 ) -> LayersFit:
     rows = _residuals(light, weights, done.x, held, known)
+    data, count = light.data, light.data.value.size
+    times = math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
+    rows[:count] = gaussianised(times * rows[:count], alone(data.freedom, data.pooled))
     chi2, freedom = float(rows @ rows), rows.size - len(names)
-    chance = float(stats.chi2.sf(chi2, freedom))
+    chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0
     _, singular, ways = np.linalg.svd(done.jac, full_matrices=False)
     sizes = wider / np.maximum(singular, np.finfo(float).tiny)
@@ -203,7 +223,7 @@ def _judged(
     values = [getattr(medium.layers[number - 1], FIELDS[kind]) for kind, number in map(_parts, light.free)]
     values += [math.exp(done.x[-1])] if len(names) > len(light.free) else []
     return LayersFit(
-        light.data, light.premises, light.medium, medium, names, np.array(values), errors,
+        data, light.premises, light.medium, medium, names, np.array(values), errors,
         covariance / np.outer(errors, errors), products, chi2, freedom, chance, expected, result,
     )  # fmt: skip
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import Any
 
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
@@ -69,20 +70,23 @@ def premises(
         raise InputError(f"{options[min(ranges)]} must be a number where a law is fitted, got {given[min(ranges)]!r}")
     if "fibre" in given and data.rings:
         raise InputError(f"{options['fibre']} must be left out where rows are averages over annuli")
-    beam, widths = _beam(options["beam"], given.get("beam"), data.unit)
+    folder = Path() if "beam" in spoken else Path(data.source).parent  # what a file states lies beside it
+    beam, widths = _beam(options["beam"], given.get("beam"), data.unit, folder)
     ranges |= {} if widths is None else {"beam": widths}
     fibre = length(options["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
     assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
     return Premises(setting, Instrument(beam, fibre), ranges, assumed)
 
 
-def _beam(option: str, text: str | None, unit: str) -> tuple[Irradiance | None, tuple[float, float] | None]:
+def _beam(
+    option: str, text: str | None, unit: str, folder: Path
+) -> tuple[Irradiance | None, tuple[float, float] | None]:
     """A beam, and the range of its width, LOW:HIGH, if it has one."""
     if text is None:
         return None, None
     parts = text.split(":")
     if len(parts) != 2 or parts[0] == TOPHAT.rstrip(":"):
-        return beam_of(option, text, unit), None
+        return beam_of(option, text, unit, folder), None
     low, high = (length(option, part, unit) for part in parts)
     if not low < high:
         raise InputError(f"{option} must have a range that rises, such as 0.3mm:0.7mm, got {text!r}")

@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.beam import Gaussian
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.exact_light import light_at_hand
 from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.model import NAMES, Light, U, u_of
 from profilefit.measured.oblique import Oblique
@@ -74,7 +74,7 @@ class Question:
         """The same where those of the ranges have these values."""
         setting = Setting.of(self.law.setting.as_table() | {name: values[name] for name in MEDIUM if name in values})
         seen = replace(self.instrument, beam=Gaussian(values["beam"])) if "beam" in values else self.instrument
-        return replace(self, law=self.law if setting == self.law.setting else exact_light(setting), instrument=seen)
+        return replace(self, law=self.law if setting == self.law.setting else light_at_hand(setting), instrument=seen)
 
 
 def held_albedo(law: Light, name: str, value: float) -> float:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from profilefit.measured.model import U
-from profilefit.measured.solving import Minimum, Problem, descended, likelihood
+from profilefit.measured.solving import Minimum, Problem, descended_from, likelihood
 
 Floats = NDArray[np.float64]
 NODES = {"n": 3, "g": 6, "beam": 5}
@@ -64,6 +64,8 @@ def opened(problem: Problem, start: Minimum) -> Opened | None:
     if not np.all(np.isfinite(rise)):
         return None
     theta, log = np.array([one.point for one in fits]), _log_volumes(problem, fits)
+    if not np.any(np.isfinite(log)):
+        return None
     if np.all(np.isfinite(log)):  # errors at every node
         between = _product([_polynomials(NODES[name], PLACES[name]) for name in ranges])
         theta, log = between @ theta, between @ log
@@ -86,10 +88,7 @@ def opened(problem: Problem, start: Minimum) -> Opened | None:
 
 def fitted_under(problem: Problem, values: Mapping[str, float], start: Minimum) -> Minimum:
     """The minimum where the ranges have these values."""
-    there = problem.under(values)
-    point, free = there.question.base, list(there.question.free)
-    point[free] = start.point[free]
-    return descended(there, point, there.question.free)
+    return descended_from(problem.under(values), start.point)
 
 
 def _fits(

@@ -28,9 +28,9 @@ from mcml_sim.files.whole_file import read_whole
 from mcml_sim.media.medium import Medium
 from mcml_sim.results import mco, tally_file
 from profilefit.errors import InputError
+from profilefit.measured import tls_file
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.table_file import read_table
-from profilefit.measured.tls_file import is_tls, read_tls
 
 UNIT = "cm"
 # At a hundred photons the standard error of a ring is known to 10 %, and near enough to a normal one.
@@ -171,10 +171,11 @@ def read(path: Path, unit: str | None = None, scaled: bool = False, colour: str 
     InputError in one line names the file, and the row and column of what is wrong with it.
     """
     if path.suffix.lower() not in SIMULATED:
-        if is_tls(path):
-            return read_tls(path, colour, scaled)
+        content = read_whole(path, tls_file.MAX_BYTES)  # once: a pipe has no second reading
+        if tls_file.is_tls(content):
+            return tls_file.read_tls(path, content, colour, scaled)
         _require_no_colour(colour)
-        return read_table(path, unit, scaled)
+        return read_table(path, content, unit, scaled)
     _require_no_colour(colour)
     if unit not in (None, UNIT):
         raise InputError(

@@ -197,6 +197,13 @@ def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum
     return Minimum(point, rows, slopes, int(done.nfev), _explained(done.status, point, slopes[:, moving], ran, free))
 
 
+def descended_from(problem: Problem, start: Floats) -> Minimum:
+    """The minimum below `start` (3,) of another question: what is held is where this one has it."""
+    point, free = problem.question.base, problem.question.free
+    point[list(free)] = start[list(free)]
+    return descended(problem, point, free)
+
+
 def _usable(rows: Floats, slopes: Floats) -> bool:
     """True where sums of squares of residuals and derivatives are floats."""
     with np.errstate(over="ignore", invalid="ignore"):

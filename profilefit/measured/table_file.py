@@ -24,7 +24,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
@@ -56,9 +55,11 @@ SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are fl
 LONGEST_SHOWN = 40  # characters of a cell in a message
 
 
-def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Measured:
-    """Read a table; `unit` is that of r if the header has none, `scaled` whether the scale of the values is unknown."""
-    content = read_whole(path, MAX_BYTES)
+def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool = False) -> Measured:
+    """A table, from a file's first MAX_BYTES + 1 bytes or more.
+
+    unit    of r if the header has none; scaled whether the scale of the values is unknown, and they in any measure
+    """
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -70,7 +71,7 @@ def read_table(path: Path, unit: str | None = None, scaled: bool = False) -> Mea
     length = _length_unit(path, header, unit)
     found, errors = _values(path, header, rows, numbers)
     _require_one_measure(path, header)
-    times = 1.0 if scaled else _value_factor(path, header, length)
+    times = _value_factor(path, header, length, scaled)
     return Measured(
         str(path),
         hashlib.sha256(content).hexdigest(),
@@ -330,13 +331,15 @@ def _alike(one: str, other: str) -> bool:
     return one == other or (None not in areas and UNITS[str(areas[0])] == UNITS[str(areas[1])])
 
 
-def _value_factor(path: Path, header: _Header, length: str) -> float:
-    """What makes the values per area in the unit of r."""
+def _value_factor(path: Path, header: _Header, length: str, scaled: bool) -> float:
+    """What makes the values per area in the unit of r; 1 where they are in any measure, and are no such values."""
     name = header.replicates[0] if header.replicates else "value"
     text = header.unit(name)
     if not text:
         return 1.0
     unit = area_unit(text)
+    if scaled and (unit is None or not length):
+        return 1.0
     if unit is None:
         raise InputError(
             f"{path}:{header.line}: column {name}: expected light per area such as [1/mm^2], or `scaled` for any "

@@ -14,7 +14,6 @@ from pathlib import Path
 
 import numpy as np
 
-from mcml_sim.files.whole_file import read_whole
 from profilefit.errors import InputError
 from profilefit.measured.data import Floats, Measured
 from profilefit.measured.replicates import FEWEST, moderated_variances
@@ -30,20 +29,19 @@ MOST_RECORDS = 3000
 MOST_PIXELS = 4096
 
 
-def is_tls(path: Path) -> bool:
+def is_tls(content: bytes) -> bool:
     """Whether the first words of a text file are those of such a file."""
-    words = read_whole(path, HEAD_BYTES)[:HEAD_BYTES].decode("utf-8", "replace").lower()
+    words = content[:HEAD_BYTES].decode("utf-8", "replace").lower()
     first = next((line for line in words.splitlines() if line.strip()), "")
     return [word for word in CELLS.split(first.strip(" \ufeff")) if word][:3] == ["record", "pixel", "value"]
 
 
-def read_tls(path: Path, colour: str | None, scaled: bool) -> Measured:
-    """The records of one colour; InputError names the line of what is wrong."""
+def read_tls(path: Path, content: bytes, colour: str | None, scaled: bool) -> Measured:
+    """The records of one colour, of a file's first MAX_BYTES + 1; InputError names the line of what is wrong."""
     if colour not in COLOURS:
         raise InputError(f"{path}: `colour` must be one of {', '.join(COLOURS)}, got {colour!r}")
     if not scaled:
         raise InputError(f"{path}: expected `scaled`, since the instrument's values are in a measure of its own")
-    content = read_whole(path, MAX_BYTES)
     if len(content) > MAX_BYTES:
         raise InputError(f"{path}: expected records of at most {MAX_BYTES} bytes, got a longer file")
     whole = _records(path, content.decode("utf-8", "replace"))

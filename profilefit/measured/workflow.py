@@ -46,7 +46,7 @@ def fit(
                default what the file states, else "searchlight" (a pencil beam, normal, collimated), n = 1 and g = 0
     held       fixed quantities: alpha or A [-], l [unit of the data]
     total      the total reflectance A [-], if that was measured too
-    scale      what the values are multiplied by: a number, one that is known to within an error, or None if unknown
+    scale      the values are light times this: a number, one that is known to within an error, or None if unknown
     seed       of the posterior's walkers; walk whether to sample it: else intervals are of the statistical error alone
     folder     of the records, by default the ones shipped
     oblique    the centre of a circle of the same medium's light, where a beam fell in aslant

@@ -83,6 +83,41 @@ def test_a_beam_is_the_sum_of_its_places(name, mfp):
         assert found == pytest.approx(by_area(twin, reach, d, mfp), rel=most), d
 
 
+def sampled(irradiance, radii):
+    return Profiled(radii, np.array([float(irradiance(r)) for r in radii]))
+
+
+class Halo:
+    """Half of the light in a disc, half of it in one of three times its radius."""
+
+    def nodes(self, d):
+        (rho, weight), (more, another) = TopHat(0.3).nodes(d), TopHat(0.9).nodes(d)
+        return np.concatenate([rho, more], axis=-1), 0.5 * np.concatenate([weight, another], axis=-1)
+
+
+@pytest.mark.parametrize(
+    ("beam", "measured"),
+    [
+        (Gaussian(0.25), sampled(lambda r: np.exp(-32.0 * r**2), np.linspace(0.0, 1.0, 200))),
+        (Gaussian(0.1), sampled(lambda r: np.exp(-200.0 * r**2), np.linspace(0.0, 5.0, 2000))),
+        (TopHat(0.3), Profiled(np.array([0.0, 0.2999, 0.3001]), np.array([5.0, 5.0, 0.0]))),
+        (Halo(), Profiled(np.array([0.0, 0.2999, 0.3001, 0.9]), np.array([1.0, 1.0, 0.1, 0.1]))),
+    ],
+    ids=["Gaussian", "Gaussian with a long dark tail", "top hat", "halo"],
+)
+def test_a_measured_beam_is_the_beam_that_it_samples(beam, measured):
+    """On the axis, at the rim, and as far as a hundred of its radii, where a circle passes it in a small angle."""
+    d = np.array([0.0, 0.01, 0.05, 0.2, 0.31, 0.5, 0.95, 2.0, 5.0, 10.0, 30.0])
+    (rho, weight), (right, another) = measured.nodes(d), beam.nodes(d)
+    np.testing.assert_allclose(np.sum(2.0 * np.pi * rho * weight, axis=-1), 1.0, rtol=1e-12)
+    for mfp in (0.02, 0.5):
+        light, exactly = (
+            np.sum(each * radius / (radius + 0.1 * mfp) * np.exp(-0.1 * radius / mfp), axis=-1)
+            for radius, each in ((rho, weight), (right, another))
+        )
+        np.testing.assert_allclose(light, exactly, rtol=1e-3)
+
+
 def test_rings_hold_their_energy():
     """Pencil beam: differences of the exact cdf. Any beam: all rings together hold all of the light."""
     setting = Setting(n=1.4)
@@ -118,7 +153,10 @@ def test_beams_from_words(tmp_path):
     path.write_text("r, irradiance\n0.1, 7  # counts\n0.5; 7\n0.6\t0\n")
     read = beam_of("beam", str(path), "mm")
     np.testing.assert_array_equal(read.r, [0.0, 0.1, 0.5, 0.6])
-    assert read.power == pytest.approx(7.0 * np.pi * (0.6**3 - 0.5**3) / (3.0 * 0.1), rel=1e-12), "a cone's frustum"
+    np.testing.assert_array_equal(read.value, [7.0, 7.0, 7.0, 0.0])
+    path.write_text("\ufeff0 9\n1 3\n2 0\n3 0\n4 0\n", encoding="utf-8")
+    read = beam_of("beam", str(path), "mm")
+    np.testing.assert_array_equal((read.r, read.value), ([0.0, 1.0, 2.0], [9.0, 3.0, 0.0])), "darkness is no beam"
     for text, message in (
         ("0, 1\n0.2, -1\n", r"beam\.csv:2: expected a radius >= 0 and an irradiance >= 0, got '0\.2, -1'"),
         ("0, 1\n0, 1\n", r"beam\.csv:2: expected radii that rise above 0, got 0"),

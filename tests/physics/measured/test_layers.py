@@ -1,9 +1,11 @@
 """A stack of layers fitted to a profile: what photons say of it, and what rings near the beam cannot."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy import stats
 
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.errors import InputError
@@ -13,6 +15,7 @@ from profilefit.measured.instrument import PENCIL
 from profilefit.measured.layers import fit_layers, solved_rows
 from profilefit.measured.premises import Premises, premises
 from profilefit.measured.problem import Known
+from profilefit.measured.replicates import widening
 
 DATA = Path(__file__).parents[3] / "examples"
 GUESS = Medium((Layer(1.0, 10.0, 10.0, 0.0, 0.05), Layer(1.0, 0.1, 10.0, 0.0)))  # of two_layers.mco, in cm
@@ -52,6 +55,48 @@ def test_rings_near_the_beam_say_nothing_of_what_is_below():
     scaled = fit_layers(rings(medium, np.geomspace(0.1, 40.0, 31), 0.02, 1), medium, ["mu_a2"], where, Known(1, 0.05))
     assert scaled.names == ("mu_a2", "scale")
     assert abs(scaled.values[1] - 1) < 0.1
+
+
+@pytest.mark.slow
+def test_a_scale_known_far_from_one_is_where_the_search_begins():
+    medium = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0)))
+    data = rings(medium, np.geomspace(0.1, 5.0, 9), 0.02, 3)
+    scaled = replace(data, value=1000.0 * data.value, sigma=1000.0 * data.sigma)
+    found = fit_layers(scaled, medium, ["mu_a1"], Premises(Setting(n=1.4)), Known(1000.0, 20.0))
+    assert found.result == "converged"
+    assert abs(found.values[1] - 1000.0) < 3 * 20.0
+    assert found.premises.setting == Setting(n=1.4)
+
+
+@pytest.mark.slow
+def test_errors_of_few_replicates_are_estimates():
+    """The same rows, their errors known or estimated from three replicates each: a few rows agree by accident."""
+    medium = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0)))
+    known = rings(medium, np.geomspace(0.1, 5.0, 9), 0.02, 3)
+    estimated = replace(known, freedom=np.full(known.value.size, 4.0), pooled=8.0)
+    sure, unsure = (fit_layers(data, medium, ["mu_a1"], Premises(Setting(n=1.4))) for data in (known, estimated))
+    assert unsure.errors[0] == pytest.approx(sure.errors[0] * np.sqrt(widening(estimated.freedom, 1)), rel=0.05)
+    wider, narrower = (np.ptp(np.log(one.intervals[0])) / one.errors[0] for one in (unsure, sure))
+    assert (wider, narrower) == pytest.approx((2 * stats.t.ppf(0.975, 8.0), 2 * stats.norm.ppf(0.975)))
+    assert unsure.chi2 < sure.chi2
+    assert unsure.chance > sure.chance
+
+
+@pytest.mark.parametrize(
+    ("statement", "message"),
+    [
+        ("n = 1.4", r"made\.csv: n must be 1 or left out, as of the layers that are fitted, got 1\.4"),
+        ("g = 0.8", r"made\.csv: g must be 0 or left out, as of the layers that are fitted, got 0\.8"),
+        ("n = 1.33:1.45", r"made\.csv: n must be one number where layers are fitted, got a range"),
+        ("beam = 1mm:2mm", r"made\.csv: beam must be one number where layers are fitted, got a range"),
+    ],
+)
+def test_what_a_table_states_is_what_the_layers_are(tmp_path, statement, message):
+    path = tmp_path / "made.csv"
+    path.write_text(f"# {statement}\nr [mm],value,sigma\n1,.5,.01\n2,.2,.01\n3,.1,.01\n")
+    data = read(path)
+    with pytest.raises(InputError, match=message):
+        fit_layers(data, GUESS, ["d1"], premises(data))
 
 
 def test_its_light_is_that_of_finer_nodes():

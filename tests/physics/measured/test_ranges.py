@@ -1,17 +1,21 @@
 """What data leave open of ranges, against fits at many values one by one."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from benchmarks import own_data
 from mcml_sim import Setting
 from profilefit.measured import model
+from profilefit.measured.assumed import as_tissue
 from profilefit.measured.beam import Gaussian
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
 from profilefit.measured.instrument import Instrument
-from profilefit.measured.problem import Known, Question
-from profilefit.measured.solving import descended
+from profilefit.measured.noise import noise
+from profilefit.measured.problem import Known, Question, held_albedo
+from profilefit.measured.solving import Problem, descended
 
 ONE = own_data.TISSUE
 RANGE = (0.3, 0.95)
@@ -76,6 +80,37 @@ def test_a_known_reflectance_counts_at_every_value(measured):
     tight = fitted(measured, asked({"g": RANGE}, total=total))
     assert tight.open.covariance[0, 0] <= loose.open.covariance[0, 0] * 1.05
     assert tight.errors(tight.likely)["A"] < 0.0022
+
+
+def test_an_index_without_direction_is_at_hand(measured, monkeypatch):
+    """No table is made for each n that is tried, and between those that are made light is the same."""
+    question, n = Question(exact_light(Setting(n=1.39)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
+    exactly = replace(question, law=exact_light(Setting(n=n)), ranges={})
+    monkeypatch.setattr("profilefit.measured.exact_light.kept", lambda *_: pytest.fail("a table is made"))
+    assert fitted(measured, question).open.error["n"] > 0
+    light, right = (
+        Problem(measured, one, noise(measured)).model.predicted(np.array([[-3.0, 0.0, 0.0]]), *EDGES)
+        for one in (question.under({"n": n}), exactly)
+    )
+    np.testing.assert_allclose(light, right, rtol=3e-4)
+
+
+def test_ranges_of_data_without_absorption_leave_the_limit():
+    """Light brighter than any medium's: the albedo runs to 1 at every g, and the middle of the range is fitted."""
+    white = own_data.Medium(Setting(n=1.4, g=0.8), 1.0 - 1e-9, 1.0, 0.005)
+    data = own_data.rows(white, np.random.default_rng(4))
+    data = replace(data, value=1.15 * data.value * (data.r / data.r[0]) ** 0.1)
+    found = fitted(data, Question(exact_light(white.setting), own_data.SCALE, ranges={"g": (0.75, 0.85)}))
+    assert found.open is None
+    assert found.values["alpha"] > 0.999
+
+
+def test_a_held_reflectance_is_held_under_tissue(measured):
+    """What n and g of tissue would say has the albedo of that reflectance there."""
+    setting = Setting(n=1.4, g=0.9)
+    found = fitted(measured, Question(exact_light(Setting()), {"A": 0.53, "scale": 1.0}, assumed=("n", "g")))
+    values = as_tissue(found).values
+    assert values["alpha"] == pytest.approx(held_albedo(exact_light(setting), "A", 0.53), abs=1e-9)
 
 
 def test_what_is_held_is_not_moved_by_ranges(measured):

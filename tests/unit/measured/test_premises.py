@@ -39,6 +39,16 @@ def test_a_file_states_and_options_go_before_it(stated):
     assert stated(ROWS.splitlines()[0] + "\n# n = 1.4\n", ROWS.partition("\n")[2]).stated == {}, "above the header only"
 
 
+def test_a_beam_that_a_file_states_lies_beside_it(stated, tmp_path, monkeypatch):
+    (tmp_path / "beam.csv").write_text("0, 1\n1, 0\n")
+    (tmp_path / "elsewhere").mkdir()
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    data = stated("# beam = beam.csv\n")
+    assert premises(data).instrument.beam.r[-1] == 1.0
+    with pytest.raises(InputError, match=r"^beam\.csv: expected a file that can be read"):
+        premises(data, told={"beam": "beam.csv"})
+
+
 def test_a_range_is_its_middle_and_its_ends(stated):
     found = premises(stated(""), told={"n": "1.33:1.45", "g": "0.7:0.9"})
     assert (found.setting.n, found.setting.g) == pytest.approx((1.39, 0.8))

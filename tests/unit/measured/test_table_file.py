@@ -1,5 +1,7 @@
 """Tables of measured light: every form that is read, and every fault by file, row and column."""
 
+import os
+import threading
 import time
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from profilefit.errors import InputError
 from profilefit.measured.lengths import UNITS
-from profilefit.measured.table_file import read_table
+from profilefit.measured.reading import read
 
 GOOD = "r,value,sigma\n1,0.5,0.01\n2,0.2,0.01\n3,0.1,0.01\n"
 
@@ -16,12 +18,12 @@ GOOD = "r,value,sigma\n1,0.5,0.01\n2,0.2,0.01\n3,0.1,0.01\n"
 def table(tmp_path):
     """Read a table of this text."""
 
-    def read(text, **options):
+    def written(text, **options):
         path = tmp_path / "data.csv"
         path.write_bytes(text if isinstance(text, bytes) else text.encode())
-        return read_table(path, **options)
+        return read(path, **options)
 
-    return read
+    return written
 
 
 def test_points(table):
@@ -56,9 +58,10 @@ def test_rings(table):
 
 
 def test_values_per_another_area_are_converted(table):
-    found = table("r [mm],value [1/cm^2],sigma\n1,50,1\n2,20,1\n3,10,1\n")
-    np.testing.assert_allclose(found.value, [0.5, 0.2, 0.1])
-    np.testing.assert_allclose(found.sigma, 0.01)
+    for scaled in (False, True):  # a free scale of light per area is near 1 as well
+        found = table("r [mm],value [1/cm^2],sigma\n1,50,1\n2,20,1\n3,10,1\n", scaled=scaled)
+        np.testing.assert_allclose(found.value, [0.5, 0.2, 0.1])
+        np.testing.assert_allclose(found.sigma, 0.01)
 
 
 def test_any_measure_will_do_if_the_scale_is_free(table):
@@ -239,8 +242,17 @@ def test_units_that_contradict(table):
         table(mixed, unit="mm")
 
 
+def test_a_pipe_is_read_once(tmp_path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    writer = threading.Thread(target=pipe.write_text, args=(GOOD,))
+    writer.start()
+    np.testing.assert_array_equal(read(pipe).value, [0.5, 0.2, 0.1])
+    writer.join()
+
+
 def test_a_file_that_is_not_there(tmp_path):
     with pytest.raises(InputError, match=r"nothing.csv: expected a file that can be read, got: No such file"):
-        read_table(tmp_path / "nothing.csv")
+        read(tmp_path / "nothing.csv")
     with pytest.raises(InputError, match=r"expected a file that can be read, got: Is a directory"):
-        read_table(tmp_path)
+        read(tmp_path)
