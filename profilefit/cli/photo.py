@@ -70,8 +70,8 @@ def photo(
 
     A bracket of exposures is merged, and rings about the spot are fitted by exact light under the beam, with what
     surface and lens add; red, green and blue apart. Cards tell what the spot alone does not: a white one beam and
-    glare, a grey one the scale. The answer names the errors that such photographs can have at best. Exit status 1 if a
-    fit fails. From a clone, pip install ".[photo]".
+    glare, a grey one the scale. The answer names the errors that such photographs have at best. Exit status 1 if a fit
+    fails. From a clone, pip install ".[photo]".
 
     \b
     Examples:
@@ -152,8 +152,8 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
     setup = read_setup(file)
     require_folder(out)
     with working("simulating", quiet):
-        files = written(setup, out)
         bounds = told(setup)
+        files = written(setup, out)
     notes(quiet).print(f"wrote {len(files)} photographs into {out}", markup=False)
     if as_json:
         print_json(bounds)
@@ -178,6 +178,8 @@ def _known(option: str, text: str, lengths: bool = False) -> Known:
         )
     except ValueError:
         raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}") from None
-    if not (0 < value < 1e6 and 0 < error < 1e6):
-        raise InputError(f"{option} must be a value > 0 with an error > 0, got {text!r}")
+    most = 1e6 if lengths else 1.0
+    if not (0 < value < most and 0 < error < most):
+        accepted = "> 0" if lengths else "in 0 ... 1"
+        raise InputError(f"{option} must be a value {accepted} with an error {accepted}, got {text!r}")
     return Known(value, error)

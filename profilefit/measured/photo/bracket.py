@@ -29,6 +29,8 @@ SHARED = 5  # pixels across, over which light is shared for the weights
 DIM, UNCLIPPED = 0.02, 0.7  # of the range, between which a pixel says something of ratios
 LEAST_PAIRS = 50  # pixels, for a ratio or a bin
 BINS = 24  # of light, for photon transfer
+BRIGHTER = 1.2  # times the light of another exposure, that one of a shorter time, or of the same, may have
+ROUNDED = 1.0 / 12.0  # steps^2, variance of a count that has no other
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,12 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
         above += float(chosen[-1][0].sum())
         below += float(chosen[-1][1].sum())
         pairs += int(good.sum())
-    if pairs < LEAST_PAIRS or not 0 < above < below:
+    if pairs >= LEAST_PAIRS and above > BRIGHTER * below:
+        raise InputError(
+            f"{shorter.source}: expected less light than {longer.source} has, whose time is longer, got "
+            f"{above / below:.3g} times as much"
+        )
+    if pairs < LEAST_PAIRS or not above > 0:
         raise InputError(
             f"{shorter.source}: expected a scene that {longer.source} shares with it, neither dark nor clipped, in "
             f"{LEAST_PAIRS} pixels, got {pairs:.0f}; take exposures in steps of a factor of eight or less"
@@ -112,6 +119,8 @@ def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
         ratio = relative[a] / relative[b]
         for one, other in zip(shots[a].planes, shots[b].planes, strict=True):
             good = (other.counts < FULL * other.range) & (other.counts > 0)
+            if np.count_nonzero(good) < LEAST_PAIRS:
+                continue
             light, off = other.counts[good], one.counts[good] - ratio * other.counts[good]
             edges = np.unique(np.quantile(light, np.linspace(0.0, 1.0, BINS + 1)))
             at = np.clip(np.searchsorted(edges, light, side="right") - 1, 0, edges.size - 2)
@@ -121,13 +130,13 @@ def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
                     continue
                 middle = float(light[at == each].mean())
                 rows.append((ratio * middle + ratio**2 * middle, 1.0 + ratio**2))
-                squares.append(float(np.mean((inside - inside.mean()) ** 2)))
+                squares.append(max(float(np.mean((inside - inside.mean()) ** 2)), ROUNDED * (1.0 + ratio**2)))
                 weights.append(np.sqrt(inside.size) / squares[-1])
     if len(rows) < 2:
         return Sensor(1.0, 1.0)
     matrix, weight = np.array(rows), np.array(weights)
     found, *_ = np.linalg.lstsq(matrix * weight[:, None], np.array(squares) * weight, rcond=None)
-    return Sensor(1.0 / max(float(found[0]), 1e-9), float(np.sqrt(max(found[1], 1.0 / 12.0))))
+    return Sensor(1.0 / max(float(found[0]), 1e-9), float(np.sqrt(max(found[1], ROUNDED))))
 
 
 def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Picture]:

@@ -2,13 +2,18 @@
 
 Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG, by Pillow,
 is not, is taken for sRGB, and the answer says so. What is read is bounded before it is read.
+
+Files that state no white level have it where many pixels share the largest value: of sixteen bits where that is the
+largest of a converter of 10, 12 or 14.
 """
 
 from __future__ import annotations
 
 import importlib
 import os
+import struct
 import warnings
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -25,7 +30,10 @@ Plane = NDArray[np.float32]
 RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", ".srw")
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
 MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
-COLOURS = ("red", "green", "blue")
+COLOURS, GREY = ("red", "green", "blue"), "grey"
+PLATEAU, BEYOND = 12, 1.2  # pixels that share the largest value where it clips; the range over it, if it does not
+CONVERTERS, STEPS = (1023.0, 4095.0, 16383.0), 65535.0  # whites in a TIFF; steps of 16 bits, which floats become
+DAMAGED = (ValueError, OSError, LookupError, TypeError, RuntimeError, struct.error, zlib.error)  # of libraries' readers
 PACKAGES = {"cv2": "opencv-python-headless", "OpenEXR": "OpenEXR", "rawpy": "rawpy", "tifffile": "tifffile"}
 
 
@@ -74,7 +82,7 @@ def _raw(path: Path) -> Exposure:
     rawpy = library("rawpy")
     try:
         with rawpy.imread(str(path)) as raw:
-            _require_size(path, raw.sizes.width, raw.sizes.height)
+            _require_size(path, raw.sizes.width, raw.sizes.height, 1)
             if raw.raw_pattern is None or raw.raw_pattern.shape != (2, 2):
                 raise InputError(f"{path}: expected a sensor of a Bayer pattern, two by two, got another")
             counts, pattern = raw.raw_image_visible, raw.raw_pattern
@@ -131,21 +139,34 @@ def _plain(path: Path, kind: str) -> Exposure:
     if values.ndim != 3 or values.shape[2] not in (1, 3):
         raise InputError(f"{path}: expected one or three values a pixel, got an array of shape {values.shape}")
     if kind in JPEG and values.dtype == np.uint8:
-        counts, most = _decode_srgb(values.astype(np.float32) / 255.0), 1.0
+        counts = np.float32(255.0) * _decode_srgb(values.astype(np.float32) / 255.0)
     elif kind in TIFF and values.dtype == np.uint16:
-        counts, most = values.astype(np.float32), 65535.0
-    elif values.dtype in (np.float32, np.float16):
         counts = values.astype(np.float32)
+    elif values.dtype in (np.float32, np.float16):
+        counts = np.float32(STEPS) * values.astype(np.float32)
         if not np.all(np.isfinite(counts)):
             raise InputError(f"{path}: expected finite numbers, got others")
-        most = float(counts.max())
     else:
         raise InputError(
             f"{path}: expected linear values, 16 bits or floats each, got {values.dtype} of an unknown curve"
         )
-    names = COLOURS if values.shape[2] == 3 else ("grey",)
-    planes = tuple(BayerPlane(name, counts[..., at], most, (0, 0), 1) for at, name in enumerate(names))
+    names = COLOURS if values.shape[2] == 3 else (GREY,)
+    planes = tuple(
+        BayerPlane(name, counts[..., at], _range(counts[..., at], values.dtype), (0, 0), 1)
+        for at, name in enumerate(names)
+    )
     return Exposure(str(path), planes, (values.shape[1], values.shape[0]), None, kind not in JPEG)
+
+
+def _range(counts: Plane, kind: np.dtype[Any]) -> float:
+    """White less black, of counts (rows, columns) of files that do not state it."""
+    largest = float(counts.max())
+    clips = int(np.count_nonzero(counts == largest)) >= PLATEAU
+    if kind == np.uint8:
+        return 255.0
+    if kind == np.uint16:
+        return largest if clips and largest in CONVERTERS else STEPS
+    return max(largest if clips else BEYOND * largest, float(np.finfo(np.float32).tiny))
 
 
 def _decoded(path: Path, kind: str) -> NDArray[Any]:
@@ -154,25 +175,28 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
         try:
             with tifffile.TiffFile(path) as file:
                 page = file.pages[0]
-                _require_size(path, int(page.imagewidth), int(page.imagelength))
+                _require_size(path, int(page.imagewidth), int(page.imagelength), int(page.samplesperpixel))
                 return np.asarray(page.asarray())
-        except (tifffile.TiffFileError, ValueError, OSError) as error:
+        except (tifffile.TiffFileError, *DAMAGED) as error:
             raise _refused(path, "a TIFF", error) from None
     if kind in EXR:
         exr = library("OpenEXR")
         try:
-            (left, top), (right, bottom) = exr.File(str(path), header_only=True).header()["dataWindow"]
-            _require_size(path, int(right - left) + 1, int(bottom - top) + 1)
+            parts = exr.File(str(path), header_only=True).parts
+            if len(parts) != 1:
+                raise InputError(f"{path}: expected an EXR of one part, got {len(parts)}")
+            (left, top), (right, bottom) = parts[0].header["dataWindow"]
+            _require_size(path, int(right - left) + 1, int(bottom - top) + 1, len(parts[0].header["channels"]))
             channels = exr.File(str(path)).channels()
             return np.asarray(next(iter(channels.values())).pixels)
-        except (RuntimeError, ValueError, KeyError, StopIteration) as error:
+        except (StopIteration, *DAMAGED) as error:
             raise _refused(path, "an EXR", error) from None
     try:
         with (
             warnings.catch_warnings(action="ignore", category=Image.DecompressionBombWarning),
             Image.open(path, formats=["jpeg"]) as file,
         ):
-            _require_size(path, *file.size)
+            _require_size(path, *file.size, 3)
             return np.asarray(ImageOps.exif_transpose(file).convert("RGB"))
     except Image.DecompressionBombError:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got more") from None
@@ -185,9 +209,12 @@ def _decode_srgb(value: Plane) -> Plane:
     return found
 
 
-def _require_size(path: Path, columns: int, rows: int) -> None:
+def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
+    """Before it is read: not more than MOST_PIXELS, and values a pixel that are those of a photograph."""
     if columns * rows > MOST_PIXELS:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got {columns} x {rows}")
+    if values not in (1, 3):
+        raise InputError(f"{path}: expected one or three values a pixel, got {values}")
 
 
 def library(name: str) -> Any:

@@ -37,6 +37,7 @@ LENGTHS = (0.02, 0.05, 0.12, 0.3)  # of the last ring's radius
 MAX_STEPS = 80
 FARTHEST = 1.0  # step of what light is not straight in
 TINY = 1e-15  # between the bounds of a step that cannot be
+NOTHING = 1e-100  # of a derivative, which is none
 ENOUGH = 1e-3  # of chi-square, that another step must gain
 
 
@@ -290,8 +291,15 @@ def _descended(shot: Shot, start: Floats) -> PhotoFit:
 
 
 def bound(slopes: Floats) -> Floats:
-    """Covariance (p, p) of the coordinates from derivatives (m, p) in standard errors: at a truth, Fisher's bound."""
-    return np.asarray(np.linalg.pinv(slopes.T @ slopes), float)
+    """Covariance (p, p) of the coordinates from derivatives (m, p) in standard errors: at a truth, Fisher's bound.
+
+    By the derivatives themselves, each over its size, since what the rows hardly tell is lost in their products.
+    """
+    size = np.maximum(np.linalg.norm(slopes, axis=0), NOTHING)
+    _, singular, ways = np.linalg.svd(slopes / size, full_matrices=False)
+    scaled = ways / np.maximum(singular, np.finfo(float).eps * singular[0])[:, None]
+    found: Floats = (scaled.T @ scaled) / np.outer(size, size)
+    return found
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:

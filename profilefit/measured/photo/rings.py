@@ -27,6 +27,7 @@ SECTORS = 24
 FACTOR = 1.12  # of the radii of neighbouring edges
 FINEST = 3.0  # pixels, of a ring's width
 GRAIN, NEXT = 8.0, 5  # pixels, of a sector that no grain fills; rings with such sectors that tell of the narrower
+SEEN = 5.0  # standard errors of noise in the middle, from which there is a spot
 DEGREE = 4  # in the square of the radius, of the light within a ring
 POWERS = np.arange(DEGREE + 1)
 EVEN = np.where(POWERS % 2 == 0, 1.0 / (POWERS + 1.0), 0.0)  # means of the powers over -1 ... 1
@@ -44,6 +45,13 @@ class SpotRings:
     @property
     def r(self) -> Floats:
         return 0.5 * (self.inner + self.outer)
+
+    @property
+    def shows_spot(self) -> bool:
+        """Whether the middle is brighter than noise explains, of which the outer half of the rings tells."""
+        areas = np.pi * (self.outer - self.inner) * (self.outer + self.inner)
+        noise = np.median((np.diag(self.covariance) * areas)[areas.size // 2 :])
+        return bool(self.value[0] > SEEN * np.sqrt(noise / areas[0]))
 
     def within(self, low: float, high: float) -> SpotRings:
         """Those that lie wholly between two radii."""

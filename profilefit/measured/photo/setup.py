@@ -39,7 +39,12 @@ KEYS = {
                "grain", "exposures", "late", "seed"),
     "cards": ("white", "grey"),
 }  # fmt: skip
-MAX_BYTES, MOST_SIDE = 1 << 16, 12_000
+MAX_BYTES, LEAST_SIDE, MOST_SIDE = 1 << 16, 50, 12_000
+# The largest numbers of a camera and of its optics that make a photograph; lengths in mm.
+LARGEST = {"pitch": 10.0, "gain": 1e4, "read": 1e4, "well": 1e9, "uneven": 0.1, "corner": 0.9, "speckle": 1.0,
+           "grain": 50.0, "beam": 100.0, "core": 100.0, "surface": 1.0, "glare": 0.9, "width": 1e3,
+           "falling": 10.0}  # fmt: skip
+OURS, HEAD = b"profilefit", 4096  # in the first bytes of each file
 MOST_PHOTONS = 10**9
 MOST = 1e6  # 1/mm
 SHORTEST = 1e-3  # seconds, of the spot: its light is as bright as that
@@ -84,7 +89,7 @@ def read_setup(path: Path) -> Setup:
     of, lens, camera, cards = (read.table(tables, name, {} if name != "medium" else None) for name in KEYS[""])
     own = SpotCamera()
     numbers: dict[str, Any] = {
-        name: read.number("camera", name, camera, getattr(own, name))
+        name: read.number("camera", name, camera, getattr(own, name), LARGEST[name])
         for name in ("pitch", "gain", "read", "well", "uneven", "corner", "speckle", "grain")
     }
     shown = replace(
@@ -94,9 +99,18 @@ def read_setup(path: Path) -> Setup:
         black=read.whole("camera", "black", camera, own.black, 0, 4000),
         tilt=_within(read, "camera", "tilt", camera, 0.0, -60.0, 60.0),
     )  # fmt: skip
+    if min(shown.sides) < LEAST_SIDE:
+        raise read.bad("camera", "sides", f"at least {LEAST_SIDE} pixels each", list(shown.sides))
+    if not shown.black < shown.white:
+        raise read.bad("camera", "black", f"less than {shown.white}, white of {shown.bits} bits", shown.black)
     optics = SpotOptics(
-        **{name: read.number("optics", name, lens, getattr(SpotOptics(), name)) for name in KEYS["optics"]}
+        **{
+            name: read.number("optics", name, lens, getattr(SpotOptics(), name), LARGEST[name])
+            for name in KEYS["optics"]
+        }
     )
+    if not optics.falling > 1.0:
+        raise read.bad("optics", "falling", "a number > 1, or its light is endless", optics.falling)
     setting = Setting(n=read.number("medium", "n", of, 1.4), g=_within(read, "medium", "g", of, 0.8, 0.0, 1.0))
     read.made("medium", lambda: require_solved(setting))
     return Setup(
@@ -104,11 +118,18 @@ def read_setup(path: Path) -> Setup:
         read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST),
         setting, read.whole("medium", "photons", of, 0, 0, MOST_PHOTONS), optics, shown,
         read.whole("camera", "exposures", camera, 5, 1, 12),
-        read.number("camera", "late", camera, 0.02, 1.0),
+        read.number("camera", "late", camera, 0.02, 0.2),
         read.whole("camera", "seed", camera, 0, 0, 2**31 - 1),
-        cards.get("white", False) is True,
+        _flag(read, "cards", "white", cards),
         read.number("cards", "grey", cards, most=1.0) if "grey" in cards else None,
     )  # fmt: skip
+
+
+def _flag(read: Tables, where: str, key: str, table: Table) -> bool:
+    value = table.get(key, False)
+    if not isinstance(value, bool):
+        raise read.bad(where, key, "true or false", value)
+    return value
 
 
 def _within(read: Tables, where: str, key: str, table: Table, default: float, least: float, most: float) -> float:
@@ -146,7 +167,16 @@ def brackets(setup: Setup) -> dict[str, list[Taken]]:
 
 
 def written(setup: Setup, out: Path) -> list[Path]:
-    """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are."""
+    """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
+
+    InputError where another camera's lie under these names.
+    """
+    names = ("spot", *(("card",) if setup.white else ()), *(("grey",) if setup.grey is not None else ()))
+    for name in names:
+        for at in range(1, setup.exposures + 1):
+            file = out / f"{name}-{at}.dng"
+            if file.exists() and OURS not in read_whole(file, HEAD):
+                raise InputError(f"{file}: expected no photograph of that name, or one that was simulated, got another")
     files = []
     for name, bracket in brackets(setup).items():
         for at, one in enumerate(bracket, start=1):
@@ -182,7 +212,11 @@ def _ratio(seconds: float) -> tuple[int, int]:
 
 
 def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
-    """Errors of mu_s' and mu_a that no fit undercuts, by colour: without cards, with either, with both."""
+    """Errors of mu_s' and mu_a by Fisher's information, by colour: without cards, with either, with both.
+
+    Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
+    surface, glare and lens what `Beliefs` have. Exposures and noise are not in it.
+    """
     grey = setup.grey or 0.18
     known = Known(grey, GREY_ERROR * grey)
     of: dict[str, tuple[Known | None, ...]]

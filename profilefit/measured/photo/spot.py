@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter, label
+from scipy.ndimage import gaussian_filter, grey_dilation, label
 
 from profilefit.errors import InputError
 from profilefit.measured.photo.bracket import Picture
@@ -65,12 +65,15 @@ def spot(pictures: Sequence[Picture], sides: tuple[int, int], plate: PixelScale,
 
 
 def _require_centre(known: NDArray[np.bool_], smooth: NDArray[np.float32], source: str) -> None:
-    """What no exposure recorded must not be the spot."""
+    """What no exposure recorded must not lie in bright light; a pixel that is stuck elsewhere may."""
     patches, count = label(~known)
-    sizes = np.bincount(patches.ravel(), minlength=count + 1)[1:]
-    if count and sizes.max() >= SMALLEST:
+    sizes = np.bincount(patches.ravel(), minlength=count + 1)
+    around = grey_dilation(patches, size=(3, 3))
+    inside = np.unique(around[known & (smooth > BRIGHT * smooth.max())])
+    most = max((int(sizes[one]) for one in inside if one > 0), default=0)
+    if most >= SMALLEST or not np.any(known):
         raise InputError(
-            f"{source}: expected a spot that the shortest exposure does not clip, got {int(sizes.max())} pixels of a "
+            f"{source}: expected a spot that the shortest exposure does not clip, got {most or known.size} pixels of a "
             "plane that all clip; add a shorter exposure"
         )
 

@@ -7,19 +7,21 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.photo import bracket, medium, rings
 from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
-from profilefit.measured.photo.exposure import BayerPlane, Exposure, read
+from profilefit.measured.photo.exposure import COLOURS, GREY, Exposure, read
 from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
 from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
 from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.photo.spot import Spot, spot
 from profilefit.measured.problem import Known
 
+Floats = NDArray[np.float64]
 MOST_SHOTS = 20
 UNIT = "mm"
 LATE, WORTH = 0.03, 2  # relative error of a stated time, and of how many exposures that is worth
@@ -56,7 +58,8 @@ class Bracket:
 
     @property
     def colours(self) -> tuple[str, ...]:
-        return tuple(dict.fromkeys(name for name, _ in self.planes))
+        """Red before green before blue, however the sensor has them."""
+        return tuple(sorted({name for name, _ in self.planes}, key=(*COLOURS, GREY).index))
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,62 +91,83 @@ def photo(
     scale   pixels as lengths (`pixel_scale`); reflectance of the grey card; dark frames, whose mean is taken off
     """
     where = setting or Setting(n=1.4, g=0.8)
-    level = _level([read(path) for path in dark])
-    exposures = _read(shots, level)
+    exposures = _read(shots)
+    level = _level(dark, exposures[0])
+    exposures = [_darkened(one, level) for one in exposures]
     size = pixel_scale("scale", scale, exposures, UNIT)
-    seen = bracketed(exposures, size)
-    shown = [(bracketed(_read(each, level), size), known)
-             for each, known in ((cards, None), (greys, reflectance or Known(0.18, 0.005))) if each]  # fmt: skip
-    for one, _ in shown:
-        if one.sides != seen.sides:
-            raise InputError(
-                f"{one.sources[0]}: expected {_sides(seen.sides)} pixels as the spot has, got {_sides(one.sides)}"
-            )
+    seen, coded = bracketed(exposures, size), [one.source for one in exposures if not one.linear]
+    shown = []
+    for paths, known in ((cards, None), (greys, reflectance or Known(0.18, 0.005))):
+        if paths:
+            own = [_darkened(one, level) for one in _read(paths, exposures[0])]
+            coded += [one.source for one in own if not one.linear]
+            shown.append((bracketed(own, size), known))
     pixel = size.pixel(seen.spot.centre)
     believed = replace(beliefs or Beliefs(), border=0.5 * pixel * float(np.hypot(*seen.sides)))
-    fits, bounds = {}, {}
+    fits, bounds, notes = {}, {}, [f"{one}: eight bits, taken for sRGB: not a measurement" for one in coded[:1]]
     for colour in seen.colours:
-        of_cards = tuple(
-            carded(one, colour, size, known, seen) for one, known in shown if colour in one.colours
-        )  # fmt: skip
-        shot = Shot(ringed(seen, colour, size), of_cards, exact_light(where), believed)
+        of_spot = ringed(seen, colour, size)
+        of_cards = tuple(carded(one, colour, size, known, seen) for one, known in shown)
+        if not all(one.shows_spot for one in (of_spot, *(card.rings for card in of_cards))):
+            notes.append(f"{colour}: no spot is seen, so it is left out")
+            continue
+        shot = Shot(of_spot, of_cards, exact_light(where), believed)
         fits[colour] = medium.fitted(shot)
         bounds[colour] = dict(medium.fisher(shot, fits[colour].x))
-    notes = []
-    if not all(one.linear for one in exposures):
-        notes.append(f"{shots[0]}: eight bits, taken for sRGB: not a measurement")
+    if not fits:
+        raise InputError(f"{shots[0]}: expected a spot brighter than the scatter of its pixels, got none in any colour")
     if any(known and not (seen.seconds and one.seconds) for one, known in shown):
         notes.append("no exposure time is stated, so the grey card tells beam and glare, and no scale")
     return Photo(seen, tuple(one for one, _ in shown), size, where, fits, bounds, tuple(notes))
 
 
-def _read(paths: Sequence[Path], level: dict[tuple[int, int], float]) -> list[Exposure]:
+def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]:
+    """Exposures of one camera, `like` another of it."""
+    _require_count(paths)
+    found: list[Exposure] = []
+    for path in paths:
+        found.append(read(path))
+        _require_alike(found[-1], like or found[0])
+    return found
+
+
+def _require_count(paths: Sequence[Path]) -> None:
     if not 1 <= len(paths) <= MOST_SHOTS:
         raise InputError(f"photographs must be 1 to {MOST_SHOTS} exposures of one bracket, got {len(paths)}")
-    found = [read(path) for path in paths]
-    for one in found[1:]:
-        if one.sides != found[0].sides:
-            expected = f"expected {_sides(found[0].sides)} pixels as {found[0].source} has"
-            raise InputError(f"{one.source}: {expected}, got {_sides(one.sides)}")
-    return [replace(one, planes=tuple(_darkened(plane, level) for plane in one.planes)) for one in found]
 
 
-def _level(frames: Sequence[Exposure]) -> dict[tuple[int, int], float]:
-    """Mean of dark frames above black, by the place of a plane."""
-    found: dict[tuple[int, int], list[float]] = {}
-    for one in frames:
-        for plane in one.planes:
-            found.setdefault((*plane.offset,), []).append(float(plane.counts.mean(dtype=float)))
-    return {place: float(np.mean(each)) for place, each in found.items()}
+def _require_alike(one: Exposure, other: Exposure) -> None:
+    """As many pixels, of the same filters."""
+    for expected, got in zip(_kind(other), _kind(one), strict=True):
+        if expected != got:
+            raise InputError(f"{one.source}: expected {expected} as {other.source} has, got {got}")
 
 
-def _darkened(plane: BayerPlane, level: dict[tuple[int, int], float]) -> BayerPlane:
-    dark = level.get(plane.offset, 0.0)
-    return plane if dark == 0.0 else replace(plane, counts=plane.counts - np.float32(dark), range=plane.range - dark)
+def _kind(one: Exposure) -> tuple[str, str]:
+    return f"{one.sides[0]} x {one.sides[1]} pixels", f"planes {', '.join(plane.colour for plane in one.planes)}"
 
 
-def _sides(sides: tuple[int, int]) -> str:
-    return f"{sides[0]} x {sides[1]}"
+def _level(paths: Sequence[Path], like: Exposure) -> Floats:
+    """Mean of dark frames above black, of each plane (p,)."""
+    if not paths:
+        return np.zeros(len(like.planes))
+    _require_count(paths)
+    means = []
+    for path in paths:  # one at a time: they are as large as photographs
+        (frame,) = _read([path], like)
+        means.append([float(plane.counts.mean(dtype=float)) for plane in frame.planes])
+    found: Floats = np.mean(means, axis=0)
+    return found
+
+
+def _darkened(one: Exposure, level: Floats) -> Exposure:
+    if not np.any(level):
+        return one
+    planes = (
+        replace(plane, counts=plane.counts - np.float32(dark), range=plane.range - dark)
+        for plane, dark in zip(one.planes, level.tolist(), strict=True)
+    )
+    return replace(one, planes=tuple(planes))
 
 
 def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
@@ -157,7 +181,7 @@ def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
     lit = [one for one, name in zip(pictures, names, strict=True) if name == brightest]
     return Bracket(
         tuple(one.source for one in shots), times, tuple(one.seconds for one in shots),
-        FULL * min(plane.range for one in shots for plane in one.planes), own,
+        FULL * max(plane.range for one in shots for plane in one.planes), own,
         tuple(zip(names, pictures, strict=True)), spot(lit, shots[0].sides, size, shots[0].source), shots[0].sides,
     )  # fmt: skip
 

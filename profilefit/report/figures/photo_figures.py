@@ -34,7 +34,7 @@ def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
     """The merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
     figure = canvas(5.4)
     axes = figure.subplots()
-    colour = found.shot.colours[min(1, len(found.shot.colours) - 1)]
+    colour = next((one for one in found.fits if one == "green"), next(iter(found.fits)))
     (picture, *_), centre = found.shot.pictures(colour), found.shot.spot.centre
     stride = max(1, max(picture.light.shape) // SHOWN)
     light = picture.light[::stride, ::stride]

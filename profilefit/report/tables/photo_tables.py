@@ -17,6 +17,7 @@ from profilefit.report.tables.fit_tables import p_value
 
 NAMES = ("mu_s'", "mu_a", "alpha", "l")
 UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm"}
+FARTHEST = 100.0  # of a logarithm, where an interval ends that says nothing
 REMEDY = "photograph cards, or expose longer"
 CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
 
@@ -27,7 +28,7 @@ def photo_tables(found: Photo) -> list[RenderableType]:
     for colour, fit in found.fits.items():
         for name in NAMES:
             value, error = fit.values[name], fit.errors[name]
-            ends = value * np.exp(1.96 * error / value * np.array([-1.0, 1.0]))
+            ends = value * np.exp(min(1.96 * error / value, FARTHEST) * np.array([-1.0, 1.0]))
             ends = np.minimum(ends, 1.0) if name == "alpha" else ends
             best = found.bounds[colour].get(name)
             cells = (
@@ -39,7 +40,7 @@ def photo_tables(found: Photo) -> list[RenderableType]:
     title = f"{found.shot.sources[0]}: {len(found.shot.sources)} exposures, exact light, {found.setting}"
     caption = (
         "±: from the scatter over sectors, a correlated 1 %, and what is known of beam, surface, glare and scale; "
-        "at best: the error that no fit of such rings undercuts"
+        "at best: by Fisher's information of such rings and of what is known"
     )
     return [column_table(title, columns, caption, left=("colour", "", "unit"))]
 
@@ -119,5 +120,6 @@ def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> lis
             columns["colour"].append(colour)
             for name in NAMES[:2]:
                 columns[name].append(f"{100 * errors[name]:.1f} %")
-    caption = "errors that no fit of such photographs undercuts"
+    caption = "by Fisher's information of rings of exact light that scatter by 0.3 %, a correlated 1 %, and what a fit "
+    caption += "takes for known of surface, glare and lens"
     return [column_table("At best", columns, caption, left=("photographs", "colour"))]

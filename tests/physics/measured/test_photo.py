@@ -147,8 +147,9 @@ def test_a_spots_centre_is_found(shots):
         (lambda light: np.maximum(light, np.roll(light, 150, axis=1)), "one spot of light, got 2, apart"),
         (lambda light: np.roll(light, 190, axis=1), "from every border, got"),
         (lambda light: np.where(light > 0.2 * np.nanmax(light), np.nan, light), "does not clip, got"),
+        (lambda light: np.full_like(light, np.nan), "does not clip, got 120000 pixels"),
     ],
-    ids=["dark", "two", "border", "clipped"],
+    ids=["dark", "two", "border", "clipped", "all clipped"],
 )
 def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, said):
     row, column = np.indices((300, 400))
@@ -157,6 +158,45 @@ def test_pictures_that_cannot_be_measured_are_refused_in_a_line(light, change, s
     with pytest.raises(InputError, match=said) as caught:
         spot.spot([bracket.Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
     assert "\n" not in str(caught.value)
+
+
+def test_a_stuck_pixel_elsewhere_is_left_out(light):
+    row, column = np.indices((300, 400))
+    picture = np.interp(2.0 * PITCH * np.hypot(row - 150.0, column - 200.0), *light).astype(np.float32)
+    picture[np.hypot(row - 40.0, column - 90.0) <= 2.0] = np.nan
+    found = spot.spot([Picture(picture, np.ones_like(picture), (0, 0), 2)], (800, 600), SQUARE, "shot")
+    assert found.centre == pytest.approx((400.0, 300.0), abs=0.1)
+
+
+def test_exposures_of_one_time_are_a_bracket(light):
+    """Chance makes one of them the brighter."""
+    first = 0.5 * CAMERA.gain * (CAMERA.white - CAMERA.black) / light[1][0]
+    for seed in range(4):
+        taken = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed)
+        again = simulated.taken(dict.fromkeys(simulated.CHANNELS, light), CAMERA, 1.0, {first: first}, seed + 50)
+        found = bracket.times([bench.as_read(one, str(at)) for at, one in enumerate((*taken, *again))])
+        np.testing.assert_allclose(found.value, 1.0, rtol=0.02)
+
+
+def test_times_that_the_pictures_contradict_are_named(shots):
+    short, long = shots[0][0], shots[0][1]
+    with pytest.raises(InputError, match=r"^1: expected less light than 0 has, whose time is longer, got 3\.94 times"):
+        bracket.times([replace(short, seconds=2.0), replace(long, seconds=1.0)])
+
+
+def test_colours_are_in_order_however_the_sensor_has_them(shots):
+    (short, *rest), _ = shots
+    turned = [replace(one, planes=one.planes[::-1]) for one in (short, *rest)]
+    assert [one.colour for one in turned[0].planes] == ["blue", "green", "green", "red"]
+    assert workflow.bracketed(turned, SQUARE).colours == ("red", "green", "blue")
+
+
+def test_errors_of_what_is_hardly_told_are_not_lost():
+    """Two nearly parallel columns, 1e12 apart in size: variances 1 / (size sin)^2."""
+    sizes, angle = np.array([1e8, 1e-4]), 1e-6
+    slopes = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]]) * sizes
+    np.testing.assert_allclose(np.diag(medium.bound(slopes)), 1.0 / (sizes * np.sin(angle)) ** 2, rtol=1e-6)
+    assert medium.bound(slopes * [1.0, 0.0])[1, 1] > 1e30, "what nothing tells has no small error"
 
 
 def test_rings_err_as_they_say(light):

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import cv2
 import numpy as np
+import OpenEXR
 import pytest
 import rawpy
 import tifffile
@@ -89,6 +90,89 @@ def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
 SCALE = ("--scale", "0.1mm/px")
 
 
+def linear(folder, name):
+    """Shares of white (exposures, rows, columns): of a setup whose colours are alike, the mosaic is a grey picture."""
+    found = []
+    for path in several(folder, name):
+        with rawpy.imread(path) as raw:
+            found.append(np.clip((raw.raw_image_visible.astype(np.float32) - 256) / 3839, 0, 1))
+    return np.array(found)
+
+
+def test_floats_clip_where_they_have_a_plateau_only(command, folder, tmp_path):
+    shares = linear(folder, "spot")
+    for at, one in enumerate(shares):
+        with OpenEXR.File({"type": OpenEXR.scanlineimage}, {"Y": one}) as file:
+            file.write(str(tmp_path / f"spot-{at}.exr"))
+    tifffile.imwrite(tmp_path / "one.tif", shares[0])
+    for files in ([f"spot-{at}.exr" for at in range(len(shares))], ["one.tif"]):
+        status, out, err = command("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
+        assert (status, err) == (0, "")
+        one = json.loads(out)["colours"]["grey"]
+        for name, truth in (("mu_s'", 1.0), ("mu_a", 0.05)):
+            assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
+
+
+def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(command, folder, tmp_path):
+    """RGB of sixteen bits, blue dark; red and green of the same light on levels of their own."""
+    levels = np.array([300, 600, 900], np.float32)
+    for at, one in enumerate(linear(folder, "spot")[:2]):
+        picture = 4095 * one[..., None] * [1, 1, 0]
+        tifffile.imwrite(tmp_path / f"spot-{at}.tif", (picture + levels).astype(np.uint16))
+    tifffile.imwrite(tmp_path / "dark.tif", np.broadcast_to(levels, picture.shape).astype(np.uint16))
+    words = (*SCALE, "--beam", "0.5mm+-0.05mm", "--dark", "dark.tif", "--json")
+    status, out, err = command("photo", "spot-0.tif", "spot-1.tif", *words)
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    assert list(found["colours"]) == ["red", "green"]
+    assert found["notes"] == ["blue: no spot is seen, so it is left out"]
+    red, green = (found["colours"][one]["values"] for one in found["colours"])
+    assert red["mu_a"] == pytest.approx(green["mu_a"], rel=1e-3)
+    tifffile.imwrite(tmp_path / "grey.tif", (4095 * one).astype(np.uint16))
+    for more in (
+        ("spot-0.tif", "grey.tif"),
+        ("spot-0.tif", "--dark", "dark.tif", "--card", "grey.tif"),
+        ("spot-0.tif", "--dark", "grey.tif"),
+    ):
+        status, _, err = command("photo", *more, *SCALE)
+        assert status == 2
+        assert "grey.tif: expected planes red, green, blue as spot-0.tif has, got planes grey" in err
+
+
+def test_photographs_of_another_camera_are_not_replaced(command, tmp_path):
+    (tmp_path / "SETUP.toml").write_text(SETUP)
+    (tmp_path / "shots").mkdir()
+    (tmp_path / "shots" / "grey-2.dng").write_bytes(b"mine")
+    status, _, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
+    assert status == 2
+    assert "shots/grey-2.dng: expected no photograph of that name, or one that was simulated, got another" in err
+    assert [one.name for one in (tmp_path / "shots").iterdir()] == ["grey-2.dng"]
+    (tmp_path / "shots" / "grey-2.dng").unlink()
+    for _ in range(2):  # its own it makes again
+        assert command("photo", "--simulate", "SETUP.toml", "--out", "shots")[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (("sides = [400, 300]", "sides = [400, 30]"), "[camera] sides must be at least 50 pixels each, got [400, 30]"),
+        (("pitch", "bits = 8\npitch"), "[camera] black must be less than 255, white of 8 bits, got 256"),
+        (("pitch", "uneven = 0.5\npitch"), "[camera] uneven must be a number > 0 and <= 0.1, got 0.5"),
+        (("pitch", "corner = 10\npitch"), "[camera] corner must be a number > 0 and <= 0.9, got 10"),
+        (("pitch", "late = 1\npitch"), "[camera] late must be a number > 0 and <= 0.2, got 1"),
+        (("white = true", "white = 1"), "[cards] white must be true or false, got 1"),
+        (("[camera]", "[optics]\nfalling = 0.8\n[camera]"), "[optics] falling must be a number > 1, or its light"),
+    ],
+)
+def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, said):
+    (tmp_path / "SETUP.toml").write_text(SETUP.replace(*change))
+    status, printed, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
+    assert (status, printed) == (2, "")
+    assert said in err
+    assert err.count("\n") == 1
+    assert not (tmp_path / "shots").exists()
+
+
 @pytest.mark.parametrize(
     ("words", "said"),
     [
@@ -102,6 +186,10 @@ SCALE = ("--scale", "0.1mm/px")
         (("cut.dng", *SCALE), "cut.dng: cannot be read as a raw file"),
         (("empty.dng", *SCALE), "expected a photograph of 1 byte"),
         (("eight.tif", *SCALE), "of an unknown curve"),
+        (("four.tif", *SCALE), "four.tif: expected one or three values a pixel, got 4"),
+        (("six.tif", *SCALE), "six.tif: cannot be read as a TIFF"),
+        (("ten.tif", *SCALE), "ten.tif: cannot be read as a TIFF"),
+        (("torn.tif", *SCALE), "torn.tif: cannot be read as a TIFF"),
         (("big.tif", *SCALE), "big.tif: expected at most 120000000 pixels, got 25000 x 20000"),
         (("big.jpg", *SCALE), "big.jpg: expected at most 120000000 pixels, got"),
         (("bigger.jpg", *SCALE), "bigger.jpg: expected at most 120000000 pixels, got"),
@@ -110,6 +198,10 @@ SCALE = ("--scale", "0.1mm/px")
         (("SPOT", "other.tif", *SCALE), "expected 400 x 300 pixels"),
         (("SPOT", *SCALE, "--beam", "0.5mm"), "--beam must be a value with its error"),
         (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
+        (
+            ("SPOT", *SCALE, "--glare", "2+-2"),
+            "--glare must be a value in 0 ... 1 with an error",
+        ),
         (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
         (("SPOT", *SCALE, "--n", "3"), "n = 3"),
         (("--simulate", "SETUP.toml"), "--out must be a folder"),
@@ -128,6 +220,13 @@ def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, wor
     (tmp_path / "empty.dng").write_bytes(b"")
     (tmp_path / "notes.txt").write_text("spot")
     tifffile.imwrite(tmp_path / "eight.tif", np.zeros((30, 40), np.uint8))
+    tifffile.imwrite(tmp_path / "four.tif", np.zeros((30, 40, 4), np.uint16), photometric="rgb")
+    tifffile.imwrite(tmp_path / "whole.tif", np.arange(1200, dtype=np.uint16).reshape(30, 40), compression="zlib")
+    packed = bytearray((tmp_path / "whole.tif").read_bytes())
+    for name, size in (("six", 6), ("ten", 10)):
+        (tmp_path / f"{name}.tif").write_bytes(packed[:size])
+    packed[-200:-100] = bytes(100)
+    (tmp_path / "torn.tif").write_bytes(packed)
     tifffile.imwrite(tmp_path / "other.tif", np.zeros((30, 40), np.uint16))
     tifffile.imwrite(tmp_path / "big.tif", np.zeros((2, 2), np.uint16))
     with tifffile.TiffFile(tmp_path / "big.tif", mode="r+b") as file:
