@@ -29,8 +29,10 @@ PANEL = np.polynomial.legendre.leggauss(6)
 PANELS, REACH = 12, 6.0  # of a Gaussian beam: as wide as its standard deviation twice, so many w to either side
 GRADED, FINER = 9, 3.0  # panels into which the nearest one is divided, each that much narrower than the next
 EDGE = np.polynomial.legendre.leggauss(40)  # where a circle crosses the rim of a top hat
-OCTAVES, STEEPEST = 10, 3  # of a measured beam's radii, down from its last; its straight pieces that are panels, too
+OCTAVES = 10  # of a measured beam's radii, down from its last, as panels
+STEEP, STEEPEST = 0.05, 8  # change over its brightest in a straight piece that is a panel, too; as many of these
 AROUND = np.polynomial.legendre.leggauss(8)  # of a circle, in each panel
+LEAST = 1e-12  # of a beam's radius, from a point to a circle about it
 TOPHAT = "tophat:"
 MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
 CELLS = re.compile(r"[\s,;]+")
@@ -103,14 +105,16 @@ class Profiled:
         at, low = d[..., None], np.maximum(d - self.r[-1], 0.0)[..., None]
         edges = np.concatenate([low + self._edges, np.abs(at - self._edges), at + self._edges], axis=-1)
         rho, weight = _between(np.sort(edges, axis=-1))
-        weight *= self._around(at, rho)
+        rho, weight = np.maximum(rho, LEAST * self.r[-1]), weight * self._around(at, rho)
         return rho, weight / (2.0 * np.pi * np.sum(rho * weight, axis=-1))[..., None]
 
     @cached_property
     def _edges(self) -> Floats:
         """Radii between which b is smooth, or little of the light."""
         octaves = self.r[-1] * 0.5 ** np.arange(OCTAVES)
-        steep = np.argsort(np.abs(np.diff(self.value)) * (self.r[1:] + self.r[:-1]))[-STEEPEST:]
+        change = np.abs(np.diff(self.value))
+        steep = np.argsort(change)[-STEEPEST:]
+        steep = steep[change[steep] > STEEP * self.value.max()]
         return np.unique(np.concatenate([[0.0], octaves, self.r[steep], self.r[steep + 1]]))
 
     def _around(self, d: Floats, rho: Floats) -> Floats:

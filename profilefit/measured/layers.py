@@ -101,13 +101,13 @@ def fit_layers(
            names that it has not, and of data that state another n, or a g
     """
     require_workable(data)
-    premises = replace(premises, setting=_setting(data, medium, premises))
     names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
     _require_free(medium, free)
     if data.value.size <= len(names):
         raise InputError(f"{data.source}: expected more than {len(names)} rows, one more than is free")
     light = _Light(data, medium, tuple(free), premises)
     light.rows(np.zeros(len(free)))  # what cannot be solved fails here
+    light = replace(light, premises=replace(premises, setting=_setting(data, medium, premises)))
     held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     known = scale if isinstance(scale, Known) else None
     wider = widening(data.freedom, len(names))

@@ -63,7 +63,9 @@ class Times(NamedTuple):
 
 def times(shots: Sequence[Exposure]) -> Times:
     """From what the exposures record; InputError where neighbours share no pixels."""
-    order = np.argsort([one.seconds or float(np.mean(one.planes[0].counts)) for one in shots])
+    stated = [one.seconds for one in shots if one.seconds]
+    light = [sum(float(each.counts.mean()) for each in one.planes) for one in shots]
+    order = np.argsort(stated if len(stated) == len(shots) else light)
     found, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
     for at in range(len(shots) - 2, -1, -1):
         shorter, longer = order[at], order[at + 1]
@@ -89,7 +91,8 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
         pairs += int(good.sum())
     if pairs >= LEAST_PAIRS and above > BRIGHTER * below:
         raise InputError(
-            f"{shorter.source}: expected less light than {longer.source} has, whose time is longer, got "
+            f"{shorter.source}: expected less light than {longer.source} has, which "
+            f"{'states a longer time' if shorter.seconds and longer.seconds else 'is brighter on the whole'}, got "
             f"{above / below:.3g} times as much"
         )
     if pairs < LEAST_PAIRS or not above > 0:
@@ -102,8 +105,8 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
     return ratio, float(np.sqrt(scatter)) / above
 
 
-def shares(light: Floats, relative: Floats, own: Sensor, most: float) -> Floats:
-    """Of exposures (m,) in a picture of so much light (n,), where more than `most` steps clip: (n, m)."""
+def shares(light: Floats, relative: Floats, own: Sensor, most: Floats) -> Floats:
+    """Of exposures (m,) in a picture of so much light (n,), where more than `most` steps (m,) clip: (n, m)."""
     steps = np.maximum(np.multiply.outer(light, relative), 0.0)
     weight = np.where(steps < most, relative**2 / (steps / own.gain + own.read**2), 0.0)
     total = weight.sum(axis=1, keepdims=True)

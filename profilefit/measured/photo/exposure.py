@@ -3,8 +3,8 @@
 Raw files are read by LibRaw (rawpy), 16-bit TIFF by tifffile and EXR by OpenEXR, all three linear; a JPEG, by Pillow,
 is not, is taken for sRGB, and the answer says so. What is read is bounded before it is read.
 
-Files that state no white level have it where many pixels share the largest value: of sixteen bits where that is the
-largest of a converter of 10, 12 or 14.
+Files that state no white level have it where more pixels share the largest value than lie just below it; else it is
+that of sixteen bits, and of floats more than the largest.
 """
 
 from __future__ import annotations
@@ -31,8 +31,10 @@ RAW = (".dng", ".cr2", ".cr3", ".nef", ".arw", ".raf", ".orf", ".rw2", ".pef", "
 TIFF, EXR, JPEG = (".tif", ".tiff"), (".exr",), (".jpg", ".jpeg")
 MOST_BYTES, MOST_PIXELS = 1 << 29, 120_000_000
 COLOURS, GREY = ("red", "green", "blue"), "grey"
-PLATEAU, BEYOND = 12, 1.2  # pixels that share the largest value where it clips; the range over it, if it does not
-CONVERTERS, STEPS = (1023.0, 4095.0, 16383.0), 65535.0  # whites in a TIFF; steps of 16 bits, which floats become
+PLATEAU, BELOW = 12, 0.98  # pixels that share the largest value where it clips, of it, others just below
+FEW, FAINT = 1000.0, 0.2  # steps, and share of the brightest plane: less is not white
+STEPS, BEYOND = 65535.0, 1.2  # of sixteen bits, which floats become; over the largest of them, if that is not white
+LARGEST = 1e30  # of a float
 DAMAGED = (ValueError, OSError, LookupError, TypeError, RuntimeError, struct.error, zlib.error)  # of libraries' readers
 PACKAGES = {"cv2": "opencv-python-headless", "OpenEXR": "OpenEXR", "rawpy": "rawpy", "tifffile": "tifffile"}
 
@@ -143,30 +145,34 @@ def _plain(path: Path, kind: str) -> Exposure:
     elif kind in TIFF and values.dtype == np.uint16:
         counts = values.astype(np.float32)
     elif values.dtype in (np.float32, np.float16):
-        counts = np.float32(STEPS) * values.astype(np.float32)
-        if not np.all(np.isfinite(counts)):
+        if not np.all(np.abs(values) < LARGEST):
             raise InputError(f"{path}: expected finite numbers, got others")
+        counts = np.float32(STEPS) * values.astype(np.float32)
     else:
         raise InputError(
             f"{path}: expected linear values, 16 bits or floats each, got {values.dtype} of an unknown curve"
         )
     names = COLOURS if values.shape[2] == 3 else (GREY,)
+    most = 255.0 if kind in JPEG else STEPS if kind in TIFF and values.dtype == np.uint16 else None
+    brightest = float(counts.max())
     planes = tuple(
-        BayerPlane(name, counts[..., at], _range(counts[..., at], values.dtype), (0, 0), 1)
+        BayerPlane(name, counts[..., at], _range(counts[..., at], most, brightest), (0, 0), 1)
         for at, name in enumerate(names)
     )
     return Exposure(str(path), planes, (values.shape[1], values.shape[0]), None, kind not in JPEG)
 
 
-def _range(counts: Plane, kind: np.dtype[Any]) -> float:
-    """White less black, of counts (rows, columns) of files that do not state it."""
+def _range(counts: Plane, most: float | None, brightest: float) -> float:
+    """White of a plane (rows, columns) of a file that does not state it.
+
+    most  of its integers, None of floats; brightest the largest count of any plane
+    """
     largest = float(counts.max())
-    clips = int(np.count_nonzero(counts == largest)) >= PLATEAU
-    if kind == np.uint8:
-        return 255.0
-    if kind == np.uint16:
-        return largest if clips and largest in CONVERTERS else STEPS
-    return max(largest if clips else BEYOND * largest, float(np.finfo(np.float32).tiny))
+    shared = int(np.count_nonzero(counts == largest))
+    near = int(np.count_nonzero(counts > BELOW * largest)) - shared
+    if shared >= max(PLATEAU, near) and largest > max(FAINT * brightest, FEW if most else 0.0):
+        return largest
+    return most or max(BEYOND * brightest, float(np.finfo(np.float32).tiny))
 
 
 def _decoded(path: Path, kind: str) -> NDArray[Any]:
@@ -210,11 +216,13 @@ def _decode_srgb(value: Plane) -> Plane:
 
 
 def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
-    """Before it is read: not more than MOST_PIXELS, and values a pixel that are those of a photograph."""
+    """Before it is read: not more than MOST_PIXELS, of three values each."""
     if columns * rows > MOST_PIXELS:
         raise InputError(f"{path}: expected at most {MOST_PIXELS} pixels, got {columns} x {rows}")
-    if values not in (1, 3):
-        raise InputError(f"{path}: expected one or three values a pixel, got {values}")
+    if columns * rows * values > 3 * MOST_PIXELS:
+        raise InputError(
+            f"{path}: expected at most {3 * MOST_PIXELS} values, got {columns} x {rows} pixels of {values} each"
+        )
 
 
 def library(name: str) -> Any:

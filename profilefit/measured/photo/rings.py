@@ -48,10 +48,12 @@ class SpotRings:
 
     @property
     def shows_spot(self) -> bool:
-        """Whether the middle is brighter than noise explains, of which the outer half of the rings tells."""
-        areas = np.pi * (self.outer - self.inner) * (self.outer + self.inner)
-        noise = np.median((np.diag(self.covariance) * areas)[areas.size // 2 :])
-        return bool(self.value[0] > SEEN * np.sqrt(noise / areas[0]))
+        """Whether the middle is brighter than the outer half of the rings, by more than their noise explains."""
+        if self.value.size < 2:
+            return False
+        areas, far = np.pi * (self.outer - self.inner) * (self.outer + self.inner), slice(self.value.size // 2, None)
+        noise = np.median((np.diag(self.covariance) * areas)[far])
+        return bool(self.value[0] - np.median(self.value[far]) > SEEN * np.sqrt(noise / areas[0]))
 
     def within(self, low: float, high: float) -> SpotRings:
         """Those that lie wholly between two radii."""

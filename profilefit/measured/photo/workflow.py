@@ -31,13 +31,13 @@ LATE, WORTH = 0.03, 2  # relative error of a stated time, and of how many exposu
 class Bracket:
     """A merged bracket: its exposures' names, times relative to the longest, sensor, and where the spot is.
 
-    most  steps that an exposure records unclipped
+    most  (m,) steps that each exposure records unclipped
     """
 
     sources: tuple[str, ...]
     times: Times
     stated: tuple[float | None, ...]
-    most: float
+    most: Floats
     sensor: Sensor
     planes: tuple[tuple[str, Picture], ...]
     spot: Spot
@@ -181,7 +181,7 @@ def bracketed(shots: Sequence[Exposure], size: PixelScale) -> Bracket:
     lit = [one for one, name in zip(pictures, names, strict=True) if name == brightest]
     return Bracket(
         tuple(one.source for one in shots), times, tuple(one.seconds for one in shots),
-        FULL * max(plane.range for one in shots for plane in one.planes), own,
+        FULL * np.array([max(plane.range for plane in one.planes) for one in shots]), own,
         tuple(zip(names, pictures, strict=True)), spot(lit, shots[0].sides, size, shots[0].source), shots[0].sides,
     )  # fmt: skip
 

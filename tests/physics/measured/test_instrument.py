@@ -109,6 +109,8 @@ def test_a_measured_beam_is_the_beam_that_it_samples(beam, measured):
     """On the axis, at the rim, and as far as a hundred of its radii, where a circle passes it in a small angle."""
     d = np.array([0.0, 0.01, 0.05, 0.2, 0.31, 0.5, 0.95, 2.0, 5.0, 10.0, 30.0])
     (rho, weight), (right, another) = measured.nodes(d), beam.nodes(d)
+    seen = Instrument(measured).nodes(measured.r[-1] * 0.5 ** np.arange(8), measured.r[-1] * 0.5 ** np.arange(8))[1]
+    assert np.all(np.isfinite(seen)), "at radii where its panels end"
     np.testing.assert_allclose(np.sum(2.0 * np.pi * rho * weight, axis=-1), 1.0, rtol=1e-12)
     for mfp in (0.02, 0.5):
         light, exactly = (

@@ -180,7 +180,9 @@ def test_exposures_of_one_time_are_a_bracket(light):
 
 def test_times_that_the_pictures_contradict_are_named(shots):
     short, long = shots[0][0], shots[0][1]
-    with pytest.raises(InputError, match=r"^1: expected less light than 0 has, whose time is longer, got 3\.94 times"):
+    with pytest.raises(
+        InputError, match=r"^1: expected less light than 0 has, which states a longer time, got 3\.94 times"
+    ):
         bracket.times([replace(short, seconds=2.0), replace(long, seconds=1.0)])
 
 

@@ -113,6 +113,33 @@ def test_floats_clip_where_they_have_a_plateau_only(command, folder, tmp_path):
             assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
 
 
+def test_a_colour_of_noise_alone_changes_no_time(command, folder, tmp_path):
+    """Floats, red on a pedestal of noise or of one value, the longest exposure first."""
+    noise = np.random.default_rng(2).normal(0.002, 0.0005, linear(folder, "spot").shape).astype(np.float32)
+    answers = []
+    for pedestal in (noise, np.full_like(noise, 0.001)):
+        files = []
+        for at, one in list(enumerate(linear(folder, "spot")[:3]))[::-1]:
+            files.append(f"spot-{at}.tif")
+            tifffile.imwrite(tmp_path / files[-1], np.stack([pedestal[at], one, one], axis=-1), photometric="rgb")
+        status, out, err = command("photo", *files, *SCALE, "--beam", "0.5mm+-0.05mm", "--json")
+        assert (status, err) == (0, "")
+        answers.append(json.loads(out))
+        assert list(answers[-1]["colours"]) == ["green", "blue"]
+        np.testing.assert_allclose(answers[-1]["times"], [1.0, 0.25, 0.0625], rtol=0.06)
+    first, second = (one["colours"]["green"]["values"]["mu_a"] for one in answers)
+    assert first == pytest.approx(second, rel=0.02)
+
+
+def test_white_of_sixteen_bits_is_where_pixels_pile_up(tmp_path):
+    """Of 14 bits less black: 15300 steps; and of a picture too dim to clip."""
+    rng = np.random.default_rng(1)
+    spot = 3e4 * np.exp(-0.5 * (np.hypot(*np.mgrid[-60:60, -60:60]) / 12) ** 2) + rng.normal(100, 10, (120, 120))
+    for name, scale, white in (("bright", 1.0, 15300.0), ("dim", 0.01, 65535.0)):
+        tifffile.imwrite(tmp_path / f"{name}.tif", np.clip(scale * spot, 0, 15300).astype(np.uint16))
+        assert read(tmp_path / f"{name}.tif").planes[0].range == white
+
+
 def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(command, folder, tmp_path):
     """RGB of sixteen bits, blue dark; red and green of the same light on levels of their own."""
     levels = np.array([300, 600, 900], np.float32)
@@ -186,7 +213,8 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
         (("cut.dng", *SCALE), "cut.dng: cannot be read as a raw file"),
         (("empty.dng", *SCALE), "expected a photograph of 1 byte"),
         (("eight.tif", *SCALE), "of an unknown curve"),
-        (("four.tif", *SCALE), "four.tif: expected one or three values a pixel, got 4"),
+        (("four.tif", *SCALE), "four.tif: expected one or three values a pixel, got an array of shape (30, 40, 4)"),
+        (("huge.tif", *SCALE), "huge.tif: expected finite numbers, got others"),
         (("six.tif", *SCALE), "six.tif: cannot be read as a TIFF"),
         (("ten.tif", *SCALE), "ten.tif: cannot be read as a TIFF"),
         (("torn.tif", *SCALE), "torn.tif: cannot be read as a TIFF"),
@@ -221,6 +249,7 @@ def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, wor
     (tmp_path / "notes.txt").write_text("spot")
     tifffile.imwrite(tmp_path / "eight.tif", np.zeros((30, 40), np.uint8))
     tifffile.imwrite(tmp_path / "four.tif", np.zeros((30, 40, 4), np.uint16), photometric="rgb")
+    tifffile.imwrite(tmp_path / "huge.tif", np.full((30, 40), 1e35, np.float32))
     tifffile.imwrite(tmp_path / "whole.tif", np.arange(1200, dtype=np.uint16).reshape(30, 40), compression="zlib")
     packed = bytearray((tmp_path / "whole.tif").read_bytes())
     for name, size in (("six", 6), ("ten", 10)):
