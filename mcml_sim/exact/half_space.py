@@ -168,6 +168,8 @@ def _setting(illumination: str, n: Any, known: Any) -> Setting:
 def require_solved(setting: Setting) -> None:
     """SettingError of a half space that is not solved."""
     if not (isinstance(setting, Setting) and setting.is_solved):
+        if isinstance(setting, Setting) and is_traced(setting.n) and setting.g != 0:
+            raise SettingError(f"exact light has derivatives by n where g = 0 only, got g = {setting.g:g}")
         raise SettingError(f"exact light needs {WHERE}, got {setting}: simulate it instead (mcml_sim.simulate_orders)")
 
 

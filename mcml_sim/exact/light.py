@@ -32,6 +32,7 @@ STEP = 0.06  # of ln x, of D_1
 SINGLE_NEAREST, SINGLE_FARTHEST = 1e-7, 1e5  # mfp
 LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
+GONE = 40.0
 ENERGY = np.polynomial.legendre.leggauss(96)
 SEARCHLIGHT = Setting()
 
@@ -107,10 +108,19 @@ class ExactLight(eqx.Module):
         return self.ring_density(x, alpha) / (2.0 * jnp.pi * x)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        """Share of the reflected energy within x [-], to 1e-6."""
+        """Share of the reflected energy within x [-], to 1e-6 where g = 0, else as well as profile and A agree."""
+        return jnp.clip(self.energy(x, alpha) / self.total(alpha), 0.0, 1.0)
+
+    def reach(self, alpha: Array) -> Array:
+        """Where what is left of the light is its e^-40 [l*]; infinite at alpha = 1."""
+        kappa = _chebyshev(self.kappa.size, jnp.sqrt(1.0 - alpha), np.sqrt(1.0 - LEAST)) @ self.kappa
+        return GONE / jnp.maximum(kappa, ROUNDING)
+
+    def energy(self, x: Array, alpha: Array) -> Array:
+        """Integral of the profile over the disc of radius x [-]."""
         t, weight = 0.5 * (1.0 + ENERGY[0]), 0.5 * ENERGY[1]
         parts = self.ring_density(jnp.maximum(x, 1e-30)[..., None] * t**3, alpha) * (3.0 * t**2 * weight)
-        return jnp.clip(x * jnp.sum(parts, axis=-1) / self.total(alpha), 0.0, 1.0)
+        return x * jnp.sum(parts, axis=-1)
 
 
 def tabulated(setting: Setting, nearest: float, step: float, rest: Floats, kappa: Floats, share: Floats) -> ExactLight:

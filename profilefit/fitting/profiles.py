@@ -128,7 +128,12 @@ class Profiles:
 
     @classmethod
     def from_orders(cls, orders: Orders, alpha: ArrayLike, correlated: bool = True) -> Profiles:
-        """Reweight one order-resolved run to every albedo in `alpha`; with `correlated`, their covariance too."""
+        """Reweight one order-resolved run to every albedo in `alpha`; with `correlated`, their covariance too.
+
+        InputError of a run with g, whose rings are of no one l*.
+        """
+        if orders.setting.g != 0:
+            raise InputError(f"orders must be of light that scatters isotropically, got g = {orders.setting.g:g}")
         albedos = _albedos(alpha)
         energy = orders.energy(albedos)
         value = np.asarray(energy.value)

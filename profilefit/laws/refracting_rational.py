@@ -186,7 +186,9 @@ def _cubic(terms: tuple[Number, Number, Number, Number], s: Array) -> Array:
 
 def _root(rest: Array, linear: Array, quadratic: Array, cubic: Number) -> Array:
     """x >= 0 with rest = linear x + quadratic x^2 + cubic x^3: that of the quadratic, and Newton's method."""
-    x = 2.0 * rest / (linear + jnp.sqrt(jnp.maximum(linear**2 + 4.0 * quadratic * rest, 0.0)))
+    inside = linear**2 + 4.0 * quadratic * rest
+    root = jnp.where(inside > 0.0, jnp.sqrt(jnp.where(inside > 0.0, inside, 1.0)), 0.0)  # 0 has no derivative
+    x = 2.0 * rest / (linear + root)
     for _ in range(STEPS):
         over = x * (linear + x * (quadratic + x * cubic)) - rest
         x = x - over / (linear + x * (2.0 * quadratic + 3.0 * cubic * x))

@@ -24,6 +24,7 @@ from mcml_sim.media.setting import Setting
 NEAREST, FARTHEST = 1e-7, 1e30
 SHORTEST, LONGEST, HALVINGS = 1e-12, 1e12, 64
 FAR = 1e4
+DARKEST, LEAST = 1e-200, 1e-300  # an albedo that stands for 0, whose shares are those next to it; of a density
 
 
 def reflectance(alpha: Any, setting: Setting) -> Any:
@@ -72,7 +73,8 @@ def _reflectance(own: ExactLight, _: Array, alpha: Array) -> Array:
 def _profile(own: ExactLight, x: Array, alpha: Array) -> Array:
     by, length = reduced(alpha, own.g)
     near = jnp.clip(x / length, NEAREST, FARTHEST)
-    return own.ring_density(near, by) / (2.0 * jnp.pi * x * length)
+    around = 2.0 * jnp.pi * jnp.where((x == 0.0) & (alpha == 0.0), 1.0, x) * length  # no light is none at the source
+    return own.ring_density(near, by) / around
 
 
 def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
@@ -81,9 +83,18 @@ def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
 
 
 def _within(own: ExactLight, x: Array, alpha: Array) -> Array:
-    """The share within x [l*], of reduced albedos; far away what is left falls off as that of a white medium."""
-    near = jnp.minimum(x, FAR)
-    return 1.0 - (1.0 - own.scaled_cdf(near, alpha)) * FAR / jnp.maximum(x, FAR)
+    """The share within x [l*], of reduced albedos: of all light of their profile, from which A differs by as much as
+    the table is off. Beyond FAR light falls off as that of a white medium, if there is any."""
+    alpha = jnp.maximum(alpha, DARKEST)
+    far, whole, tail = _whole(own, alpha)
+    return jnp.minimum((own.energy(jnp.minimum(x, far), alpha) + tail * (1.0 - far / jnp.maximum(x, far))) / whole, 1.0)
+
+
+def _whole(own: ExactLight, alpha: Array) -> tuple[Array, Array, Array]:
+    """How far there is light, or else FAR; all light of a profile, and that beyond."""
+    far = jnp.minimum(FAR, jax.lax.stop_gradient(own.reach(alpha)))
+    tail = far * own.ring_density(far, alpha)
+    return far, own.energy(far, alpha) + tail, tail
 
 
 def _quantile(own: ExactLight, xi: Array, alpha: Array) -> Array:
@@ -97,8 +108,10 @@ def _quantile(own: ExactLight, xi: Array, alpha: Array) -> Array:
         return jnp.where(beyond, middle, low), jnp.where(beyond, high, middle)
 
     ends = jax.lax.fori_loop(0, HALVINGS, halved, (low, high))
-    x = jax.lax.stop_gradient(jnp.exp(0.5 * (ends[0] + ends[1])))
-    # One step of Newton's, which moves nothing but has the derivatives of the implicit function.
-    share, density = _within(own, x, by), own.ring_density(x, by) / own.total(by)
-    x = x + (xi - share) / jax.lax.stop_gradient(density)
-    return length * jnp.where(xi == 0.0, 0.0, jnp.where(xi == 1.0, jnp.inf, x))
+    x = jax.lax.stop_gradient(jnp.where(xi == 1.0, 1.0, jnp.exp(0.5 * (ends[0] + ends[1]))))
+    # One step of Newton's without its value, for the derivatives of the implicit function.
+    light = jnp.maximum(by, DARKEST)
+    density = own.ring_density(x, light) / _whole(own, light)[1]
+    step = xi - _within(own, x, by)
+    step = (step - jax.lax.stop_gradient(step)) / jax.lax.stop_gradient(jnp.maximum(density, LEAST))
+    return length * jnp.where(xi == 1.0, jnp.inf, jnp.where(xi == 0.0, 0.0, x) + step)

@@ -97,6 +97,46 @@ def test_no_light_is_made_far_away(g):
             assert energy == pytest.approx(exact.reflectance(alpha, setting), rel=1e-3 if g > 0.9 else 5e-4)
 
 
+@pytest.mark.parametrize(
+    ("setting", "alpha"),
+    [
+        (Setting(n=1.4, g=0.95), 0.99),
+        (Setting("diffuse", 1.4, 0.95), 0.99),
+        (Setting(n=1.4, g=0.8), 0.2),
+        (Setting(n=1.4, g=0.05), 0.999),
+        (Setting(n=1.4, g=0.9), 1.0),
+        (Setting(n=1.4, g=0.9), 0.0),
+    ],
+    ids=str,
+)
+def test_shares_rise_to_all_of_the_light_and_have_radii(setting, alpha):
+    """Where A and the profile's own integral differ, too, and of an albedo of 0, whose shares are those next to it."""
+    xi = np.array([0.0, 1e-16, 1e-6, 0.5, 0.999, 0.9999, 0.99999, 1.0])
+    radius = exact.quantile(xi, alpha, setting=setting)
+    assert (radius[0], radius[-1]) == (0.0, np.inf)
+    assert np.all(np.diff(radius) > 0)
+    np.testing.assert_allclose(exact.cdf(radius[2:], alpha, setting=setting), xi[2:], atol=1e-12)
+    shares = exact.cdf(np.geomspace(1e-6, 1e8, 500), alpha, setting=setting)
+    assert np.diff(shares).min() > -1e-6
+    assert shares[-1] == pytest.approx(1.0, abs=1e-6)
+    if alpha < 1:
+        assert radius[-2] < 5e3, "a share short of all light by 1e-5 is where there is light"
+
+
+def test_no_light_is_none_at_the_source():
+    np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=TISSUE), [0.0, 0.0])
+
+
+def test_derivatives_at_the_ends_of_shares():
+    with jax.enable_x64(True):
+        by_share, by_albedo = (jax.grad(lambda xi, a: exact.quantile(xi, a, setting=TISSUE), k) for k in (0, 1))
+        zero, alpha = jnp.float64(0.0), jnp.float64(0.9)
+        assert float(by_share(zero, alpha)) == pytest.approx(exact.quantile(1e-9, 0.9, setting=TISSUE) / 1e-9, rel=1e-3)
+        assert np.isfinite(float(by_albedo(zero, alpha)))
+        with pytest.raises(SettingError, match=r"derivatives by n where g = 0 only, got g = 0\.9"):
+            exact.profile(1.0, 0.5, setting=Setting(n=jnp.float64(1.4), g=0.9))
+
+
 def test_it_has_derivatives():
     """Of jax, against differences."""
     with jax.enable_x64(True):

@@ -218,6 +218,13 @@ def test_albedos_must_be_a_list_above_zero(alpha, white_run):
             make()
 
 
+def test_orders_that_scatter_forwards_are_refused():
+    """Their rings are in mean free paths, which are other shares of l* for each albedo."""
+    run = simulate_orders(Grid(1.0, 3), 100, seed=1, setting=Setting(g=0.5))
+    with pytest.raises(InputError, match=r"orders must be of light that scatters isotropically, got g = 0\.5"):
+        Profiles.from_orders(run, [0.5])
+
+
 def test_a_white_medium_is_allowed():
     run = simulate_orders(Grid(1.0, 3), 1000, seed=1)
     assert Profiles.from_orders(run, [0.5, 1.0]).reflectance[1] > 0.9

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -42,6 +44,17 @@ def test_near_exact_light_at_other_indices(light, n):
         found = profile_quality(load("hazard", setting=Setting(light, n, g)), REDUCED[::2])
         assert np.max(found.rel) < 0.025
         assert np.max(found.ks) < 0.006
+
+
+@pytest.mark.parametrize("g", [0.5, 0.8, 0.95])
+def test_albedos_have_derivatives_by_reflectance(g):
+    albedo, step = load("hazard", setting=Setting("diffuse", 1.4, g)).albedo, 1e-6
+    with jax.enable_x64(True):
+        for whole in (0.01, 0.1, 0.15, 0.3, 0.9):
+            slope = float(jax.grad(albedo.alpha)(jnp.float64(whole)))
+            assert slope == pytest.approx(
+                (albedo.alpha(whole + step) - albedo.alpha(whole - step)) / (2 * step), rel=1e-5
+            )
 
 
 @pytest.mark.slow
