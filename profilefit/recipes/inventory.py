@@ -99,7 +99,7 @@ def find(
     if (setting := replace(found.setting, **given)) == found.setting:
         return found
     entry = found.law.entry
-    which = "regenerated" if found.records or not found.constants else found.constants
+    which = constants or ("regenerated" if found.records or not found.constants else found.constants)
     return _named(entry, which, _load(entry, which, setting, records), records)
 
 

@@ -149,3 +149,13 @@ def test_what_light_in_water_and_fur_do_not_take(command):
         status, out, err = command("export", *words)
         assert (status, out, err.count("\n")) == (2, "", 1), err
         assert err.startswith(f"profilefit: {told}")
+
+
+def test_constants_of_a_file_stay_those_at_another_g(command, tmp_path):
+    record = json.loads((FITS / "hazard-forward.json").read_text())
+    record["constants"]["a00"]["regenerated"] += 1.0
+    (tmp_path / "own.json").write_text(json.dumps(record))
+    words = ("export", "hazard", "--n", "1.4", "--lang", "json")
+    for g in ("0.9", "0.5"):
+        own, shipped = (json.loads(command(*words, "--g", g, *more)[1]) for more in (("--constants", "own.json"), ()))
+        assert own != shipped, g
