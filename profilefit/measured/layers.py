@@ -127,7 +127,8 @@ def fit_layers(
 def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
     """That of the layers; InputError where a table states another, or what is open is more than the layers."""
     for name in told.ranges:
-        raise InputError(f"{data.source}: {name} must be one number where layers are fitted, got a range")
+        of, what = f"{data.source}: " if name in data.stated else "", "width" if name == "beam" else "number"
+        raise InputError(f"{of}{name} must be one {what} where layers are fitted, got a range")
     own = Setting(told.setting.illumination, medium.layers[0].n / medium.n_above)
     for name, value in (("n", own.n), ("g", own.g)):
         if name in data.stated and not math.isclose(got := getattr(told.setting, name), value):
