@@ -32,7 +32,7 @@ STEP = 0.06  # of ln x, of D_1
 SINGLE_NEAREST, SINGLE_FARTHEST = 1e-7, 1e5  # mfp
 LEAST = 1e-3  # albedo below which f no longer changes
 ROUNDING = 1e-14
-GONE = 40.0
+GONE = 40.0  # kappa x, from where there is no light that counts
 ENERGY = np.polynomial.legendre.leggauss(96)
 SEARCHLIGHT = Setting()
 

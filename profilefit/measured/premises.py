@@ -70,10 +70,9 @@ def premises(
         raise InputError(f"{options[min(ranges)]} must be a number where a law is fitted, got {given[min(ranges)]!r}")
     if "fibre" in given and data.rings:
         raise InputError(f"{options['fibre']} must be left out where rows are averages over annuli")
-    stated = (
-        "beam" not in spoken and Path(data.source).is_file()
-    )  # what a file states lies beside it; a pipe has no place
-    folder = Path(data.source).parent if stated else Path()
+    # What a file states lies beside it; a pipe has no place.
+    beside = "beam" not in spoken and Path(data.source).is_file()
+    folder = Path(data.source).parent if beside else Path()
     beam, widths = _beam(options["beam"], given.get("beam"), data.unit, folder)
     ranges |= {} if widths is None else {"beam": widths}
     fibre = length(options["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0

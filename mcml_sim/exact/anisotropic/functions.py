@@ -79,19 +79,19 @@ def _profile(own: ExactLight, x: Array, alpha: Array) -> Array:
 
 def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
     by, length = reduced(alpha, own.g)
-    return _within(own, x / length, by)
+    return _within(own, x / length, by, _whole(own, by))
 
 
-def _within(own: ExactLight, x: Array, alpha: Array) -> Array:
+def _within(own: ExactLight, x: Array, alpha: Array, of: tuple[Array, Array, Array]) -> Array:
     """The share within x [l*], of reduced albedos: of all light of their profile, from which A differs by as much as
-    the table is off. Beyond FAR light falls off as that of a white medium, if there is any."""
-    alpha = jnp.maximum(alpha, DARKEST)
-    far, whole, tail = _whole(own, alpha)
+    the table is off. Beyond FAR light falls off as that of a white medium, if there is any. `of` as in `_whole`."""
+    (far, whole, tail), alpha = of, jnp.maximum(alpha, DARKEST)
     return jnp.minimum((own.energy(jnp.minimum(x, far), alpha) + tail * (1.0 - far / jnp.maximum(x, far))) / whole, 1.0)
 
 
 def _whole(own: ExactLight, alpha: Array) -> tuple[Array, Array, Array]:
     """How far there is light, or else FAR; all light of a profile, and that beyond."""
+    alpha = jnp.maximum(alpha, DARKEST)
     far = jnp.minimum(FAR, jax.lax.stop_gradient(own.reach(alpha)))
     tail = far * own.ring_density(far, alpha)
     return far, own.energy(far, alpha) + tail, tail
@@ -99,19 +99,18 @@ def _whole(own: ExactLight, alpha: Array) -> tuple[Array, Array, Array]:
 
 def _quantile(own: ExactLight, xi: Array, alpha: Array) -> Array:
     by, length = reduced(alpha, own.g)
-    low, high = jnp.log(SHORTEST), jnp.log(LONGEST)
+    low, high, of = jnp.log(SHORTEST), jnp.log(LONGEST), _whole(own, by)
 
     def halved(_: int, ends: tuple[Array, Array]) -> tuple[Array, Array]:
         low, high = ends
         middle = 0.5 * (low + high)
-        beyond = _within(own, jnp.exp(middle), by) < xi
+        beyond = _within(own, jnp.exp(middle), by, of) < xi
         return jnp.where(beyond, middle, low), jnp.where(beyond, high, middle)
 
     ends = jax.lax.fori_loop(0, HALVINGS, halved, (low, high))
     x = jax.lax.stop_gradient(jnp.where(xi == 1.0, 1.0, jnp.exp(0.5 * (ends[0] + ends[1]))))
     # One step of Newton's without its value, for the derivatives of the implicit function.
-    light = jnp.maximum(by, DARKEST)
-    density = own.ring_density(x, light) / _whole(own, light)[1]
-    step = xi - _within(own, x, by)
+    density = own.ring_density(x, jnp.maximum(by, DARKEST)) / of[1]
+    step = xi - _within(own, x, by, of)
     step = (step - jax.lax.stop_gradient(step)) / jax.lax.stop_gradient(jnp.maximum(density, LEAST))
     return length * jnp.where(xi == 1.0, jnp.inf, jnp.where(xi == 0.0, 0.0, x) + step)
