@@ -183,7 +183,7 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     xi = np.linspace(0.0, LAST_SHARE, BATCH)
     return {
         "alpha": alpha,
-        "inversion_error": float(np.max(np.abs(_drawn_by(sampler, xi, alpha, target) - xi))),
+        "inversion_error": float(np.max(np.abs(drawn_by(sampler, xi, alpha, target) - xi))),
         "missing": 1.0 - atom - _integral(own, shape.levels),
         "atom": atom,
         "bias": mean - 1.0,
@@ -194,8 +194,9 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     }
 
 
-def _drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floats:
-    """The xi that an exact inverse of the target's cdf sends to the radii drawn at xi."""
+def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floats:
+    """The xi that an exact inverse of the target's cdf sends to the radii drawn at xi (m,) [-]: where a sampler draws a
+    radius twice, of its own two the nearer, as far off as the target's cdf is from the law's."""
     x = _called(_sample, sampler, xi, alpha)
     with jax.enable_x64(True):
         found = np.asarray(sampler.undone(x, xi, alpha))

@@ -51,6 +51,11 @@ def home(place: str) -> "Any":
     return getattr(import_module(module if "." in module else f"{__name__}.{module}"), kind)
 
 
+def takes_g(name: str) -> bool:
+    """Whether the profile law of a name has a form in which scattering has a direction."""
+    return PROFILES.get(name) in FORWARD
+
+
 def at(kind: "Any", setting: "Any") -> "Any":
     """The class that a law or map has in a setting: this one, or that for surfaces that refract, or for any g."""
     forms = REFRACTING if setting.is_isotropic else FORWARD

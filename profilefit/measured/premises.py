@@ -10,6 +10,7 @@ from typing import Any
 
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
+from profilefit.laws import takes_g
 from profilefit.measured.beam import TOPHAT, Gaussian, Irradiance, beam_of
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT
@@ -47,7 +48,8 @@ def premises(
 ) -> Premises:
     """From what is told, texts by the names light, n, g, beam and fibre; else from what the file states.
 
-    names   what messages call these. A simulation's medium is what its file states, its g only where exact light has it
+    names   what messages call these. A simulation's medium is what its file states, its g only where exact light, or
+            the law that is fitted, has it
     """
     spoken = {name: text for name, text in (told or {}).items() if text is not None}
     options = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
@@ -63,7 +65,7 @@ def premises(
     ranges = {name: parsed(options[name], given[name], name) for name in MEDIUM if name in given}
     n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
     setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
-    if "g" not in given and law == EXACT and data.g and replace(setting, g=data.g).is_solved:
+    if "g" not in given and data.g and (law == EXACT or takes_g(law)) and replace(setting, g=data.g).is_solved:
         setting = replace(setting, g=data.g)
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:

@@ -38,12 +38,13 @@ ROW, FEET, HEAD = 2.7, 0.5, 0.3  # height of a row of panels, of what is below, 
 
 @dataclass(frozen=True)
 class Line:
-    """One set of constants: its label, where it was measured, the measures by name."""
+    """One set of constants: its label, where it was measured, the measures by name; whether it has a g."""
 
     label: str
     alpha: list[float]
     values: Content
     printed: bool
+    forward: bool
 
 
 @styled
@@ -89,6 +90,8 @@ def _panel(ax: Axes, key: str, lines: list[Line]) -> None:
         }
         ax.plot(line.alpha, line.values[key], label=line.label, markersize=3.0, **look)
     albedo_axis(ax)
+    if any(line.forward for line in lines):
+        ax.set_xlabel("single-scattering albedo α [-], reduced if g ≠ 0")
     ax.tick_params(axis="x", labelsize=7.0)
     ax.set_yscale("log")
     plain_log(ax.yaxis)
@@ -106,7 +109,8 @@ def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
         quality = content["quality"]
         for which in (one for one in SETS if one in quality):
             regenerated = which == "regenerated"
-            label = name if regenerated else f"{content['law']}, {which}"
+            g = content["setting"]["g"]
+            label = (name if regenerated else f"{content['law']}, {which}") + (f", g = {g:g}" if g else "")
             if label not in drawn and (converged(content) or not regenerated):
                 drawn.add(label)
-                yield Line(label, quality["alpha"], quality[which], not regenerated)
+                yield Line(label, quality["alpha"], quality[which], not regenerated, bool(g))

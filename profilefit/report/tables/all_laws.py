@@ -11,8 +11,9 @@ from typing import Any, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
-from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, sampler_quality
+from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.laws.base import Sampler
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
@@ -35,8 +36,9 @@ SHARES = 256
 class MeasuredSampler:
     """One sampler of a law.
 
-    quality      for the light of the law itself
-    exact_error  (m,) max over xi in [0, 0.999] of |exact cdf(r(xi)) - xi| at the same albedos [-]
+    quality      for the light of the law itself, at reduced albedos, its lengths in l*
+    exact_error  (m,) max over xi in [0, 0.999] of |exact cdf(r(xi)) - xi| at the same albedos [-]; of two xi that draw
+                 one radius, the one meant
     """
 
     of: Named
@@ -70,16 +72,16 @@ def measured_map(one: Named) -> AlbedoQuality:
 
 
 def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
-    """Every sampler of a profile law at `alpha` (m,)."""
+    """Every sampler of a profile law at (reduced) `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
     found = []
-    for name, sampler in one.law.samplers.items():
-        errors = np.array([_exact_error(sampler, float(value)) for value in albedos])
+    for name, sampler in one.law.in_reduced().samplers.items():
+        errors = np.array([_exact_error(one.law.samplers[name], float(value)) for value in albedos])
         found.append(MeasuredSampler(one, name, sampler_quality(sampler, albedos), errors))
     return found
 
 
-def _exact_error(sampler: Sampler, alpha: float) -> float:
-    xi = np.linspace(0.0, LAST_SHARE, SHARES)
-    share = ExactTarget(sampler.law.setting).cdf(np.asarray(sampler.sample(xi, alpha)), alpha)
+def _exact_error(sampler: Sampler, reduced: float) -> float:
+    xi, setting = np.linspace(0.0, LAST_SHARE, SHARES), sampler.law.setting
+    share = drawn_by(sampler, xi, float(unreduced(reduced, setting.g)), ExactTarget(setting))
     return float(np.max(np.abs(share - xi)))

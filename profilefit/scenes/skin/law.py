@@ -24,7 +24,7 @@ from scipy.special import erf
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.scenes.stage.exact_law import DIFFUSE
+from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb
 from profilefit.shader.emit import literal
 
@@ -108,6 +108,7 @@ class Separable:
     def __post_init__(self) -> None:
         if len(self.strength) != 3 or not all(0 < share <= 1 for share in self.strength):
             raise InputError(f"strength must be three shares in (0, 1], got {self.strength!r}")
+        require_isotropic(self.setting)
 
     def stretches(self, alpha: Floats, mfp: Floats) -> Floats:
         """(3,) lengths [mm] of the kernel's unit: a step edge rises to 3/4 where it does under the exact profile."""

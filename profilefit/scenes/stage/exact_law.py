@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
+from profilefit.errors import InputError, SettingError
 from profilefit.shader.emit import literal, text_beside
 
 Floats = NDArray[np.float64]
@@ -41,6 +41,7 @@ class ExactLaw:
     def __post_init__(self) -> None:
         if not 1 <= len(self.alpha) <= MOST_ALBEDOS or not all(0 < a <= 1 for a in self.alpha):
             raise InputError(f"alpha must be 1 ... {MOST_ALBEDOS} albedos in (0, 1], got {self.alpha!r}")
+        require_isotropic(self.setting)
 
     def text(self, name: str) -> str:
         """The law's text with the prefix `name`; it needs the textures of `textures(name)`."""
@@ -52,6 +53,12 @@ class ExactLaw:
         """Float textures (rows, columns, channels) by the names of their samplers."""
         drawn, known = _tables(self.alpha, self.setting)
         return {f"{name}_drawn": drawn, f"{name}_known": known}
+
+
+def require_isotropic(setting: Setting) -> None:
+    """SettingError where a setting has g: a scene's albedos and lengths are reduced, those of exact light are not."""
+    if setting.g != 0.0:
+        raise SettingError(f"a scene's exact light scatters isotropically: setting must have g = 0, got {setting}")
 
 
 def table_text(name: str, reflectance: Iterable[float]) -> str:

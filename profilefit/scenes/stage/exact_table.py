@@ -17,6 +17,7 @@ from scipy.interpolate import CubicSpline, RectBivariateSpline
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
+from profilefit.scenes.stage.exact_law import require_isotropic
 
 Floats = NDArray[np.float64]
 NEAREST, FARTHEST = 1e-5, 1e4  # x [mfp] of the table's ends
@@ -106,11 +107,12 @@ def knots() -> Floats:
 
 @lru_cache(maxsize=4)
 def exact_table(setting: Setting) -> ExactTable:
-    """The table of a light and a surface, built once: seconds.
+    """The table of a light and a surface, built once: seconds; SettingError where it has g.
 
     Relative error below 1e-5 of R_d for x in [1e-5, 3000] where x^2 R_d l^2 / A > 1e-10, and of the cdf everywhere;
     where the surface refracts, below 1e-3 of R_d where x^2 R_d l^2 / A > 1e-8, and 1e-7 of the whole in the cdf.
     """
+    require_isotropic(setting)
     y = knots()
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, ALBEDOS) ** 3) ** 2
     alpha = np.maximum(1.0 - s * s, LEAST_ALPHA)

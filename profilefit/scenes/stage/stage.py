@@ -98,8 +98,8 @@ class Stage:
         """(h, w, 3) radiant exitance, A times the blurred irradiance, in its unit; radiance is that over pi. Pass 3.
 
         law  with a shader source, or an `ExactLaw`, which is sampled; or a technique of another kind
-        mfp  of red, green and blue, or one for all [mm]
-        fixed_alpha  single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
+        mfp  transport mean free path l* of red, green and blue, or one for all [mm]
+        fixed_alpha  reduced single-scattering albedo of the three, or one for all; by default that of A, pixel by pixel
         rows  the first, and the first beyond: only these are drawn and returned, though they gather from all
         """
         first, last = rows or (0, self.size[1])

@@ -70,7 +70,7 @@ def gathered(
 
     mfp  of the three channels (3,), in the unit of the positions
     table  of the curves, by the surface's `reflectance`; of a setting, that of the exact half space by A
-    Raises InputError. 26 000 visible pixels take about a minute on a core, 100 MiB.
+    Raises InputError; SettingError of a setting with g. 26 000 visible pixels take about a minute on a core, 100 MiB.
     """
     lengths = np.asarray(mfp, float)
     if lengths.shape != (3,) or not np.all((lengths > 0) & np.isfinite(lengths)):

@@ -65,7 +65,8 @@ def test_a_simulation_states_its_medium():
     tissue, outside = (replace(one, medium=Medium((layer,))) for layer in (forward, replace(forward, n=1.5)))
     assert premises(tissue) == Premises(Setting(n=1.4, g=0.9))
     assert premises(outside) == Premises(Setting(n=1.5)), "which no table has"
-    assert premises(tissue, "hazard") == Premises(Setting(n=1.4)), "laws scatter without direction"
+    assert premises(tissue, "hazard") == Premises(Setting(n=1.4, g=0.9))
+    assert premises(tissue, "burley") == Premises(Setting(n=1.4)), "which scatters without direction"
     other = replace(forward, phase=phase.HenyeyGreenstein(0.9))
     assert premises(replace(one, medium=Medium((other,)))).setting in (Setting(n=1.4), Setting(n=1.4, g=0.9))
 

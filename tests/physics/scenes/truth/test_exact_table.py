@@ -1,10 +1,14 @@
 """The table between its nodes, against the exact half space itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from mcml_sim import Setting, exact
-from profilefit.errors import InputError
+from profilefit.errors import InputError, SettingError
+from profilefit.scenes.skin.law import Separable
+from profilefit.scenes.stage.exact_law import ExactLaw
 from profilefit.scenes.stage.exact_table import exact_table
 
 REFLECTANCES = np.concatenate([np.linspace(0.013, 0.987, 24), [1e-4, 2e-3, 0.9991, 0.99993]])
@@ -51,3 +55,9 @@ def test_ends():
 def test_misuse():
     with pytest.raises(InputError, match=r"reflectance must be a list of numbers in \[0, 1\]"):
         exact_table(Setting("diffuse")).curves([1.2])
+
+
+@pytest.mark.parametrize("made", [lambda own: ExactLaw((0.5,), own), exact_table, lambda own: Separable(setting=own)])
+def test_scattering_with_a_direction_is_refused(made):
+    with pytest.raises(SettingError, match=r"setting must have g = 0, got diffuse, n = 1\.4, g = 0\.8"):
+        made(replace(SKIN, g=0.8))
