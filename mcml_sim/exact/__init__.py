@@ -35,7 +35,7 @@ shares that are that close to 1 is too large there. `error_estimate` says what m
 Relative error of the table, g > 0, from .05 to 15 l* against photons where n = 1.4 (`benchmarks/half_spaces.py`): A
 below 3e-4, 1.3e-3 where g = .95; rings, where alpha' >= .5 and g <= .9, mostly below .5 %, which is what 1e8 to 6e8
 photons know; up to 5 % far from the source of darker media, 9 % where g = .95. `cdf` is that of the profile's own
-light, of which A holds 1 to within 3e-4, 2e-3 where g = .95.
+light, which is A to within 8e-4, and 3.2e-3 in white media (alpha' > .999).
 """
 
 from mcml_sim.exact.half_space import (

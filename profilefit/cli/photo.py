@@ -33,7 +33,7 @@ class SeveralFiles(TyperCommand):
                 if at + 1 == len(args) or args[at + 1].startswith("-"):
                     written.append(one)
             elif one.startswith("-"):
-                option = None
+                option = one.partition("=")[0] if one.startswith(tuple(f"{name}=" for name in SEVERAL)) else None
                 written.append(one)
             else:
                 written.extend([one] if option is None else [option, one])
@@ -87,7 +87,7 @@ def photo(
         from mcml_sim.runs.progress import working
         from profilefit.measured.photo.medium import Beliefs
         from profilefit.measured.photo.workflow import photo as measured
-        from profilefit.report.page.photo import medium_text, photo_page
+        from profilefit.report.page.photo import diffuse_law, medium_text, photo_page
         from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
@@ -105,16 +105,18 @@ def photo(
         beam=None if beam is None else _known("--beam", beam, lengths=True),
         surface=_known("--surface", surface), glare=_known("--glare", glare),
     )  # fmt: skip
+    setting = Setting(n=n, g=g)
+    law = None if out is None else diffuse_law(setting)
     with working("measuring", quiet):
         found = measured(
-            shots, scale, card or [], grey or [], dark or [], Setting(n=n, g=g), beliefs,
+            shots, scale, card or [], grey or [], dark or [], setting, beliefs,
             _known("--reflectance", reflectance),
         )  # fmt: skip
     body = photo_content(found)
-    if out is not None:  # after photographs that cannot be measured, which leave no folder
+    if out is not None and law is not None:  # after photographs that cannot be measured, which leave no folder
         require_folder(out)
+        text = medium_text(found, law)
         figures = _figures(found, out)
-        text = medium_text(found)
         write_whole(out / "medium.glsl", text)
         write_whole(out / "photo.html", photo_page(found, out, text))
         write_whole(out / "photo.json", json_text(body))
@@ -180,6 +182,6 @@ def _known(option: str, text: str, lengths: bool = False) -> Known:
         raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}") from None
     most = 1e6 if lengths else 1.0
     if not (0 < value < most and 0 < error < most):
-        accepted = "> 0" if lengths else "in 0 ... 1"
+        accepted = "> 0" if lengths else "between 0 and 1"
         raise InputError(f"{option} must be a value {accepted} with an error {accepted}, got {text!r}")
     return Known(value, error)

@@ -20,7 +20,7 @@ from profilefit.measured.noise import Noise, noise
 from profilefit.measured.problem import Question
 from profilefit.measured.ranges import Opened, opened
 from profilefit.measured.replicates import widening
-from profilefit.measured.solving import Minimum, Problem, are_apart, descended, minimised
+from profilefit.measured.solving import Minimum, Problem, are_apart, descended, descended_from, minimised
 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
@@ -234,7 +234,7 @@ def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...
     for one in others:
         if one.cost > found.minimum.cost + FAR:
             continue
-        there = descended(found.problem, one.point, found.question.free)
+        there = descended_from(found.problem, one.point)
         near = there.cost - found.minimum.cost < found.quantile**2
         if near and all(are_apart(there, other) for other in (found.minimum, *rivals)):
             rivals.append(there)

@@ -65,8 +65,10 @@ def premises(
     ranges = {name: parsed(options[name], given[name], name) for name in MEDIUM if name in given}
     n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
     setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
-    if "g" not in given and data.g and (law == EXACT or takes_g(law)) and replace(setting, g=data.g).is_solved:
-        setting = replace(setting, g=data.g)
+    # Clear layers may state any g.
+    forward = replace(setting, g=data.g) if "g" not in given and data.g and abs(data.g) < 1.0 else setting
+    if forward.is_solved and (law == EXACT or takes_g(law)):
+        setting = forward
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:
         raise InputError(f"{options[min(ranges)]} must be a number where a law is fitted, got {given[min(ranges)]!r}")

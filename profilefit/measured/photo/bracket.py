@@ -63,9 +63,9 @@ class Times(NamedTuple):
 
 def times(shots: Sequence[Exposure]) -> Times:
     """From what the exposures record; InputError where neighbours share no pixels."""
-    stated = [one.seconds for one in shots if one.seconds]
+    stated = [one.seconds or 0.0 for one in shots]
     light = [sum(float(each.counts.mean()) for each in one.planes) for one in shots]
-    order = np.argsort(stated if len(stated) == len(shots) else light)
+    order = np.lexsort((light, stated)) if all(stated) else np.argsort(light)
     found, covariance = np.ones(len(shots)), np.zeros((len(shots),) * 2)
     for at in range(len(shots) - 2, -1, -1):
         shorter, longer = order[at], order[at + 1]
@@ -89,10 +89,11 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
         above += float(chosen[-1][0].sum())
         below += float(chosen[-1][1].sum())
         pairs += int(good.sum())
+    longer_is_stated = shorter.seconds and longer.seconds and shorter.seconds < longer.seconds
     if pairs >= LEAST_PAIRS and above > BRIGHTER * below:
         raise InputError(
             f"{shorter.source}: expected less light than {longer.source} has, which "
-            f"{'states a longer time' if shorter.seconds and longer.seconds else 'is brighter on the whole'}, got "
+            f"{'states a longer time' if longer_is_stated else 'is brighter on the whole'}, got "
             f"{above / below:.3g} times as much"
         )
     if pairs < LEAST_PAIRS or not above > 0:

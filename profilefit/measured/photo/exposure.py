@@ -16,7 +16,7 @@ import warnings
 import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -55,13 +55,16 @@ class BayerPlane:
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """A photograph. seconds is None where the file does not state them; sides are columns and rows of the whole."""
+    """A photograph. sides are columns and rows of the whole; seconds, iso and aperture (an f-number) None where the
+    file does not state them."""
 
     source: str
     planes: tuple[BayerPlane, ...]
     sides: tuple[int, int]
     seconds: float | None
     linear: bool
+    iso: float | None = None
+    aperture: float | None = None
 
 
 def read(path: Path) -> Exposure:
@@ -94,6 +97,7 @@ def _raw(path: Path) -> Exposure:
             black = [[float(raw.black_level_per_channel[int(which)]) for which in row] for row in pattern]
             seconds = float(raw.other.shutter_speed)
             found = of_sensor(str(path), counts, own, black, float(raw.white_level), seconds or None)
+            found = replace(found, iso=raw.other.iso_speed or None, aperture=raw.other.aperture or None)
     except rawpy.LibRawError as error:
         raise _refused(path, "a raw file", error) from None
     return found

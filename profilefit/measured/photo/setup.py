@@ -113,9 +113,12 @@ def read_setup(path: Path) -> Setup:
         raise read.bad("optics", "falling", "a number > 1, or its light is endless", optics.falling)
     setting = Setting(n=read.number("medium", "n", of, 1.4), g=_within(read, "medium", "g", of, 0.8, 0.0, 1.0))
     read.made("medium", lambda: require_solved(setting))
+    mu_s = read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST)
+    mu_a = read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST)
+    longest = 1.0 / min(map(sum, zip(mu_s, mu_a, strict=True)))
+    read.made("medium", lambda: simulated.require_resolved(longest, optics, _far(shown)))
     return Setup(
-        read.three("medium", "mu_s", of, (1.0, 1.0, 1.0), 1e-3, MOST),
-        read.three("medium", "mu_a", of, (0.05, 0.05, 0.05), 1e-4, MOST),
+        mu_s, mu_a,
         setting, read.whole("medium", "photons", of, 0, 0, MOST_PHOTONS), optics, shown,
         read.whole("camera", "exposures", camera, 5, 1, 12),
         read.number("camera", "late", camera, 0.02, 0.2),
@@ -139,10 +142,14 @@ def _within(read: Tables, where: str, key: str, table: Table, default: float, le
     return float(value)
 
 
+def _far(camera: SpotCamera) -> float:
+    """[mm], beyond the corners."""
+    return 1.2 * camera.pitch * float(np.hypot(*camera.sides))
+
+
 def brackets(setup: Setup) -> dict[str, list[Taken]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
-    far = 1.2 * setup.camera.pitch * float(np.hypot(*setup.camera.sides))
-    radii = simulated.radii(far, setup.optics)
+    radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
     for at, (colour, mu_s, mu_a) in enumerate(zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)):
         medium = mu_s / (mu_s + mu_a), 1.0 / (mu_s + mu_a), setup.setting, setup.optics, radii
@@ -169,14 +176,16 @@ def brackets(setup: Setup) -> dict[str, list[Taken]]:
 def written(setup: Setup, out: Path) -> list[Path]:
     """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
 
-    InputError where another camera's lie under these names.
+    InputError where another camera's lie under these names, or where any lie that are not of this setup, which SPOT-*
+    would name too.
     """
-    names = ("spot", *(("card",) if setup.white else ()), *(("grey",) if setup.grey is not None else ()))
-    for name in names:
-        for at in range(1, setup.exposures + 1):
-            file = out / f"{name}-{at}.dng"
-            if file.exists() and OURS not in read_whole(file, HEAD):
-                raise InputError(f"{file}: expected no photograph of that name, or one that was simulated, got another")
+    taken = {"spot": True, "card": setup.white, "grey": setup.grey is not None}
+    own = {out / f"{name}-{at}.dng" for name in taken if taken[name] for at in range(1, setup.exposures + 1)}
+    for file in sorted(one for name in taken for one in out.glob(f"{name}-*.dng")):
+        if file not in own:
+            raise InputError(f"{file}: expected none but photographs of this setup in its folder, got another")
+        if OURS not in read_whole(file, HEAD):
+            raise InputError(f"{file}: expected no photograph of that name, or one that was simulated, got another")
     files = []
     for name, bracket in brackets(setup).items():
         for at, one in enumerate(bracket, start=1):

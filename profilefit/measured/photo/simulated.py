@@ -27,13 +27,15 @@ from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.runs.simulation import simulate
+from profilefit.errors import InputError
 from profilefit.measured.exact_light import exact_light
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]
 CHANNELS = ("red", "green", "blue")
 PATTERN = (("red", "green"), ("green", "blue"))  # of a Bayer sensor's first two rows
-PANELS, ORDER = 260, 10  # of the quadratures
+PANELS, ORDER = 260, 10  # of the quadratures, which have more where J_0 turns by more than TURN in a panel [rad]
+TURN, MOST_VALUES = 16.0, 4e8  # and the most values of J_0: ten seconds
 PANEL = np.polynomial.legendre.leggauss(ORDER)
 CUT = 8.0  # k sigma beyond which the core's transform is nothing
 NEAR, FAR = 1e-5, 80.0  # l*, of the profile's
@@ -118,14 +120,14 @@ def light(
 
     photons  to trace; 0: light is exact
     """
-    k, weight = _panels(np.linspace(0.0, CUT / optics.sigma, PANELS + 1))
+    k, weight = _waves(optics, float(r.max()))
     medium = traced(alpha, length, setting, k, photons, seed) if photons else transform(alpha, length, setting, k)
     return _inverse((medium + optics.surface) * optics.transform(k), k, weight, r)
 
 
 def card(optics: SpotOptics, r: Floats) -> Floats:
     """I(r) [1/mm^2] of a white card that light does not enter."""
-    k, weight = _panels(np.linspace(0.0, CUT / optics.sigma, PANELS + 1))
+    k, weight = _waves(optics, float(r.max()))
     return _inverse(optics.transform(k), k, weight, r)
 
 
@@ -148,16 +150,42 @@ def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: in
 def _transform(alpha: float, length: float, setting: Setting, k: bytes) -> Floats:
     whole = np.frombuffer(k)
     edges = np.append(np.geomspace(NEAR, 1.0, 30), np.linspace(1.0, FAR, PANELS // 2)[1:]) * length
-    rho, weight = _panels(np.append(0.0, edges))
+    rho, weight = _panels(_turned(np.append(0.0, edges), float(whole.max())))
     with jax.enable_x64(True):
         light = exact_light(setting).ring_density(jnp.asarray(rho / length), jnp.asarray(alpha))
     density = np.asarray(light) / length
-    return np.concatenate([j0(np.multiply.outer(part, rho)) @ (weight * density) for part in np.array_split(whole, 16)])
+    parts = np.array_split(whole, max(16, whole.size * rho.size >> 22))  # of 32 MiB
+    return np.concatenate([j0(np.multiply.outer(part, rho)) @ (weight * density) for part in parts])
+
+
+def require_resolved(length: float, optics: SpotOptics, far: float) -> None:
+    """InputError of an l* [mm] whose exact light takes too many nodes, under such a beam and out to `far` [mm]."""
+    waves, _ = _waves(optics, far)
+    nodes = FAR * length * CUT / optics.sigma / TURN * ORDER
+    if waves.size * nodes > MOST_VALUES:
+        most = length * MOST_VALUES / (waves.size * nodes)
+        raise InputError(
+            f"mu_s + mu_a must be >= {1.0 / most:.2g} 1/mm under a beam this narrow in a picture this wide, got "
+            f"{1.0 / length:.2g}"
+        )
+
+
+def _waves(optics: SpotOptics, far: float) -> tuple[Floats, Floats]:
+    """k [1/mm] and their weights, for light out to `far` [mm]."""
+    return _panels(_turned(np.linspace(0.0, CUT / optics.sigma, PANELS + 1), far))
+
+
+def _turned(edges: Floats, rate: float) -> Floats:
+    """Edges of panels, cut where J_0 turns by more than TURN between them: by `rate` a unit."""
+    pieces = np.ceil(np.diff(edges) * rate / TURN).clip(1.0)
+    at = np.append(0.0, np.cumsum(pieces))
+    found: Floats = np.interp(np.arange(at[-1] + 1.0), at, edges)
+    return found
 
 
 def _inverse(transformed: Floats, k: Floats, weight: Floats, r: Floats) -> Floats:
-    found: Floats = j0(np.multiply.outer(r, k)) @ (weight * k * transformed) / (2.0 * np.pi)
-    return found
+    rows = np.array_split(r, max(1, r.size * k.size >> 22))
+    return np.concatenate([j0(np.multiply.outer(row, k)) @ (weight * k * transformed) for row in rows]) / (2.0 * np.pi)
 
 
 def _panels(edges: Floats) -> tuple[Floats, Floats]:

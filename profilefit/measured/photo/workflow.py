@@ -107,11 +107,17 @@ def photo(
     fits, bounds, notes = {}, {}, [f"{one}: eight bits, taken for sRGB: not a measurement" for one in coded[:1]]
     for colour in seen.colours:
         of_spot = ringed(seen, colour, size)
-        of_cards = tuple(carded(one, colour, size, known, seen) for one, known in shown)
-        if not all(one.shows_spot for one in (of_spot, *(card.rings for card in of_cards))):
+        if not of_spot.shows_spot:
             notes.append(f"{colour}: no spot is seen, so it is left out")
             continue
-        shot = Shot(of_spot, of_cards, exact_light(where), believed)
+        of_cards = [(one.sources[0], carded(one, colour, size, known, seen)) for one, known in shown]
+        notes += [
+            f"{colour}: no spot is seen in {source}, so that card tells nothing of it"
+            for source, card in of_cards
+            if not card.rings.shows_spot
+        ]
+        lit = tuple(card for _, card in of_cards if card.rings.shows_spot)
+        shot = Shot(of_spot, lit, exact_light(where), believed)
         fits[colour] = medium.fitted(shot)
         bounds[colour] = dict(medium.fisher(shot, fits[colour].x))
     if not fits:
@@ -137,14 +143,19 @@ def _require_count(paths: Sequence[Path]) -> None:
 
 
 def _require_alike(one: Exposure, other: Exposure) -> None:
-    """As many pixels, of the same filters."""
+    """As many pixels, of the same filters, taken alike but for the time, where that is stated."""
     for expected, got in zip(_kind(other), _kind(one), strict=True):
-        if expected != got:
+        if None not in (expected, got) and expected != got:
             raise InputError(f"{one.source}: expected {expected} as {other.source} has, got {got}")
 
 
-def _kind(one: Exposure) -> tuple[str, str]:
-    return f"{one.sides[0]} x {one.sides[1]} pixels", f"planes {', '.join(plane.colour for plane in one.planes)}"
+def _kind(one: Exposure) -> tuple[str | None, ...]:
+    return (
+        f"{one.sides[0]} x {one.sides[1]} pixels",
+        f"planes {', '.join(plane.colour for plane in one.planes)}",
+        None if one.iso is None else f"ISO {one.iso:g}",
+        None if one.aperture is None else f"f/{one.aperture:.3g}",
+    )
 
 
 def _level(paths: Sequence[Path], like: Exposure) -> Floats:

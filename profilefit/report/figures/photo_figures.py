@@ -68,7 +68,8 @@ def rings_figure(found: Photo, out: Path, name: str = RINGS) -> list[Path]:
         )
         top.plot(rings.r, light, label=f"{colour}: fit", **{**WHOLE, "color": shade})
         below.plot(rings.r, rows, marker="o", markersize=2.6, linewidth=0.6, color=shade)
-    top.set(xscale="log", yscale="log", ylabel="light [counts a second]")
+    unit = "counts" if found.shot.seconds is None else "counts a second"
+    top.set(xscale="log", yscale="log", ylabel=f"light [{unit}]")
     below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
     below.set(xlabel="r [mm]", ylabel="residual, whitened [σ]")
     legend_below(figure, [top, below])

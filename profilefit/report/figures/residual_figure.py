@@ -44,12 +44,13 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
 def _of_map(ax: Axes, fitted: Fitted) -> None:
     """Of what was fitted: alpha at the data's A, or A at the data's alpha."""
     alpha = albedo_values(Albedos(**fitted.content["protocol"]["albedos"]), fitted.law.setting)
+    law = fitted.law.in_reduced()  # as the data's albedos are
     reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
     if fitted.content["protocol"]["weighting"]["objective"] == "albedo":
-        left, error = np.asarray(fitted.law.alpha(reflectance)) - alpha, error * np.gradient(alpha, reflectance)
+        left, error = np.asarray(law.alpha(reflectance)) - alpha, error * np.gradient(alpha, reflectance)
         what = "α"
     else:
-        left, what = np.asarray(fitted.law.reflectance(alpha)) - reflectance, "A"
+        left, what = np.asarray(law.reflectance(alpha)) - reflectance, "A"
     ax.errorbar(alpha, left, error, color=BLUE, marker="o", markersize=2.6, linewidth=0.8, elinewidth=0.8)
     albedo_axis(ax)
     ax.set_ylabel(f"{what} of the map less {what} of the data [-]")

@@ -9,9 +9,11 @@ import numpy as np
 
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.setting import Setting
+from profilefit.errors import SettingError
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes.folder import fits_folder
-from profilefit.recipes.inventory import find
+from profilefit.recipes.inventory import Named, find
 from profilefit.report.drawing import inline
 from profilefit.report.figures.photo_figures import RINGS, SPOT
 from profilefit.report.page.document import document
@@ -33,10 +35,17 @@ SHADER = (
 )
 
 
-def medium_text(found: Photo) -> str:
-    """GLSL of the law for diffuse light at the medium's n and g, and after it albedo and mean free path by colour."""
-    folder, fits = fits_folder(), list(found.fits.values())
-    law = find("hazard-diffuse", folder, None, found.setting.n, found.setting.g)
+def diffuse_law(setting: Setting) -> Named:
+    """The law for diffuse light at a medium's n and g; SettingError where there is none."""
+    try:
+        return find("hazard-diffuse", fits_folder(), None, setting.n, setting.g)
+    except SettingError as error:
+        raise SettingError(f"{error}; without --out the medium alone is measured") from None
+
+
+def medium_text(found: Photo, law: Named) -> str:
+    """GLSL of a law for diffuse light, and after it albedo and mean free path by colour."""
+    fits = list(found.fits.values())
     values = {
         name: np.array([[one.values[of] for one in fits], [one.errors[of] for one in fits]])
         for name, of in (("albedo", "alpha"), ("mfp", "l"))
@@ -45,7 +54,7 @@ def medium_text(found: Photo) -> str:
         f"by photographs from {found.shot.sources[0]} on, {', '.join(found.fits)}: as alpha and mfp above",
         "mfp in mm; errors of one standard deviation",
     ]
-    return export_medium(law, folder, "medium", head, values)
+    return export_medium(law, fits_folder(), "medium", head, values)
 
 
 def photo_page(found: Photo, folder: Path, text: str) -> str:

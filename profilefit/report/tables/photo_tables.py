@@ -65,6 +65,8 @@ def photo_lines(found: Photo) -> Iterator[str]:
             f"{colour}: beam and lens 1/e^2 radius {2.0 * np.exp(x['core']):.3g} mm, {told}; chi-square {fit.chi2:.1f} "
             f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
         )
+        if not fit.converged:
+            yield f"{colour}: THE SEARCH DID NOT END at a minimum: these values are no answer"
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"

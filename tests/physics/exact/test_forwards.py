@@ -123,6 +123,26 @@ def test_shares_rise_to_all_of_the_light_and_have_radii(setting, alpha):
         assert radius[-2] < 5e3, "a share short of all light by 1e-5 is where there is light"
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("g", [0.05, 0.7, 0.95])
+@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+def test_a_profile_holds_its_reflectance(light, g):
+    """To what is documented: its slope in cdf is R_d over its own light."""
+    worst = {0.999: 0.0, 1.0: 0.0}
+    for n in (1.33, 1.4, 1.45):
+        setting = Setting(light, n, g)
+        for by in (0.05, 0.5, 0.95, 0.999, 0.9999, 1.0):
+            alpha = float(unreduced(by, g))
+            x = np.array([1.0, 1.0 + 1e-4])
+            share = float(np.diff(exact.cdf(x, alpha, setting=setting))[0])
+            ring = float(2.0 * np.pi * np.mean(x * exact.profile(x, alpha, setting=setting)) * np.diff(x)[0])
+            off = abs(ring / share / exact.reflectance(alpha, setting) - 1.0)
+            kind = 0.999 if by <= 0.999 else 1.0
+            worst[kind] = max(worst[kind], off)
+    assert worst[0.999] < 8e-4
+    assert 4e-4 < worst[1.0] < 3.2e-3, "white media are worse: a test that can fail"
+
+
 def test_no_light_is_none_at_the_source():
     np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=TISSUE), [0.0, 0.0])
 

@@ -5,6 +5,7 @@ import re
 import struct
 from html import escape
 from pathlib import Path
+from typing import Annotated
 
 import cv2
 import numpy as np
@@ -12,7 +13,9 @@ import OpenEXR
 import pytest
 import rawpy
 import tifffile
+import typer
 
+from profilefit.cli.photo import SeveralFiles
 from profilefit.errors import InputError
 from profilefit.measured.photo import setup
 from profilefit.measured.photo.exposure import read
@@ -177,6 +180,10 @@ def test_photographs_of_another_camera_are_not_replaced(command, tmp_path):
     (tmp_path / "shots" / "grey-2.dng").unlink()
     for _ in range(2):  # its own it makes again
         assert command("photo", "--simulate", "SETUP.toml", "--out", "shots")[0] == 0
+    (tmp_path / "SETUP.toml").write_text(SETUP.replace("white = true", "white = false"))
+    status, _, err = command("photo", "--simulate", "SETUP.toml", "--out", "shots")
+    assert status == 2
+    assert "shots/card-1.dng: expected none but photographs of this setup in its folder, got another" in err
 
 
 @pytest.mark.parametrize(
@@ -189,6 +196,7 @@ def test_photographs_of_another_camera_are_not_replaced(command, tmp_path):
         (("pitch", "late = 1\npitch"), "[camera] late must be a number > 0 and <= 0.2, got 1"),
         (("white = true", "white = 1"), "[cards] white must be true or false, got 1"),
         (("[camera]", "[optics]\nfalling = 0.8\n[camera]"), "[optics] falling must be a number > 1, or its light"),
+        (("1.0]\nmu_a = [0.05,", "0.001]\nmu_a = [0.05, 0.05, 0.001] #"), "[medium] mu_s + mu_a must be >= 0.01"),
     ],
 )
 def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, said):
@@ -228,10 +236,11 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
         (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
         (
             ("SPOT", *SCALE, "--glare", "2+-2"),
-            "--glare must be a value in 0 ... 1 with an error",
+            "--glare must be a value between 0 and 1 with an error",
         ),
         (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
         (("SPOT", *SCALE, "--n", "3"), "n = 3"),
+        (("SPOT", *SCALE, "--n", "1.7", "--g", "0", "--out", "out"), "without --out the medium alone is measured"),
         (("--simulate", "SETUP.toml"), "--out must be a folder"),
         (
             ("--simulate", "SETUP.toml", *SCALE, "--out", "out"),
@@ -276,6 +285,30 @@ def test_bad_input_is_one_line_and_writes_nothing(command, folder, tmp_path, wor
     assert said in err
     assert err.count("\n") == 1
     assert {path.name for path in tmp_path.iterdir()} == before
+
+
+def test_photographs_of_another_aperture_are_refused(command, folder, tmp_path):
+    """As spot and card of another aperture would have a scale that is wrong, and no misfit."""
+    for at in (0, 1):  # what was the time, 1 and 3.9 ms, is an f-number
+        whole = Path(several(folder, "spot")[at]).read_bytes()
+        time, number = (struct.pack("<HHI", tag, 5, 1) for tag in (33434, 33437))
+        assert whole.count(time) == 1
+        (tmp_path / f"spot-{at}.dng").write_bytes(whole.replace(time, number))
+    for words in (("spot-0.dng", "spot-1.dng"), ("spot-0.dng", "--grey", "spot-1.dng")):
+        status, _, err = command("photo", *words, *SCALE)
+        assert status == 2
+        assert re.fullmatch(r"profilefit: spot-1.dng: expected f/0.001 as spot-0.dng has, got f/0.00\d+\n", err)
+
+
+def test_files_after_an_equals_sign_are_the_options_too():
+    app, seen = typer.Typer(), []
+
+    @app.command(cls=SeveralFiles)
+    def photo(shots: list[str], card: Annotated[list[str], typer.Option()]):
+        seen.extend([shots, card])
+
+    app(["one", "--card=two", "three", "--card", "four"], standalone_mode=False)
+    assert seen == [["one"], ["two", "three", "four"]]
 
 
 def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):

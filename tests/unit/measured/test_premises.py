@@ -67,6 +67,8 @@ def test_a_simulation_states_its_medium():
     assert premises(outside) == Premises(Setting(n=1.5)), "which no table has"
     assert premises(tissue, "hazard") == Premises(Setting(n=1.4, g=0.9))
     assert premises(tissue, "burley") == Premises(Setting(n=1.4)), "which scatters without direction"
+    glass = replace(one, medium=Medium((Layer(1.5, 0.0, 0.0, 1.0, thickness=0.1), forward)))
+    assert premises(glass) == premises(glass, "hazard") == Premises(Setting(n=1.5)), "no light scatters in glass"
     other = replace(forward, phase=phase.HenyeyGreenstein(0.9))
     assert premises(replace(one, medium=Medium((other,)))).setting in (Setting(n=1.4), Setting(n=1.4, g=0.9))
 
