@@ -18,6 +18,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.cli.program import Program
 from mcml_sim.runs.store import DamagedBatch
 
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell starts what is in its background without
 app = typer.Typer()
 
 @app.command()
@@ -109,7 +110,7 @@ def test_a_pipe_that_nobody_reads_ends_it_quietly(small, words):
         (
             "fault",
             70,
-            "small: a fault of this program, please report it: KeyError in <string>:62: 'first line\\nsecond line' "
+            "small: a fault of this program, please report it: KeyError in <string>:63: 'first line\\nsecond line' "
             "(PYTHONDEVMODE=1 shows where)\n",
         ),
         ("overflow", 2, "small: no answer: a number on the way is beyond double precision; check units and sizes\n"),
