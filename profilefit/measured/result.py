@@ -30,7 +30,7 @@ KEPT = 4000
 WALKERS = 2 * FLOCK  # which move by halves
 MAX_STEPS = 20_000
 ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
-WIDEST = 1.0  # spread of the first walkers in a coordinate that the data do not constrain
+WIDEST = 1.0  # spread of the first walkers in a direction that the data do not constrain
 
 
 def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
@@ -50,9 +50,9 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
             value = value - np.logaddexp(0.0, full[:, U]) - np.logaddexp(0.0, -full[:, U])
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
-    likely = found.likely[np.ix_(free, free)]
-    narrowed = WIDEST / np.maximum(np.sqrt(np.diag(likely)), WIDEST)
-    covariance = likely * np.outer(narrowed, narrowed)
+    covariance = found.likely[np.ix_(free, free)]
+    if np.linalg.norm(found.jacobian, -2) * WIDEST < 1.0:  # its least singular value: covariances lose the others
+        covariance[:] = np.linalg.inv(found.jacobian.T @ found.jacobian + np.eye(len(free)) / WIDEST**2)
     start = np.random.default_rng(seed).multivariate_normal(centre[free], covariance, WALKERS)
     return walk(
         log_density, start, centre[free], seed, max_steps, KEPT, default_moves(centre[free], covariance), LAPLACE_LOOK

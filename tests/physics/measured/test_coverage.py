@@ -7,11 +7,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
+from benchmarks import own_data
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
+from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
 from profilefit.measured.identifiability import identifiability
+from profilefit.measured.instrument import Instrument
 from profilefit.measured.law_error import origin
 from profilefit.measured.problem import Question
 from profilefit.measured.reading import read
@@ -153,6 +156,18 @@ def test_the_chain_has_the_width_of_the_covariance(replicates):
     expected = np.sqrt(np.diag(replicates[0].likely))[:2]
     # 4000 thinned draws of tau ten know a standard deviation to 4 %: three of these.
     np.testing.assert_allclose(walked.samples.std(axis=0), expected, rtol=0.12)
+
+
+def test_a_chain_starts_where_the_data_leave_a_direction_open():
+    """Rings under a beam that is taken for a pencil, scale free: by its curvature the fit is open to 1e6 along one
+    direction, and the errors of the two others are lost in rounding."""
+    one, edges = own_data.Medium(Setting(), 0.969137, 0.249761, 0.0031), np.arange(1.5, 10.1, 0.25)
+    data = own_data.rows(one, np.random.default_rng(1), Instrument(Gaussian(0.897)), edges)
+    found = fitted(data, Question(exact_light(Setting()), {}))
+    assert np.linalg.cond(found.jacobian) > 1e8, "whose square is more than double precision has"
+    walked = posterior(found, max_steps=2000)
+    spread = np.linalg.svd(np.cov(walked.samples.T))[1]
+    assert 1e-7 < spread[2] < spread[0] < 1e2
 
 
 def test_the_stored_runs_can_be_made_again(tmp_path):
