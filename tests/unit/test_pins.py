@@ -127,13 +127,14 @@ def run(*words: str, program: Callable[[], None] = main) -> str:
 def exports(*languages: str) -> dict[str, str]:
     """A digest of the text of every law and record in each language, or of why there is none.
 
-    Of numbers in JSON, which are written to the last bit, six digits count: processors sum matrices in their own ways.
+    Of numbers in JSON, which are written to the last bit, nine digits count, as many as shaders have: processors sum
+    matrices in their own ways.
     """
     names = [*profilefit.names(), *(path.stem for path in sorted((ROOT / "fits").glob("*.json")))]
     texts = {f"{name} {lang}": run("export", name, "--lang", lang) for name in names for lang in languages}
     for name, text in texts.items():
         if name.endswith(" json") and text.startswith("{"):
-            texts[name] = json.dumps(json.loads(text, parse_float=lambda number: f"{float(number):.6g}"))
+            texts[name] = json.dumps(json.loads(text, parse_float=lambda number: f"{float(number):.9g}"))
     return {name: hashlib.sha256(text.encode()).hexdigest()[:16] for name, text in texts.items()}
 
 
