@@ -22,7 +22,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import multivariate_t
 
 from benchmarks.render_figure import save
 from mcml_sim import Setting
@@ -32,14 +31,12 @@ from profilefit.measured.assumed import beam_width
 from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import exact_light
-from profilefit.measured.fitting import MediumFit, fitted
+from profilefit.measured.fitting import fitted
 from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, U, u_of
+from profilefit.measured.model import Model, u_of
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Question
-from profilefit.measured.ranges import DRAWS
 from profilefit.measured.result import Answer, judged
-from profilefit.measured.solving import FARTHEST_U, likelihood
 from profilefit.report.figures.canvas import BLUE, GREEN, ORANGE, VERMILION, WIDTH, canvas, plain_log, styled
 
 Floats = NDArray[np.float64]
@@ -66,7 +63,7 @@ class Coverage(NamedTuple):
     held: float
     """Share of the intervals that hold the truth."""
     answered: float
-    """Share of the media that have one."""
+    """Share of the media that have one with two ends."""
     wider: float
     """Median half-width over the Fisher bound's."""
 
@@ -101,36 +98,25 @@ def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
     rng = np.random.default_rng([1, at])
     one = drawn(rng)
     data, premises = rows(one, rng), _premises(one, opened)
-    fit = fitted(data, _question(premises))
-    truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
-    draws = _draws(fit, rng) if fit.minimum.converged else dict.fromkeys(NAMES, np.full(2, np.nan))
+    answer = judged(fitted(data, _question(premises)))
     bound = _fisher(one, data, premises.instrument, premises.ranges)
-    found = []
-    for name in NAMES:
-        low, high = np.quantile(draws[name], [0.025, 0.975])
-        ratio = (high - low) / 3.92 / fit.values[name]
-        found.append((bool(low < truth[name] < high), bool(ratio < 0.5), float(ratio / bound[name])))
-    return found
+    return [_held(answer, one, name, bound[name]) for name in NAMES]
 
 
-def _draws(fit: MediumFit, rng: np.random.Generator) -> dict[str, Floats]:
-    """Those that intervals are of; the chain's by importance sampling from Student's t of five degrees of freedom."""
-    free = list(fit.question.free)
-    spread = multivariate_t(fit.point[free], fit.conditional[np.ix_(free, free)], df=5, seed=rng)
-    points = np.repeat(fit.point[None], DRAWS, axis=0)
-    points[:, free] = spread.rvs(DRAWS)
-    reached = np.abs(points[:, U]) < FARTHEST_U
-    log = likelihood(fit.problem.costs(np.where(reached[:, None], points, fit.point)), len(free), fit.data.pooled)
-    log -= np.logaddexp(0.0, points[:, U]) + np.logaddexp(0.0, -points[:, U]) + spread.logpdf(points[:, free])
-    share = np.where(reached & np.isfinite(log), np.exp(log - np.max(log[reached & np.isfinite(log)])), 0.0)
-    points = points[rng.choice(DRAWS, DRAWS, p=share / share.sum())]
-    points += 0.0 if fit.open is None else fit.open.offsets
-    return model.quantities(points, np.zeros(DRAWS))
+def _held(answer: Answer, one: Medium, name: str, bound: float) -> tuple[bool, bool, float]:
+    low, high = answer.interval(name) or (None, None)
+    if low is None or high is None:
+        return False, False, np.inf
+    return low < _truth(one)[name] < high, True, (high - low) / 3.92 / answer.found.values[name] / bound
 
 
 def _summary(each: Floats) -> Coverage:
     answered = each[:, 1] > 0
     return Coverage(float(each[answered, 0].mean()), float(answered.mean()), float(np.median(each[answered, 2])))
+
+
+def _truth(one: Medium) -> dict[str, float]:
+    return {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
 
 
 def _point(one: Medium) -> Floats:
@@ -240,14 +226,8 @@ def beamed(at: int) -> Beamed:
 
 def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
     """Whether the intervals hold the truth; None where a quantity has none with two ends."""
-    truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
-    inside = []
-    for name in NAMES:
-        low, high = answer.interval(name) or (None, None)
-        if low is None or high is None:
-            return None
-        inside.append(low < truth[name] < high)
-    return tuple(inside)
+    each = [_held(answer, one, name, 1.0) for name in NAMES]
+    return tuple(held for held, _, _ in each) if all(answered for _, answered, _ in each) else None
 
 
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm

@@ -1,9 +1,4 @@
-"""The result of a fit: estimates, identifiability, the most informative additional measurement; and its JSON content.
-
-emcee samples the posterior of the fit's coordinates. Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k:
-nothing is known of the units, and alpha may be 1. Errors estimated from replicates share a scale that is itself an
-estimate: with that unknown the likelihood is Student's t.
-"""
+"""The result of a fit: values, identifiability, the most informative additional measurement; and its JSON content."""
 
 from __future__ import annotations
 
@@ -14,58 +9,19 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.chains import LAPLACE_LOOK, Walk, default_moves, walk
+from profilefit.fitting.chains import Walk
 from profilefit.measured import model
 from profilefit.measured.assumed import BeamWidth, Tissue, as_tissue, beam_width
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit
 from profilefit.measured.identifiability import Identifiability, Interval, identifiability
-from profilefit.measured.model import FLOCK, NAMES, U, u_of
+from profilefit.measured.model import NAMES, U, u_of
 from profilefit.measured.optimal_design import Advice, advised
-from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended, likelihood
+from profilefit.measured.posterior import points, posterior
+from profilefit.measured.solving import Minimum, descended
 from profilefit.recipes import record
 
 Floats = NDArray[np.float64]
-KEPT = 4000
-WALKERS = 2 * FLOCK  # which move by halves
-MAX_STEPS = 20_000
-ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
-WIDEST = 1.0  # spread of the first walkers in a direction that the data do not constrain
-
-
-def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
-    """Posterior of the free coordinates of a fit, by emcee: samples (k, p)."""
-    free, centre = list(found.question.free), found.point
-    reach = np.full(centre.size, FARTHEST_LN)
-
-    def log_density(points: Floats) -> Floats:
-        full = np.repeat(centre[None], len(points), axis=0)
-        full[:, free] = points
-        inside = np.all(np.abs(full - centre)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
-            np.abs(full[:, U]) < FARTHEST_U + ROOM
-        )
-        rise = found.problem.costs(np.clip(full, centre - 3 * reach, centre + 3 * reach)) - found.minimum.cost
-        value = likelihood(rise, len(free), found.data.pooled)
-        if U in free:  # ds/du: what is flat in s
-            value = value - np.logaddexp(0.0, full[:, U]) - np.logaddexp(0.0, -full[:, U])
-        return np.where(inside & np.isfinite(value), value, -np.inf)
-
-    covariance = found.likely[np.ix_(free, free)]
-    if np.linalg.norm(found.jacobian, -2) * WIDEST < 1.0:  # its least singular value: covariances lose the others
-        covariance[:] = np.linalg.inv(found.jacobian.T @ found.jacobian + np.eye(len(free)) / WIDEST**2)
-    start = np.random.default_rng(seed).multivariate_normal(centre[free], covariance, WALKERS)
-    return walk(
-        log_density, start, centre[free], seed, max_steps, KEPT, default_moves(centre[free], covariance), LAPLACE_LOOK
-    )
-
-
-def points(found: MediumFit, samples: Floats) -> Floats:
-    """The coordinates (k, 3) of samples (k, p) of the free ones."""
-    full = np.repeat(found.point[None], len(samples), axis=0)
-    full[:, list(found.question.free)] = samples
-    return full
-
-
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
 GREY = 0.9  # albedo assumed for the advice where the data do not bound it at all

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from scipy import stats
+from scipy.special import expit
 
 from benchmarks import own_data
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
@@ -16,10 +17,12 @@ from profilefit.measured.fitting import fitted
 from profilefit.measured.identifiability import identifiability
 from profilefit.measured.instrument import Instrument
 from profilefit.measured.law_error import origin
+from profilefit.measured.model import U
+from profilefit.measured.posterior import posterior, ridge
 from profilefit.measured.problem import Question
 from profilefit.measured.reading import read
 from profilefit.measured.replicates import moderated_variances
-from profilefit.measured.result import Answer, judged, posterior
+from profilefit.measured.result import Answer, judged
 from profilefit.recipes import catalogue
 
 pytestmark = pytest.mark.slow
@@ -170,6 +173,35 @@ def test_a_chain_starts_where_the_data_leave_a_direction_open():
     curved = np.linalg.svd(found.jacobian)[1] ** -2.0
     assert spread[1] == pytest.approx(curved[1], rel=0.5)
     assert curved[0] < spread[2] < spread[1] < spread[0] < 1e2
+
+
+def test_a_chain_walks_the_whole_of_a_bent_ridge():
+    """Its shares of u between quantiles of the density summed over a grid of the three coordinates.
+
+    The medium 312 of `benchmarks.own_data --beams`, under a beam that is known, scale free.
+    """
+    one, edges = own_data.Medium(Setting(), 0.715456, 0.676514, 0.00577), np.arange(2.75, 10.1, 0.25)
+    seen = Instrument(Gaussian(0.64))
+    data = own_data.rows(one, np.random.default_rng(10), seen, edges)
+    found = fitted(data, Question(exact_light(Setting()), {}, instrument=seen))
+    walked, along = posterior(found), ridge(found)
+    u = np.linspace(along.first[0], along.first[-1], 81)
+    z = np.stack(np.meshgrid(*[np.linspace(-4.5, 4.5, 19)] * 2), axis=-1).reshape(-1, 2)
+    log = []
+    for first in u:
+        node = min(along.nodes, key=lambda one: abs(one.first - first)).moved(first)
+        others = node.others + z @ np.linalg.cholesky(node.covariance).T
+        costs = found.problem.costs(np.column_stack([np.full(len(z), first), others])) - found.minimum.cost
+        log.append(np.logaddexp.reduce(-0.5 * costs) + 0.5 * np.linalg.slogdet(node.covariance)[1])
+    share = np.exp(log - np.max(log)) * expit(u) * expit(-u)
+    summed = np.cumsum(share) - 0.5 * share
+    levels = np.array([0.005, 0.025, 0.16, 0.5, 0.84, 0.975, 0.995])
+    places = np.interp(levels, summed / share.sum(), u)
+    error = np.sqrt(levels * (1 - levels) * walked.tau / (walked.steps * walked.walkers))
+    assert walked.tau < 10, "in coordinates that are not straight it is 226, and the share .975 ends where .93 does"
+    assert np.all(np.abs(np.mean(walked.samples[:, :1] < places, axis=0) - levels) < 4 * error)
+    wide = found.point[U] + np.sqrt(found.likely[U, U]) * stats.norm.ppf(levels)
+    assert np.max(np.abs(np.interp(wide, u, summed / share.sum()) - levels) / error) > 20, "negative control"
 
 
 def test_the_stored_runs_can_be_made_again(tmp_path):

@@ -17,9 +17,10 @@ from profilefit.measured.identifiability import identifiability, relative_errors
 from profilefit.measured.law_error import BEYOND, RMS, WAVE, origin, relative_error
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.optimal_design import advised
+from profilefit.measured.posterior import posterior
 from profilefit.measured.problem import Known, Question
 from profilefit.measured.reading import read
-from profilefit.measured.result import Answer, judged, posterior
+from profilefit.measured.result import Answer, judged
 from profilefit.measured.solving import FARTHEST_LN, LONGEST
 from profilefit.recipes import catalogue
 
