@@ -51,13 +51,14 @@ class Node:
     @property
     def slope(self) -> Floats:
         """Derivatives (p - 1,) of the others by the first."""
-        found: Floats = -self.covariance @ self._ways.T @ self.there.jacobian[:, self.found.question.free[0]]
-        return found
+        way = self.there.jacobian[:, self.found.question.free[0]]
+        return np.asarray(-self.root @ self.root.T @ self._ways.T @ way, float)
 
     @cached_property
-    def covariance(self) -> Floats:
-        """(p - 1, p - 1) of the others."""
-        return np.asarray(np.linalg.inv(self._ways.T @ self._ways + np.eye(len(self._others)) / WIDEST**2), float)
+    def root(self) -> Floats:
+        """(p - 1, p - 1) of the others' covariance: triangular, its diagonal positive."""
+        r = np.linalg.qr(np.vstack([self._ways, np.eye(len(self._others)) / WIDEST]), mode="r")
+        return np.asarray(np.linalg.inv(np.sign(np.diag(r))[:, None] * r), float)
 
     @cached_property
     def log(self) -> float:
@@ -65,9 +66,8 @@ class Node:
         free, rise = self.found.question.free, self.there.cost - self.found.minimum.cost
         if not (np.isfinite(rise) and np.all(np.isfinite(self._ways))):
             return -np.inf
-        log = likelihood(np.array([rise]), len(free), self.found.data.pooled)
-        log += 0.5 * np.linalg.slogdet(self.covariance)[1]
-        return float((log + _log_prior(np.array([self.first])) if free[0] == U else log)[0])
+        log = likelihood(np.array(rise), len(free), self.found.data.pooled) + np.sum(np.log(np.diag(self.root)))
+        return float(log + _log_prior(np.array(self.first)) if U in free else log)
 
     @property
     def _others(self) -> list[int]:
@@ -103,8 +103,7 @@ class Ridge:
 
     @cached_property
     def _root(self) -> BSpline:
-        """Cholesky's lower factor of the others' covariance."""
-        return make_interp_spline(self.first, [np.linalg.cholesky(one.covariance) for one in self.nodes], k=1)
+        return make_interp_spline(self.first, [one.root for one in self.nodes], k=1)
 
     def bent(self, straight: Floats) -> tuple[Floats, Floats]:
         """Coordinates (m, p) of straight ones (m, p), and ln of the volume (m,) of these in those."""
@@ -127,10 +126,10 @@ def ridge(found: MediumFit) -> Ridge:
     """That of a fit: its first free coordinate is moved to either side, and the others are fitted again."""
     first, best = found.question.free[0], Node(found, found.minimum)
     ends = np.array([-1.0, 1.0]) * (FARTHEST_U + ROOM) if first == U else best.first + np.array([-1, 1]) * FARTHEST_LN
-    stride = STRIDE * min(float(np.sqrt(found.conditional[first, first])), WIDEST)
+    error = float(np.sqrt(found.conditional[first, first])) or WIDEST
     nodes = [best]
     for side in (-1.0, 1.0):
-        last, step = best, side * stride
+        last, step = best, side * STRIDE * min(error, WIDEST)
         for _ in range(NODES):
             last, step = last.moved(float(np.clip(last.first + step, *ends))), step * LONGER
             if not np.isfinite(last.log):
