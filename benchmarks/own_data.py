@@ -1,7 +1,7 @@
 """How often intervals of `profilefit fit` hold the truth, and what a measurement can know at all.
 
     python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
-    python -m benchmarks.own_data --beams                  # under beams of .25 to 1 mm, given or not: an hour
+    python -m benchmarks.own_data --beams                  # under beams of .25 to 1 mm, given or not: the same
     python -m benchmarks.own_data --chart own-data.png     # a minute: error by r_min, r_max, noise, beam, n and g
 
 Media are drawn from what a fit takes for possible: n from 1.33 to 1.45, g from 0 to .95, alpha' flat in sqrt(1 -
