@@ -63,7 +63,7 @@ class Coverage(NamedTuple):
     held: float
     """Share of the intervals that hold the truth."""
     answered: float
-    """Share of the media that have one with two ends."""
+    """Share of the media that have one, its half-width below the value."""
     wider: float
     """Median half-width over the Fisher bound's."""
 
@@ -100,14 +100,18 @@ def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
     data, premises = rows(one, rng), _premises(one, opened)
     answer = judged(fitted(data, _question(premises)))
     bound = _fisher(one, data, premises.instrument, premises.ranges)
-    return [_held(answer, one, name, bound[name]) for name in NAMES]
+    found, truth = [], _truth(one)
+    for name in NAMES:
+        low, high = _ends(answer, name) or (np.nan, np.nan)
+        ratio = (high - low) / 3.92 / answer.found.values[name]
+        found.append((bool(low < truth[name] < high), bool(ratio < 0.5), float(ratio / bound[name])))
+    return found
 
 
-def _held(answer: Answer, one: Medium, name: str, bound: float) -> tuple[bool, bool, float]:
+def _ends(answer: Answer, name: str) -> tuple[float, float] | None:
+    """Of the interval that has two."""
     low, high = answer.interval(name) or (None, None)
-    if low is None or high is None:
-        return False, False, np.inf
-    return low < _truth(one)[name] < high, True, (high - low) / 3.92 / answer.found.values[name] / bound
+    return None if low is None or high is None else (low, high)
 
 
 def _summary(each: Floats) -> Coverage:
@@ -226,8 +230,12 @@ def beamed(at: int) -> Beamed:
 
 def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
     """Whether the intervals hold the truth; None where a quantity has none with two ends."""
-    each = [_held(answer, one, name, 1.0) for name in NAMES]
-    return tuple(held for held, _, _ in each) if all(answered for _, answered, _ in each) else None
+    inside = []
+    for name in NAMES:
+        if (ends := _ends(answer, name)) is None:
+            return None
+        inside.append(ends[0] < _truth(one)[name] < ends[1])
+    return tuple(inside)
 
 
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm

@@ -20,7 +20,7 @@ from scipy.interpolate import BSpline, CubicHermiteSpline, make_interp_spline
 from profilefit.fitting.chains import LAPLACE_LOOK, Walk, default_moves, walk
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.model import FLOCK, U
-from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended, likelihood
+from profilefit.measured.solving import FARTHEST_LN, FARTHEST_U, Minimum, descended, likelihood, log_prior
 
 Floats = NDArray[np.float64]
 KEPT = 4000
@@ -67,7 +67,7 @@ class Node:
         if not (np.isfinite(rise) and np.all(np.isfinite(self._ways))):
             return -np.inf
         log = likelihood(np.array(rise), len(free), self.found.data.pooled) + np.sum(np.log(np.diag(self.root)))
-        return float(log + _log_prior(np.array(self.first)) if U in free else log)
+        return float(log + log_prior(np.array(self.first)) if U in free else log)
 
     @property
     def _others(self) -> list[int]:
@@ -154,7 +154,7 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
         rise = found.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach)) - found.minimum.cost
         value = likelihood(rise, len(free), found.data.pooled) + volume
         if U in free:
-            value = value + _log_prior(full[:, U])
+            value = value + log_prior(full[:, U])
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
     centre, covariance = np.zeros(len(free)), np.eye(len(free))
@@ -170,9 +170,3 @@ def points(found: MediumFit, samples: Floats) -> Floats:
     full = np.repeat(found.point[None], len(samples), axis=0)
     full[:, list(found.question.free)] = samples
     return full
-
-
-def _log_prior(u: Floats) -> Floats:
-    """ln ds/du: what is flat in s."""
-    found: Floats = -np.logaddexp(0.0, u) - np.logaddexp(0.0, -u)
-    return found

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from profilefit.measured.model import U
-from profilefit.measured.solving import Minimum, Problem, descended_from, likelihood
+from profilefit.measured.solving import Minimum, Problem, descended_from, likelihood, log_prior
 
 Floats = NDArray[np.float64]
 NODES = {"n": 3, "g": 6, "beam": 5}
@@ -151,7 +151,7 @@ def _log_volumes(problem: Problem, fits: Sequence[Minimum]) -> Floats:
     for at, one in enumerate(fits):
         sign, log = np.linalg.slogdet(one.jacobian[:, free].T @ one.jacobian[:, free])
         if one.converged and sign > 0:
-            flat = -np.logaddexp(0.0, one.point[U]) - np.logaddexp(0.0, -one.point[U]) if U in free else 0.0
+            flat = float(log_prior(one.point[U])) if U in free else 0.0
             found[at] = flat - 0.5 * log
     return found
 

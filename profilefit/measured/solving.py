@@ -175,6 +175,12 @@ def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
     return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
 
 
+def log_prior(u: Floats) -> Floats:
+    """ln ds/du (m,): what is flat in s = sqrt(1 - alpha)."""
+    found: Floats = -np.logaddexp(0.0, u) - np.logaddexp(0.0, -u)
+    return found
+
+
 def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum:
     """The minimum below `start` (3,) in the coordinates `free`; the others stay."""
     moving, last = list(free), _Last(problem, start, list(free))
