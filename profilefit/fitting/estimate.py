@@ -25,7 +25,7 @@ from mcml_sim.errors import InputError, SettingError
 from mcml_sim.media.checks import require_own_process
 from profilefit.fitting.objectives import NO_LIMITS, OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import Optimum, solve, solve_batch
+from profilefit.fitting.solver import Solution, least_squares, solve_batch
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.laws.liang import QUANTILES
 
@@ -55,7 +55,7 @@ class Fit:
     free: tuple[str, ...]
     objective: str
     rings: Rings
-    solution: Optimum
+    solution: Solution
     statistical: Floats | None
     misfit: Floats
     jackknife: Floats
@@ -135,7 +135,7 @@ def fit(
     rings = rings_of(profiles, used, limits, xi)
     if counted is not None:
         rings = eqx.tree_at(lambda tree: tree.weight, rings, np.asarray(rings.weight) * counted)
-    solution = judged(solve(problem, law.vector(names), (law, rings)), names)
+    solution = judged(least_squares(problem, law.vector(names), (law, rings)), names)
     return Fit(
         law.with_vector(names, [float(value) for value in solution.parameters]),
         names,
@@ -166,12 +166,12 @@ class ResidualFunction:
         return (rings.weight[:, None] * table).ravel()
 
 
-def degrees_of_freedom(solution: Optimum) -> int:
+def degrees_of_freedom(solution: Solution) -> int:
     """Residuals that count, less the free constants."""
     return max(int(np.count_nonzero(solution.residuals)) - solution.parameters.size, 1)
 
 
-def misfit_covariance(solution: Optimum) -> Floats:
+def misfit_covariance(solution: Solution) -> Floats:
     """s^2 (J^T J)^-1 (p, p); NaN where the fit failed."""
     if not solution.converged:
         return np.full((solution.parameters.size,) * 2, np.nan)
@@ -185,7 +185,7 @@ def scaled_inverse(matrix: Floats) -> Floats:
     return np.linalg.inv(matrix / np.outer(scale, scale)) / np.outer(scale, scale)
 
 
-def judged(solution: Optimum, names: tuple[str, ...]) -> Optimum:
+def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
     """A solution whose constants are not separately identifiable has failed, however small its misfit."""
     if not solution.converged or (condition := solution.condition_number) <= DEGENERATE:
         return solution
@@ -202,7 +202,7 @@ def residual_structure(table: Floats) -> Structure:
     return Structure(rms, float(np.max(np.abs(table), initial=0.0)), _lag_one(table), _lag_one(table.T), waves)
 
 
-def _jackknife(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
+def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
     m = rings.alpha.size
     if not solution.converged or m < JACKKNIFE_GROUPS:
@@ -221,20 +221,20 @@ def _jackknife(problem: ResidualFunction, solution: Optimum, law: Constants, rin
     return np.sqrt((len(groups) - 1) / len(groups) * spread)
 
 
-def sensitivity(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
+def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
     its data."""
     hessian, mixed = _second_derivatives(problem, solution, law, rings)
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
 
 
-def curvature(problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings) -> Floats:
+def curvature(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
     return _second_derivatives(problem, solution, law, rings)[0]
 
 
 def _second_derivatives(
-    problem: ResidualFunction, solution: Optimum, law: Constants, rings: Rings
+    problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
 ) -> tuple[Floats, Floats]:
     """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p); one program."""
     with jax.enable_x64(True):

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import solve_triangular
 from scipy.linalg.lapack import dpotri
-from scipy.optimize import minimize
+
+from profilefit.fitting.solver import minimise
 
 Floats = NDArray[np.float64]
 NUGGET = 1e-3  # of the amplitude's square, left to each ring alone: without it the finest scale decides on the largest
@@ -66,12 +67,13 @@ def likeliest(begin: Floats, limits: Floats, args) -> tuple[Floats, Floats, floa
 
     A length at a limit is held there: it has no curvature.
     """
-    options = {"gtol": TOLERANCE, "maxiter": MAX_STEPS}
-    found = minimize(_loss, begin, args, method="L-BFGS-B", jac=True, bounds=limits, options=options)
-    around = [[_loss(found.x + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
+    theta, loss, converged = minimise(
+        lambda x: _loss(x, *args), begin, (limits[:, 0], limits[:, 1]), TOLERANCE, MAX_STEPS
+    )
+    around = [[_loss(theta + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
     curved = np.array([(after - before) / (2.0 * STEP) for after, before in around])
-    free = (limits[:, 0] < found.x) & (found.x < limits[:, 1])
+    free = (limits[:, 0] < theta) & (theta < limits[:, 1])
     _, _, y, slope, noise = args
     floor = np.diag(np.where(np.diag(noise) > 0, 0.0, 1.0))
-    gain = _restricted(noise + floor, y, slope)[0] - found.fun
-    return found.x, 0.5 * (curved + curved.T) * np.outer(free, free), gain, bool(found.success)
+    gain = _restricted(noise + floor, y, slope)[0] - loss
+    return theta, 0.5 * (curved + curved.T) * np.outer(free, free), gain, converged

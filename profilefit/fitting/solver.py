@@ -1,25 +1,32 @@
-"""Nonlinear least squares by a trust region: parameters scaled, in float64, one problem or a batch of them.
+"""Nonlinear least squares and minimisation by optimistix: parameters scaled, bounds kept, in float64.
 
-Only residuals and their Jacobian are compiled, as one small program for each law and shape of data; the steps between
-are scipy's. A loop that is compiled takes as long to compile as a fit, for each number of problems anew.
+Residuals and Jacobian are evaluated here, by one small compiled program per model and shape of data, or by any numpy
+function. Levenberg and Marquardt's method needs only their triangular factor: the QR factor of the matrix (J, r) has
+the same products J'J, J'r and r'r. `optimistix.LevenbergMarquardt` therefore steps on a problem of p + 1 rows, through
+its interface for interactive solves. That step compiles once per size of p, whatever the model and the data.
 
-A failure is a result, not an exception: `Optimum.result` is "converged" or says what happened and what to try.
+A failure is a result, not an exception: `Solution.result` is "converged" or states what happened and what to try.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import Any
 
 import equinox as eqx
 import jax
 import jax.numpy as jnp
+import lineax as lx
 import numpy as np
+import optimistix as optx
+from jax import Array
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 Floats = NDArray[np.float64]
+Bounds = tuple[Floats | float, Floats | float]
+Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
@@ -30,16 +37,23 @@ NOT_FINITE = "the residual is not finite there: start nearer to the data, or nar
 STALLED, NO_MISFIT = 0.03, 1e-8
 # Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
 ORTHOGONAL = 1e-7
+SOLVER: Any = optx.LevenbergMarquardt(0.0, 0.0, linear_solver=lx.QR())  # `solve` decides when it ends
+MINIMISER: Any = optx.BFGS(0.0, 0.0)
+STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: below it, the parameter is at its bound
+SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
+OPTIONS = {"jac": "bwd"}  # optimistix keeps the Jacobian as an array, not as a program
+NO_TAGS: frozenset[object] = frozenset()
 
 
 @dataclass(frozen=True)
-class Optimum:
-    """Where a least-squares problem ended.
+class Solution:
+    """End of a least-squares search.
 
     parameters  (p,) the minimiser, in the caller's units
     residuals   (n,) there; jacobian (n, p) d residual / d parameter
-    steps       points at which the residuals were asked for
+    steps       number of points at which the residuals were evaluated
     result      "converged", or what failed and what to try next
+    at_bound    (p,) True for each parameter that a bound holds
     """
 
     parameters: Floats
@@ -47,6 +61,7 @@ class Optimum:
     jacobian: Floats
     steps: int
     result: str
+    at_bound: NDArray[np.bool_] | None = None
 
     @property
     def converged(self) -> bool:
@@ -54,20 +69,54 @@ class Optimum:
 
     @property
     def cost(self) -> float:
-        """Sum of squared residuals."""
-        return float(self.residuals @ self.residuals)
+        """Sum of squared residuals; infinite or NaN where they are."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return float(self.residuals @ self.residuals)
+
+    @property
+    def covariance(self) -> Floats:
+        """(J'J)^-1 (p, p), of residuals in standard errors; times `variance` for residuals of unknown size."""
+        return covariance(self.jacobian)
+
+    @property
+    def variance(self) -> float:
+        """Sum of squared residuals per degree of freedom; residuals of exactly 0 do not count."""
+        return self.cost / max(int(np.count_nonzero(self.residuals)) - self.parameters.size, 1)
 
     @property
     def condition_number(self) -> float:
-        """Of the Jacobian with its columns scaled to unit length: above 1e7 constants trade against each other."""
+        """Condition number of the Jacobian, columns of unit length: above 1e7 constants trade against each other."""
         if not np.all(np.isfinite(self.jacobian)):
             return float("inf")
         lengths = np.linalg.norm(self.jacobian, axis=0)
         return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
 
 
-def solve(residual: Callable, start: ArrayLike, data: object = None) -> Optimum:
-    """Minimise |residual(parameters, data)|^2 from `start` (p,); `data` is any pytree of arrays."""
+def covariance(jacobian: Floats) -> Floats:
+    """(J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
+
+    The singular values of J itself, columns of unit length, give it: products would lose half of the digits. Directions
+    beyond rounding get the error of rounding, which is large but finite.
+    """
+    size = np.linalg.norm(jacobian, axis=0)
+    size = np.maximum(size, np.finfo(float).tiny ** 0.25)
+    _, singular, ways = np.linalg.svd(jacobian / size, full_matrices=False)
+    scaled = ways / np.maximum(singular, np.finfo(float).eps * singular[0])[:, None]
+    found: Floats = (scaled.T @ scaled) / np.outer(size, size)
+    return found
+
+
+def least_squares(
+    residual: Callable[..., Array], start: ArrayLike, data: object = None, bounds: Bounds | None = None
+) -> Solution:
+    """Minimise |residual(parameters, data)|^2.
+
+    Args:
+        residual: function of jax arrays, (p,) and a pytree, that returns (n,) residuals.
+        start: (p,) parameters to start from, in the caller's units; each is scaled by its size.
+        data: any pytree of arrays.
+        bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
+    """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
 
@@ -75,17 +124,17 @@ def solve(residual: Callable, start: ArrayLike, data: object = None) -> Optimum:
             values, jacobian = _linearise(residual, parameters, arrays)
             return np.asarray(values), np.asarray(jacobian)
 
-        return _least_squares(at, np.asarray(start, np.float64))
+        return solve(at, np.asarray(start, np.float64), bounds)
 
 
-def solve_batch(residual: Callable, starts: ArrayLike, data: object = None) -> tuple[Optimum, ...]:
+def solve_batch(residual: Callable[..., Array], starts: ArrayLike, data: object = None) -> tuple[Solution, ...]:
     """Solve m problems of one shape: `starts` (m, p), every leaf of `data` with a leading axis m.
 
-    One after the other: one program serves them all and `solve` too, and none waits for the slowest.
+    One after the other: one program serves them all and `least_squares` too, and none waits for the slowest.
     """
     begins, leaves = np.asarray(starts, np.float64), jax.tree.map(np.asarray, data)
     items = (jax.tree.map(lambda leaf, row=row: leaf[row], leaves) for row in range(len(begins)))
-    return tuple(solve(residual, begin, item) for begin, item in zip(begins, items, strict=True))
+    return tuple(least_squares(residual, begin, item) for begin, item in zip(begins, items, strict=True))
 
 
 @eqx.filter_jit
@@ -93,43 +142,147 @@ def _linearise(residual, parameters, data):
     return residual(parameters, data), jax.jacfwd(residual)(parameters, data)
 
 
-def _least_squares(at: Callable[[Floats], tuple[Floats, Floats]], start: Floats) -> Optimum:
-    """From `start` (p,), `at` the residuals and the Jacobian of constants.
+def differences(
+    residual: Callable[[Floats], Floats], step: float | Floats, highest: Floats | float = np.inf
+) -> Linearised:
+    """Residuals and their Jacobian by forward differences of `step`, backward where that passes `highest`."""
 
-    Constants span four decades, so they are scaled by their start: the trust region treats them alike.
+    def at(x: Floats) -> tuple[Floats, Floats]:
+        here, ways = residual(x), np.broadcast_to(np.where(x + step > highest, -step, step), x.shape)
+        columns = [(residual(x + way) - here) / way.sum() for way in np.diag(ways)]
+        return here, np.stack(columns, axis=1)
+
+    return at
+
+
+def solve(
+    at: Linearised,
+    start: Floats,
+    bounds: Bounds | None = None,
+    *,
+    by_slope: bool = False,
+    tolerance: float = RELATIVE_TOLERANCE,
+    gain: float = 0.0,
+    longest: ArrayLike = np.inf,
+    most: int = MAX_STEPS,
+) -> Solution:
+    """Minimise the sum of squares of residuals that `at` returns with their Jacobian, (n,) and (n, p), for (p,).
+
+    Args:
+        at: residuals and Jacobian; either may be not finite, and then the step is taken back.
+        start: (p,) parameters to start from, inside the bounds.
+        bounds: lowest and highest parameters; None for none.
+        by_slope: scale parameters by the size of their column of the Jacobian at the start, not by their own size.
+        tolerance: relative size of a step at which the search ends.
+        gain: reduction of the sum of squares that a step must promise for the search to go on.
+        longest: (p,) longest step of each parameter.
+        most: number of evaluations after which the search gives up.
     """
+    low, high = np.broadcast_arrays(*(np.asarray(end, float) for end in bounds or (-np.inf, np.inf)), start)[:2]
+    values, jacobian = at(start)
+    if not (np.all(np.isfinite(values)) and np.all(np.isfinite(jacobian))):
+        return Solution(start, values, jacobian, 1, NOT_FINITE, np.zeros(start.size, bool))
     scale = np.where(start == 0, 1.0, np.abs(start))
+    if by_slope:
+        sizes = np.linalg.norm(jacobian, axis=0)
+        scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
+    ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
+    size = next((size for size in SIZES if size >= start.size), start.size)
+    y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
+    while True:
+        here, state = _stepped(proposed, values, _held(values, jacobian * scale, proposed, ends), state, y, size)
+        if accepted := steps == 1 or not np.array_equal(here, y):
+            y, best = here, (point, values, jacobian)
+        proposed = np.clip(y + np.clip(np.asarray(state.y_eval)[: start.size] - y, -reach, reach), *ends)
+        ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
+        if ended or steps >= most or (gain and accepted and _promised(best, (proposed - y) * scale) < gain):
+            break
+        point = np.clip(proposed * scale, low, high)
+        values, jacobian = at(point)
+        steps += 1
+    active = _active(*best[1:], best[0], (low, high))
+    result = _explain(ended or steps < most, most, best[1], best[2][:, ~active])
+    return Solution(*best, steps, result, active)
 
-    @lru_cache(maxsize=2)
-    def linear(here: bytes) -> tuple[Floats, Floats]:
-        values, jacobian = at(np.frombuffer(here) * scale)
-        # A step to where there is no slope is one to take back, which residuals say that are not finite.
-        return values if np.all(np.isfinite(jacobian)) else np.full_like(values, np.nan), jacobian * scale
 
-    begin = start / scale
-    if not np.all(np.isfinite(linear(begin.tobytes())[0])):
-        return Optimum(start, *at(start), 1, NOT_FINITE)
-    with np.errstate(over="ignore", divide="ignore", invalid="ignore"):  # of constants that run away
-        found = least_squares(
-            lambda here: linear(here.tobytes())[0], begin, lambda here: linear(here.tobytes())[1],
-            xtol=RELATIVE_TOLERANCE, ftol=None, gtol=None, max_nfev=MAX_STEPS,
-        )  # fmt: skip
-    jacobian = found.jac / scale
-    return Optimum(found.x * scale, found.fun, jacobian, found.nfev, _explain(found.success, found.fun, jacobian))
+def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
+    """Reduction of the sum of squares that the linear model promises for a step."""
+    _, values, jacobian = best
+    return float(values @ values - np.sum((values + jacobian @ step) ** 2))
 
 
-def _explain(ended: bool, values: Floats, jacobian: Floats) -> str:
+def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> NDArray[np.bool_]:
+    """True for each parameter (p,) that is at a bound and that descent would move beyond it."""
+    uphill = jacobian.T @ values
+    return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
+
+
+def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:
+    """Jacobian without what would move a parameter beyond its bound (Bertsekas, SIAM J. Control Optim. 20, 221)."""
+    return np.where(_active(values, jacobian, y, ends), 0.0, jacobian)
+
+
+class _Tangent(eqx.Module):
+    """Value and slope at a point (p,), as the function that optimistix evaluates at that point only."""
+
+    at: Array
+    value: Array
+    slope: Array
+
+    def __call__(self, y, args):
+        return self.value + self.slope @ (y - self.at), None
+
+
+@lru_cache
+def _blank(solver: Any, size: int, rows: tuple[int, ...]) -> Any:
+    """State of a solver before its first step, for so many parameters and values."""
+    y, value = jnp.zeros(size), jnp.zeros(rows)
+    tangent = _Tangent(y, value, jnp.zeros((*rows, size)))
+    return solver.init(tangent, y, None, OPTIONS, jax.eval_shape(lambda: value), None, NO_TAGS)
+
+
+@eqx.filter_jit
+def _advance(solver, y, state, value, slope):
+    """Accept or take back the point that `state` proposed, and propose the next one."""
+    y, state, _ = solver.step(_Tangent(state.y_eval, value, slope), y, None, OPTIONS, state, NO_TAGS)
+    return y, state
+
+
+def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any, y: Floats) -> tuple[Floats, Any]:
+    """The point (p,) after value and slope at `at` are known, and the state with the next proposal."""
+    with jax.enable_x64(True):
+        state = _blank(solver, y.size, value.shape) if state is None else state
+        here, state = _advance(solver, y, replace(state, y_eval=jnp.asarray(at)), value, slope)
+    return np.asarray(here), state
+
+
+def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Floats, Any]:
+    """As `_advanced`, of least squares with the triangular factor, filled up to a `size` of parameters."""
+    count = y.size
+    triangle = np.zeros((size + 1, size + 1))
+    if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):
+        with np.errstate(over="ignore", invalid="ignore"):
+            factor = np.linalg.qr(np.column_stack([slope, values]), mode="r")
+        triangle[: len(factor), [*range(count), size]] = factor
+    else:
+        triangle[:, size] = np.nan
+    more = (0, size - count)
+    here, state = _advanced(SOLVER, np.pad(at, more), triangle[:, size], triangle[:, :size], state, np.pad(y, more))
+    return here[:count], state
+
+
+def _explain(ended: bool, most: int, values: Floats, jacobian: Floats) -> str:
     steepness = _steepness(values, jacobian)
     if not ended and steepness > ORTHOGONAL:
-        return f"no convergence in {MAX_STEPS} steps: constants trade against each other; fix one or widen the range"
+        return f"no convergence in {most} steps: constants trade against each other; fix one or widen the range"
     if steepness > STALLED and np.linalg.norm(values) > NO_MISFIT:
         return "stalled beside an optimum, at the edge of where the law is defined: start elsewhere"
     return CONVERGED
 
 
 def _steepness(values: Floats, jacobian: Floats) -> float:
-    """The largest cosine between the residuals and a column of the Jacobian: none is left at an optimum."""
-    return float(np.max(np.abs(_unit(jacobian).T @ _unit(values))))
+    """Largest cosine between the residuals and a column of the Jacobian: 0 at an optimum."""
+    return float(np.max(np.abs(_unit(jacobian).T @ _unit(values)), initial=0.0))
 
 
 def _unit(columns: Floats) -> Floats:
@@ -137,3 +290,39 @@ def _unit(columns: Floats) -> Floats:
     for size in (lambda c: np.max(np.abs(c), axis=0), lambda c: np.linalg.norm(c, axis=0)):
         columns = columns / np.where(size(columns) > 0, size(columns), 1.0)
     return columns
+
+
+def minimise(
+    at: Callable[[Floats], tuple[float, Floats]], start: Floats, bounds: Bounds, tolerance: float, most: int
+) -> tuple[Floats, float, bool]:
+    """Minimise a function by `optimistix.BFGS`, between bounds by x = middle + half sin y.
+
+    Args:
+        at: value and gradient (p,) for (p,).
+        start: (p,) point to start from.
+        bounds: lowest and highest points, all finite.
+        tolerance: size of every derivative by y at which the search ends.
+        most: number of evaluations after which the search gives up.
+
+    Returns:
+        The minimiser (p,), exactly on a bound that holds it; the value there; whether the search converged.
+    """
+    low, high = (np.asarray(end, float) for end in bounds)
+    middle, half = 0.5 * (low + high), 0.5 * (high - low)
+
+    def evaluated(y: Floats) -> tuple[Floats, float, Floats]:
+        value, gradient = at(middle + half * np.sin(y))
+        return y, value, gradient * half * np.cos(y)
+
+    best = last = evaluated(np.arcsin(np.clip((start - middle) / np.where(half > 0, half, 1.0), -1.0, 1.0)))
+    unit = max(float(np.max(np.abs(last[2]))), 1.0)  # the first step is the gradient: of length 1 at most
+    state = None
+    for _ in range(most):
+        here, state = _advanced(MINIMISER, last[0], np.asarray(last[1] / unit), last[2] / unit, state, best[0])
+        best = last if np.array_equal(here, last[0]) else best
+        if converged := bool(np.max(np.abs(best[2])) <= tolerance):
+            break
+        last = evaluated(np.asarray(state.y_eval))
+    y = best[0]
+    x = np.where(np.abs(np.cos(y)) < STRAIGHT, np.where(np.sin(y) > 0, high, low), middle + half * np.sin(y))
+    return x, best[1], converged

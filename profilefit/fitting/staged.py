@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from profilefit.fitting.estimate import scaled_inverse
 from profilefit.fitting.profiles import Profiles, trimmed_radius
-from profilefit.fitting.solver import Optimum, solve, solve_batch
+from profilefit.fitting.solver import Solution, least_squares, solve_batch
 from profilefit.laws.liang import Liang
 
 Floats = NDArray[np.float64]
@@ -53,7 +53,7 @@ class CoefficientLaw:
     """One of (11), (13), (15) through the per-albedo coefficients: names, solution, covariance or None."""
 
     names: tuple[str, ...]
-    solution: Optimum
+    solution: Solution
     covariance: Floats | None
 
 
@@ -93,7 +93,7 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
         names = tuple(name for name in CONSTANTS_OF[letter] if name not in held)
         residual = _CoefficientProblem(letter, names)
         data = points.values[:, column]
-        solution = solve(residual, start.vector(names), (start, points.alpha, data))
+        solution = least_squares(residual, start.vector(names), (start, points.alpha, data))
         covariance = None
         if points.covariance is not None:
             block = points.covariance[column::3, column::3]

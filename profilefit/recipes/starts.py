@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from profilefit import laws
 from profilefit.errors import RecipeError
 from profilefit.fitting.estimate import Fit, ResidualFunction, judged, misfit_covariance
-from profilefit.fitting.solver import Optimum, solve_batch
+from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.laws import published
 from profilefit.laws.base import Constants
 from profilefit.laws.entry import Entry
@@ -166,7 +166,7 @@ def spread_out(constants: Floats, count: int, seed: int) -> Floats:
     return np.where(constants == 0, normal, constants * np.exp(normal))
 
 
-def summarised(own: Optimum, found: Sequence[Optimum], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
+def summarised(own: Solution, found: Sequence[Solution], names: tuple[str, ...], seed: int, rule: str) -> RandomStarts:
     """Group the solutions by where they ended, and say whether one is better than the recipe's own."""
     converged = [one for one in (own, *found) if one.converged]
     best = min(converged, key=lambda one: one.cost, default=None)
@@ -191,9 +191,9 @@ def summarised(own: Optimum, found: Sequence[Optimum], names: tuple[str, ...], s
     )
 
 
-def _groups(found: Sequence[Optimum]) -> list[list[Optimum]]:
+def _groups(found: Sequence[Solution]) -> list[list[Solution]]:
     """Solutions that are one optimum, or that failed in the same way, together, each group and all by cost."""
-    groups: list[list[Optimum]] = []
+    groups: list[list[Solution]] = []
     for one in sorted(found, key=lambda one: (not one.converged, _cost(one))):
         home = next((group for group in groups if _same(one, group[0])), None)
         if home is None:
@@ -203,7 +203,7 @@ def _groups(found: Sequence[Optimum]) -> list[list[Optimum]]:
     return groups
 
 
-def _same(one: Optimum, other: Optimum) -> bool:
+def _same(one: Solution, other: Solution) -> bool:
     """Whether two solutions are one optimum, or failed in the same way, whatever the numbers in its text."""
     if not (one.converged and other.converged):
         return re.split("[,:]", one.result)[0] == re.split("[,:]", other.result)[0]
@@ -212,14 +212,14 @@ def _same(one: Optimum, other: Optimum) -> bool:
     return _as_cheap(one, other) and bool(np.all(np.abs(one.parameters - other.parameters) <= near))
 
 
-def _as_cheap(one: Optimum, other: Optimum) -> bool:
+def _as_cheap(one: Solution, other: Solution) -> bool:
     return one.cost <= other.cost * (1.0 + SAME_COST) + ROUNDING
 
 
-def _cost(one: Optimum) -> float:
+def _cost(one: Solution) -> float:
     """The cost, infinite where the residuals are not finite."""
     return one.cost if np.isfinite(one.cost) else np.inf
 
 
-def _named(names: tuple[str, ...], one: Optimum) -> dict[str, float]:
+def _named(names: tuple[str, ...], one: Solution) -> dict[str, float]:
     return dict(zip(names, map(float, one.parameters), strict=True))

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import solve
+from profilefit.fitting.solver import least_squares
 from profilefit.laws import published
 from profilefit.recipes.paper.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
 from profilefit.recipes.paper.truth import ExactTruth, Truth
@@ -182,7 +182,7 @@ _MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1
 def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Floats:
     """Constants of a law by least squares, residuals in units of the largest datum."""
     weights = np.broadcast_to(weight / np.max(np.abs(data)), data.shape)
-    return solve(_MISFITS[law], start, (x, data, weights)).parameters
+    return least_squares(_MISFITS[law], start, (x, data, weights)).parameters
 
 
 def _held(columns: list[Floats], data: Floats) -> Floats:

@@ -18,7 +18,7 @@ from mcml_sim.media.phase import Phase, as_table, from_table
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
 from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance, scaled_inverse
-from profilefit.fitting.solver import Optimum, solve
+from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.phases.data import PhaseData
 from profilefit.recipes.schema import ERRORS
@@ -47,7 +47,7 @@ class PhaseFit:
     form: PhaseForm
     held: tuple[str, ...]
     range: tuple[float, float]
-    best: Optimum
+    best: Solution
     constants: Floats
     errors: dict[str, Floats | None]
     phase: Phase
@@ -104,7 +104,7 @@ def fit_phase(
     arrays = _arrays(data, used)
     residual = _residual(form, held)
     random = np.random.default_rng(SEED)
-    found = [solve(residual, start, arrays) for start in own.starts(random, STARTS)]
+    found = [least_squares(residual, start, arrays) for start in own.starts(random, STARTS)]
     best = min(found, key=lambda one: (not one.converged, one.cost if np.isfinite(one.cost) else np.inf))
     best = judged(best, tuple(f"parameter {i + 1}" for i in range(own.free)))
     with jax.enable_x64(True):
@@ -153,7 +153,7 @@ def _residual(form: str, held: tuple[str, ...]) -> Callable[[Array, Any], Array]
 def _errors(
     form: PhaseForm,
     held: tuple[str, ...],
-    best: Optimum,
+    best: Solution,
     arrays: tuple[Floats, ...],
     data: PhaseData,
     used: NDArray[np.bool_],
@@ -200,14 +200,16 @@ def _errors(
 
 
 def _jackknife(
-    form: PhaseForm, held: tuple[str, ...], best: Optimum, arrays: tuple[Floats, ...], used: NDArray[np.bool_]
+    form: PhaseForm, held: tuple[str, ...], best: Solution, arrays: tuple[Floats, ...], used: NDArray[np.bool_]
 ) -> Floats:
     """Standard errors of a grouped jackknife over rows (Efron, The Jackknife, 1982, ch. 2); NaN where a refit fails."""
     cosine, level, weight, moments = arrays
     group = np.where(used, (np.cumsum(used) - 1) // TOGETHER % JACKKNIFE_GROUPS, -1)
     moved = []
     for number in range(JACKKNIFE_GROUPS):
-        again = solve(_residual(form.name, held), best.parameters, (cosine, level, weight * (group != number), moments))
+        again = least_squares(
+            _residual(form.name, held), best.parameters, (cosine, level, weight * (group != number), moments)
+        )
         with jax.enable_x64(True):
             own = np.asarray(form.constants(jnp.asarray(again.parameters)))
         moved.append(own if again.converged else np.full(own.shape, np.nan))

@@ -22,7 +22,7 @@ from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import degrees_of_freedom, scaled_inverse
-from profilefit.fitting.solver import Optimum, solve
+from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.recipes import catalogue
@@ -68,8 +68,8 @@ class Interface(NamedTuple):
     is_below: bool
     thicknesses: Floats
     lights: Lights
-    best: Optimum
-    found: tuple[Optimum, ...]
+    best: Solution
+    found: tuple[Solution, ...]
 
     @property
     def is_traced(self) -> bool:
@@ -121,7 +121,7 @@ def _fitted(
         if begun:
             lights += [rings_of(here, each, illumination, number) for number, each in enumerate(d)]
             best = _solved(begun[place].best.parameters, top, law, d, lights)
-            found: tuple[Optimum, ...] = (best,)
+            found: tuple[Solution, ...] = (best,)
         else:
             lights += [light_of(here, each, illumination) for each in d]
             best, found = _searched(top, law, d, lights)
@@ -266,7 +266,7 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 def _searched(
     top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights
-) -> tuple[Optimum, tuple[Optimum, ...]]:
+) -> tuple[Solution, tuple[Solution, ...]]:
     """The best optimum of several starts, and all."""
     random = np.random.default_rng(SEED)
     spread = START + SPREAD * random.standard_normal((STARTS - 2, len(START)))
@@ -284,13 +284,15 @@ def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
 
-def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights) -> Optimum:
+def _solved(start, top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights) -> Solution:
     """The optimum from a start; fits to traced light stay near it where nothing speaks against that."""
     if isinstance(lights[0], TracedRings):
         rings = [light for light in lights if isinstance(light, TracedRings)]
         arrays = tuple(np.stack([np.asarray(part) for part in column]) for column in zip(*rings, strict=True))
-        return solve(_ring_residual, start, (*arrays, d, top, below, np.asarray(start)))
-    return solve(_residual, start, (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below))
+        return least_squares(_ring_residual, start, (*arrays, d, top, below, np.asarray(start)))
+    return least_squares(
+        _residual, start, (*(np.stack(columns) for columns in zip(*lights, strict=True)), d, top, below)
+    )
 
 
 def _law_of(parameters: Floats, top: LayerLaw, below: LayerLaw | StackLaw, thickness: float) -> StackLaw:

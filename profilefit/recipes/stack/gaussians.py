@@ -15,7 +15,7 @@ from mcml_sim import Medium, exact
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import judged
-from profilefit.fitting.solver import Optimum, solve
+from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.recipes.stack import fit, photons
 
@@ -58,7 +58,7 @@ class JointSum(NamedTuple):
     variances: Floats
     weights: Floats
     slopes: Floats
-    best: Optimum
+    best: Solution
 
     @property
     def free(self) -> NDArray[np.bool_]:
@@ -175,10 +175,10 @@ def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     return offset + slopes @ best.parameters if best.converged else np.full(len(offset), np.nan)
 
 
-def _settled(start: Floats, data: object) -> Optimum:
+def _settled(start: Floats, data: object) -> Solution:
     """The optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
     for _ in range(TURNS):
-        best = solve(_linear_residual, start, data)
+        best = least_squares(_linear_residual, start, data)
         if best.converged:
             break
         start = best.parameters
@@ -234,7 +234,7 @@ def ring_shares(edges: ArrayLike, variances: ArrayLike, xp: Any = np) -> Any:
     return xp.exp(-depth[:-1]) * -xp.expm1(depth[:-1] - depth[1:])
 
 
-def fitted(lights: Sequence[SumLight], count: int) -> Optimum:
+def fitted(lights: Sequence[SumLight], count: int) -> Solution:
     """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1 of each light, unbounded."""
     shortest, longest = min(light.edges[0] for light in lights), max(light.edges[-1] for light in lights)
     widest = 2.0 * np.log(WIDEST * longest)
@@ -245,7 +245,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Optimum:
     for low in lows:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
-        found.append(solve(_residual, np.array(start), _rings_of(lights)))
+        found.append(least_squares(_residual, np.array(start), _rings_of(lights)))
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Grid, Layer, Medium, Setting, exact, simulate
-from profilefit.fitting.solver import Optimum, solve
+from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.forward import ForwardHalfSpace
 from profilefit.laws.stack import LayerLaw
 
@@ -82,7 +82,7 @@ def half_space(layer: Layer, setting: Setting, seed: int, photons: int = HALF_SP
         within = _law(own, similar.alpha, rings.whole, parameters).unscaled_energy(at, jnp.asarray(0.0))
         return weight * (jnp.diff(within) / energy - 1.0)
 
-    found: list[Optimum] = [solve(residual, np.array(start), data) for start in STARTS]
+    found: list[Solution] = [least_squares(residual, np.array(start), data) for start in STARTS]
     best = min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
     with jax.enable_x64(True):
         law = jax.tree.map(float, _law(own, similar.alpha, rings.whole, jnp.asarray(best.parameters)))

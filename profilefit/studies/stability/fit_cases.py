@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from profilefit.fitting.estimate import ResidualFunction, judged
 from profilefit.fitting.objectives import NO_LIMITS, Rings
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import Optimum, solve_batch
+from profilefit.fitting.solver import Solution, solve_batch
 from profilefit.fitting.staged import fit_per_albedo
 from profilefit.laws.base import Constants, ProfileLaw
 from profilefit.laws.liang import Liang
@@ -77,7 +77,7 @@ def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[F
     problem, own = ResidualFunction(objective, names), law.vector(names)
     label = f"{name}, {objective}"
 
-    def solved(begins: Floats, data: list[Rings]) -> list[Optimum]:
+    def solved(begins: Floats, data: list[Rings]) -> list[Solution]:
         return [judged(one, names) for one in solve_batch(problem, begins, _stacked(law, data))]
 
     def case_of(case: str, value: str, begins: Floats, data: list[Rings], start: Floats | None = None) -> FitCase:
@@ -157,7 +157,7 @@ def _stacked(law: Constants, data: list[Rings]) -> Any:
 
 
 def _case(
-    label: str, case: str, value: str, names: tuple[str, ...], found: list[Optimum], start: Floats | None
+    label: str, case: str, value: str, names: tuple[str, ...], found: list[Solution], start: Floats | None
 ) -> FitCase:
     done = [one for one in found if one.converged]
     least = min((one.cost for one in done), default=np.inf)

@@ -10,7 +10,7 @@ from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
 from profilefit.fitting.estimate import ResidualFunction, fit, misfit_covariance, residual_structure, sensitivity
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Covariance, Profiles
-from profilefit.fitting.solver import solve, solve_batch
+from profilefit.fitting.solver import least_squares, solve_batch
 from profilefit.laws.base import AlbedoLaw
 from profilefit.laws.liang_albedo import LiangAlbedo
 
@@ -103,7 +103,7 @@ def test_sensitivity_is_that_of_refitting(tallies, burley):
             energy = profiles.energy.copy()
             energy[a, i] *= 1 + sign * 1e-3
             rings = eqx.tree_at(lambda r: r.energy, one.rings, energy)
-            ends.append(solve(problem, one.solution.parameters, (burley, rings)).parameters)
+            ends.append(least_squares(problem, one.solution.parameters, (burley, rings)).parameters)
         slope = (ends[1] - ends[0]) / (2e-3 * profiles.energy[a, i])
         # Second order in the step: 1e-6; LM's tolerance of 1e-10 over the step of 1e-3: 1e-7 of the constants.
         np.testing.assert_allclose(found[:, a, i], slope, rtol=1e-3, atol=1e-4 * np.abs(found).max())
@@ -250,7 +250,7 @@ def test_misfit_counts_degrees_of_freedom():
     """Four residuals of which one does not count, two constants: s^2 = cost / 1."""
     design = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, 2.0], [0.0, 0.0]])
     y = np.array([0.0, 1.0, 1.0, 0.0])
-    found = solve(lambda p, d: d[0] @ p - d[1], np.ones(2), (design, y))
+    found = least_squares(lambda p, d: d[0] @ p - d[1], np.ones(2), (design, y))
     expected = found.cost / 1 * np.linalg.inv(design.T @ design)
     np.testing.assert_allclose(misfit_covariance(found), expected, rtol=1e-9)
 

@@ -4,7 +4,7 @@ import jax.numpy as jnp
 import numpy as np
 import pytest
 
-from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Optimum, solve, solve_batch
+from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Solution, least_squares, solve_batch
 
 X = np.linspace(0, 3, 20)
 
@@ -19,7 +19,7 @@ def problem(amplitude, rate, noise=0.0, seed=0):
 
 
 def test_known_parameters_come_back():
-    found = solve(decay, [1.0, 1.0], problem(2.0, 1.7))
+    found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-9)  # the solver's own tolerance is 1e-10
     assert found.converged
     assert found.result == CONVERGED == "converged"
@@ -30,12 +30,12 @@ def test_known_parameters_come_back():
 def test_scaling_does_not_matter():
     """Constants that differ by ten decades are found as well as equal ones: they are scaled by their start."""
     data = {"x": X * 1e5, "y": 2e-5 * np.exp(-1.7 * X)}
-    found = solve(decay, [1e-5, 1e-5], data)
+    found = least_squares(decay, [1e-5, 1e-5], data)
     np.testing.assert_allclose(found.parameters, [2e-5, 1.7e-5], rtol=1e-6)
 
 
 def test_a_start_at_zero_can_move():
-    found = solve(decay, [0.0, 0.0], problem(2.0, 1.7))
+    found = least_squares(decay, [0.0, 0.0], problem(2.0, 1.7))
     np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-8)
 
 
@@ -44,7 +44,7 @@ def test_a_linear_problem_is_lstsq():
     """The slow twin: the normal equations."""
     rng = np.random.default_rng(3)
     design, y = rng.standard_normal((30, 4)), rng.standard_normal(30)
-    found = solve(lambda p, d: d[0] @ p - d[1], np.ones(4), (design, y))
+    found = least_squares(lambda p, d: d[0] @ p - d[1], np.ones(4), (design, y))
     expected, cost, *_ = np.linalg.lstsq(design, y)
     np.testing.assert_allclose(found.parameters, expected, rtol=1e-8)
     assert found.cost == pytest.approx(cost[0], rel=1e-12)
@@ -59,21 +59,21 @@ def test_a_batch_is_its_singles():
     stacked = {key: np.stack([case[key] for case in cases]) for key in ("x", "y")}
     together = solve_batch(decay, starts, stacked)
     for one, start, case in zip(together, starts, cases, strict=True):
-        alone = solve(decay, start, case)
+        alone = least_squares(decay, start, case)
         np.testing.assert_allclose(one.parameters, alone.parameters, rtol=1e-8)
         assert one.steps == alone.steps
         assert one.converged
 
 
 def test_double_precision_whatever_the_caller_set():
-    found = solve(decay, np.ones(2, np.float32), problem(2.0, 1.7, 1e-10))
+    found = least_squares(decay, np.ones(2, np.float32), problem(2.0, 1.7, 1e-10))
     assert found.parameters.dtype == found.residuals.dtype == np.float64
     assert 1e-11 < np.sqrt(found.cost / X.size) < 1e-9  # float32 residuals would stop at 1e-8
 
 
 def test_no_minimum_is_a_result():
     """exp(-p) falls for ever."""
-    found = solve(lambda p, _: jnp.exp(-p), [1.0], None)
+    found = least_squares(lambda p, _: jnp.exp(-p), [1.0], None)
     assert not found.converged
     assert (
         found.result
@@ -84,7 +84,7 @@ def test_no_minimum_is_a_result():
 
 @pytest.mark.slow
 def test_not_a_number_is_a_result():
-    found = solve(lambda p, d: jnp.log(p - d), [1.0], np.array([2.0]))
+    found = least_squares(lambda p, d: jnp.log(p - d), [1.0], np.array([2.0]))
     assert not found.converged
     assert found.result.startswith("the residual is not finite there: start nearer to the data")
 
@@ -97,7 +97,7 @@ def test_one_bad_problem_leaves_the_others_of_its_batch_alone():
 
 
 def solution(jacobian):
-    return Optimum(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
+    return Solution(np.zeros(2), np.array([3.0, 4.0]), np.asarray(jacobian, float), 1, CONVERGED)
 
 
 @pytest.mark.parametrize("scale", [1.0, 1e8])
@@ -123,4 +123,4 @@ def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
     def residual(p, data):
         return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
 
-    assert "stalled beside an optimum" in solve(residual, [1.0], np.zeros(2)).result
+    assert "stalled beside an optimum" in least_squares(residual, [1.0], np.zeros(2)).result

@@ -10,7 +10,7 @@ from profilefit.errors import InputError
 from profilefit.fitting.estimate import ResidualFunction
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import solve
+from profilefit.fitting.solver import least_squares
 from profilefit.laws.gaussians import Gaussians, law_class
 
 # Four Gaussians fitted to the exact profile, rounded.
@@ -108,6 +108,6 @@ def test_a_fit_from_the_start_converges(normalisation):
     law = kind(Setting(), normalisation, **kind.start())
     names = kind.constant_names()
     data = law, rings_of(profiles, None, (0.0, 0.0), ())
-    solution = solve(ResidualFunction("energy", names), law.vector(names), data)
+    solution = least_squares(ResidualFunction("energy", names), law.vector(names), data)
     assert solution.converged
     assert np.sqrt(np.mean(solution.residuals**2)) < 0.12

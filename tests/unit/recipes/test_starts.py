@@ -9,7 +9,7 @@ from mcml_sim import Setting
 from profilefit.errors import RecipeError
 from profilefit.fitting.estimate import fit
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import CONVERGED, Optimum
+from profilefit.fitting.solver import CONVERGED, Solution
 from profilefit.laws import published
 from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.recipes import catalogue, recipe, starts
@@ -36,7 +36,7 @@ def solution(parameters, cost, result=CONVERGED):
     residuals = np.full(100 + size, np.sqrt(cost / (100 + size)))
     jacobian = np.zeros((100 + size, size))
     jacobian[:size] = np.eye(size)
-    return Optimum(np.asarray(parameters, float), residuals, jacobian, 7, result)
+    return Solution(np.asarray(parameters, float), residuals, jacobian, 7, result)
 
 
 NAMES = ("a", "b")
