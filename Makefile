@@ -9,18 +9,27 @@ PIP := $(PY) -m pip --quiet --no-input --disable-pip-version-check
 # A worker that dies fails the run: xdist would start another, and then wait for ever for the file that died with it.
 PYTEST := $(PY) -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --max-worker-restart 0
 ARGS ?=
+# Records that `make fits` makes: never the shipped ones, which tests and pages read.
+MADE := build/fits
 # Pages with tables of what was fitted, between marks.
 TABLES := README.md docs/guide/laws.md docs/guide/paper.md docs/guide/layered.md docs/guide/phases.md docs/howto/shader.md
 
 .DEFAULT_GOAL := help
-.PHONY: help fits evidence claims readme docs test test-all benchmark programs lint format wheel clean
+.PHONY: help fits records evidence claims docs test test-all benchmark programs lint format wheel clean
 
 help:  ## list the targets
 	@sed -n 's/^\([a-z-]*\):.*  ## /\1\t/p' $(MAKEFILE_LIST) | while read -r name text; do printf '%-10s%s\n' "$$name" "$$text"; done
 
-fits: $(VENV)/.installed  ## simulate, fit every recipe, write the records and the report into fits/
-	$(VENV)/bin/profilefit regenerate --preset quick --out fits
+fits: $(VENV)/.installed  ## make every record again in build/fits, compare it with the shipped one, and write the report
+	@$(VENV)/bin/profilefit regenerate --out $(MADE); status=$$?; \
+	$(VENV)/bin/profilefit report --fits $(MADE) --figures $(MADE)/figures --html $(MADE)/report.html >$(MADE)/report.txt \
+	&& echo "report: $(MADE)/report.html" && exit $$status
+
+records: $(VENV)/.installed-test  ## for maintainers: write the records into fits/, the tables of pages, and the pins of tests
+	$(VENV)/bin/profilefit regenerate --out fits
 	$(VENV)/bin/profilefit report --fits fits --figures fits/figures
+	for page in $(TABLES); do $(VENV)/bin/profilefit report --fits fits --markdown $$page || exit; done
+	$(PY) -m tests.unit.test_pins
 
 evidence: $(VENV)/.installed programs  ## measure what reports show beside the fits, on an idle machine: shader check, atlas, times; fifteen minutes
 	$(VENV)/bin/profilefit check --fits fits --out fits/evidence
@@ -31,9 +40,6 @@ claims: $(VENV)/.installed-test programs  ## measure what README and guides prom
 	@$(PIP) install --editable '.[benchmark]'
 	$(PY) -m benchmarks.claims $(ARGS)
 	$(VENV)/bin/profilefit report --fits fits --markdown docs/guide/claims.md
-
-readme: fits  ## make fits, and put its tables into the README and the docs
-	for page in $(TABLES); do $(VENV)/bin/profilefit report --fits fits --markdown $$page || exit; done
 
 test: lint programs  ## what CI runs: lint, and all tests but the slow ones
 	$(PYTEST) -m "not slow" $(ARGS)

@@ -226,7 +226,7 @@ def _gains(fit: Fit, parameters: Floats, energy: Floats) -> Floats:
 def _second_derivatives(problem, law, rings, parameters, energy):
     def cost(theta, energies):
         data = eqx.tree_at(lambda tree: (tree.energy, tree.beyond), rings, (energies[:, :-1], energies[:, -1]))
-        return 0.5 * jnp.sum(problem(theta, (law, data)) ** 2)
+        return 0.5 * problem.cost(theta, (law, data))
 
     hessian = jax.jacfwd(jax.grad(cost))
     mixed = jax.jacfwd(jax.grad(cost, argnums=1))

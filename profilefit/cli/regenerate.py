@@ -13,7 +13,7 @@ from mcml_sim.cli.lazy import interruptible
 from profilefit.cli import options
 from profilefit.cli.options import Quiet
 from profilefit.errors import InputError
-from profilefit.recipes.folder import LOCAL, PHASES, STACKS, SUMS, fits_folder
+from profilefit.recipes.folder import LOCAL, PHASES, STACKS, fits_folder
 
 PHOTON_STORE = ".photons"
 SEED = 1
@@ -32,7 +32,7 @@ def regenerate(
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
-            help="Names of recipes, stacks, phase functions, or their files (.toml, .csv); all recipes if none.",
+            help="Names of recipes, stacks, phase functions, or their files (.toml, .csv); all shipped ones if none.",
             autocompletion=options.recipes,
         ),
     ] = None,
@@ -49,14 +49,16 @@ def regenerate(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate light, refit the laws, write the records.
+    """Simulate light, refit the laws, write the records, and compare them with the shipped ones.
 
-    One record a recipe, in some seconds each, as many side by side as there are cores. Ctrl-C loses what is in flight
-    only: photons that are traced stay, and the same command resumes.
+    Each record takes seconds to minutes, and as many are fitted side by side as there are cores. After Ctrl-C the same
+    command resumes: photons that are traced stay. The table at the end states for each record how far its constants
+    moved from the shipped record, in units of their stated error. The command ends with status 1 where a constant moves
+    by more than 0.05 of its error, or an interval by more than the Monte Carlo error of its chain.
 
-    A file of layers is a stack: its law is fitted to exact light in two to four minutes, longer where a layer scatters
-    forward, and its record goes to OUT/stacks. That of its sums of Gaussians, two minutes more, goes to OUT/gaussians.
-    A table of a phase function is fitted by every form in a minute, and its record goes to OUT/phases.
+    A file of layers is a stack. Its law is fitted to exact light in one to four minutes, longer where a layer scatters
+    forward, and its record goes to OUT/stacks. The record of its sums of Gaussians, two minutes more, goes to
+    OUT/gaussians. A table of a phase function is fitted by every form in a minute, and its record goes to OUT/phases.
 
     \b
     Examples, the last on a file of profilefit examples:
@@ -69,32 +71,34 @@ def regenerate(
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import is_watched
         from profilefit.recipes.phases import record as phase_record
-        from profilefit.recipes.phases.data import read_phase
         from profilefit.recipes.recipe import chosen
         from profilefit.recipes.regenerate import regenerate as regenerate_records
+        from profilefit.recipes.reproduction import reproduction
         from profilefit.recipes.run import RecipeRun
         from profilefit.recipes.stack import record as stack_record
         from profilefit.recipes.stack import sum_record
         from profilefit.recipes.workers import cores
-        from profilefit.report.tables.summary_tables import outcome, spent
+        from profilefit.report.tables.summary_tables import outcome, reproduced, verdict
 
     if not 0 <= seed <= MAX_SEED:
         raise InputError(f"seed must be a whole number in [0, {MAX_SEED}], got {seed}")
     if photons is not None and photons < 1:
         raise InputError(f"photons must be a whole number >= 1, got {photons}")
     said = notes(quiet)
-    tables = {name: found for name in recipes or () if (found := phase_record.table_of(name)) is not None}
-    phases, recipes = list(dict.fromkeys(tables.values())), [name for name in recipes or () if name not in tables]
-    for table in phases:
-        read_phase(table)
-    stacks = [stack_record.request_of(name) for name in recipes or () if stack_record.is_stack(name)]
-    others = [name for name in recipes or () if not stack_record.is_stack(name)]
-    those = chosen(others, fits_folder()) if others or not (stacks or phases) else ()
+    names = recipes if recipes else [*_shipped("", "toml"), *_shipped(STACKS, "toml"), *_shipped(PHASES, "csv")]
+    tables = {name: found for name in names if (found := phase_record.table_of(name)) is not None}
+    stacks = [stack_record.request_of(name) for name in names if name not in tables and stack_record.is_stack(name)]
+    others = [name for name in names if name not in tables and not stack_record.is_stack(name)]
+    those = chosen(others, fits_folder()) if others else ()
     stack_record.require_apart(stacks)
-    if stacks or phases:
+    if recipes and (stacks or tables):
         _require_default(
             {"--preset": preset is not Preset.QUICK, "--seed": seed != SEED, "--photons": photons is not None}
         )
+    works = [make(stack) for make in (stack_record.work, sum_record.work) for stack in stacks]
+    works += [phase_record.work(table) for table in dict.fromkeys(tables.values())]
+    if out == LOCAL and out.resolve() == fits_folder():
+        raise InputError("out must be named where ./fits holds the shipped records, for example --out mine, got none")
     require_folder(out)
     begin = time.perf_counter()
     run = RecipeRun(
@@ -106,23 +110,30 @@ def regenerate(
         say=lambda text: said.print(f"[{time.perf_counter() - begin:4.0f} s] {text}", markup=False),
         progress=is_watched() and not quiet,
     )
-    steps = regenerate_records(those, run, processes=cores()) if those else []
+    steps = regenerate_records(those, run, processes=cores(), others=works)
     written = {step.name: step.path for step in steps if step.path}
     seconds = {step.name: step.seconds for step in steps}
-    for stack in stacks:
-        for folder, made in ((STACKS, stack_record.regenerate), (SUMS, sum_record.regenerate)):
-            start, name = time.perf_counter(), f"{folder}/{stack.name}"
-            written[name] = made(stack, out, cores(), run.say)
-            seconds[name] = time.perf_counter() - start
-    for table in phases:
-        start, name = time.perf_counter(), f"{PHASES}/{table.stem}"
-        written[name] = phase_record.regenerate(table, out, run.say)
-        seconds[name] = time.perf_counter() - start
-    if len(written) > 1:
-        put(spent(seconds, written), said)
+    beside = {name: reproduction(path, name) for name, path in written.items()}
+    compared = [one for one in beside.values() if one is not None]
+    if len(written) > 1 or compared:
+        put(reproduced(seconds, written, beside), said)
     run.say(f"wrote {len(written)} record{'s' if len(written) != 1 else ''} to {out}")
     if as_json:
-        print_json({name: {**outcome(path), "seconds": round(seconds[name], 1)} for name, path in written.items()})
+        print_json(
+            {
+                name: {**outcome(path), "seconds": round(seconds[name], 1), "reproduction": beside[name]}
+                for name, path in written.items()
+            }
+        )
+    if compared:
+        said.print(verdict(compared), markup=False)
+    if not all(one.is_reproduced for one in compared):
+        raise typer.Exit(1)
+
+
+def _shipped(folder: str, ending: str) -> list[str]:
+    """Names of the recipes, stacks or tables in a folder of the shipped records."""
+    return sorted(path.stem for path in (fits_folder() / folder).glob(f"*.{ending}"))
 
 
 def _require_default(given: dict[str, bool]) -> None:

@@ -7,7 +7,7 @@ if TYPE_CHECKING:
     from profilefit.fitting.estimate import Structure
     from profilefit.fitting.profiles import Covariance
     from profilefit.fitting.quality import AlbedoQuality, Quality
-    from profilefit.fitting.solver import Solution
+    from profilefit.fitting.solver import Solution, least_squares
 else:
     __getattr__ = attributes(
         __name__,
@@ -15,8 +15,8 @@ else:
             "Structure": "estimate",
             "Covariance": "profiles",
             **dict.fromkeys(("AlbedoQuality", "Quality"), "quality"),
-            "Solution": "solver",
+            **dict.fromkeys(("Solution", "least_squares"), "solver"),
         },
     )
 
-__all__ = ["AlbedoQuality", "Covariance", "Quality", "Solution", "Structure"]
+__all__ = ["AlbedoQuality", "Covariance", "Quality", "Solution", "Structure", "least_squares"]

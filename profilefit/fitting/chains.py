@@ -246,7 +246,7 @@ class _Density(eqx.Module):
     def __call__(self, points):
         def one(theta):
             moved = self.centre + self.adjust @ (theta - self.centre)
-            misfit = jnp.sum(self.problem(moved, (self.law, self.rings)) ** 2)
+            misfit = self.problem.cost(moved, (self.law, self.rings))
             return -0.5 * (misfit - self.least) / self.variance
 
         value = jnp.where(jnp.all(jnp.abs(points) < self.bound, axis=1), jax.vmap(one)(points), -jnp.inf)

@@ -162,8 +162,12 @@ class ResidualFunction:
 
     def __call__(self, vector, data):
         law, rings = data
-        table = OBJECTIVES[self.objective](law.with_vector(self.free, vector), rings)
-        return (rings.weight[:, None] * table).ravel()
+        tables = OBJECTIVES[self.objective](law.with_vector(self.free, vector), rings)
+        return tuple(rings.weight[:, None] * table for table in tables)
+
+    def cost(self, vector, data) -> jax.Array:
+        """Sum of squared residuals."""
+        return jnp.sum(jnp.stack([jnp.sum(table**2) for table in self(vector, data)]))
 
 
 def degrees_of_freedom(solution: Solution) -> int:
@@ -259,7 +263,7 @@ def _curved(residual, vector, along, law, rings):
 
     def cost(theta, energies):
         data = eqx.tree_at(lambda tree: (tree.energy, tree.beyond), rings, (energies[:, :-1], energies[:, -1]))
-        return 0.5 * jnp.sum(residual(theta, (law, data)) ** 2)
+        return 0.5 * residual.cost(theta, (law, data))
 
     energies = jnp.column_stack([jnp.asarray(rings.energy), jnp.asarray(rings.beyond)])
     slopes = jax.grad(cost, argnums=(0, 1))

@@ -1,4 +1,7 @@
-"""Objectives, which a fit minimises: a function each, from a law and ring energies to residuals, a row for each albedo.
+"""Objectives, which a fit minimises: a function each, from a law and ring energies to tables of residuals.
+
+A table has a row for each albedo. Tables of one objective stay apart: XLA would compute what they share for each column
+anew if they were joined in a compiled program. `joined` joins them.
 
 Every objective is a differentiable function of the law **and** of the ring energies, weights included, so that the
 photon noise of the energies propagates to the constants without another formula. The weighting decides the constants of
@@ -8,13 +11,14 @@ alpha, whose derivatives are infinite at alpha = 1.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.light import reduced, unreduced
@@ -23,6 +27,7 @@ from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.surface import RefractingSurface, surfaces_of
 
 Values = Array | NDArray[np.float64]
+Tables = tuple[Any, ...]  # of residuals, a row for each albedo
 # A radius [mfp] beyond all light; infinity itself would turn 0 * inf into NaN in a derivative.
 EVERYWHERE = 1e9
 # An error of the cdf weighs as much as a relative error of the profile twenty times its size.
@@ -68,7 +73,12 @@ class Rings(eqx.Module):
         return jnp.concatenate([jnp.zeros_like(inside[:, :1]), inside], axis=-1) / self.reflectance[:, None]
 
 
-def energy(law, rings: Rings) -> Array:
+def joined(tables: Sequence[ArrayLike]) -> NDArray[np.float64]:
+    """All residuals (m, k), the tables side by side."""
+    return np.concatenate([np.asarray(table) for table in tables], axis=1)
+
+
+def energy(law, rings: Rings) -> Tables:
     """Whole profile: ring energies, each ring's relative error weighted by its share of the energy; and the limits.
 
     The sum of squares of a profile's rings is the energy-weighted mean of (law/data - 1)^2. Two more rows an albedo
@@ -81,10 +91,10 @@ def energy(law, rings: Rings) -> Array:
     misfit = weight * (jnp.diff(inside, axis=-1) - rings.energy)
     total = law.unscaled_energy(EVERYWHERE, alpha) / rings.reflectance[:, None] - 1.0
     source = law.source_strength(alpha) / (0.5 * alpha) - 1.0
-    return jnp.concatenate([misfit, rings.limits[0] * total, rings.limits[1] * source], axis=1)
+    return misfit, rings.limits[0] * total, rings.limits[1] * source
 
 
-def relative(law, rings: Rings) -> Array:
+def relative(law, rings: Rings) -> Tables:
     """Whole profile on a log-spaced eye: relative errors of ring energies, even in ln r; and of the cumulated energy.
 
     The rings from `NEAREST` to the radius of `ENERGY_WITHIN` weigh as much as they are wide in ln r, so that their sum
@@ -106,7 +116,7 @@ def relative(law, rings: Rings) -> Array:
     shares = inside / law.unscaled_energy(EVERYWHERE, alpha) - rings.cdf
     of_each = rings.alpha.size // len(added)
     added = rings.limits[2] / np.sqrt(of_each) * jnp.repeat(added, of_each, axis=0)
-    return jnp.concatenate([misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, added], axis=1)
+    return misfit, SHARE_WEIGHT / np.sqrt(rings.r_edges.size) * shares, added
 
 
 def _added_light(law, rings: Rings) -> Array:
@@ -118,46 +128,46 @@ def _added_light(law, rings: Rings) -> Array:
     return jnp.where(lit, jnp.maximum(slope + LEAST_FALL, 0.0), 0.0)
 
 
-def radial(law, rings: Rings) -> Array:
+def radial(law, rings: Rings) -> Tables:
     """As published: r R_d at the ring centres, unweighted, over the rings that the trimming (6) keeps."""
     r = 0.5 * (rings.r_edges[1:] + rings.r_edges[:-1])
     a, b, c = law.coefficients(rings.alpha[:, None])
     data = rings.energy / (2.0 * jnp.pi * jnp.diff(rings.r_edges))  # r R_d: the area is 2 pi r dr
-    return rings.used * ((a * r + b) / (r + c) - data)
+    return (rings.used * ((a * r + b) / (r + c) - data),)
 
 
-def albedo(law, rings: Rings) -> Array:
+def albedo(law, rings: Rings) -> Tables:
     """alpha(A) - alpha of reduced albedos, unweighted over those given."""
     found = law.under(rings.surface).alpha(rings.reflectance[:, None])
-    return reduced(found, law.setting.g).alpha - rings.alpha[:, None]
+    return (reduced(found, law.setting.g).alpha - rings.alpha[:, None],)
 
 
-def reflectance(law, rings: Rings) -> Array:
+def reflectance(law, rings: Rings) -> Tables:
     """A(alpha) - A, unweighted over the albedos given."""
     alpha = unreduced(rings.alpha[:, None], law.setting.g)
-    return law.under(rings.surface).reflectance(alpha) - rings.reflectance[:, None]
+    return (law.under(rings.surface).reflectance(alpha) - rings.reflectance[:, None],)
 
 
-def relative_reflectance(law, rings: Rings) -> Array:
+def relative_reflectance(law, rings: Rings) -> Tables:
     """A(alpha) / A - 1, unweighted over the albedos given."""
-    return reflectance(law, rings) / rings.reflectance[:, None]
+    return (reflectance(law, rings)[0] / rings.reflectance[:, None],)
 
 
-def radius(law, rings: Rings) -> Array:
+def radius(law, rings: Rings) -> Tables:
     """g(xi) minus the radius within which the share xi of the energy leaves [mfp], unweighted in xi."""
-    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) - _quantile(rings)
+    return (law.sampler.unclipped(rings.xi, rings.alpha[:, None]) - _quantile(rings),)
 
 
-def relative_radius(law, rings: Rings) -> Array:
+def relative_radius(law, rings: Rings) -> Tables:
     """g(xi) over the radius within which the share xi of the energy leaves, minus 1 [-], unweighted in xi."""
-    return law.sampler.unclipped(rings.xi, rings.alpha[:, None]) / _quantile(rings) - 1.0
+    return (law.sampler.unclipped(rings.xi, rings.alpha[:, None]) / _quantile(rings) - 1.0,)
 
 
-def share(law, rings: Rings) -> Array:
+def share(law, rings: Rings) -> Tables:
     """Whole profile: the share of the energy within g(xi), minus xi, unweighted in xi [-]."""
     x = law.sampler.unclipped(rings.xi, rings.alpha[:, None])
     inner = _interpolate(jnp.abs(x), rings.r_edges, rings.cdf) * jnp.sign(x)
-    return inner - rings.xi
+    return (inner - rings.xi,)
 
 
 _ALL = (energy, relative, radial, albedo, reflectance, relative_reflectance, radius, relative_radius, share)

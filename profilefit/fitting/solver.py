@@ -38,7 +38,12 @@ STALLED, NO_MISFIT = 0.03, 1e-8
 # Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
 ORTHOGONAL = 1e-7
 SOLVER: Any = optx.LevenbergMarquardt(0.0, 0.0, linear_solver=lx.QR())  # `solve` decides when it ends
+# Damping falls after each step that gains three quarters of what it promised: beside bounds few gain all of it.
+BY_SLOPE = eqx.tree_at(lambda solver: solver.search.high_cutoff, SOLVER, 0.75)
 MINIMISER: Any = optx.BFGS(0.0, 0.0)
+# Length of the Jacobian's longest column, by the unit of the residuals: damping, which begins at 1, is its square times
+# 1e-4, and 1e-2 where all columns are as long (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
+LONGEST_COLUMN, EVERY_COLUMN = 100.0, 10.0
 STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: below it, the parameter is at its bound
 SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
 OPTIONS = {"jac": "bwd"}  # optimistix keeps the Jacobian as an array, not as a program
@@ -96,8 +101,10 @@ def covariance(jacobian: Floats) -> Floats:
     """(J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
 
     The singular values of J itself, columns of unit length, give it: products would lose half of the digits. Directions
-    beyond rounding get the error of rounding, which is large but finite.
+    beyond rounding get the error of rounding, which is large but finite. Infinite where derivatives are not finite.
     """
+    if not np.all(np.isfinite(jacobian)):
+        return np.full((jacobian.shape[1],) * 2, np.inf)
     size = np.linalg.norm(jacobian, axis=0)
     size = np.maximum(size, np.finfo(float).tiny ** 0.25)
     _, singular, ways = np.linalg.svd(jacobian / size, full_matrices=False)
@@ -112,7 +119,7 @@ def least_squares(
     """Minimise |residual(parameters, data)|^2.
 
     Args:
-        residual: function of jax arrays, (p,) and a pytree, that returns (n,) residuals.
+        residual: function of jax arrays, (p,) and a pytree, that returns residuals, (n,) or a tuple of tables (m, k).
         start: (p,) parameters to start from, in the caller's units; each is scaled by its size.
         data: any pytree of arrays.
         bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
@@ -122,7 +129,7 @@ def least_squares(
 
         def at(parameters: Floats) -> tuple[Floats, Floats]:
             values, jacobian = _linearise(residual, parameters, arrays)
-            return np.asarray(values), np.asarray(jacobian)
+            return _joined(values).ravel(), _joined(jacobian).reshape(-1, parameters.size)
 
         return solve(at, np.asarray(start, np.float64), bounds)
 
@@ -140,6 +147,13 @@ def solve_batch(residual: Callable[..., Array], starts: ArrayLike, data: object 
 @eqx.filter_jit
 def _linearise(residual, parameters, data):
     return residual(parameters, data), jax.jacfwd(residual)(parameters, data)
+
+
+def _joined(parts: Array | tuple[Array, ...]) -> Floats:
+    """Tables side by side."""
+    return (
+        np.concatenate([np.asarray(part) for part in parts], axis=1) if isinstance(parts, tuple) else np.asarray(parts)
+    )
 
 
 def differences(
@@ -182,26 +196,30 @@ def solve(
     values, jacobian = at(start)
     if not (np.all(np.isfinite(values)) and np.all(np.isfinite(jacobian))):
         return Solution(start, values, jacobian, 1, NOT_FINITE, np.zeros(start.size, bool))
-    scale = np.where(start == 0, 1.0, np.abs(start))
+    scale, sizes = np.where(start == 0, 1.0, np.abs(start)), np.linalg.norm(jacobian, axis=0)
     if by_slope:
-        sizes = np.linalg.norm(jacobian, axis=0)
         scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
+    unit = (EVERY_COLUMN if by_slope else LONGEST_COLUMN) / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
-    size = next((size for size in SIZES if size >= start.size), start.size)
+    size, solver = next((size for size in SIZES if size >= start.size), start.size), BY_SLOPE if by_slope else SOLVER
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
-        here, state = _stepped(proposed, values, _held(values, jacobian * scale, proposed, ends), state, y, size)
+        slope = _held(values, jacobian * scale, proposed, ends)
+        here, aimed, damping, state = _stepped(solver, proposed, unit * values, unit * slope, state, y, size)
         if accepted := steps == 1 or not np.array_equal(here, y):
             y, best = here, (point, values, jacobian)
-        proposed = np.clip(y + np.clip(np.asarray(state.y_eval)[: start.size] - y, -reach, reach), *ends)
+        room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
+        slope = _held(best[1], best[2] * scale, y, ends)
+        step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
+        proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
-        if ended or steps >= most or (gain and accepted and _promised(best, (proposed - y) * scale) < gain):
+        if ended or steps >= most or (gain and accepted and _promised(best, (aimed - y) * scale) < gain):
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
         steps += 1
     active = _active(*best[1:], best[0], (low, high))
-    result = _explain(ended or steps < most, most, best[1], best[2][:, ~active])
+    result = _explain(ended or steps < most, most, best[1], best[2][:, ~active], gain)
     return Solution(*best, steps, result, active)
 
 
@@ -209,6 +227,17 @@ def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
     """Reduction of the sum of squares that the linear model promises for a step."""
     _, values, jacobian = best
     return float(values @ values - np.sum((values + jacobian @ step) ** 2))
+
+
+def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: Floats, slope: Floats) -> Floats:
+    """A damped step (p,) within bounds: parameters that pass one end there, and the others are solved for again."""
+    free = np.ones(step.size, bool)
+    while np.any(out := free & ((step < room[0]) | (step > room[1]))):
+        step, free = np.clip(step, *room), free & ~out
+        damped = np.vstack([slope, np.sqrt(damping) * np.eye(step.size)])
+        left = np.append(values, np.zeros(step.size)) + damped[:, ~free] @ step[~free]
+        step[free] = -np.linalg.lstsq(damped[:, free], left)[0]
+    return step
 
 
 def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> NDArray[np.bool_]:
@@ -234,48 +263,58 @@ class _Tangent(eqx.Module):
 
 
 @lru_cache
-def _blank(solver: Any, size: int, rows: tuple[int, ...]) -> Any:
-    """State of a solver before its first step, for so many parameters and values."""
+def _step(solver: Any, size: int, rows: tuple[int, ...]) -> tuple[Callable[..., Any], list[Array]]:
+    """Compiled step of a solver for so many parameters and values, and the arrays of its state before the first one.
+
+    The step accepts or takes back the point that the state proposed, and proposes the next one.
+    """
     y, value = jnp.zeros(size), jnp.zeros(rows)
-    tangent = _Tangent(y, value, jnp.zeros((*rows, size)))
-    return solver.init(tangent, y, None, OPTIONS, jax.eval_shape(lambda: value), None, NO_TAGS)
+    blank = solver.init(
+        _Tangent(y, value, jnp.zeros((*rows, size))), y, None, OPTIONS, jax.eval_shape(lambda: value), None, NO_TAGS
+    )
+    leaves, tree = jax.tree.flatten(blank)
+
+    @jax.jit
+    def step(at, value, slope, leaves, y):
+        state = replace(jax.tree.unflatten(tree, leaves), y_eval=at)
+        y, state, _ = solver.step(_Tangent(at, value, slope), y, None, OPTIONS, state, NO_TAGS)
+        return y, state.y_eval, 1.0 / state.search_state.step_size, jax.tree.leaves(state)
+
+    return step, leaves
 
 
-@eqx.filter_jit
-def _advance(solver, y, state, value, slope):
-    """Accept or take back the point that `state` proposed, and propose the next one."""
-    y, state, _ = solver.step(_Tangent(state.y_eval, value, slope), y, None, OPTIONS, state, NO_TAGS)
-    return y, state
-
-
-def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any, y: Floats) -> tuple[Floats, Any]:
-    """The point (p,) after value and slope at `at` are known, and the state with the next proposal."""
+def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any, y: Floats) -> tuple[Any, ...]:
+    """The point (p,) after value and slope at `at` are known, the next proposal (p,), its damping, and the state."""
     with jax.enable_x64(True):
-        state = _blank(solver, y.size, value.shape) if state is None else state
-        here, state = _advance(solver, y, replace(state, y_eval=jnp.asarray(at)), value, slope)
-    return np.asarray(here), state
+        step, first = _step(solver, y.size, value.shape)
+        here, proposed, damping, state = step(at, value, slope, first if state is None else state, y)
+    return np.asarray(here), np.asarray(proposed), float(damping), state
 
 
-def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Floats, Any]:
+def _stepped(
+    solver: Any, at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int
+) -> tuple[Any, ...]:
     """As `_advanced`, of least squares with the triangular factor, filled up to a `size` of parameters."""
     count = y.size
     triangle = np.zeros((size + 1, size + 1))
     if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):
         with np.errstate(over="ignore", invalid="ignore"):
-            factor = np.linalg.qr(np.column_stack([slope, values]), mode="r")
+            rows = np.column_stack([slope, values])
+            factor = np.linalg.qr(rows[np.any(rows, axis=1)], mode="r")  # residuals that do not count are 0
         triangle[: len(factor), [*range(count), size]] = factor
     else:
         triangle[:, size] = np.nan
     more = (0, size - count)
-    here, state = _advanced(SOLVER, np.pad(at, more), triangle[:, size], triangle[:, :size], state, np.pad(y, more))
-    return here[:count], state
+    at, y = np.pad(at, more), np.pad(y, more)
+    here, aimed, damping, state = _advanced(solver, at, triangle[:, size], triangle[:, :size], state, y)
+    return here[:count], aimed[:count], damping, state
 
 
-def _explain(ended: bool, most: int, values: Floats, jacobian: Floats) -> str:
-    steepness = _steepness(values, jacobian)
+def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: float) -> str:
+    steepness, size = _steepness(values, jacobian), float(np.linalg.norm(values))
     if not ended and steepness > ORTHOGONAL:
         return f"no convergence in {most} steps: constants trade against each other; fix one or widen the range"
-    if steepness > STALLED and np.linalg.norm(values) > NO_MISFIT:
+    if steepness > STALLED and size > NO_MISFIT and (steepness * size) ** 2 > gain:
         return "stalled beside an optimum, at the edge of where the law is defined: start elsewhere"
     return CONVERGED
 
@@ -318,11 +357,13 @@ def minimise(
     unit = max(float(np.max(np.abs(last[2]))), 1.0)  # the first step is the gradient: of length 1 at most
     state = None
     for _ in range(most):
-        here, state = _advanced(MINIMISER, last[0], np.asarray(last[1] / unit), last[2] / unit, state, best[0])
+        here, aimed, _, state = _advanced(
+            MINIMISER, last[0], np.asarray(last[1] / unit), last[2] / unit, state, best[0]
+        )
         best = last if np.array_equal(here, last[0]) else best
         if converged := bool(np.max(np.abs(best[2])) <= tolerance):
             break
-        last = evaluated(np.asarray(state.y_eval))
+        last = evaluated(aimed)
     y = best[0]
     x = np.where(np.abs(np.cos(y)) < STRAIGHT, np.where(np.sin(y) > 0, high, low), middle + half * np.sin(y))
     return x, best[1], converged

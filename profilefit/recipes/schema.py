@@ -209,7 +209,7 @@ EVIDENCE: Kinds = {
     "readings": LIST,
     "readings.*": TABLE,
     **{f"readings.*.{name}": TEXT for name in ("equation", "verdict", "choices")},
-    "readings.*.evidence?": TEXT,
+    **{f"readings.*.{name}?": TEXT for name in ("evidence", "result")},
     **{f"readings.*.{name}": MEASURE for name in ("curve_distance", "constant_distance")},
     **{f"readings.*.{name}": TABLE for name in ("constants", "published")},
     **{f"readings.*.{name}.*": NUMBER for name in ("constants", "published")},

@@ -1,24 +1,30 @@
 """Processes that work side by side: each does one job after the other, and none outlives the one that started it.
 
 They are spawned, since the threads of JAX do not survive a fork, and nothing here imports JAX, so that all of them
-start at once. What a job warns of is warned of where it was asked for.
+start at once. What XLA compiles for one of them serves all. What a job warns of is warned of where it was asked for.
 """
 
 from __future__ import annotations
 
 import os
 import signal
+import tempfile
 import threading
 import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import partial
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import Connection, wait
 from types import TracebackType
 from typing import Any, Self, TypeVar, cast
 
+CACHE = "JAX_COMPILATION_CACHE_DIR"  # read by JAX when a process starts
+SHARED = {  # programs worth keeping: of any size, that took some time
+    "JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS": "0.1",
+    "JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES": "-1",
+}
 Job = TypeVar("Job")
 Done = TypeVar("Done")
 
@@ -38,7 +44,9 @@ class Workers:
         self._processes = processes if processes > 1 else 0
 
     def __enter__(self) -> Self:
-        context = get_context("spawn")
+        context, self._left = get_context("spawn"), ExitStack()
+        if self._processes:
+            self._left.enter_context(_sharing_programs())
         pairs = [context.Pipe() for _ in range(self._processes)]
         self._pipes = [ours for ours, _ in pairs]
         self._started = [context.Process(target=_work, args=(theirs,), daemon=True) for _, theirs in pairs]
@@ -52,6 +60,7 @@ class Workers:
             process.kill()
             process.join()
             pipe.close()
+        self._left.close()
 
     def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
         """The number of each job and what `task` makes of it, as they come; jobs begin in their order.
@@ -72,6 +81,22 @@ class Workers:
                 number, pipe = at_work.pop(ready), cast("Connection", ready)
                 idle.append(pipe)
                 yield number, _received(pipe)
+
+
+@contextmanager
+def _sharing_programs() -> Iterator[None]:
+    """Let processes that start keep compiled programs in one folder, unless the user's environment names one."""
+    if CACHE in os.environ:
+        yield
+        return
+    before = {name: os.environ.get(name) for name in SHARED}
+    with tempfile.TemporaryDirectory(prefix="profilefit-") as folder:
+        os.environ.update({**SHARED, CACHE: folder})
+        try:
+            yield
+        finally:
+            for name, value in {**before, CACHE: None}.items():
+                os.environ.pop(name, None) if value is None else os.environ.update({name: value})
 
 
 def _received(pipe: Connection) -> Any:

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from mcml_sim import exact
 from profilefit.fitting.profiles import Profiles
-from profilefit.fitting.solver import least_squares
+from profilefit.fitting.solver import CONVERGED, Solution, least_squares
 from profilefit.laws import published
 from profilefit.recipes.paper.protocol import Coefficients, Protocol7, fit_coefficients, profiles_at
 from profilefit.recipes.paper.truth import ExactTruth, Truth
@@ -69,6 +69,7 @@ class Reading:
     constant_distance  the largest |found / printed - 1| of a constant (|found - printed| for exponents of l) [-]
     curve_distance     rms of found curve / printed curve - 1 over its range [-]; curve_maximum its largest
     verdict            `judge` of the two distances
+    result             of the fit: "converged", or why its constants are not identified
     """
 
     equation: str
@@ -80,6 +81,7 @@ class Reading:
     curve_maximum: float
     verdict: str
     evidence: str
+    result: str = CONVERGED
 
 
 def judge(constant_distance: float, curve_distance: float) -> str:
@@ -159,7 +161,9 @@ def _printed(equation: str) -> Floats:
     return np.array(list(PUBLISHED[equation].values()))
 
 
-def _reading(equation: str, choices: str, found, curves: tuple[Floats, Floats], evidence: str, printed=None) -> Reading:
+def _reading(
+    equation: str, choices: str, found, curves: tuple[Floats, Floats], evidence: str, printed=None, result=CONVERGED
+) -> Reading:
     """Measure `found` against print; `curves` are found and printed over the range."""
     printed = printed or PUBLISHED[equation]
     constants = dict(zip(printed, map(float, np.atleast_1d(found)), strict=True))
@@ -168,7 +172,8 @@ def _reading(equation: str, choices: str, found, curves: tuple[Floats, Floats], 
     off = np.abs(curves[0] / curves[1] - 1)
     gap, rms = float(max(gaps)), float(np.sqrt(np.mean(off**2)))
     distances = gap, rms, float(off.max())
-    return Reading(equation, choices, constants, dict(printed), *distances, judge(gap, rms), evidence)
+    verdict = judge(gap, rms) if result == CONVERGED else "not reproduced"
+    return Reading(equation, choices, constants, dict(printed), *distances, verdict, evidence, result)
 
 
 def _misfit_of(law: Callable) -> Callable:
@@ -179,10 +184,10 @@ def _misfit_of(law: Callable) -> Callable:
 _MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1_law, k2_law)}
 
 
-def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Floats:
-    """Constants of a law by least squares, residuals in units of the largest datum."""
+def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:
+    """Fit a law by least squares, residuals in units of the largest datum."""
     weights = np.broadcast_to(weight / np.max(np.abs(data)), data.shape)
-    return least_squares(_MISFITS[law], start, (x, data, weights)).parameters
+    return least_squares(_MISFITS[law], start, (x, data, weights))
 
 
 def _held(columns: list[Floats], data: Floats) -> Floats:
@@ -200,7 +205,7 @@ def _albedo_readings(source: Truth, grids: dict[str, Floats]) -> list[Reading]:
         if alpha is hundred:  # to first order a residual in A, without the kink where (8) has no inverse
             weights = {"A": np.gradient(reflectance, alpha)}
         for residual, weight in weights.items():
-            constants = _fit(albedo_law, reflectance, alpha, [4.0, 2.5, 0.7], weight)
+            constants = _fit(albedo_law, reflectance, alpha, [4.0, 2.5, 0.7], weight).parameters
             misfit = np.abs(albedo_law(reflectance, _printed("(8)")) - alpha)[reflectance <= 0.75].max()
             curves = albedo_law(REFLECTANCE_RANGE, constants), albedo_law(REFLECTANCE_RANGE, _printed("(8)"))
             evidence = f"the printed (8) is within {misfit:.4f} of these alphas up to A = .75"
@@ -244,11 +249,12 @@ def _law_readings(points: Coefficients, choices: str, exponent_free: bool = Fals
     return [_law_reading(*case, alpha, choices, cuts) for case in cases]
 
 
-def _law_reading(equation, law, data, constants, held, print_set, alpha, choices, cuts) -> Reading:
+def _law_reading(equation, law, data, found, held, print_set, alpha, choices, cuts) -> Reading:
+    constants, result = (found.parameters, found.result) if isinstance(found, Solution) else (found, CONVERGED)
     printed = np.array(list(print_set.values()))
     ratio, curves = data / law(alpha, printed), (law(ALPHA_RANGE, constants), law(ALPHA_RANGE, printed))
     evidence = f"{cuts}; coefficient over printed law {ratio.min():.3f} to {ratio.max():.3f}"
-    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set)
+    return _reading(equation, f"{choices}; {held}", constants, curves, evidence, print_set, result)
 
 
 def _misprint_readings(points: Coefficients, choices: str, profiles: Profiles) -> list[Reading]:
@@ -327,7 +333,8 @@ def _law_quantiles(alpha: float, xi: Floats) -> tuple[Floats, Floats]:
 
 def _inverse_reading(alpha: Floats, points, residual: str, name: str) -> Reading:
     k1, k2 = np.stack([_inverse_amplitudes(xi, r, residual) for xi, r in points]).T
-    found = np.concatenate([_fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])])
+    fits = _fit(k1_law, alpha, k1, [1.2, 2.0, 0.5, 0.3]), _fit(k2_law, alpha, k2, [3.0, 2.5, 0.4])
+    found = np.concatenate([one.parameters for one in fits])
     # sqrt(xi) ln(1 + eps - xi) is in both curves: only the bracket of (19) differs
     printed = _printed("(20)")
     curves, laws = (_bracket(found), _bracket(printed)), _both_k(alpha, printed)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from profilefit.recipes.kinds import COUNT, MEASURE, MEASURES, NUMBER, TABLE, TE
 from profilefit.recipes.phases.data import PhaseData, read_phase
 from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
 from profilefit.recipes.schema import Kinds
+from profilefit.recipes.work import Work
 
 PIPELINE = "phase"
 TITLE = "Phase functions fitted to a table"
@@ -84,11 +86,11 @@ def fits_of(
     return found
 
 
-def regenerate(path: Path, out: Path, say: Callable[[str], None] = lambda _: None) -> Path:
-    """Fit every form to a table, and write the record: a minute. InputError on what is no table."""
+def work(path: Path) -> Work:
+    """Fits of every form to a table, one part: a minute. InputError on a damaged table."""
     data = read_phase(path)
     arrays = {"angles": data.angles, "values": data.values}
-    return record.write(out / PHASES, path.stem, content(data, fits_of(data, say=say)), arrays)
+    return Work(f"{PHASES}/{path.stem}", (partial(fits_of, data),), lambda found: (content(data, found[0]), arrays))
 
 
 def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:

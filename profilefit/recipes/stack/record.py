@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import partial
@@ -28,7 +28,7 @@ from profilefit.recipes.folder import STACKS, fits_folder
 from profilefit.recipes.stack import fit, quality
 from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
 from profilefit.recipes.toml_tables import Table, Tables
-from profilefit.recipes.workers import Workers
+from profilefit.recipes.work import Made, Work
 
 FOLDER, PIPELINE = STACKS, "stack"
 TITLE = "Layers under a first one of any thickness"
@@ -125,19 +125,17 @@ def require_apart(stacks: Sequence[StackRequest]) -> None:
         raise RecordError(f"stacks must have different names, as their records do, got {twice!r} twice")
 
 
-def regenerate(of: StackRequest, out: Path, processes: int = 1, say: Callable[[str], None] = lambda _: None) -> Path:
-    """Fit the laws of a stack's colours, and write its record: a minute. InputError on what no law is for."""
+def work(of: StackRequest) -> Work:
+    """Fits of the laws of a stack's colours, a part each: half a minute to two minutes. InputError if no law fits."""
     for medium in of.stack.media:
         fit.require(medium)
     different = list(dict.fromkeys(of.stack.media))
-    found: list[dict[str, Any]] = [{} for _ in different]
-    with Workers(min(processes, len(different))) as workers:
-        for number, made in workers.each(partial(_channel, of.illumination), different):
-            found[number] = made
-            done = [name for name, medium in zip(CHANNELS, of.stack.media, strict=True) if medium == different[number]]
-            say(f"{of.name}: {', '.join(done)} fitted")
-    channels = {name: found[different.index(medium)] for name, medium in zip(CHANNELS, of.stack.media, strict=True)}
-    return record.write(out / FOLDER, of.name, _content(of, channels), {})
+
+    def finish(found: list[Any]) -> Made:
+        colours = zip(CHANNELS, of.stack.media, strict=True)
+        return _content(of, {name: found[different.index(medium)] for name, medium in colours}), {}
+
+    return Work(f"{FOLDER}/{of.name}", tuple(partial(_channel, of.illumination, one) for one in different), finish)
 
 
 def load(path: Path) -> StackRecord:

@@ -5,14 +5,13 @@ Records lie in a folder of their own, FITS/gaussians, each beside the arrays of 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from threadpoolctl import threadpool_limits
 
 from mcml_sim import Medium, Setting
 from mcml_sim.media.setting import ILLUMINATIONS
@@ -28,7 +27,7 @@ from profilefit.recipes.stack.file import LayerStack
 from profilefit.recipes.stack.gaussians import SumLight
 from profilefit.recipes.stack.record import StackRequest, damage, told_stack
 from profilefit.recipes.stack.sum_errors import constant_names, errors, quality
-from profilefit.recipes.workers import Workers
+from profilefit.recipes.work import Made, Work
 
 PIPELINE = "gaussians"
 TITLE = "Sums of 1 to 8 Gaussians, three colours with the same variances"
@@ -104,17 +103,17 @@ class SumRecord:
         return tuple(found)
 
 
-def regenerate(of: StackRequest, out: Path, processes: int = 1, say: Callable[[str], None] = lambda _: None) -> Path:
-    """Fit the sums of a stack in both lights, and write their record: two minutes. InputError on what none are for."""
+def work(of: StackRequest) -> Work:
+    """Fits of the sums of a stack in both lights, a part each: a minute. InputError on media without a law."""
     for medium in of.stack.media:
         fit.require(medium)
-    found: dict[str, dict[str, Any]] = {}
-    with Workers(min(processes, len(ILLUMINATIONS))) as workers:
-        for number, made in workers.each(partial(_of_light, of.stack.media), ILLUMINATIONS):
-            found[ILLUMINATIONS[number]] = made
-            say(f"{of.name}: Gaussians in {ILLUMINATIONS[number]} light fitted")
-    arrays = {f"{light}_{name}": array for light in ILLUMINATIONS for name, array in found[light]["arrays"].items()}
-    return record.write(out / SUMS, of.name, _content(of, {one: found[one] for one in ILLUMINATIONS}, arrays), arrays)
+
+    def finish(found: list[Any]) -> Made:
+        lights = dict(zip(ILLUMINATIONS, found, strict=True))
+        arrays = {f"{light}_{name}": array for light, one in lights.items() for name, array in one["arrays"].items()}
+        return _content(of, lights, arrays), arrays
+
+    return Work(f"{SUMS}/{of.name}", tuple(partial(_of_light, of.stack.media, one) for one in ILLUMINATIONS), finish)
 
 
 def beside(stack: Path) -> Path | None:
@@ -140,25 +139,24 @@ def _of_light(media: tuple[Medium, ...], illumination: str) -> dict[str, Any]:
     fewer = None if is_traced else gaussians.lights_of(media, illumination, fit.NODES.fewer)
     constants: dict[str, Any] = {}
     by_count = []
-    with threadpool_limits(1, "blas"):  # threads take longer to agree than such small matrices take
-        for count in COUNTS:
-            found = gaussians.joint(lights, count)
-            values, known = np.append(found.variances, found.weights), errors(found, lights, media, fewer)
-            for place, name in enumerate(constant_names(count)):
-                constants[f"{count}.{name}"] = {
-                    **{"published": None, "regenerated": values[place], "free": bool(found.free[place])},
-                    **{key: None if one is None else one[place] for key, one in known.items()},
-                }
-            each = [quality(one, found.variances, own) for one, own in zip(lights, found.weights, strict=True)]
-            by_count.append(
-                {
-                    "result": found.best.result,
-                    "steps": found.best.steps,
-                    "condition_number": found.best.condition_number,
-                    **{key: [one[key] for one in each] for key in ("rel", "rms", "ks")},
-                    "alone": [_alone(light, count) for light in lights],
-                }
-            )
+    for count in COUNTS:
+        found = gaussians.joint(lights, count)
+        values, known = np.append(found.variances, found.weights), errors(found, lights, media, fewer)
+        for place, name in enumerate(constant_names(count)):
+            constants[f"{count}.{name}"] = {
+                **{"published": None, "regenerated": values[place], "free": bool(found.free[place])},
+                **{key: None if one is None else one[place] for key, one in known.items()},
+            }
+        each = [quality(one, found.variances, own) for one, own in zip(lights, found.weights, strict=True)]
+        by_count.append(
+            {
+                "result": found.best.result,
+                "steps": found.best.steps,
+                "condition_number": found.best.condition_number,
+                **{key: [one[key] for one in each] for key in ("rel", "rms", "ks")},
+                "alone": [_alone(light, count) for light in lights],
+            }
+        )
     return {
         "constants": constants,
         "reflectance": [light.whole for light in lights],

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +10,7 @@ from rich.console import Group, RenderableType
 from rich.text import Text
 
 from profilefit.recipes import record
+from profilefit.recipes.reproduction import Reproduction
 from profilefit.recipes.schema import ERRORS
 from profilefit.report.records import SETS, Content, converged, measures
 from profilefit.report.tables.cells import ABSENT, column_table, significant, span, spark
@@ -19,6 +20,12 @@ from profilefit.report.tables.quality_tables import values_of, worst_measures
 SPARK = 8  # characters of a sparkline: 80 columns hold no more beside the longest name
 FAILED = "FAILED"
 Records = Mapping[str, Content]
+REPRODUCED = "Records made, and the largest moves of their constants from the shipped records"
+REPRODUCED_CAPTION = (
+    "moved: in units of the constant's stated error; at most 0.05 counts as reproduced. relative: as a "
+    "share of the constant. interval: largest move of an interval's end, in units of what the Monte Carlo error of the "
+    f"chains allows. {ABSENT}: no shipped record of the same photons, seed and layers."
+)
 CAPTION = (
     "Worst over α, and over n where a record spans indices: as printed → corrected, where there is such a set → "
     "regenerated. "
@@ -50,11 +57,25 @@ def outcome(path: Path) -> dict[str, Any]:
     return {**told, "result": content["fit"]["result"], "constants": constants, "worst": worst_measures(content)}
 
 
-def spent(seconds: Mapping[str, float], paths: Mapping[str, Path]) -> RenderableType:
-    """Seconds of each record, and of the photons of each setting, with what came out of it."""
-    results = [_result(record.read(paths[name])) if name in paths else "" for name in seconds]
-    columns = {"record": list(seconds), "seconds": [f"{value:.1f}" for value in seconds.values()], "result": results}
-    return column_table("Where the seconds went", columns, left=("record", "result"))
+def reproduced(
+    seconds: Mapping[str, float], paths: Mapping[str, Path], found: Mapping[str, Reproduction | None]
+) -> RenderableType:
+    """Seconds of each record and of each setting's light, and how far each record is from the shipped one."""
+    rows = []
+    for name, spent in seconds.items():
+        one, result = found.get(name), _result(record.read(paths[name])) if name in paths else ""
+        numbers = (one.moved, one.relative, one.intervals) if one else ()
+        cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
+        rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
+    headers = ("record", "seconds", "constants", "moved", "relative", "interval", "result")
+    columns = dict(zip(headers, map(list, zip(*rows, strict=True)), strict=True))
+    return column_table(REPRODUCED, columns, REPRODUCED_CAPTION, left=("record",), fold=("result",))
+
+
+def verdict(found: Sequence[Reproduction]) -> str:
+    """One line: how many records are reproduced, and the largest move of a constant."""
+    count, moved = sum(one.is_reproduced for one in found), max(one.moved for one in found)
+    return f"{count} of {len(found)} records reproduced; largest move {moved:.1g} of a stated error"
 
 
 def _result(content: Content) -> str:
