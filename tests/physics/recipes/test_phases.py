@@ -14,6 +14,7 @@ from profilefit.recipes.folder import shipped
 from profilefit.recipes.phases import record
 from profilefit.recipes.phases.data import read_phase
 from profilefit.recipes.phases.fit import MOMENTS, fit_phase
+from profilefit.recipes.work import alone
 
 FOLDER = shipped("fits") / "phases"
 PETZOLD = read_phase(FOLDER / "petzold.csv")
@@ -130,7 +131,7 @@ def test_shipped_record():
 
 @pytest.mark.slow
 def test_the_record_comes_out_again(tmp_path):
-    again = record.load(record.regenerate(FOLDER / "petzold.csv", tmp_path))
+    again = record.load(alone(record.work(FOLDER / "petzold.csv"), tmp_path))
     for name, one in SHIPPED.content["constants"].items():
         error = max(value for key, value in one.items() if key.endswith("error") and value is not None)
         assert abs(again.content["constants"][name]["regenerated"] - one["regenerated"]) <= 0.01 * error + 1e-9, name

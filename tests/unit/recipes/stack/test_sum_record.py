@@ -16,6 +16,7 @@ from profilefit.recipes.stack import sum_record
 from profilefit.recipes.stack.record import request_of
 from profilefit.recipes.stack.sum_errors import constant_names
 from profilefit.recipes.stack.sum_record import COUNTS, beside, load
+from profilefit.recipes.work import alone
 from tests.unit.recipes.stack.test_record import STACK, changed
 
 SHIPPED = sorted(path.stem for path in (fits_folder() / STACKS).glob("*.toml"))
@@ -59,7 +60,7 @@ def written(monkeypatch, tmp_path):
     """The record of a stack whose fit takes no time."""
     monkeypatch.setattr(sum_record, "_of_light", made_sums)
     (tmp_path / "heart.toml").write_text(STACK, encoding="utf-8")
-    return sum_record.regenerate(request_of(str(tmp_path / "heart.toml")), tmp_path / "mine")
+    return alone(sum_record.work(request_of(str(tmp_path / "heart.toml"))), tmp_path / "mine")
 
 
 def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
@@ -82,7 +83,7 @@ def test_a_record_is_read_as_the_sums_that_were_written(written, tmp_path):
             assert [one.whole, one.inside] == known["arrays"][f"{channel}_ends"].tolist()
     first, second = (found.laws(light)[0].variance for light in ILLUMINATIONS)
     assert first != second
-    again = sum_record.regenerate(of, tmp_path / "again")
+    again = alone(sum_record.work(of), tmp_path / "again")
     assert again.read_bytes() == written.read_bytes()
     assert again.with_suffix(".npz").read_bytes() == written.with_suffix(".npz").read_bytes()
 
@@ -172,7 +173,7 @@ def test_what_no_sums_are_for_is_refused_before_any_fit(monkeypatch, tmp_path):
     path = tmp_path / "heart.toml"
     path.write_text(STACK.replace("n = 1.38\nmu_a = [0.20", "n = 1.5\nmu_a = [0.20"), encoding="utf-8")
     with pytest.raises(InputError, match="layers must have one n for a law of a stack"):
-        sum_record.regenerate(request_of(str(path)), tmp_path / "mine")
+        alone(sum_record.work(request_of(str(path))), tmp_path / "mine")
     assert not (tmp_path / "mine").exists()
 
 
