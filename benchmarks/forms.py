@@ -22,17 +22,17 @@ import numpy as np
 from jax import Array
 from numpy.polynomial.legendre import legvander
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
 from benchmarks.survival import FORMS, HAZARD, Form
 from benchmarks.table import show
 from mcml_sim import exact
+from profilefit.fitting.solver import solve
 from profilefit.studies.tradeoff.counting import count, described
 
 Floats = NDArray[np.float64]
 # Weights of the relative error, of that in the tail, and what more than thrice as bright counts for.
 RELATIVE, TAIL, MOST = 0.1, 0.0, 3.0
-EVALUATIONS = 300  # of a start
+EVALUATIONS, GAIN = 300, 1e-9  # of a start; of a sum of squares, that another step must gain
 WIDEST = 9.0  # largest |ln| of a shape
 
 
@@ -263,7 +263,7 @@ def judge_law(law: CoefficientLaw, constants: Floats, truth: Truth) -> Errors:
 
 
 class Solver:
-    """Least squares of residual(parameters, data) by MINPACK, from several starts: compiled once for any data.
+    """Least squares of residual(parameters, data) from several starts: compiled once for any data.
 
     Single problems one after another: a batch of them would wait for its slowest at every form and start.
     """
@@ -276,18 +276,12 @@ class Solver:
         """The parameters of the least sum of squares."""
         with jax.enable_x64(True):
             arrays = jax.tree.map(jnp.asarray, data)
-            found = [
-                least_squares(
-                    lambda p: np.asarray(self._residual(p, arrays)),
-                    start,
-                    jac=lambda p: np.nan_to_num(np.asarray(self._jacobian(p, arrays))),
-                    method="lm",
-                    x_scale="jac",
-                    max_nfev=EVALUATIONS,
-                )
-                for start in starts
-            ]
-        return min(found, key=lambda result: result.cost).x
+
+            def at(p: Floats) -> tuple[Floats, Floats]:
+                return np.asarray(self._residual(p, arrays)), np.nan_to_num(np.asarray(self._jacobian(p, arrays)))
+
+            found = [solve(at, start, by_slope=True, gain=GAIN, most=EVALUATIONS) for start in starts]
+        return min(found, key=lambda result: result.cost).parameters
 
 
 def functions(form: Form) -> str:

@@ -11,8 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from profilefit.fitting.solver import differences, solve
 from profilefit.scenes.fur.law import shadow, shared_shadow, visibility
 from profilefit.scenes.fur.truth import Patch, cast, random_patch, spaced_patch, struck, tufted_patch
 
@@ -23,7 +23,7 @@ PATCHES, SIDE, OF_LEANS = 16, 5.0, 48
 LATTICE = 50  # rays of a patch along a side, one anywhere in each of its squares
 RAYS = LATTICE**2
 DENSITIES, DEGREES, HEIGHTS = (16.0, 64.0, 144.0), (0.0, 30.0, 60.0, 75.0), (0.0, 0.3, 0.6)
-LEAST = 0.02  # seen, of which kappa is told
+LEAST, STEP = 0.02, 1e-6  # seen, of which kappa is told; of a constant, for derivatives
 PACKING, EACH, SPREAD = 0.5, 8, 0.5  # n d^2; strands of a tuft; its radius by the tufts' mean distance
 LEANS, NODES = (0.1, 0.2, 0.4), 64
 LAMP_DENSITIES, EYES, LAMPS = (16.0, 64.0), (0.0, 45.0), (0.0, 15.0, 30.0, 60.0)
@@ -129,17 +129,16 @@ def feet_laws() -> Rows:
         def left(c: Floats, q: Floats = q, kappa: Floats = kappa, weight: Floats = weight, p: float = power) -> Floats:
             return np.asarray(((1.0 + np.exp(c[0]) * q ** c[1]) ** p - kappa) * weight)
 
-        best = least_squares(left, (0.0, 1.0))
-        spread = best.fun @ best.fun / (len(q) - 2)
-        errors = np.sqrt(np.diag(np.linalg.inv(best.jac.T @ best.jac)) * spread)
-        a, off = float(np.exp(best.x[0])), np.abs(best.fun / weight / kappa)
+        best = solve(differences(left, STEP), np.array([0.0, 1.0]), by_slope=True)
+        (log, b), errors = best.parameters.tolist(), np.sqrt(np.diag(best.covariance) * best.variance)
+        a, off = float(np.exp(log)), np.abs(best.residuals / weight / kappa)
         head_on = [f for f in factors() if f.kind == kind and f.degrees == 0.0]
-        there = max(abs((1.0 + a * f.thick ** best.x[1]) ** power / f.kappa - 1.0) for f in head_on)
+        there = max(abs((1.0 + a * f.thick**b) ** power / f.kappa - 1.0) for f in head_on)
         found.append(
             (
                 kind,
                 "1 + a q^b" if power > 0 else "1 / (1 + a q^b)",
-                *(a, a * float(errors[0]), float(best.x[1]), float(errors[1])),
+                *(a, a * float(errors[0]), b, float(errors[1])),
                 *(float(np.sqrt(np.mean(off**2))), float(off.max()), there),
                 *(float(kappa.mean()), float(kappa.std(ddof=1))),
             )

@@ -31,6 +31,7 @@ from profilefit.laws.liang import QUANTILES
 
 Floats = NDArray[np.float64]
 JACKKNIFE_GROUPS = 6
+JACKKNIFE_TOLERANCE = 1e-8  # of its refits: they move constants by 1e-3 and more, and creep over their last digits
 # Half of float64's digits: J^T J has the square of this condition number, and nothing is left of its inverse.
 DEGENERATE = 1e7
 
@@ -69,7 +70,7 @@ class Fit:
     @property
     def variance(self) -> float:
         """s^2: the misfit per degree of freedom."""
-        return self.solution.cost / degrees_of_freedom(self.solution)
+        return self.solution.variance
 
     @property
     def result(self) -> str:
@@ -170,17 +171,11 @@ class ResidualFunction:
         return jnp.sum(jnp.stack([jnp.sum(table**2) for table in self(vector, data)]))
 
 
-def degrees_of_freedom(solution: Solution) -> int:
-    """Residuals that count, less the free constants."""
-    return max(int(np.count_nonzero(solution.residuals)) - solution.parameters.size, 1)
-
-
 def misfit_covariance(solution: Solution) -> Floats:
     """s^2 (J^T J)^-1 (p, p); NaN where the fit failed."""
     if not solution.converged:
         return np.full((solution.parameters.size,) * 2, np.nan)
-    inverse = scaled_inverse(solution.jacobian.T @ solution.jacobian)
-    return np.asarray(solution.cost / degrees_of_freedom(solution) * inverse)
+    return solution.variance * solution.covariance
 
 
 def scaled_inverse(matrix: Floats) -> Floats:
@@ -217,7 +212,7 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
         row[group] = 0.0
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
     data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
-    refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data)
+    refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data, JACKKNIFE_TOLERANCE)
     if not all(judged(refit, problem.free).converged for refit in refits):
         return np.full(solution.parameters.size, np.nan)
     moved = np.stack([refit.parameters for refit in refits])

@@ -47,7 +47,7 @@ class Quality:
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
     """Measure a law against the exact profile of its own setting at each (reduced) albedo in `alpha` (m,)."""
     albedos = np.atleast_1d(np.asarray(alpha, float))
-    rows = [_at(law, float(value)) for value in albedos]
+    rows = [_at(law, *pair) for pair in zip(albedos.tolist(), _outer(tuple(albedos), law.setting), strict=True)]
     return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -74,10 +74,16 @@ def _medium(reduced: float, setting: Setting) -> tuple[float, float]:
     return own, 1.0 - own * setting.g
 
 
+@lru_cache(maxsize=64)
+def _outer(alpha: tuple[float, ...], setting: Setting) -> list[float]:
+    """Radii of `ENERGY_WITHIN` [l*], of all albedos in one call."""
+    own, mfp = np.array([_medium(one, setting) for one in alpha]).T
+    return list(np.asarray(exact.quantile(ENERGY_WITHIN, own, mfp, setting)).tolist())
+
+
 @lru_cache(maxsize=256)
-def _truth(alpha: float, setting: Setting) -> _Truth:
+def _truth(alpha: float, outer: float, setting: Setting) -> _Truth:
     own, mfp = _medium(alpha, setting)
-    outer = float(exact.quantile(ENERGY_WITHIN, own, mfp, setting))
     r = np.geomspace(NEAREST, outer, RADII)
     far = np.geomspace(1e-4, 20.0 * outer, 4 * RADII)
     walked = np.append(r, outer + np.arange(1, 9) / 8)  # (6) may stop one stride beyond
@@ -88,8 +94,8 @@ def _truth(alpha: float, setting: Setting) -> _Truth:
     return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, own, mfp, setting)), even, scaled)
 
 
-def _at(law: ProfileLaw, alpha: float) -> tuple[float | tuple[float, float], ...]:
-    truth, (own, mfp) = _truth(alpha, law.setting), _medium(alpha, law.setting)
+def _at(law: ProfileLaw, alpha: float, outer: float) -> tuple[float | tuple[float, float], ...]:
+    truth, (own, mfp) = _truth(alpha, outer, law.setting), _medium(alpha, law.setting)
     off = np.abs(law.profile(truth.r, own, mfp) / truth.profile - 1.0)
     law_cdf = law.cdf(truth.far, own, mfp)
     ks = np.max(np.abs(law_cdf - truth.cdf))

@@ -120,34 +120,45 @@ def covariance(jacobian: Floats) -> Floats:
 
 
 def least_squares(
-    residual: Callable[..., Array], start: ArrayLike, data: object = None, bounds: Bounds | None = None
+    residual: Callable[..., Any],
+    start: ArrayLike,
+    data: object = None,
+    bounds: Bounds | None = None,
+    tolerance: float = RELATIVE_TOLERANCE,
 ) -> Solution:
     """Minimise |residual(parameters, data)|^2.
 
     Args:
-        residual: function of jax arrays, (p,) and a pytree, that returns residuals, (n,) or a tuple of tables (m, k).
+        residual: function of jax arrays, (p,) and a pytree, that returns residuals: (n,), a tuple of such, or
+            of tables (m, k). XLA would compute what parts share for each row anew if a program joined them.
         start: (p,) parameters to start from, in the caller's units; each is scaled by its size.
         data: any pytree of arrays.
         bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
+        tolerance: relative size of a step at which the search ends.
     """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
 
         def at(parameters: Floats) -> tuple[Floats, Floats]:
             values, jacobian = _linearise(residual, parameters, arrays)
-            return _joined(values).ravel(), _joined(jacobian).reshape(-1, parameters.size)
+            rows = 0 if np.ndim(values[0]) < 2 else 1
+            return _joined(values, rows).ravel(), _joined(jacobian, rows).reshape(-1, parameters.size)
 
-        return solve(at, np.asarray(start, np.float64), bounds)
+        return solve(at, np.asarray(start, np.float64), bounds, tolerance=tolerance)
 
 
-def solve_batch(residual: Callable[..., Array], starts: ArrayLike, data: object = None) -> tuple[Solution, ...]:
+def solve_batch(
+    residual: Callable[..., Any], starts: ArrayLike, data: object = None, tolerance: float = RELATIVE_TOLERANCE
+) -> tuple[Solution, ...]:
     """Solve m problems of one shape: `starts` (m, p), every leaf of `data` with a leading axis m.
 
     One after the other: one program serves them all and `least_squares` too, and none waits for the slowest.
     """
     begins, leaves = np.asarray(starts, np.float64), jax.tree.map(np.asarray, data)
     items = (jax.tree.map(lambda leaf, row=row: leaf[row], leaves) for row in range(len(begins)))
-    return tuple(least_squares(residual, begin, item) for begin, item in zip(begins, items, strict=True))
+    return tuple(
+        least_squares(residual, begin, item, tolerance=tolerance) for begin, item in zip(begins, items, strict=True)
+    )
 
 
 @eqx.filter_jit
@@ -155,11 +166,8 @@ def _linearise(residual, parameters, data):
     return residual(parameters, data), jax.jacfwd(residual)(parameters, data)
 
 
-def _joined(parts: Array | tuple[Array, ...]) -> Floats:
-    """Tables side by side."""
-    return (
-        np.concatenate([np.asarray(part) for part in parts], axis=1) if isinstance(parts, tuple) else np.asarray(parts)
-    )
+def _joined(parts: Array | tuple[Array, ...], axis: int) -> Floats:
+    return np.concatenate([np.asarray(part) for part in parts], axis) if isinstance(parts, tuple) else np.asarray(parts)
 
 
 def differences(

@@ -11,17 +11,16 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
-from scipy.optimize import least_squares
 
 from mcml_sim import exact
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
+from profilefit.fitting import solver
 from profilefit.measured.data import Measured, require_workable
 from profilefit.measured.instrument import Instrument
 from profilefit.measured.misfit import DETECTED, alone, gaussianised, scatter_chance
@@ -38,6 +37,7 @@ NODES = exact.Nodes(depth=10, slope=12, azimuth=12, wave=10)
 STEP = 0.02  # of ln of a quantity, for derivatives
 REACH = math.log(300.0)  # how far ln of a quantity may go from where it starts
 TOLERANCE, MOST_STEPS = 1e-4, 20
+GAIN = 1e-3  # of chi-square, that another step must gain
 ROUNDS = 2  # of weights: those of counts come from the fit
 LOOSE = 0.5  # relative error from which a quantity is not identified
 NAMED = 0.1  # exponents below it are left out of a product's name
@@ -119,7 +119,7 @@ def fit_layers(
         start[-1] = math.log(max(float(white @ weights.whitened(data.value) / (white @ white)), 1e-30))
     for _ in range(ROUNDS if data.counted else 1):
         done = _least(light, weights, start, held, known)
-        start, expected = done.x, _rows(light, done.x, held)
+        start, expected = done.parameters, _rows(light, done.parameters, held)
         weights = noise(data, np.maximum(expected, 0.01 * data.value), wider)
     return _judged(light, names, done, expected, weights, held, known)
 
@@ -180,49 +180,40 @@ def _residuals(light: _Light, weights: Noise, x: Floats, held: float, known: Kno
     return rows if known is None else np.append(rows, (math.exp(x[-1]) - known.value) / known.error)
 
 
-def _least(light: _Light, weights: Noise, start: Floats, held: float, known: Known | None) -> Any:
-    def residuals(x: Floats) -> Floats:
-        return _residuals(light, weights, x, held, known)
-
-    def slopes(x: Floats) -> Floats:
-        here = residuals(x)
-        return np.stack([(residuals(x + STEP * way) - here) / STEP for way in np.eye(x.size)], axis=1)
-
-    return least_squares(
-        residuals,
-        start,
-        slopes,
-        bounds=(start - REACH, start + REACH),
-        xtol=TOLERANCE,
-        ftol=TOLERANCE,
-        max_nfev=MOST_STEPS,
-    )
+def _least(light: _Light, weights: Noise, start: Floats, held: float, known: Known | None) -> solver.Solution:
+    at = solver.differences(lambda x: _residuals(light, weights, x, held, known), STEP)
+    bounds = start - REACH, start + REACH
+    return solver.solve(at, start, bounds, by_slope=True, tolerance=TOLERANCE, gain=GAIN, most=MOST_STEPS)
 
 
 def _judged(
-    light: _Light, names: tuple[str, ...], done: Any, expected: Floats, weights: Noise, held: float, known: Known | None
+    light: _Light,
+    names: tuple[str, ...],
+    done: solver.Solution,
+    expected: Floats,
+    weights: Noise,
+    held: float,
+    known: Known | None,
 ) -> LayersFit:
-    rows = _residuals(light, weights, done.x, held, known)
+    rows = _residuals(light, weights, done.parameters, held, known)
     data, count = light.data, light.data.value.size
     times = math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
     rows[:count] = gaussianised(times * rows[:count], alone(data.freedom, data.pooled))
     chi2, freedom = float(rows @ rows), rows.size - len(names)
     chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0
-    _, singular, ways = np.linalg.svd(done.jac, full_matrices=False)
-    sizes = wider / np.maximum(singular, np.finfo(float).tiny)
-    covariance = (ways.T * sizes**2) @ ways
+    _, singular, ways = np.linalg.svd(done.jacobian, full_matrices=False)
+    sizes, covariance = wider / np.maximum(singular, np.finfo(float).tiny), wider**2 * done.covariance
     errors = np.sqrt(np.diag(covariance))
-    result = "converged"
-    if done.status <= 0:
+    result = solver.CONVERGED
+    if not done.converged:
         result = f"no convergence in {MOST_STEPS} steps: start nearer, or free fewer quantities"
-    elif np.any(done.active_mask):
-        name = names[int(np.argmax(done.active_mask != 0))]
-        result = f"{name} runs away: these data do not constrain it"
+    elif done.at_bound is not None and np.any(done.at_bound):
+        result = f"{names[int(np.argmax(done.at_bound))]} runs away: these data do not constrain it"
     products = tuple((way / way[np.argmax(np.abs(way))], float(size)) for way, size in zip(ways, sizes, strict=True))
-    medium = light.at(done.x[: len(light.free)])
+    medium = light.at(done.parameters[: len(light.free)])
     values = [getattr(medium.layers[number - 1], FIELDS[kind]) for kind, number in map(_parts, light.free)]
-    values += [math.exp(done.x[-1])] if len(names) > len(light.free) else []
+    values += [math.exp(done.parameters[-1])] if len(names) > len(light.free) else []
     return LayersFit(
         data, light.premises, light.medium, medium, names, np.array(values), errors,
         covariance / np.outer(errors, errors), products, chi2, freedom, chance, expected, result,

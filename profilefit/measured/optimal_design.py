@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.fitting.solver import covariance
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.identifiability import relative_errors
 from profilefit.measured.law_error import WITHIN
@@ -93,20 +94,20 @@ def _others(found: MediumFit) -> list[Candidate]:
 
 def _repeated(found: MediumFit) -> Floats:
     """Covariance of the coordinates where the data's errors are those of REPEATS profiles, and the law's stay."""
-    law, free = found.law_rows, list(found.question.free)
+    law = found.law_rows
     rows = law + (np.eye(len(law)) - law) / REPEATS
-    gain = np.linalg.pinv(np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
-    covariance = np.zeros((len(NAMES), len(NAMES)))
-    covariance[np.ix_(free, free)] = gain @ gain.T
-    return covariance + found.of_ranges
+    return _covariance(found, np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
 
 
 def _candidate(
     found: MediumFit, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
 ) -> Candidate:
-    free = list(found.question.free)
-    rows = np.vstack([found.jacobian, slope[free] / error])
-    gain = np.linalg.pinv(rows)
-    covariance = np.zeros((len(NAMES), len(NAMES)))
-    covariance[np.ix_(free, free)] = gain @ gain.T
-    return Candidate(kind, inner, outer, value, error, relative_errors(found, covariance + found.of_ranges))
+    joint = _covariance(found, np.vstack([found.jacobian, slope[list(found.question.free)] / error]))
+    return Candidate(kind, inner, outer, value, error, relative_errors(found, joint))
+
+
+def _covariance(found: MediumFit, jacobian: Floats) -> Floats:
+    """Covariance (3, 3) of the coordinates from derivatives (m, p) by the free ones, and by what ranges leave open."""
+    free, joint = list(found.question.free), np.zeros((len(NAMES), len(NAMES)))
+    joint[np.ix_(free, free)] = covariance(jacobian)
+    return joint + found.of_ranges

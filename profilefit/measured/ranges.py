@@ -15,8 +15,8 @@ from itertools import product
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
+from profilefit.fitting.solver import differences, solve
 from profilefit.measured.model import U
 from profilefit.measured.solving import Minimum, Problem, descended_from, likelihood, log_prior
 
@@ -25,7 +25,8 @@ NODES = {"n": 3, "g": 6, "beam": 5}
 PLACES = {"n": 15, "g": 121, "beam": 61}  # between the nodes, where the polynomials are evaluated
 COARSE = 3  # nodes of each range from which the search begins
 REACH = 5.0  # standard errors of a range's value to either side of the best, beyond which it is not looked for
-STEP, MAX_STEPS = 1e-3, 60  # of a range, for derivatives; of the search
+STEP = 1e-3  # of a range, for derivatives
+ENOUGH, MAX_STEPS = 1e-5, 60  # of chi-square, that another step of the search must gain; of the search
 DRAWS, SEED = 4000, 0
 
 
@@ -108,33 +109,25 @@ def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Mi
     """The best fit within the ranges, and what of them is within REACH of it; begun at the fit under some values."""
     free, ranges = list(problem.question.free), problem.question.ranges
     low, high = np.array(list(ranges.values())).T
-    step = STEP * (high - low)
 
-    def at(x: Floats) -> tuple[Problem, Floats]:
-        there = problem.under(dict(zip(ranges, map(float, x[len(free) :]), strict=True)))
+    def residuals(theta: Floats, values: Floats) -> tuple[Floats, Floats]:
+        there = problem.under(dict(zip(ranges, map(float, values), strict=True)))
         point = there.question.base
-        point[free] = x[: len(free)]
-        return there, point
+        point[free] = theta
+        rows, slopes = there.residuals(point)
+        return rows, slopes[:, free]
 
-    def rows(x: Floats) -> Floats:
-        there, point = at(x)
-        found = there.residuals(point)[0]
-        return np.where(np.isfinite(found), found, np.sqrt(np.finfo(float).max) * STEP)
-
-    def slopes(x: Floats) -> Floats:
-        there, point = at(x)
-        here, by_point = there.residuals(point)
-        ways = np.where(x[len(free) :] + step > high, -step, step)
-        by_range = [(rows(x + np.append(np.zeros(len(free)), way)) - here) / way.sum() for way in np.diag(ways)]
-        return np.column_stack([by_point[:, free], *by_range])
+    def at(x: Floats) -> tuple[Floats, Floats]:
+        theta, values = np.split(x, [len(free)])
+        by_range = differences(lambda moved: residuals(theta, moved)[0], STEP * (high - low), high)(values)[1]
+        rows, slopes = residuals(theta, values)
+        return rows, np.column_stack([slopes, by_range])
 
     first, last = (end[free] for end in problem.bounds(start.point))
     bounds = np.append(first, low), np.append(last, high)
     inside = np.clip(np.append(start.point[free], list(values.values())), *bounds)
-    done = least_squares(rows, inside, slopes, bounds=bounds, x_scale="jac", max_nfev=MAX_STEPS)
-    best = done.x[len(free) :]
-    errors = np.sqrt(np.maximum(np.diag(np.linalg.pinv(done.jac.T @ done.jac))[len(free) :], 0.0))
-    errors = np.where(np.any(done.jac[:, len(free) :] != 0, axis=0), errors, np.inf)
+    done = solve(at, inside, bounds, by_slope=True, gain=ENOUGH, most=MAX_STEPS)
+    best, errors = done.parameters[len(free) :], np.sqrt(np.diag(done.covariance))[len(free) :]
     ends = zip(np.maximum(best - REACH * errors, low), np.minimum(best + REACH * errors, high), strict=True)
     box = dict(zip(ranges, ((float(a), float(b)) for a, b in ends), strict=True))
     return fitted_under(problem, dict(zip(ranges, map(float, best), strict=True)), start), box

@@ -1,6 +1,4 @@
-"""Least squares in the three coordinates, from starts that a coarse search of the data finds.
-
-scipy's trust region with bounds, which `fitting.solver` has not: coordinates of bad data run away.
+"""Least squares in the three coordinates, within bounds, from starts that a coarse search of the data finds.
 
 A failure is a result: `Minimum.result` is "converged" or says what happened and what to try.
 """
@@ -13,9 +11,8 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 
-from profilefit.fitting.solver import CONVERGED
+from profilefit.fitting import solver
 from profilefit.measured.data import Measured
 from profilefit.measured.model import LENGTH, NAMES, SCALE, Model, U, u_of
 from profilefit.measured.noise import Noise
@@ -24,6 +21,7 @@ from profilefit.measured.problem import Question
 Floats = NDArray[np.float64]
 # Far below any error that data leave a coordinate, well above what rounding of the profile does to it.
 TOLERANCE = 1e-9
+GAIN = 1e-8  # of chi-square, below which no further step is worth taking
 MAX_STEPS = 1000  # along a ridge, where alpha and scale run away together, hundreds are taken
 # Albedos and lengths where the search begins; lengths from a twentieth of the first radius to twice the last.
 ALBEDOS = (0.02, 0.1, 0.3, 0.5, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99, 0.997, 0.999, 0.9999)
@@ -126,25 +124,15 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Minimum:
-    """Where a least-squares problem ended: point (3,), residuals (m,), jacobian (m, 3) there."""
+class Minimum(solver.Solution):
+    """End of a descent in all three coordinates; `others` other minima that a search found, the lowest first."""
 
-    point: Floats
-    residuals: Floats
-    jacobian: Floats
-    steps: int
-    result: str
     others: tuple[Minimum, ...] = ()
-    """Other minima that a search found, the lowest first."""
 
     @property
-    def cost(self) -> float:
-        with np.errstate(over="ignore", invalid="ignore"):
-            return float(self.residuals @ self.residuals)
-
-    @property
-    def converged(self) -> bool:
-        return self.result == CONVERGED
+    def point(self) -> Floats:
+        """Coordinates (3,)."""
+        return self.parameters
 
     @property
     def at_edge(self) -> bool:
@@ -183,24 +171,19 @@ def log_prior(u: Floats) -> Floats:
 
 def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum:
     """The minimum below `start` (3,) in the coordinates `free`; the others stay."""
-    moving, last = list(free), _Last(problem, start, list(free))
-    if not moving:
-        rows, slopes = problem.residuals(start)
-        return Minimum(start, rows, slopes, 0, CONVERGED if _usable(rows, slopes) else NOT_FINITE)
-    low, high = (end[moving] for end in problem.bounds(start))
+    (low, high), held = problem.bounds(start), np.setdiff1d(range(len(NAMES)), free)
+    low[held] = high[held] = start[held]
+
+    def at(point: Floats) -> tuple[Floats, Floats]:
+        rows, slopes = problem.residuals(point)
+        return (rows if _usable(rows, slopes) else np.full(rows.shape, np.nan)), slopes
+
+    done = solver.solve(
+        at, np.clip(start, low, high), (low, high), by_slope=True, tolerance=TOLERANCE, gain=GAIN, most=MAX_STEPS
+    )
     edge = EDGE * (high - low)
-    inside = np.clip(start[moving], low + edge, high - edge)
-    if not np.all(np.isfinite(last.rows(inside))):
-        return Minimum(start, *problem.residuals(start), 0, NOT_FINITE)
-    done = least_squares(
-        last.rows, inside, last.slopes, bounds=(low, high), x_scale="jac",
-        xtol=TOLERANCE, ftol=TOLERANCE, gtol=TOLERANCE, max_nfev=MAX_STEPS,
-    )  # fmt: skip
-    point = start.copy()
-    point[moving] = done.x
-    rows, slopes = problem.residuals(point)
-    ran = [at for at, x, a, b, e in zip(moving, done.x, low, high, edge, strict=True) if not a + e < x < b - e]
-    return Minimum(point, rows, slopes, int(done.nfev), _explained(done.status, point, slopes[:, moving], ran, free))
+    ran = (done.parameters <= low + edge) | (done.parameters >= high - edge)
+    return Minimum(**vars(replace(done, result=_explained(done, free, [at for at in free if ran[at]]))))
 
 
 def descended_from(problem: Problem, start: Floats) -> Minimum:
@@ -216,42 +199,20 @@ def _usable(rows: Floats, slopes: Floats) -> bool:
         return bool(np.isfinite(np.sum(rows**2) + np.sum(slopes**2)))
 
 
-class _Last:
-    """Residuals and derivatives in the moving coordinates; both come at once, so the last point's are kept."""
-
-    def __init__(self, problem: Problem, start: Floats, moving: list[int]) -> None:
-        self._problem, self._point, self._moving = problem, start.copy(), moving
-        self._at: Floats | None = None
-        self._found: tuple[Floats, Floats]
-
-    def rows(self, x: Floats) -> Floats:
-        return self._evaluated(x)[0]
-
-    def slopes(self, x: Floats) -> Floats:
-        return self._evaluated(x)[1][:, self._moving]
-
-    def _evaluated(self, x: Floats) -> tuple[Floats, Floats]:
-        if self._at is None or not np.array_equal(x, self._at):
-            self._at = x.copy()
-            self._point[self._moving] = x
-            rows, slopes = self._problem.residuals(self._point)
-            # The solver steps back from residuals that are not finite, but not from such derivatives.
-            self._found = (rows if _usable(rows, slopes) else np.full(rows.shape, np.nan), slopes)
-        return self._found
-
-
-def _explained(status: int, point: Floats, slopes: Floats, ran: list[int], free: tuple[int, ...]) -> str:
-    """How a descent ended, with the derivatives (m, p) there; `ran` the coordinates at the end of their range."""
+def _explained(done: solver.Solution, free: tuple[int, ...], ran: list[int]) -> str:
+    """How a descent ended; `ran` the coordinates at the end of their range."""
+    if done.result == solver.NOT_FINITE:
+        return NOT_FINITE
     if LENGTH in ran:
         return RAN_AWAY
-    if U in free and point[U] < WHITE:
+    if U in free and done.parameters[U] < WHITE:
         return AT_WHITE
-    if U in free and point[U] > BLACK:  # there a lower albedo and a larger scale are equivalent
+    if U in free and done.parameters[U] > BLACK:  # there a lower albedo and a larger scale are equivalent
         return AT_BLACK
     if SCALE in ran:
         return RAN_AWAY
-    if not np.all(np.any(slopes != 0, axis=0)):
+    if not np.all(np.any(done.jacobian[:, free] != 0, axis=0)):
         return "the predicted profile does not depend on what is free there: check the unit and what is held"
-    if status <= 0:
+    if done.steps >= MAX_STEPS:
         return f"no convergence in {MAX_STEPS} steps: hold one of alpha, l and scale, or measure over a wider range"
-    return CONVERGED
+    return solver.CONVERGED if done.converged else RAN_AWAY

@@ -37,8 +37,7 @@ def regenerate(
     """
     for recipe in recipes:
         starts.require_known(recipe)
-    # Those that span indices, and those with random starts, take longest: none is left when all others are done.
-    ordered = sorted(recipes, key=lambda r: (_stage(r), not r.cosines, not r.indices, -r.random_starts))
+    ordered = sorted(recipes, key=_order)
     lights: dict[Setting, Orders] = {}
     steps = []
     for setting in dict.fromkeys(recipe.setting for recipe in ordered if needs_photons(recipe)):
@@ -73,6 +72,17 @@ LAWS = 1  # the stage that reads the records of maps
 def _stage(recipe: Recipe) -> int:
     """When a recipe runs: it reads records of earlier ones."""
     return {"albedo": 0, "evidence": 2}.get(recipe.pipeline, LAWS)
+
+
+def _order(recipe: Recipe) -> tuple[Any, ...]:
+    """Key by which recipes begin in their order.
+
+    Those that span indices, and those with random starts, take longest: none is left when all others are done. Twins of
+    two illuminations do not run side by side: the second takes over what XLA compiled for the first.
+    """
+    spans = bool(recipe.indices)
+    second = spans and recipe.setting.illumination == "diffuse"
+    return _stage(recipe), not spans, second, not recipe.cosines, -recipe.random_starts
 
 
 def _work(recipe: Recipe, run: RecipeRun, lights: Mapping[Setting, Orders], pipelines: Mapping[str, Pipeline]) -> Work:

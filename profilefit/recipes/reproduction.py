@@ -8,6 +8,7 @@ error was not fitted, and must be equal.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -148,7 +149,7 @@ def _moves(
                 for place, share in enumerate((outside, 1.0 - outside)):
                     by = abs(made["constants"][name]["intervals"][kind][level][place] - ends_before[place])
                     errors = [_quantile_error(one[kind][:, column], share) for one in (chains, again)]
-                    yield (by / (most * float(np.hypot(*errors))) if by else 0.0), f"{name}, {kind}, {level}"
+                    yield (by / (most * math.hypot(*errors)) if by else 0.0), f"{name}, {kind}, {level}"
 
 
 def _quantile_error(draws: np.ndarray, share: float) -> float:

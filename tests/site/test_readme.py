@@ -16,7 +16,7 @@ from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]
 README = ROOT / "README.md"
-# Where each table stands; `make readme` fills these files.
+# Where each table stands; `make records` fills these files.
 PLACES = {
     "short": README,
     **dict.fromkeys(("quality", "hazard", "laws"), ROOT / "docs/guide/laws.md"),
@@ -47,7 +47,7 @@ def test_every_table_is_the_records_own():
     tables = sections(shipped())
     assert set(tables) == set(PLACES) - set(MEASURED)
     for name, table in tables.items():
-        assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in text_of(PLACES[name]), f"{name}: run make readme"
+        assert f"<!-- {name} -->\n{table}\n<!-- /{name} -->" in text_of(PLACES[name]), f"{name}: run make records"
 
 
 def test_every_table_stands_in_one_place_and_no_other():
@@ -108,7 +108,7 @@ def test_measured_tables_name_every_law_and_two_are_measured_again():
     assert {(r[0], r[1], r[2]) for r in rows} == {(o.name, o.constants or "none", o.setting.illumination) for o in laws}
     for one in [o for o in laws if o.label in ("burley, published", "liang-whole")]:
         line = markdown_laws([(one, measured_profile(one))]).splitlines()[2]
-        assert [cell.strip() for cell in line.strip("|").split("|")] in rows, f"{one.label}: run make readme"
+        assert [cell.strip() for cell in line.strip("|").split("|")] in rows, f"{one.label}: run make records"
 
 
 def test_the_table_of_claims_is_what_was_measured_last():

@@ -17,9 +17,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import stats
 from scipy.linalg import block_diag, solve_triangular
-from scipy.optimize import lsq_linear
 
 from mcml_sim.exact.light import ExactLight
+from profilefit.fitting.solver import covariance, solve
 from profilefit.measured import law_error, model
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import Model, u_of
@@ -36,8 +36,6 @@ ALBEDOS = (0.5, 0.8, 0.95, 0.99)
 LENGTHS = (0.02, 0.05, 0.12, 0.3)  # of the last ring's radius
 MAX_STEPS = 80
 FARTHEST = 1.0  # step of what light is not straight in
-TINY = 1e-15  # between the bounds of a step that cannot be
-NOTHING = 1e-100  # of a derivative, which is none
 ENOUGH = 1e-3  # of chi-square, that another step must gain
 
 
@@ -264,46 +262,18 @@ def fitted(shot: Shot) -> PhotoFit:
 
 
 def _descended(shot: Shot, start: Floats) -> PhotoFit:
-    """Where damped least squares ends from a start; each step is the best within bounds (`lsq_linear`)."""
+    """End of damped least squares within bounds, from a start."""
     halos = len(shot.beliefs.halos)
-    low, high, most = np.full((3, start.size), np.inf) * [[-1.0], [1.0], [1.0]]
+    low, high, longest = np.full((3, start.size), np.inf) * [[-1.0], [1.0], [1.0]]
     low[0], low[4 : 5 + halos], high[0] = -12.0, 0.0, 12.0
-    most[:4], most[7 + halos :] = FARTHEST, FARTHEST
-    x, damping, converged = np.clip(start, low, high), 0.01, False
-    rows, slopes = shot.residuals(x)
-    for _ in range(MAX_STEPS):
-        damped = np.sqrt(damping) * np.diag(np.linalg.norm(slopes, axis=0))
-        ends = np.maximum(low - x, -most) - TINY, np.minimum(high - x, most) + TINY
-        system = np.vstack([slopes, damped]), np.append(-rows, np.zeros(x.size))
-        step = lsq_linear(*system, bounds=ends, method="bvls").x
-        hoped = rows @ rows - np.sum((rows + slopes @ step) ** 2)
-        there = np.clip(x + step, low, high)
-        new_rows, new_slopes = shot.residuals(there)
-        gained = rows @ rows - new_rows @ new_rows
-        converged = bool(hoped < ENOUGH and gained < ENOUGH)
-        if gained > 0:
-            x, rows, slopes, damping = there, new_rows, new_slopes, 0.2 * damping
-        else:
-            damping *= 4.0
-        if converged:
-            break
-    return PhotoFit(shot, x, bound(slopes), float(rows @ rows), len(rows) - x.size, converged)
-
-
-def bound(slopes: Floats) -> Floats:
-    """Covariance (p, p) of the coordinates from derivatives (m, p) in standard errors: at a truth, Fisher's bound.
-
-    By the derivatives themselves, each over its size, since what the rows hardly tell is lost in their products.
-    """
-    size = np.maximum(np.linalg.norm(slopes, axis=0), NOTHING)
-    _, singular, ways = np.linalg.svd(slopes / size, full_matrices=False)
-    scaled = ways / np.maximum(singular, np.finfo(float).eps * singular[0])[:, None]
-    found: Floats = (scaled.T @ scaled) / np.outer(size, size)
-    return found
+    longest[:4], longest[7 + halos :] = FARTHEST, FARTHEST
+    start = np.clip(start, low, high)
+    done = solve(shot.residuals, start, (low, high), by_slope=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
+    freedom = done.residuals.size - start.size
+    return PhotoFit(shot, done.parameters, done.covariance, done.cost, freedom, done.converged)
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:
     """Relative errors of mu_s' and mu_a that no unbiased estimate from such rings undercuts."""
-    covariance = bound(truth.residuals(x)[1])
-    one = PhotoFit(truth, x, covariance, 0.0, 1, True)
+    one = PhotoFit(truth, x, covariance(truth.residuals(x)[1]), 0.0, 1, True)
     return {name: one.errors[name] / one.values[name] for name in ("mu_s'", "mu_a")}

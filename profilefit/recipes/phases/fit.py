@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from mcml_sim.media.phase import Phase, as_table, from_table
 from profilefit.errors import InputError
 from profilefit.fitting.discrepancy import FAILED, Residuals, of_residuals
-from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance, scaled_inverse
+from profilefit.fitting.estimate import JACKKNIFE_GROUPS, judged, misfit_covariance
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.phases import FORMS, PhaseForm, backscattered
 from profilefit.recipes.phases.data import PhaseData
@@ -171,7 +171,7 @@ def _errors(
     cosine, _, weight, _ = arrays
     with jax.enable_x64(True):
         slope = np.asarray(jax.jacfwd(form.constants)(jnp.asarray(best.parameters)))
-    gain = scaled_inverse(best.jacobian.T @ best.jacobian) @ (best.jacobian[: cosine.size] * weight[:, None]).T
+    gain = best.covariance @ (best.jacobian[: cosine.size] * weight[:, None]).T
 
     def spread(covariance: Floats) -> Floats:
         return np.sqrt(np.maximum(np.diag(slope @ covariance @ slope.T), 0.0))

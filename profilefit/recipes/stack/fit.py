@@ -21,7 +21,6 @@ from mcml_sim.exact.stack.solution import MAX_LAYERS
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import degrees_of_freedom, scaled_inverse
 from profilefit.fitting.solver import Solution, least_squares
 from profilefit.laws.refracting_rational import REFRACTING
 from profilefit.laws.stack import LayerLaw, StackLaw
@@ -162,8 +161,7 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
     jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
     with jax.enable_x64(True):
         slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(jnp.asarray(one.best.parameters))
-    slopes, jacobian = np.asarray(slopes), one.best.jacobian
-    inverse = scaled_inverse(jacobian.T @ jacobian)
+    slopes, inverse = np.asarray(slopes), one.best.covariance
 
     def spread(covariance: Floats) -> Floats:
         return np.sqrt(np.diag(slopes @ covariance @ slopes.T))
@@ -172,7 +170,7 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
         "statistical_error": spread(inverse @ _noise(one) @ inverse) if one.is_traced else None,
         "discretisation_error": None if fewer is None else np.abs(fewer - own),
         "model_error": None,
-        "misfit_error": spread(one.best.cost / degrees_of_freedom(one.best) * inverse),
+        "misfit_error": spread(one.best.variance * inverse),
         "jackknife_error": jackknife,
     }
     return {
@@ -306,7 +304,7 @@ def _residual(parameters, data):
     relative = jax.vmap(law.value)(r, d) / value - 1.0
     of_a = jax.vmap(law.whole)(d) / whole - 1.0
     away = TIMID * (parameters - jnp.asarray(START))
-    return jnp.concatenate([jnp.where(weight > 0, jnp.sqrt(weight) * relative, 0.0).ravel(), OF_A * of_a, away])
+    return jnp.where(weight > 0, jnp.sqrt(weight) * relative, 0.0).ravel(), OF_A * of_a, away
 
 
 def _ring_residual(parameters, data):
@@ -315,7 +313,7 @@ def _ring_residual(parameters, data):
     within = jax.vmap(law.within)(edges, d)
     relative = jnp.diff(within, axis=1) / energy - 1.0
     of_a = jax.vmap(law.whole)(d) / whole - 1.0
-    return jnp.concatenate([(weight * relative).ravel(), OF_A * of_a, TIMID * (parameters - start)])
+    return (weight * relative).ravel(), OF_A * of_a, TIMID * (parameters - start)
 
 
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:

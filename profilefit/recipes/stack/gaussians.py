@@ -278,7 +278,7 @@ def _linear_residual(parameters, data):
 
 @jax.jit
 def _hessian(parameters, data):
-    return jax.hessian(lambda at: 0.5 * jnp.sum(_linear_residual(at, data) ** 2))(parameters)
+    return jax.hessian(lambda at: 0.5 * sum(jnp.sum(part**2) for part in _linear_residual(at, data)))(parameters)
 
 
 def _off(variances, weights, lights):
@@ -286,4 +286,4 @@ def _off(variances, weights, lights):
     found = []
     for own, (edges, energy, weight, whole) in zip(weights, lights, strict=True):
         found.append(weight * (whole * (ring_shares(edges, variances, jnp) @ own) / energy - 1.0))
-    return jnp.concatenate(found)
+    return tuple(found)

@@ -14,18 +14,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import minimize_scalar
 from scipy.special import gammaln
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
+from profilefit.fitting.solver import differences, solve
 
 Floats = NDArray[np.float64]
 MOST_LAYERS = 4096
 SLENDER = (10.0, 20.0, 50.0)  # L / r0
 PER_DECADE = 8  # x = N r0 / L, even in its logarithm
 ANGLES = np.radians(np.arange(2.0, 80.0, 4.0))  # middles of equal parts of 0 to 80 degrees
-LARGEST = 8.0
+FIRST, LARGEST = 2.0, 8.0
+STEP, TOLERANCE = 1e-5, 1e-6  # of an exponent, for derivatives; of its search
 NODES = 48  # of quadratures over directions
 LEAST_X, MOST_X = 0.64, 6.4  # N r0 / L for which an exponent is fitted
 
@@ -190,16 +191,20 @@ def lobe_mean(exponent: ArrayLike) -> Any:
 
 def misfit(layers: int, exponent: float, slender: float) -> float:
     """Mean square of ln(shadow of the shells / shadow of the cone), weighed by sin cos, over 0 to 80 degrees."""
-    logs = np.log([shell_shadow(layers, exponent, 1.0 / slender, 1.0, float(angle)) for angle in ANGLES])
-    return float(np.average(logs**2, weights=np.sin(ANGLES) * np.cos(ANGLES)))
+    return float(np.sum(_missed(layers, exponent, slender) ** 2))
 
 
 def best_of(layers: int, slender: float) -> float:
     """The exponent of the least misfit."""
-    found = minimize_scalar(
-        lambda p: misfit(layers, p, slender), bounds=(1.0, LARGEST), method="bounded", options={"xatol": 1e-5}
-    )
-    return float(found.x)
+    at = differences(lambda p: _missed(layers, float(p[0]), slender), STEP, LARGEST)
+    return float(solve(at, np.array([FIRST]), (1.0, LARGEST), by_slope=True, tolerance=TOLERANCE).parameters[0])
+
+
+def _missed(layers: int, exponent: float, slender: float) -> Floats:
+    """ln(shadow of the shells / shadow of the cone) at each angle, times the root of its share of the weight."""
+    logs = np.log([shell_shadow(layers, exponent, 1.0 / slender, 1.0, float(angle)) for angle in ANGLES])
+    weight = np.sin(ANGLES) * np.cos(ANGLES)
+    return logs * np.sqrt(weight / weight.sum())
 
 
 def fitted(slender: Sequence[float] = SLENDER) -> tuple[Exponent, Exponent]:

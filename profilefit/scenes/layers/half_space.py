@@ -8,18 +8,20 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq, minimize_scalar
+from scipy.optimize import brentq
 
 from mcml_sim import Setting, exact
 from mcml_sim.media.medium import Medium
 from profilefit.errors import InputError
+from profilefit.fitting.solver import differences, solve
 
 Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # right to 1e-4
 WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
 RINGS, NEAREST, FARTHEST = 200, 1e-3, 200.0  # that light is summed over [mfp]
 PLACES = 40  # beside the edge
-SPAN = 1.5  # of ln l that is searched on either side of the first guess
+SPAN = 4.5  # of l, over the first guess and under it, that is searched
+STEP, TOLERANCE = 1e-3, 1e-5  # of the first guess, for derivatives; of l
 
 
 @dataclass(frozen=True)
@@ -95,10 +97,12 @@ def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
     def quartile(rings: RingShares) -> float:
         return float(brentq(lambda u: float(rings.beyond(np.exp([u]))[0]) - 0.25, *np.log(rings.radius[[0, -1]])))
 
-    first = quartile(stack) - quartile(one)
+    first = np.exp(quartile(stack) - quartile(one))
 
-    def missed(u: float) -> float:
-        d = places(np.exp(u), within)
-        return float(np.mean((stack.beyond(d) - one.beyond(d / np.exp(u))) ** 2))
+    def missed(mfp: Floats) -> Floats:
+        d = places(float(mfp[0]), within)
+        return stack.beyond(d) - one.beyond(d / mfp)
 
-    return float(np.exp(minimize_scalar(missed, bounds=(first - SPAN, first + SPAN), method="bounded").x))
+    bounds = first / SPAN, first * SPAN
+    found = solve(differences(missed, STEP * first), np.array([first]), bounds, by_slope=True, tolerance=TOLERANCE)
+    return float(found.parameters[0])

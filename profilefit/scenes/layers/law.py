@@ -31,7 +31,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares
 
 from mcml_sim import exact
 from mcml_sim.media.checks import checked_numbers, require_one_shape, shown
@@ -39,6 +38,7 @@ from mcml_sim.media.fresnel import fresnel
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.phase import HenyeyGreenstein, Phase
 from profilefit.errors import InputError
+from profilefit.fitting.solver import differences, solve
 from profilefit.recipes.stack.fit import stack_law
 
 __all__ = ["Plate", "beams", "plate_of", "single_scattering", "stack_law"]
@@ -46,6 +46,7 @@ __all__ = ["Plate", "beams", "plate_of", "single_scattering", "stack_law"]
 Floats = NDArray[np.float64]
 NODES = exact.Nodes(12, 16, 16, 10)  # of plates: right to 1e-4
 PLATES = (0.2, 0.6, 1.5, 4.0, 8.0)  # thicknesses of a part's core that its transmittance is fitted at [mfp]
+STEP = 1e-6  # of ln of a constant, for derivatives
 
 
 class Beam(NamedTuple):
@@ -140,9 +141,9 @@ def plate_of(medium: Medium, illumination: str = "diffuse") -> Plate:
     def off(at: Floats) -> Floats:
         return at[0] - np.log(np.sinh(rate * depth + np.exp(at[1]))) - known
 
-    best = least_squares(off, [known[0], 0.0])
-    error = float(np.max(np.abs(np.expm1(best.fun))))
-    return Plate(rate, skins, float(np.exp(best.x[0])), float(np.exp(best.x[1])), error)
+    best = solve(differences(off, STEP), np.array([known[0], 0.0]), by_slope=True)
+    strength, offset = map(float, np.exp(best.parameters))
+    return Plate(rate, skins, strength, offset, float(np.max(np.abs(np.expm1(best.residuals)))))
 
 
 def _phases_of(medium: Medium) -> tuple[Phase, ...]:

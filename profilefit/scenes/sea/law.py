@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import least_squares, nnls
+from scipy.optimize import nnls
 from scipy.special import hankel1
 
 from mcml_sim.media.checks import checked_numbers, checked_whole, is_number, require_one_shape, shown
 from profilefit.errors import InputError
+from profilefit.fitting.solver import differences, solve
 from profilefit.laws.phases import haltrin
 
 __all__ = [
@@ -68,6 +69,8 @@ NARROWEST = 1e-12  # radius [-] from which on only unscattered light is left
 SPAN = 0.999, 0.003  # of a transform, between which a sum of Gaussians follows it
 FREQUENCIES = 96
 MOST_GAUSSIANS = 8
+MOVED, TOLERANCE = 1e-6, 1e-6  # of ln of a variance, for derivatives and of a search
+GAIN = 1e-10  # of a sum of squares, that another step must gain
 HALVINGS = 60
 
 
@@ -134,7 +137,7 @@ class WaterGaussians(NamedTuple):
 def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterGaussians:
     """`water_mtf` as unscattered light and 1 to 8 Gaussians: least squares over frequencies even in ln k.
 
-    Variances by a trust region, and the weights, none negative, to each of them.
+    Variances by least squares within bounds, and the weights, none negative, to each of them.
     """
     terms = _checked_lobes(lobes)
     albedo, depth = _checked(omega=omega, ct=ct)
@@ -160,8 +163,10 @@ def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterG
         return found, table @ found - target
 
     ends = -2.0 * np.log(frequency[[-1, 0]])
+    bounds = ends[0] - 3, ends[1] + 3
     start = ends[0] + (ends[1] - ends[0]) * (np.arange(number) + 0.5) / number
-    logs = np.sort(least_squares(lambda here: weighted(here)[1], start, bounds=(ends[0] - 3, ends[1] + 3)).x)
+    at = differences(lambda here: weighted(here)[1], MOVED)
+    logs = np.sort(solve(at, start, bounds, by_slope=True, tolerance=TOLERANCE, gain=GAIN, longest=1.0).parameters)
     weights, _ = weighted(logs)
     off = np.exp(-0.5 * np.square(wide)[:, None] * np.exp(logs)) @ weights - of_wide
     error = float(np.max(np.abs(off))) * whole / (whole + straight)

@@ -15,10 +15,10 @@ from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares
 from scipy.special import ndtr
 
 from profilefit.fitting.sampling import LawTarget
+from profilefit.fitting.solver import differences, solve
 from profilefit.laws.base import ProfileLaw
 from profilefit.scenes.skin.law import FOLLOW, Separable, kernel_quartile
 from profilefit.scenes.stage.step_edge import LAST_XI, shifted_points
@@ -29,6 +29,7 @@ from profilefit.studies.choose.response import Beyond, ReferenceLight
 Floats = NDArray[np.float64]
 FITTED = 6.0 * ((np.arange(60) + 0.5) / 60) ** 2  # distances [mfp], closer together at the edge
 REACH = 3.0  # of the taps, in the widest sigma
+STEP, TOLERANCE = 1e-6, 1e-6  # of ln of a weight or a width, for derivatives and of a search
 
 
 @dataclass(frozen=True)
@@ -65,8 +66,8 @@ def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
         return ndtr(-FITTED[:, None] / sigma) @ weight - wanted
 
     first = np.log(quartile * np.geomspace(0.3, 4.0, count)) if count > 1 else np.log([1.5 * quartile])
-    found = least_squares(missed, np.append(first, np.zeros(count - 1)), method="lm")
-    return split(found.x)
+    start = np.append(first, np.zeros(count - 1))
+    return split(solve(differences(missed, STEP), start, by_slope=True, tolerance=TOLERANCE).parameters)
 
 
 def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floats, Separable, Floats]]:

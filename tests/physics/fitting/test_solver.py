@@ -3,8 +3,20 @@
 import jax.numpy as jnp
 import numpy as np
 import pytest
+from scipy import optimize
 
-from profilefit.fitting.solver import CONVERGED, MAX_STEPS, Solution, least_squares, solve_batch
+from profilefit.fitting.solver import (
+    CONVERGED,
+    MAX_STEPS,
+    NOT_FINITE,
+    Solution,
+    covariance,
+    differences,
+    least_squares,
+    minimise,
+    solve,
+    solve_batch,
+)
 
 X = np.linspace(0, 3, 20)
 
@@ -124,3 +136,163 @@ def test_a_search_that_stalls_at_the_edge_of_its_domain_has_not_converged():
         return jnp.array([jnp.sqrt(p[0]) + 1.0, 0.1 * p[0]]) + 0.0 * data
 
     assert "stalled beside an optimum" in least_squares(residual, [1.0], np.zeros(2)).result
+
+
+def valley(p):
+    """Rosenbrock's, whose optimum is at (1, 1)."""
+    return np.array([10.0 * (p[1] - p[0] ** 2), 1.0 - p[0]])
+
+
+def valley_of(p, data):
+    return jnp.array([10.0 * (p[1] - p[0] ** 2), 1.0 - p[0]]) + 0.0 * data
+
+
+def noisy(p):
+    data = problem(2.0, 1.7, 0.05, seed=4)
+    return p[0] * np.exp(-p[1] * data["x"]) - data["y"]
+
+
+def test_an_optimum_at_a_bound():
+    found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7), ([0.0, 0.0], [1.5, 5.0]))
+    assert found.converged
+    assert found.parameters[0] == 1.5
+    np.testing.assert_array_equal(found.at_bound, [True, False])
+    assert found.jacobian[:, 1] @ found.residuals == pytest.approx(0.0, abs=1e-8)
+    assert found.jacobian[:, 0] @ found.residuals < 0, "a larger one would fit better"
+
+
+def test_a_start_at_a_bound_leaves_it():
+    found = least_squares(decay, [1.0, 1.0], problem(2.0, 1.7), (1.0, 3.0))
+    np.testing.assert_allclose(found.parameters, [2.0, 1.7], rtol=1e-9)
+    assert not np.any(found.at_bound)
+
+
+def test_a_bound_on_both_sides_holds_a_parameter():
+    found = solve(differences(noisy, 1e-6), np.array([2.5, 1.0]), ([2.5, 0.0], [2.5, 9.0]), by_slope=True)
+    alone = solve(differences(lambda p: noisy(np.append(2.5, p)), 1e-6), np.array([1.0]), by_slope=True)
+    assert found.parameters[0] == 2.5
+    assert found.parameters[1] == pytest.approx(alone.parameters[0], rel=1e-8)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_bounds_of_a_linear_problem_are_those_of_nnls(seed):
+    """Ten columns that are nearly parallel: several of them end at 0."""
+    rng = np.random.default_rng(seed)
+    design = 1.0 + 0.3 * rng.standard_normal((30, 10))
+    y = design @ rng.normal(0.5, 1.0, 10) + 0.1 * rng.standard_normal(30)
+    found = solve(lambda p: (design @ p - y, design), np.ones(10), (0.0, np.inf), by_slope=True)
+    expected, size = optimize.nnls(design, y)
+    assert found.converged
+    assert found.steps < 20
+    assert np.any(expected == 0), "a control"
+    np.testing.assert_allclose(found.parameters, expected, atol=1e-8)
+    assert found.cost == pytest.approx(size**2, rel=1e-12)
+    np.testing.assert_array_equal(found.parameters == 0, found.at_bound)
+
+
+def test_steps_are_no_longer_than_the_longest():
+    seen = []
+
+    def at(p):
+        seen.append(p)
+        return p - [5.0, 1.0], np.eye(2)
+
+    found = solve(at, np.zeros(2), by_slope=True, longest=[0.5, np.inf])
+    np.testing.assert_allclose(found.parameters, [5.0, 1.0])
+    assert np.max(np.abs(np.diff(seen, axis=0))[:, 0]) == pytest.approx(0.5)
+    assert np.max(seen, axis=0)[1] > 0.9
+    assert solve(lambda p: (p - [5.0, 1.0], np.eye(2)), np.zeros(2), by_slope=True).steps < found.steps - 4, "a control"
+
+
+def test_what_gains_little_ends_the_search():
+    start = np.array([1.0, 1.0])
+    early, late = (solve(differences(noisy, 1e-6), start, by_slope=True, gain=gain) for gain in (1e-3, 0.0))
+    assert early.converged
+    assert early.steps < late.steps
+    assert early.cost - late.cost < 1e-3
+
+
+def test_a_start_that_is_not_finite_is_a_result():
+    found = solve(lambda p: (np.full(3, np.nan), np.ones((3, 1))), np.ones(1))
+    assert (found.result, found.steps) == (NOT_FINITE, 1)
+
+
+def test_differences_are_derivatives_within_the_bound():
+    def residual(x):
+        assert np.all(x <= 1.0)
+        return np.array([np.exp(x[0]), x[0] * x[1], x[1] ** 2])
+
+    for x in (np.array([0.3, 0.5]), np.array([1.0, 0.5])):
+        here, slopes = differences(residual, 1e-6, 1.0)(x)
+        np.testing.assert_array_equal(here, residual(x))
+        np.testing.assert_allclose(slopes, [[np.exp(x[0]), 0.0], [x[1], x[0]], [0.0, 2.0 * x[1]]], atol=1e-5)
+
+
+def test_covariance_is_the_inverse_of_products():
+    jacobian = np.random.default_rng(2).standard_normal((20, 3)) * [1.0, 1e4, 1e-4]
+    np.testing.assert_allclose(covariance(jacobian), np.linalg.inv(jacobian.T @ jacobian), rtol=1e-7)
+    assert np.all(np.isinf(covariance(np.array([[np.nan, 1.0], [1.0, 1.0]]))))
+
+
+def test_errors_of_what_is_hardly_told_are_not_lost():
+    """Two nearly parallel columns, 1e12 apart in size: variances 1 / (size sin)^2."""
+    sizes, angle = np.array([1e8, 1e-4]), 1e-6
+    slopes = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]]) * sizes
+    np.testing.assert_allclose(np.diag(covariance(slopes)), 1.0 / (sizes * np.sin(angle)) ** 2, rtol=1e-6)
+    assert covariance(slopes * [1.0, 0.0])[1, 1] > 1e30, "what nothing tells has no small error"
+
+
+@pytest.mark.parametrize(("high", "expected"), [(3.0, [1.0, -0.5]), (0.5, [0.5, -0.25])])
+def test_a_quadratic_is_minimised_inside_and_at_a_bound(high, expected):
+    """x^2 + xy + y^2 - 1.5 x: y follows x by -x / 2."""
+
+    def at(x):
+        return float(x[0] ** 2 + x[0] * x[1] + x[1] ** 2 - 1.5 * x[0]), np.array(
+            [2 * x[0] + x[1] - 1.5, x[0] + 2 * x[1]]
+        )
+
+    bounds = np.array([-2.0, -3.0]), np.array([high, 3.0])
+    x, value, converged = minimise(at, np.array([-1.0, 2.0]), bounds, 1e-6, 100)
+    assert converged
+    np.testing.assert_allclose(x, expected, atol=1e-6)
+    assert value == pytest.approx(at(np.array(expected))[0], abs=1e-12)
+    assert (x[0] == high) == (high < 1.0)
+    assert not minimise(at, np.array([-1.0, 2.0]), bounds, 1e-6, 2)[2]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("residual", "start", "bounds"),
+    [
+        (noisy, [1.0, 1.0], (-np.inf, np.inf)),
+        (noisy, [1.0, 1.0], ([0.0, 0.0], [1.5, 9.0])),
+        (valley, [-1.2, 1.0], (-np.inf, np.inf)),
+        (valley, [-1.2, 1.0], ([-2.0, -2.0], [0.8, 2.0])),
+        (valley, [-1.2, 1.0], ([-2.0, 0.5], [2.0, 0.5])),
+    ],
+    ids=["free", "at a bound", "valley", "valley at a bound", "valley of one parameter"],
+)
+def test_the_optimum_is_that_of_a_trust_region(residual, start, bounds):
+    """The slow twin: scipy's trust region, reflected at the bounds."""
+    start, bounds = np.array(start), tuple(np.broadcast_to(end, 2) for end in bounds)
+    loose = bounds[0], np.maximum(bounds[1], bounds[0] + 1e-9)  # scipy needs room between the bounds
+    twin = optimize.least_squares(residual, np.clip(start, *loose), bounds=loose, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    for by_slope in (False, True):
+        found = solve(differences(residual, 1e-7), np.clip(start, *bounds), bounds, by_slope=by_slope)
+        assert found.converged
+        assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
+        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
+
+
+@pytest.mark.slow
+def test_a_traced_problem_has_the_optimum_of_a_trust_region():
+    data = problem(2.0, 1.7, 0.05, seed=4)
+    for residual, of_numpy, start, more in (
+        (decay, noisy, [1.0, 1.0], data),
+        (valley_of, valley, [-1.2, 1.0], np.zeros(2)),
+    ):
+        twin = optimize.least_squares(of_numpy, start, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+        found = least_squares(residual, start, more)
+        assert found.converged
+        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-6)
+        np.testing.assert_allclose(covariance(twin.jac), found.covariance, rtol=1e-4)

@@ -205,14 +205,6 @@ def test_colours_are_in_order_however_the_sensor_has_them(shots):
     assert workflow.bracketed(turned, SQUARE).colours == ("red", "green", "blue")
 
 
-def test_errors_of_what_is_hardly_told_are_not_lost():
-    """Two nearly parallel columns, 1e12 apart in size: variances 1 / (size sin)^2."""
-    sizes, angle = np.array([1e8, 1e-4]), 1e-6
-    slopes = np.array([[1.0, np.cos(angle)], [0.0, np.sin(angle)], [0.0, 0.0]]) * sizes
-    np.testing.assert_allclose(np.diag(medium.bound(slopes)), 1.0 / (sizes * np.sin(angle)) ** 2, rtol=1e-6)
-    assert medium.bound(slopes * [1.0, 0.0])[1, 1] > 1e30, "what nothing tells has no small error"
-
-
 def test_rings_err_as_they_say(light):
     """Of twelve pictures, the scatter of each ring over its stated error; the mean of the ratios' squares."""
     edges, camera = rings.edges_of(15.0, 2 * PITCH), replace(CAMERA, grain=2.5)
