@@ -49,12 +49,12 @@ def regenerate(
     ] = False,
     quiet: Quiet = False,
 ) -> None:
-    """Simulate light, refit the laws, write the records, and compare them with the shipped ones.
+    """Simulate light, refit the laws, write the records.
 
     Each record takes seconds to minutes, and as many are fitted side by side as there are cores. After Ctrl-C the same
-    command resumes: photons that are traced stay. The table at the end states for each record how far its constants
-    moved from the shipped record, in units of their stated error. The command ends with status 1 where a constant moves
-    by more than 0.05 of its error, or an interval by more than the Monte Carlo error of its chain.
+    command resumes: photons that are traced stay. The table at the end compares each record with the shipped one: how
+    far its constants moved, in units of their stated error. The command ends with status 1 where a constant moves by
+    more than 0.05 of its error, or an interval by more than the Monte Carlo error of its chain.
 
     A file of layers is a stack. Its law is fitted to exact light in one to four minutes, longer where a layer scatters
     forward, and its record goes to OUT/stacks. The record of its sums of Gaussians, two minutes more, goes to

@@ -30,7 +30,7 @@ Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
-MAX_STEPS = 200
+MAX_STEPS = 500  # beside a curved valley an optimum takes 300
 NOT_FINITE = "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
@@ -44,8 +44,8 @@ SOLVER: Any = eqx.tree_at(
     optx.LevenbergMarquardt(0.0, 0.0, linear_solver=lx.QR()),
     (0.9, 5.0),
 )
-# Damping falls after each step that gains three quarters of what it promised: beside bounds few gain all of it.
-BY_SLOPE = eqx.tree_at(lambda solver: solver.search.high_cutoff, SOLVER, 0.75)
+# Beside bounds few steps gain so much of what they promised.
+BY_SLOPE: Any = eqx.tree_at(lambda solver: solver.search.high_cutoff, SOLVER, 0.75)
 MINIMISER: Any = optx.BFGS(0.0, 0.0)
 # Length of the Jacobian's longest column, by the unit of the residuals: damping, which begins at 1, is its square times
 # 1e-4, and 1e-2 where all columns are as long (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
@@ -189,6 +189,7 @@ def solve(
     bounds: Bounds | None = None,
     *,
     by_slope: bool = False,
+    rescaled: bool = False,
     tolerance: float = RELATIVE_TOLERANCE,
     gain: float = 0.0,
     longest: ArrayLike = np.inf,
@@ -201,6 +202,7 @@ def solve(
         start: (p,) parameters to start from, inside the bounds.
         bounds: lowest and highest parameters; None for none.
         by_slope: scale parameters by the size of their column of the Jacobian at the start, not by their own size.
+        rescaled: scale them anew by their columns at each point that is accepted, where slopes change by decades.
         tolerance: relative size of a step at which the search ends.
         gain: reduction of the sum of squares that a step must promise for the search to go on.
         longest: (p,) longest step of each parameter.
@@ -215,13 +217,20 @@ def solve(
         scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
     unit = (EVERY_COLUMN if by_slope else LONGEST_COLUMN) / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
-    size, solver = next((size for size in SIZES if size >= start.size), start.size), BY_SLOPE if by_slope else SOLVER
+    size, search = next((size for size in SIZES if size >= start.size), start.size), BY_SLOPE if by_slope else SOLVER
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, jacobian * scale, proposed, ends)
-        here, aimed, damping, state = _stepped(solver, proposed, unit * values, unit * slope, state, y, size)
+        here, aimed, damping, state = _stepped(search, proposed, unit * values, unit * slope, state, y, size)
         if steps == 1 or not np.array_equal(here, y):
             y, best = here, (point, values, jacobian)
+            if rescaled and steps > 1:
+                # Begun anew where each column of the Jacobian has its length here, with the damping that was reached.
+                sizes, unit = np.linalg.norm(jacobian, axis=0), unit / np.sqrt(damping)
+                scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
+                y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
+                slope = _held(values, jacobian * scale, y, ends)
+                _, aimed, damping, state = _stepped(search, y, unit * values, unit * slope, None, y, size)
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
         slope = _held(best[1], best[2] * scale, y, ends)
         step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
@@ -232,8 +241,11 @@ def solve(
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
         steps += 1
-    active = _active(*best[1:], best[0], (low, high))
-    result = _explain(ended or steps < most, most, best[1], best[2][:, ~active], gain)
+    active = _active(best[1], best[2] * scale, proposed, ends)  # where the last step ends: beside a bound it is no step
+    # A parameter that gains nothing within its longest step has no slope but rounding.
+    uphill = 2.0 * np.abs(best[2].T @ best[1])
+    counts = ~active & (np.multiply(uphill, longest, out=np.zeros(start.size), where=uphill > 0) > gain)
+    result = _explain(ended or steps < most, most, best[1], best[2][:, counts], gain)
     return Solution(*best, steps, result, active)
 
 

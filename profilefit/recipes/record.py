@@ -33,7 +33,7 @@ ARRAYS_OF_FORMAT_1 = {f"{kind}_{MISFIT_BEFORE}": f"{kind}_{MISFIT}" for kind in 
 # Twelve digits are beyond any error here, and within what a repeated run gives again.
 DIGITS = 12
 MOST_ARRAYS = 2**25  # bytes of the arrays beside it, packed or not; the largest that ship have 2^18
-LIBRARIES = ("profilefit", "jax", "jaxlib", "emcee", "numpy", "scipy")
+LIBRARIES = ("profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy")
 NEAREST, ALIKE = 3, 0.6  # names that are suggested; of difflib's similarity, 1 for the same name
 
 

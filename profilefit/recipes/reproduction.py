@@ -87,6 +87,8 @@ def compared(
         problems.append(f"{worst} moved by {moved:.2g} of its stated error")
     if shipped["fit"]["result"] != made["fit"]["result"]:
         problems.append(f"the fit {made['fit']['result']!r} in place of {shipped['fit']['result']!r}")
+    if lost := sorted(chains.keys() ^ again.keys()):
+        problems.append(f"the chain of {lost[0]} is in one record only")
     intervals, end = max(_moves(shipped, made, chains, again), default=(0.0, ""))
     if intervals > 1.0:
         problems.append(f"the interval of {end} moved by {intervals:.2g} of what its chain allows")
@@ -140,7 +142,7 @@ def _moves(
     """Move of each end of each interval over what is allowed, and whose it is."""
     ends = 4 * sum(draws.shape[1] for draws in chains.values())
     most = float(norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(ends, 1)))))  # Sidak, over all ends of the record
-    for kind in chains:
+    for kind in chains.keys() & again.keys():
         free = [name for name, one in shipped["constants"].items() if kind in one.get("intervals", {})]
         for column, name in enumerate(free):
             levels = shipped["constants"][name]["intervals"][kind]

@@ -384,7 +384,7 @@ def test_digest_tells_numbers_apart():
 
 
 def test_versions_name_what_decides_the_numbers():
-    assert {"profilefit", "jax", "jaxlib", "emcee", "numpy", "scipy"} == set(record.versions())
+    assert {"profilefit", "jax", "jaxlib", "optimistix", "emcee", "numpy", "scipy"} == set(record.versions())
 
 
 def test_a_record_error_is_an_input_error():

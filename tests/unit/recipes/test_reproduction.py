@@ -84,6 +84,11 @@ def test_intervals_of_two_right_chains_agree_and_of_a_shifted_one_do_not():
     assert "the interval of a, misfit" in compared("one", one, other, draws, again).problem
 
 
+def test_a_chain_that_is_missing_is_named():
+    one, draws = of_chain(np.random.default_rng(5).standard_normal(1000))
+    assert "the chain of misfit is in one record only" in compared("one", one, content(), draws, {}).problem
+
+
 def test_records_of_other_photons_are_not_compared(made, tmp_path):
     shutil.copy(made / f"{NAME}.json", tmp_path)
     path = tmp_path / f"{NAME}.json"
