@@ -22,8 +22,8 @@ help:  ## list the targets
 
 fits: $(VENV)/.installed  ## make every record again in build/fits, compare it with the shipped one, and write the report
 	@$(VENV)/bin/profilefit regenerate --out $(MADE); status=$$?; \
-	$(VENV)/bin/profilefit report --fits $(MADE) --figures $(MADE)/figures --html $(MADE)/report.html >$(MADE)/report.txt \
-	&& echo "report: $(MADE)/report.html" && exit $$status
+	$(VENV)/bin/profilefit report --fits $(MADE) --figures $(MADE)/figures >$(MADE)/report.txt \
+	&& echo "report: $(MADE)/report.txt, figures beside it" && exit $$status
 
 records: $(VENV)/.installed-test  ## for maintainers: write the records into fits/, the tables of pages, and the pins of tests
 	$(VENV)/bin/profilefit regenerate --out fits
