@@ -143,7 +143,7 @@ def _moves(
     ends = 4 * sum(draws.shape[1] for draws in chains.values())
     most = float(norm.isf(0.5 * (1.0 - (1.0 - CHANCE) ** (1.0 / max(ends, 1)))))  # Sidak, over all ends of the record
     for kind in chains.keys() & again.keys():
-        free = [name for name, one in shipped["constants"].items() if kind in one.get("intervals", {})]
+        free = shipped.get("covariance", {}).get("names") or list(shipped["constants"])  # in the order of the draws
         for column, name in enumerate(free):
             levels = shipped["constants"][name]["intervals"][kind]
             for level, ends_before in levels.items():
