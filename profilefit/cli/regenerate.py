@@ -29,6 +29,7 @@ class Preset(StrEnum):
 
 
 def regenerate(
+    context: typer.Context,
     recipes: Annotated[
         list[str] | None,
         typer.Argument(
@@ -97,8 +98,9 @@ def regenerate(
         )
     works = [make(stack) for make in (stack_record.work, sum_record.work) for stack in stacks]
     works += [phase_record.work(table) for table in dict.fromkeys(tables.values())]
-    if out == LOCAL and out.resolve() == fits_folder():
-        raise InputError("out must be named where ./fits holds the shipped records, for example --out mine, got none")
+    is_named = getattr(context.get_parameter_source("out"), "name", "") == "COMMANDLINE"
+    if out.resolve() == fits_folder() and not is_named:
+        raise InputError("--out must be given where ./fits holds the shipped records, for example --out mine, got none")
     require_folder(out)
     begin = time.perf_counter()
     run = RecipeRun(

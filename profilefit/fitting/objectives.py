@@ -1,7 +1,7 @@
 """Objectives, which a fit minimises: a function each, from a law and ring energies to tables of residuals.
 
 A table has a row for each albedo. Tables of one objective stay apart: XLA would compute what they share for each column
-anew if they were joined in a compiled program. `joined` joins them.
+anew if they were joined in a compiled program.
 
 Every objective is a differentiable function of the law **and** of the ring energies, weights included, so that the
 photon noise of the energies propagates to the constants without another formula. The weighting decides the constants of
@@ -11,14 +11,14 @@ alpha, whose derivatives are infinite at alpha = 1.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import equinox as eqx
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.light import reduced, unreduced
@@ -71,11 +71,6 @@ class Rings(eqx.Module):
         """(m, n + 1) share of energy within each edge."""
         inside = jnp.cumsum(self.energy, axis=-1)
         return jnp.concatenate([jnp.zeros_like(inside[:, :1]), inside], axis=-1) / self.reflectance[:, None]
-
-
-def joined(tables: Sequence[ArrayLike]) -> NDArray[np.float64]:
-    """All residuals (m, k), the tables side by side."""
-    return np.concatenate([np.asarray(table) for table in tables], axis=1)
 
 
 def energy(law, rings: Rings) -> Tables:

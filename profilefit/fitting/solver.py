@@ -30,7 +30,7 @@ Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
-MAX_STEPS = 500  # beside a curved valley an optimum takes 300
+MAX_STEPS = 500  # `hazard-diffuse-forward` takes 240, along a curved valley
 NOT_FINITE = "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
@@ -167,6 +167,7 @@ def _linearise(residual, parameters, data):
 
 
 def _joined(parts: Array | tuple[Array, ...], axis: int) -> Floats:
+    """Parts of residuals, or of their Jacobian, as one array."""
     return np.concatenate([np.asarray(part) for part in parts], axis) if isinstance(parts, tuple) else np.asarray(parts)
 
 
@@ -320,7 +321,7 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
 def _stepped(
     solver: Any, at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int
 ) -> tuple[Any, ...]:
-    """As `_advanced`, of least squares with the triangular factor, filled up to a `size` of parameters."""
+    """Advance least squares by the triangular factor, filled up to a `size` of parameters; results of `_advanced`."""
     count = y.size
     triangle = np.zeros((size + 1, size + 1))
     if np.all(np.isfinite(values)) and np.all(np.isfinite(slope)):

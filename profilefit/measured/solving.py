@@ -200,7 +200,7 @@ def _usable(rows: Floats, slopes: Floats) -> bool:
 
 
 def _explained(done: solver.Solution, free: tuple[int, ...], ran: list[int]) -> str:
-    """How a descent ended; `ran` the coordinates at the end of their range."""
+    """Verdict on a descent; `ran` the coordinates at the end of their range."""
     if done.result == solver.NOT_FINITE:
         return NOT_FINITE
     if LENGTH in ran:

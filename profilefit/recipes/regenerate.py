@@ -15,7 +15,7 @@ from profilefit.recipes import record, starts
 from profilefit.recipes.pipelines import PIPELINES, Pipeline, needs_photons, surfaces
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.run import RecipeRun
-from profilefit.recipes.work import Made, Step, Work, written
+from profilefit.recipes.work import Made, Step, Work, silent, written
 from profilefit.recipes.workers import Workers
 
 
@@ -94,12 +94,8 @@ def _work(recipe: Recipe, run: RecipeRun, lights: Mapping[Setting, Orders], pipe
             run.say(text)
         return {**_header(recipe, run, light), **content}, arrays
 
-    part = partial(_made, replace(run, say=_silent), (recipe, light, pipelines[recipe.pipeline]))
+    part = partial(_made, replace(run, say=silent), (recipe, light, pipelines[recipe.pipeline]))
     return Work(recipe.name, (part,), finish)
-
-
-def _silent(text: str) -> None:
-    """Take the place of `RecipeRun.say` on the way to another process."""
 
 
 def _made(run: RecipeRun, job: tuple[Recipe, Orders | None, Pipeline]) -> tuple[Made, list[str]]:

@@ -23,8 +23,8 @@ _PARTS = itertools.count(1)  # of this process
 Made = tuple[Mapping[str, Any], Mapping[str, np.ndarray]]
 
 
-def _silent(text: str) -> None:
-    pass
+def silent(text: str) -> None:
+    """Say nothing: the function that takes the place of a caller's on the way to another process."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Step:
     path: Path | None = None
 
 
-def written(works: Sequence[Work], out: Path, workers: Workers, say: Callable[[str], None] = _silent) -> Iterator[Step]:
+def written(works: Sequence[Work], out: Path, workers: Workers, say: Callable[[str], None] = silent) -> Iterator[Step]:
     """Write the records of `works` into the folder `out`, each as soon as its parts are done; parts begin in order."""
     parts = [(at, place) for at, work in enumerate(works) for place in range(len(work.parts))]
     results: list[dict[int, Any]] = [{} for _ in works]
@@ -82,7 +82,7 @@ def _done(part: Callable[[], Any]) -> tuple[Any, float]:
     return result, time.perf_counter() - begin
 
 
-def alone(work: Work, out: Path, processes: int = 1, say: Callable[[str], None] = _silent) -> Path:
+def alone(work: Work, out: Path, processes: int = 1, say: Callable[[str], None] = silent) -> Path:
     """Write one record, and return its path."""
     with Workers(min(processes, len(work.parts))) as workers:
         (step,) = written([work], out, workers, say)

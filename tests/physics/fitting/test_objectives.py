@@ -7,7 +7,7 @@ import pytest
 
 from mcml_sim import InputError, Setting
 from profilefit.fitting import objectives
-from profilefit.fitting.objectives import OBJECTIVES, Rings, joined, rings_of
+from profilefit.fitting.objectives import OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
 from profilefit.laws.liang_albedo import LiangAlbedo
 
@@ -33,7 +33,7 @@ def of_law(law, **extra):
 @pytest.mark.parametrize("name", ["liang", "burley"])
 def test_energy_vanishes_on_the_laws_own(name, request, x64):
     law = request.getfixturevalue(name)
-    table = joined(objectives.energy(law, of_law(law, limits=np.array([1.0, 0.0]))))
+    table = np.hstack(objectives.energy(law, of_law(law, limits=np.array([1.0, 0.0]))))
     assert table.shape == (3, 22)
     np.testing.assert_allclose(table[:, :-1], 0.0, atol=1e-13)
 
@@ -42,7 +42,7 @@ def test_energy_rows_are_weighted_by_the_share(burley, x64):
     """A ring of energy E that is off by the fraction f has the residual f sqrt(E / A): f^2, weighted by energy."""
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond)
-    table = joined(objectives.energy(burley, off))[:, :-2]
+    table = np.hstack(objectives.energy(burley, off))[:, :-2]
     expected = 0.1 * np.sqrt(off.energy / off.reflectance[:, None])
     np.testing.assert_allclose(table, expected, rtol=1e-10)
     # So a law that is off by f everywhere has the sum of squares f^2 (its rings' share of A).
@@ -53,7 +53,7 @@ def test_limit_rows_of_energy(burley, x64):
     """Weight times (law / limit - 1): the unscaled energy over A, and twice the source strength over alpha."""
     rings = of_law(burley)
     doubled = made(2 * rings.energy, 2 * rings.beyond, limits=np.array([3.0, 5.0]))
-    table = joined(objectives.energy(burley, doubled))
+    table = np.hstack(objectives.energy(burley, doubled))
     np.testing.assert_allclose(table[:, -2], 3.0 * (0.5 - 1), rtol=1e-12)
     # Normalized diffusion: 2 pi r R_d -> A s / 2 at the source.
     reflectance = np.asarray(burley.albedo.reflectance(jnp.asarray(ALPHAS)))
@@ -67,7 +67,7 @@ def test_rings_that_do_not_count_add_nothing(burley, x64):
     used[1, 4] = 0
     energy = rings.energy * 1.3
     energy[1, 4] = 0.0  # an empty ring has no relative error
-    table = joined(objectives.energy(burley, made(energy, rings.beyond, used=used)))
+    table = np.hstack(objectives.energy(burley, made(energy, rings.beyond, used=used)))
     assert np.all(np.isfinite(table))
     assert np.flatnonzero(table[1, :-2] == 0).tolist() == [4]
 
@@ -78,23 +78,23 @@ def test_radial_vanishes_on_the_formula_itself(liang, x64):
     a, b, c = (np.asarray(value) for value in liang.coefficients(jnp.asarray(ALPHAS)[:, None]))
     curve = (a * centre + b) / (centre + c)
     rings = made(2 * np.pi * width * curve, np.zeros(3))
-    np.testing.assert_allclose(joined(objectives.radial(liang, rings)), 0.0, atol=1e-15)
+    np.testing.assert_allclose(np.hstack(objectives.radial(liang, rings)), 0.0, atol=1e-15)
     # Unweighted: data that are higher by d give -d in every ring that counts.
     used = np.ones_like(curve)
     used[:, 15:] = 0
     raised = made(2 * np.pi * width * (curve + 0.01), np.zeros(3), used=used)
-    np.testing.assert_allclose(joined(objectives.radial(liang, raised)), -0.01 * used, atol=1e-15)
+    np.testing.assert_allclose(np.hstack(objectives.radial(liang, raised)), -0.01 * used, atol=1e-15)
 
 
 def test_albedo_and_reflectance_vanish_on_the_map_itself(normalisation, x64):
     map8 = LiangAlbedo(Setting(), 5.67, 3.84, 0.84)
     for law, objective, sign in ((map8, objectives.albedo, 1), (normalisation, objectives.reflectance, -1)):
         reflectance = np.asarray(law.reflectance(jnp.asarray(ALPHAS)))
-        table = joined(objective(law, made(0.25 * reflectance[:, None], 0.75 * reflectance, edges=EDGES[:2])))
+        table = np.hstack(objective(law, made(0.25 * reflectance[:, None], 0.75 * reflectance, edges=EDGES[:2])))
         assert table.shape == (3, 1)
         np.testing.assert_allclose(table, 0.0, atol=1e-14)
         # Negative control: more light in the data raises alpha(A) and lowers A(alpha) - A.
-        more = joined(objective(law, made(0.26 * reflectance[:, None], 0.75 * reflectance, edges=EDGES[:2])))
+        more = np.hstack(objective(law, made(0.26 * reflectance[:, None], 0.75 * reflectance, edges=EDGES[:2])))
         assert np.all(sign * more > 1e-4)
 
 
@@ -107,7 +107,7 @@ def test_radius_and_share_vanish_on_the_samplers_own_cdf(liang, x64):
     energy = np.diff(np.concatenate([[0.0], xi]))[None, :]
     rings = made(energy, np.array([0.05]), edges=edges, alpha=alpha, xi=xi)
     for name in ("radius", "relative_radius", "share"):
-        np.testing.assert_allclose(joined(OBJECTIVES[name](liang, rings)), 0.0, atol=1e-13)
+        np.testing.assert_allclose(np.hstack(OBJECTIVES[name](liang, rings)), 0.0, atol=1e-13)
 
 
 @pytest.mark.slow
@@ -116,9 +116,9 @@ def test_radius_share_and_relative_radius_measure_in_their_own_units(liang, x64)
     xi, alpha = np.array([0.25, 0.5]), ALPHAS[:1]
     rings = made(np.full((1, 4), 0.25), np.zeros(1), edges=np.linspace(0, 2, 5), alpha=alpha, xi=xi)
     g = np.asarray(liang.sampler.unclipped(jnp.asarray(xi), jnp.asarray(alpha[0])))
-    np.testing.assert_allclose(joined(objectives.radius(liang, rings))[0], g - 2 * xi, rtol=1e-12)
-    np.testing.assert_allclose(joined(objectives.relative_radius(liang, rings))[0], g / (2 * xi) - 1, rtol=1e-12)
-    np.testing.assert_allclose(joined(objectives.share(liang, rings))[0], g / 2 - xi, rtol=1e-12)
+    np.testing.assert_allclose(np.hstack(objectives.radius(liang, rings))[0], g - 2 * xi, rtol=1e-12)
+    np.testing.assert_allclose(np.hstack(objectives.relative_radius(liang, rings))[0], g / (2 * xi) - 1, rtol=1e-12)
+    np.testing.assert_allclose(np.hstack(objectives.share(liang, rings))[0], g / 2 - xi, rtol=1e-12)
 
 
 def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
@@ -128,7 +128,7 @@ def test_share_counts_the_negative_branch_as_below_zero(liang, x64):
     )
     g = float(liang.sampler.unclipped(jnp.asarray(0.004), jnp.asarray(ALPHAS[0])))
     assert g < 0
-    assert float(joined(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
+    assert float(np.hstack(objectives.share(liang, rings)).item()) == pytest.approx(g / 2 - 0.004, rel=1e-12)
 
 
 @pytest.mark.slow
@@ -149,7 +149,7 @@ def test_every_objective_moves_what_its_law_says_it_sees(name, liang, normalisat
     rings = made(rings.energy, rings.beyond, alpha=np.array([0.3, 0.6, 0.97]), xi=rings.xi, limits=rings.limits)
     names = law.constant_names()
     jacobian = jax.jacfwd(lambda v: OBJECTIVES[name](law.with_vector(names, v), rings))(jnp.asarray(law.vector(names)))
-    moves = np.any(np.abs(joined(jacobian)) > 1e-12, axis=(0, 1))
+    moves = np.any(np.abs(np.hstack(jacobian)) > 1e-12, axis=(0, 1))
     assert tuple(n for n, m in zip(names, moves, strict=True) if m) == law.seen_by(name)
 
 
@@ -201,7 +201,7 @@ def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
     """A law that is 10 % off in every ring has rows of 0.1 whose squares add up to 0.01, however the rings are cut."""
     rings = of_law(burley)
     off = made(rings.energy / 1.1, rings.beyond / 1.1)
-    table = joined(objectives.relative(burley, off))
+    table = np.hstack(objectives.relative(burley, off))
     n = EDGES.size - 1
     misfit, shares = table[:, :n], table[:, n : 2 * n + 1]
     np.testing.assert_allclose(np.sum(misfit**2, axis=1), 0.01, rtol=1e-10)
@@ -214,7 +214,7 @@ def test_relative_is_the_mean_square_error_on_a_log_spaced_eye(burley, x64):
 def test_relative_counts_misplaced_energy_and_stops_at_the_last_percent(burley, x64):
     rings = of_law(burley)
     moved = made(np.roll(rings.energy, 1, axis=1), rings.beyond)
-    table = joined(objectives.relative(burley, moved))
+    table = np.hstack(objectives.relative(burley, moved))
     n = EDGES.size - 1
     cdf = np.asarray(moved.cdf)
     expected = objectives.SHARE_WEIGHT / np.sqrt(EDGES.size) * (np.asarray(rings.cdf) - cdf)
@@ -237,7 +237,7 @@ def test_relative_resists_a_law_that_falls_next_to_white(burley, x64):
 
     limits = np.array([0.0, 0.0, 7.0])
     n = EDGES.size - 1
-    rows = joined(objectives.relative(Falling(), of_law(burley, limits=limits)))[:, 2 * n + 1 :]
+    rows = np.hstack(objectives.relative(Falling(), of_law(burley, limits=limits)))[:, 2 * n + 1 :]
     np.testing.assert_allclose(rows, 7 * (1 + objectives.LEAST_FALL) / np.sqrt(ALPHAS.size), rtol=1e-4)
-    rises = joined(objectives.relative(burley, of_law(burley, limits=limits)))[:, 2 * n + 1 :]
+    rises = np.hstack(objectives.relative(burley, of_law(burley, limits=limits)))[:, 2 * n + 1 :]
     assert np.any(rises == 0)

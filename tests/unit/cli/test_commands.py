@@ -11,7 +11,9 @@ from pathlib import Path
 import pytest
 
 from mcml_sim import Setting
+from profilefit.errors import InputError
 from profilefit.recipes import catalogue
+from profilefit.recipes.folder import fits_folder
 
 RECIPE = """
 title = "A small one"
@@ -305,3 +307,17 @@ def test_help_names_both_commands_and_version_is_a_number(command):
     status, out, _ = command("--version")
     assert status == 0
     assert out.startswith("profilefit 0.")
+
+
+def test_shipped_records_are_written_over_only_where_they_are_named(command, monkeypatch):
+    """Where ./fits is what is shipped, as in a clone; the last error comes from behind that check."""
+    monkeypatch.chdir(fits_folder().parent)
+    status, _, err = command("regenerate", "albedo-liang")
+    assert (status, "--out must be given where ./fits holds the shipped records" in err) == (2, True)
+    monkeypatch.setattr("mcml_sim.files.whole_file.require_folder", _reached)
+    status, _, err = command("regenerate", "albedo-liang", "--out", "fits")
+    assert (status, "the folder is next" in err) == (2, True)
+
+
+def _reached(folder):
+    raise InputError("the folder is next")
