@@ -280,7 +280,7 @@ class Solver:
             def at(p: Floats) -> tuple[Floats, Floats]:
                 return np.asarray(self._residual(p, arrays)), np.nan_to_num(np.asarray(self._jacobian(p, arrays)))
 
-            found = [solve(at, start, by_slope=True, gain=GAIN, most=EVALUATIONS) for start in starts]
+            found = [solve(at, start, gain=GAIN, most=EVALUATIONS) for start in starts]
         return min(found, key=lambda result: result.cost).parameters
 
 

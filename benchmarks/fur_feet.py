@@ -129,7 +129,7 @@ def feet_laws() -> Rows:
         def left(c: Floats, q: Floats = q, kappa: Floats = kappa, weight: Floats = weight, p: float = power) -> Floats:
             return np.asarray(((1.0 + np.exp(c[0]) * q ** c[1]) ** p - kappa) * weight)
 
-        best = solve(differences(left, STEP), np.array([0.0, 1.0]), by_slope=True)
+        best = solve(differences(left, STEP), np.array([0.0, 1.0]))
         (log, b), errors = best.parameters.tolist(), np.sqrt(np.diag(best.covariance) * best.variance)
         a, off = float(np.exp(log)), np.abs(best.residuals / weight / kappa)
         head_on = [f for f in factors() if f.kind == kind and f.degrees == 0.0]

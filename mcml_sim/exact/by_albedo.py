@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact import table, tables, transform
+from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from mcml_sim.media.setting import ILLUMINATIONS, Setting, is_traced
 
@@ -92,15 +93,15 @@ def _transform(alpha: float, setting: Setting, rule: Rule) -> Transform:
     return _solve(np.float64(alpha), surface(setting, rule), setting.illumination, rule)
 
 
-_solve = jax.jit(solve, static_argnums=(2, 3))
+_solve = jit(solve, static_argnums=(2, 3))
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jit, static_argnums=0)
 def _of_block(kernel: Kernel, transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
     return kernel(transform, alpha, x)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jit, static_argnums=0)
 def _each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
     return jax.vmap(function, in_axes=(0, None))(alpha, of)
 
@@ -111,7 +112,7 @@ def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
     return list(full.reshape(-1, size))
 
 
-@partial(jax.jit, static_argnums=(0, 4, 5))
+@partial(jit, static_argnums=(0, 4, 5))
 def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, of: Surface, illumination: str, rule: Rule) -> jax.Array:
     shape = jnp.broadcast_shapes(x.shape, alpha.shape)
     albedos = alpha.ravel()
@@ -126,7 +127,7 @@ def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, of: Surface, illumin
     return _map(one, (jnp.asarray(owner), jnp.broadcast_to(x, shape).ravel()), at_once=BLOCK).reshape(shape)
 
 
-@partial(jax.jit, static_argnums=0)
+@partial(jit, static_argnums=0)
 def _traced_each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
     return _map(lambda one: function(one, of), alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
 

@@ -36,6 +36,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
+from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.special_functions import logarithm, square_root
 
@@ -71,7 +72,7 @@ def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -
     return source @ powers.T / np.pi
 
 
-@partial(jax.jit, static_argnames=("x_nodes", "angles"))
+@partial(jit, static_argnames=("x_nodes", "angles"))
 def orders(n: float, alpha: float, k: jax.Array, x_nodes: int = 240, angles: int = 72) -> tuple[jax.Array, jax.Array]:
     """R^(k) of one albedo at real k > 0 of shape (k,), and what of it was scattered once: float64 (2, k) each."""
 

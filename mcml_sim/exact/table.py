@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact import cone
+from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import square_root
@@ -221,7 +222,7 @@ def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Comp
         return np.concatenate(list(pool.map(in_double, parts)), axis=1)[:, : k.size]
 
 
-@partial(jax.jit, static_argnums=(2, 3, 4))
+@partial(jit, static_argnums=(2, 3, 4))
 def _systems(
     n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool
 ) -> tuple[cone.System, cone.System | tuple[()]]:
@@ -233,7 +234,7 @@ def _systems(
     return jax.jvp(at, (n,), (1.0,)) if slope else (at(n), ())
 
 
-@partial(jax.jit, static_argnums=(2, 3, 4))
+@partial(jit, static_argnums=(2, 3, 4))
 def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
     """Of each order of scattering, or its derivative by n: (k, 2, orders)."""
 

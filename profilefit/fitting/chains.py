@@ -25,6 +25,7 @@ import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import Fit, ResidualFunction, curvature, scaled_inverse
@@ -242,7 +243,7 @@ class _Density(eqx.Module):
             density = cls(fit.law, fit.rings, centre, adjust, variance, fit.solution.cost, bound, problem)
             return jax.tree.map(jnp.asarray, density)
 
-    @eqx.filter_jit
+    @filter_jit
     def __call__(self, points):
         def one(theta):
             moved = self.centre + self.adjust @ (theta - self.centre)

@@ -22,13 +22,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
@@ -293,7 +293,7 @@ def _scales(x: Floats) -> Floats:
     return np.array([SHORTEST * np.min(np.diff(along)), LONGEST * np.ptp(along)]) if along.size > 1 else np.ones(2)
 
 
-@eqx.filter_jit
+@filter_jit
 def _predicted(problem: ResidualFunction, theta, law, rings: Rings):
     def energy(vector):
         return _energy(problem.objective, law.with_vector(problem.free, vector), rings)

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError, SettingError
+from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.checks import require_own_process
 from profilefit.fitting.objectives import NO_LIMITS, OBJECTIVES, Rings, rings_of
 from profilefit.fitting.profiles import Profiles
@@ -31,7 +32,7 @@ from profilefit.laws.liang import QUANTILES
 
 Floats = NDArray[np.float64]
 JACKKNIFE_GROUPS = 6
-JACKKNIFE_TOLERANCE = 1e-8  # of its refits: they move constants by 1e-3 and more, and creep over their last digits
+JACKKNIFE_WORTH = 1e-7  # as of `solve`, of its refits: errors are right to a hundredth
 # Half of float64's digits: J^T J has the square of this condition number, and nothing is left of its inverse.
 DEGENERATE = 1e7
 
@@ -212,7 +213,7 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
         row[group] = 0.0
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(groups), *np.shape(leaf))), (law, rings))
     data = eqx.tree_at(lambda tree: tree[1].weight, data, weights)
-    refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data, JACKKNIFE_TOLERANCE)
+    refits = solve_batch(problem, np.tile(solution.parameters, (len(groups), 1)), data, JACKKNIFE_WORTH)
     if not all(judged(refit, problem.free).converged for refit in refits):
         return np.full(solution.parameters.size, np.nan)
     moved = np.stack([refit.parameters for refit in refits])
@@ -252,7 +253,7 @@ def _statistical(problem, solution, law, rings, profiles) -> Floats | None:
     return profiles.covariance.sandwich(sensitivity(problem, solution, law, rings))
 
 
-@eqx.filter_jit
+@filter_jit
 def _curved(residual, vector, along, law, rings):
     """One column of both: all at once would compile as long as a fit."""
 

@@ -26,7 +26,6 @@ from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import NamedTuple, Protocol
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -34,6 +33,7 @@ from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Setting, exact
+from mcml_sim.exact.compiled import filter_jit
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
 
@@ -326,21 +326,21 @@ def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alp
     return np.concatenate(parts)[: values.size]
 
 
-@eqx.filter_jit
+@filter_jit
 def _sample(sampler: Sampler, xi: Array, alpha: Array) -> Array:
     return sampler.sample(xi, alpha)
 
 
-@eqx.filter_jit
+@filter_jit
 def _pdf(sampler: Sampler, x: Array, alpha: Array) -> Array:
     return sampler.pdf(x, alpha)
 
 
-@eqx.filter_jit
+@filter_jit
 def _share(law: ProfileLaw, x: Array, alpha: Array) -> Array:
     return law.cdf(x, alpha)
 
 
-@eqx.filter_jit
+@filter_jit
 def _slope(law: ProfileLaw, x: Array, alpha: Array) -> Array:
     return jax.jvp(lambda y: law.cdf(y, alpha), (x,), (jnp.ones_like(x),))[1]

@@ -24,32 +24,34 @@ import optimistix as optx
 from jax import Array
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.exact.compiled import filter_jit, jit
+
 Floats = NDArray[np.float64]
 Bounds = tuple[Floats | float, Floats | float]
 Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
-MAX_STEPS = 500  # `hazard-diffuse-forward` takes 240, along a curved valley
+MAX_STEPS = 300
 NOT_FINITE = "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
 STALLED, NO_MISFIT = 0.03, 1e-8
 # Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
 ORTHOGONAL = 1e-7
-# `solve` decides when it ends. Damping falls to a fifth after each step that gains nine tenths of what it promised:
-# optimistix's own 99 hundredths creep along curved valleys, such as those of sums of Gaussians.
+# A step that promises less than this of the sum of squares cannot be told from rounding.
+ROUNDING = 4.0 * np.finfo(float).eps
+# `solve` decides when it ends. Damping falls to a fifth after each step that gains three quarters of what it promised:
+# optimistix's own 99 hundredths creep along curved valleys, such as those of sums of Gaussians, and beside bounds.
 SOLVER: Any = eqx.tree_at(
     lambda solver: (solver.search.high_cutoff, solver.search.high_constant),
     optx.LevenbergMarquardt(0.0, 0.0, linear_solver=lx.QR()),
-    (0.9, 5.0),
+    (0.75, 5.0),
 )
-# Beside bounds few steps gain so much of what they promised.
-BY_SLOPE: Any = eqx.tree_at(lambda solver: solver.search.high_cutoff, SOLVER, 0.75)
 MINIMISER: Any = optx.BFGS(0.0, 0.0)
-# Length of the Jacobian's longest column, by the unit of the residuals: damping, which begins at 1, is its square times
-# 1e-4, and 1e-2 where all columns are as long (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
-LONGEST_COLUMN, EVERY_COLUMN = 100.0, 10.0
+# Length of the Jacobian's columns, by the unit of the residuals: damping, which begins at 1, is its square times 1e-2
+# (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
+COLUMN = 10.0
 STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: below it, the parameter is at its bound
 SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
 OPTIONS = {"jac": "bwd"}  # optimistix keeps the Jacobian as an array, not as a program
@@ -124,17 +126,17 @@ def least_squares(
     start: ArrayLike,
     data: object = None,
     bounds: Bounds | None = None,
-    tolerance: float = RELATIVE_TOLERANCE,
+    worth: float = ROUNDING,
 ) -> Solution:
     """Minimise |residual(parameters, data)|^2.
 
     Args:
         residual: function of jax arrays, (p,) and a pytree, that returns residuals: (n,), a tuple of such, or
             of tables (m, k). XLA would compute what parts share for each row anew if a program joined them.
-        start: (p,) parameters to start from, in the caller's units; each is scaled by its size.
+        start: (p,) parameters to start from, in the caller's units.
         data: any pytree of arrays.
         bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
-        tolerance: relative size of a step at which the search ends.
+        worth: as of `solve`.
     """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
@@ -144,11 +146,11 @@ def least_squares(
             rows = 0 if np.ndim(values[0]) < 2 else 1
             return _joined(values, rows).ravel(), _joined(jacobian, rows).reshape(-1, parameters.size)
 
-        return solve(at, np.asarray(start, np.float64), bounds, tolerance=tolerance)
+        return solve(at, np.asarray(start, np.float64), bounds, worth=worth)
 
 
 def solve_batch(
-    residual: Callable[..., Any], starts: ArrayLike, data: object = None, tolerance: float = RELATIVE_TOLERANCE
+    residual: Callable[..., Any], starts: ArrayLike, data: object = None, worth: float = ROUNDING
 ) -> tuple[Solution, ...]:
     """Solve m problems of one shape: `starts` (m, p), every leaf of `data` with a leading axis m.
 
@@ -156,12 +158,10 @@ def solve_batch(
     """
     begins, leaves = np.asarray(starts, np.float64), jax.tree.map(np.asarray, data)
     items = (jax.tree.map(lambda leaf, row=row: leaf[row], leaves) for row in range(len(begins)))
-    return tuple(
-        least_squares(residual, begin, item, tolerance=tolerance) for begin, item in zip(begins, items, strict=True)
-    )
+    return tuple(least_squares(residual, begin, item, worth=worth) for begin, item in zip(begins, items, strict=True))
 
 
-@eqx.filter_jit
+@filter_jit
 def _linearise(residual, parameters, data):
     return residual(parameters, data), jax.jacfwd(residual)(parameters, data)
 
@@ -189,10 +189,10 @@ def solve(
     start: Floats,
     bounds: Bounds | None = None,
     *,
-    by_slope: bool = False,
     rescaled: bool = False,
     tolerance: float = RELATIVE_TOLERANCE,
     gain: float = 0.0,
+    worth: float = ROUNDING,
     longest: ArrayLike = np.inf,
     most: int = MAX_STEPS,
 ) -> Solution:
@@ -202,10 +202,11 @@ def solve(
         at: residuals and Jacobian; either may be not finite, and then the step is taken back.
         start: (p,) parameters to start from, inside the bounds.
         bounds: lowest and highest parameters; None for none.
-        by_slope: scale parameters by the size of their column of the Jacobian at the start, not by their own size.
-        rescaled: scale them anew by their columns at each point that is accepted, where slopes change by decades.
+        rescaled: scale parameters by their columns of the Jacobian at each point that is accepted, not at the start
+            alone: where slopes change by decades.
         tolerance: relative size of a step at which the search ends.
         gain: reduction of the sum of squares that a step must promise for the search to go on.
+        worth: the same as a share of the sum of squares.
         longest: (p,) longest step of each parameter.
         most: number of evaluations after which the search gives up.
     """
@@ -213,16 +214,14 @@ def solve(
     values, jacobian = at(start)
     if not (np.all(np.isfinite(values)) and np.all(np.isfinite(jacobian))):
         return Solution(start, values, jacobian, 1, NOT_FINITE, np.zeros(start.size, bool))
-    scale, sizes = np.where(start == 0, 1.0, np.abs(start)), np.linalg.norm(jacobian, axis=0)
-    if by_slope:
-        scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
-    unit = (EVERY_COLUMN if by_slope else LONGEST_COLUMN) / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
+    sizes, unit = np.linalg.norm(jacobian, axis=0), COLUMN
+    scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
-    size, search = next((size for size in SIZES if size >= start.size), start.size), BY_SLOPE if by_slope else SOLVER
+    size = next((size for size in SIZES if size >= start.size), start.size)
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, jacobian * scale, proposed, ends)
-        here, aimed, damping, state = _stepped(search, proposed, unit * values, unit * slope, state, y, size)
+        here, aimed, damping, state = _stepped(proposed, unit * values, unit * slope, state, y, size)
         if steps == 1 or not np.array_equal(here, y):
             y, best = here, (point, values, jacobian)
             if rescaled and steps > 1:
@@ -231,13 +230,13 @@ def solve(
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
                 slope = _held(values, jacobian * scale, y, ends)
-                _, aimed, damping, state = _stepped(search, y, unit * values, unit * slope, None, y, size)
+                _, aimed, damping, state = _stepped(y, unit * values, unit * slope, None, y, size)
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
         slope = _held(best[1], best[2] * scale, y, ends)
         step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
-        if ended or steps >= most or (gain and _promised(best, (aimed - y) * scale) < gain):
+        if ended or steps >= most or _promised(best, (aimed - y) * scale) < max(gain, worth * float(best[1] @ best[1])):
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
@@ -253,7 +252,8 @@ def solve(
 def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
     """Reduction of the sum of squares that the linear model promises for a step."""
     _, values, jacobian = best
-    return float(values @ values - np.sum((values + jacobian @ step) ** 2))
+    change = jacobian @ step
+    return -float(change @ (2.0 * values + change))
 
 
 def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: Floats, slope: Floats) -> Floats:
@@ -301,7 +301,7 @@ def _step(solver: Any, size: int, rows: tuple[int, ...]) -> tuple[Callable[..., 
     )
     leaves, tree = jax.tree.flatten(blank)
 
-    @jax.jit
+    @jit
     def step(at, value, slope, leaves, y):
         state = replace(jax.tree.unflatten(tree, leaves), y_eval=at)
         y, state, _ = solver.step(_Tangent(at, value, slope), y, None, OPTIONS, state, NO_TAGS)
@@ -318,9 +318,7 @@ def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any,
     return np.asarray(here), np.asarray(proposed), float(damping), state
 
 
-def _stepped(
-    solver: Any, at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int
-) -> tuple[Any, ...]:
+def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, size: int) -> tuple[Any, ...]:
     """Advance least squares by the triangular factor, filled up to a `size` of parameters; results of `_advanced`."""
     count = y.size
     triangle = np.zeros((size + 1, size + 1))
@@ -333,7 +331,7 @@ def _stepped(
         triangle[:, size] = np.nan
     more = (0, size - count)
     at, y = np.pad(at, more), np.pad(y, more)
-    here, aimed, damping, state = _advanced(solver, at, triangle[:, size], triangle[:, :size], state, y)
+    here, aimed, damping, state = _advanced(SOLVER, at, triangle[:, size], triangle[:, :size], state, y)
     return here[:count], aimed[:count], damping, state
 
 

@@ -8,12 +8,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.exact.compiled import filter_jit, jit
 from profilefit.fitting.estimate import scaled_inverse
 from profilefit.fitting.profiles import Profiles, trimmed_radius
 from profilefit.fitting.solver import Solution, least_squares, solve_batch
@@ -146,7 +146,7 @@ def _coefficient_sensitivity(solutions, radii, data, used, profiles) -> Floats:
     return out.reshape(m * p, m, n)
 
 
-@jax.jit
+@jit
 def _rational_derivatives(parameters, radii, data, used):
     def cost(p, d, r, u):
         return 0.5 * jnp.sum(_rational(p, (r, d, u)) ** 2)
@@ -156,7 +156,7 @@ def _rational_derivatives(parameters, radii, data, used):
     return hessian, mixed
 
 
-@eqx.filter_jit
+@filter_jit
 def _gain_arrays(residual, vector, law, alpha, data):
     def cost(p, d):
         return 0.5 * jnp.sum(residual(p, (law, alpha, d)) ** 2)

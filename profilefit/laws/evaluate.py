@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.by_albedo import blocks
+from mcml_sim.exact.compiled import jit
 from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
 
 Floats = NDArray[np.float64]
@@ -67,7 +68,7 @@ def _program(method: Callable, form: Any, names: tuple[str, ...]) -> Callable:
         out = method(jax.tree.unflatten(form, leaves), **dict(zip(names, values, strict=True)))
         return jnp.broadcast_to(out, values[0].shape)
 
-    return jax.jit(run)
+    return jit(run)
 
 
 def _in_blocks(program: Callable, leaves: list[Floats], arguments: dict[str, Floats]) -> Floats:

@@ -183,7 +183,7 @@ def _residuals(light: _Light, weights: Noise, x: Floats, held: float, known: Kno
 def _least(light: _Light, weights: Noise, start: Floats, held: float, known: Known | None) -> solver.Solution:
     at = solver.differences(lambda x: _residuals(light, weights, x, held, known), STEP)
     bounds = start - REACH, start + REACH
-    return solver.solve(at, start, bounds, by_slope=True, tolerance=TOLERANCE, gain=GAIN, most=MOST_STEPS)
+    return solver.solve(at, start, bounds, tolerance=TOLERANCE, gain=GAIN, most=MOST_STEPS)
 
 
 def _judged(

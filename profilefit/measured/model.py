@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from scipy.special import expit
 
 from mcml_sim.exact.by_albedo import blocks
+from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.light import ExactLight
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.instrument import PENCIL, Instrument
@@ -118,7 +119,7 @@ def _alpha(u):
 
 def _double(function):
     """Compile a function of numpy arrays in double precision; the law's class and its setting select it."""
-    compiled = jax.jit(function)
+    compiled = jit(function)
 
     def call(law, *arrays):
         with jax.enable_x64(True):

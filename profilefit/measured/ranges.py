@@ -126,7 +126,7 @@ def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Mi
     first, last = (end[free] for end in problem.bounds(start.point))
     bounds = np.append(first, low), np.append(last, high)
     inside = np.clip(np.append(start.point[free], list(values.values())), *bounds)
-    done = solve(at, inside, bounds, by_slope=True, gain=ENOUGH, most=MAX_STEPS)
+    done = solve(at, inside, bounds, gain=ENOUGH, most=MAX_STEPS)
     best, errors = done.parameters[len(free) :], np.sqrt(np.diag(done.covariance))[len(free) :]
     ends = zip(np.maximum(best - REACH * errors, low), np.minimum(best + REACH * errors, high), strict=True)
     box = dict(zip(ranges, ((float(a), float(b)) for a, b in ends), strict=True))

@@ -178,9 +178,7 @@ def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum
         rows, slopes = problem.residuals(point)
         return (rows if _usable(rows, slopes) else np.full(rows.shape, np.nan)), slopes
 
-    done = solver.solve(
-        at, np.clip(start, low, high), (low, high), by_slope=True, tolerance=TOLERANCE, gain=GAIN, most=MAX_STEPS
-    )
+    done = solver.solve(at, np.clip(start, low, high), (low, high), tolerance=TOLERANCE, gain=GAIN, most=MAX_STEPS)
     edge = EDGE * (high - low)
     ran = (done.parameters <= low + edge) | (done.parameters >= high - edge)
     return Minimum(**vars(replace(done, result=_explained(done, free, [at for at in free if ran[at]]))))

@@ -9,7 +9,6 @@ from __future__ import annotations
 from functools import partial
 from typing import Any
 
-import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -17,6 +16,7 @@ from jax import Array
 
 from mcml_sim.exact.anisotropic.table import light
 from mcml_sim.exact.by_albedo import BLOCK, blocks
+from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import ExactLight, reduced
 from mcml_sim.media.setting import Setting
 
@@ -54,16 +54,18 @@ def _called(function: Any, own: ExactLight, x: Any, alpha: Any) -> Any:
         x, alpha = jnp.broadcast_arrays(x, alpha)
         values = _each(function, own, x.ravel(), alpha.ravel())
         return jnp.where(jnp.isnan(x + alpha), jnp.nan, values.reshape(x.shape))
-    x, alpha = np.broadcast_arrays(x, alpha)
+    is_one = np.ndim(alpha) == 0
+    x, albedos = np.broadcast_arrays(x, alpha)
     with jax.enable_x64(True), jax.core.eval_context():
-        pairs = zip(blocks(x.ravel(), BLOCK), blocks(alpha.ravel(), BLOCK), strict=True)
-        parts = [np.asarray(_each(function, own, *map(jnp.asarray, pair))) for pair in pairs]
+        pairs = zip(blocks(x.ravel(), BLOCK), blocks(albedos.ravel(), BLOCK), strict=True)
+        parts = [_each(function, own, jnp.asarray(some), jnp.asarray(alpha if is_one else of)) for some, of in pairs]
     return np.concatenate([np.empty(0), *parts])[: x.size].reshape(x.shape)
 
 
-@eqx.filter_jit
+@filter_jit
 def _each(function: Any, own: ExactLight, x: Array, alpha: Array) -> Array:
-    return jax.vmap(partial(function, own))(x, alpha)
+    """At each radius; what depends on the albedo alone is worked out once where there is but one."""
+    return jax.vmap(partial(function, own), in_axes=(0, None if alpha.ndim == 0 else 0))(x, alpha)
 
 
 def _reflectance(own: ExactLight, _: Array, alpha: Array) -> Array:

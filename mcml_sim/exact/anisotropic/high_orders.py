@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import hankel1
 
 from mcml_sim.exact.anisotropic import system as systems
+from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.setting import Setting
@@ -134,7 +135,7 @@ def totals(n: float, g: float, beyond: int, alpha: Floats, rule: Fineness) -> Fl
 directions = lru_cache(maxsize=8)(systems.directions)
 
 
-@partial(jax.jit, static_argnums=(6, 7))
+@partial(jit, static_argnums=(6, 7))
 def _solved(
     g: Array, k: Array, x: Array, dx: Array, alpha: Array, of: systems.Directions, beyond: int, steps: int
 ) -> Array:

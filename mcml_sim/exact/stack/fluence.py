@@ -33,7 +33,7 @@ from mcml_sim.exact.stack.slants import Complexes, Slants, cones, deepest, direc
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
 SERIES_TERMS = 16
-DIRECT_NODES = 20
+DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen by so many e-folds: 3e-12 of K
 
 
 class Field(NamedTuple):
@@ -77,8 +77,8 @@ def _direct_close(a: Floats, b: Floats) -> Floats:
 
 
 def _direct_far(a: Floats, b: Floats) -> Floats:
-    """Gauss's rule in v as far as the exponent has grown by DARK."""
-    largest = a + b + DARK
+    """Gauss's rule in v."""
+    largest = a + b + FALLEN
     v = np.log((largest + np.sqrt(largest**2 - 4 * a * b)) / (2 * a))
     total = np.zeros_like(a)
     for x, weight in zip(*gauss(DIRECT_NODES), strict=True):
@@ -147,10 +147,11 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
     close = _is_close(here, z_ends, tau_ends)
     own = np.eye(here.panels, dtype=bool) & (mirror is None)
     matrix = np.zeros((here.panels, here.nodes, here.panels, here.nodes))
-    far = np.broadcast_to(~(close | own)[:, None, :, None], matrix.shape).reshape(z.size, z.size)
-    row, column = np.nonzero(far)
+    far = ~(close | own)
+    row, column = np.nonzero(np.triu(np.repeat(np.repeat(far | far.T, here.nodes, axis=0), here.nodes, axis=1)))
     whole = matrix.reshape(z.size, z.size)
     whole[row, column] = direct(np.abs(here.tau[row] - tau[column]), np.abs(here.z[row] - z[column]), k)
+    whole[column, row] = whole[row, column]
     whole *= here.weight
     target, source = np.nonzero(close & ~own)
     rule = near_end(here.nodes)
@@ -188,8 +189,11 @@ def _own(here: Depths, k: float) -> Floats:
     """mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
     rule = near_node(here.nodes)
     tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
-    kernel = direct(tau_length * rule.height, z_length * rule.height, k) * rule.weight
-    return np.einsum("piq,iqj->pij", here.alpha[:, None, None] * tau_length * kernel, rule.through, optimize=True)
+    upwards = rule.height[:, : rule.height.shape[1] // 2]
+    above = direct(tau_length * upwards, z_length * upwards, k)
+    # What lies below a node lies above its mirror image in the panel's middle.
+    kernel = np.concatenate([above, above[:, ::-1]], axis=2) * (here.alpha[:, None, None] * tau_length * rule.weight)
+    return np.einsum("piq,iqj->pij", kernel, rule.through, optimize=True)
 
 
 def _slanted(here: Depths, slants: Slants) -> Floats:
@@ -205,12 +209,16 @@ def _slanted(here: Depths, slants: Slants) -> Floats:
 
 
 def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Floats:
-    """Re(left^T diag(weight) right), (N, N): in half the time where the weights are real."""
+    """Re(left^T diag(weight) right), (N, N): in half the time where weights are real, in a quarter of it squared."""
     if np.any(weight.imag):
         return np.asarray((left.T @ (weight[:, None] * right)).real)
+    if right is left and np.all(weight.real <= 0):
+        roots = np.sqrt(-weight.real)[:, None]
+        real, imaginary = roots * left.real, roots * left.imag
+        return np.asarray(imaginary.T @ imaginary - real.T @ real)
     weights = np.concatenate([weight.real, -weight.real])[:, None]
     both = np.concatenate([left.real, left.imag])
-    return np.asarray(both.T @ (weights * (both if right is left else np.concatenate([right.real, right.imag]))))
+    return np.asarray(both.T @ (weights * np.concatenate([right.real, right.imag])))
 
 
 def _below(here: Depths, k: float) -> Floats:

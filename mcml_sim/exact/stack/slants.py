@@ -102,8 +102,12 @@ def deepest(here: Depths) -> float:
 def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
     """tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
     t, d_mu = cones(here, rule.slope + int(0.55 * phase))
-    azimuths = 1 if k == 0 else rule.azimuth // 3 + int(0.25 * phase)
-    parts = [(t, np.cos(0.5 * np.pi * (np.arange(azimuths) + 0.5) / azimuths), d_mu, np.full(azimuths, 1 / azimuths))]
+    # Of each slope as many azimuths as its own phases take.
+    share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
+    azimuths = np.ones(t.size, int) if k == 0 else rule.azimuth // 3 + (0.25 * phase * share).astype(int)
+    of = np.repeat(np.arange(t.size), azimuths)
+    place = (np.arange(of.size) - (np.cumsum(azimuths) - azimuths)[of] + 0.5) / azimuths[of]
+    columns = [(t[of], np.cos(0.5 * np.pi * place), 0.5 * d_mu[of] / azimuths[of])]
     reflected_below = here.below != 1 and 0 < here.optical < DARK
     if reflected_below or min(here.above, here.below) < 1:
         last = DARK / max(here.optical, THINNEST) if min(here.above, here.below) >= 1 else STEEPEST
@@ -111,10 +115,8 @@ def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexe
         # Close to 90 degrees the phase stays small out to the largest slopes: within an angle of mu_t / k.
         waves = k * here.z[-1] / here.tau[-1] if here.panels else 0.0
         x, weight = gauss(rule.azimuth + 8 * int(0.04 * phase + AZIMUTHS * np.log1p(waves)))
-        parts.append((t, np.sin(0.5 * np.pi * x**4), d_mu, 4 * x**3 * weight))
-    columns = [
-        (np.repeat(t, c.size), np.tile(c, t.size), 0.5 * np.outer(d_mu, share).ravel()) for t, c, d_mu, share in parts
-    ]
+        cosine = np.sin(0.5 * np.pi * x**4)
+        columns.append((np.repeat(t, x.size), np.tile(cosine, t.size), 0.5 * np.outer(d_mu, 4 * x**3 * weight).ravel()))
     slope, cosine, weight = (np.concatenate(column) for column in zip(*columns, strict=True))
     return slope, cosine, weight, columns[0][0].size
 

@@ -268,9 +268,7 @@ def _descended(shot: Shot, start: Floats) -> PhotoFit:
     low[0], low[4 : 5 + halos], high[0] = -12.0, 0.0, 12.0
     longest[:4], longest[7 + halos :] = FARTHEST, FARTHEST
     start = np.clip(start, low, high)
-    done = solve(
-        shot.residuals, start, (low, high), by_slope=True, rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS
-    )
+    done = solve(shot.residuals, start, (low, high), rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
     freedom = done.residuals.size - start.size
     return PhotoFit(shot, done.parameters, done.covariance, done.cost, freedom, done.converged)
 

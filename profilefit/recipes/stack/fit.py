@@ -6,6 +6,7 @@ begin at those of the similar stack and are fitted to the stack's own traced lig
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -13,7 +14,7 @@ import equinox as eqx
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim import Layer, Medium, Setting, exact
 from mcml_sim.exact import half_space
@@ -47,7 +48,7 @@ STARTS, SPREAD, SEED = 6, 0.8, 1
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
-NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: right to a tenth of the law's error and better
+NODES = exact.Nodes(12, 16, 16, 8)  # of the exact light: right to a tenth of the law's error and better
 
 
 Lights = list[tuple[Floats, ...] | TracedRings]
@@ -90,21 +91,29 @@ def stack_law(medium: Medium, illumination: str = "searchlight") -> StackLaw | L
     return law
 
 
-def fitted(medium: Medium, illumination: str) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
-    """The law, and the fit at each interface from the surface down; none of a half space."""
+def fitted(
+    medium: Medium, illumination: str, starts: Sequence[ArrayLike] = ()
+) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
+    """The law, and the fit at each interface from the surface down; none of a half space.
+
+    starts  constants (9,) of each interface: the law is the optimum that a fit from there reaches, not the best one of
+            the search, which many optima beside each other make a matter of rounding. Light of isotropic layers only
+    """
     require(medium)
     require_illumination(illumination)
     setting = setting_of(medium, illumination)
     if all(layer.g == 0 for layer in medium.layers):
         hazard = catalogue.load("hazard", setting=setting)
-        return _fitted(medium, [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers])
+        return _fitted(
+            medium, [LayerLaw(setting, hazard, layer.alpha, layer.mfp) for layer in medium.layers], starts=starts
+        )
     _, begun = fitted(replace(medium, layers=tuple(layer.similar for layer in medium.layers)), illumination)
     tops = [photons.half_space(layer, setting, SEED + place) for place, layer in enumerate(medium.layers)]
     return _fitted(medium, tops, begun)
 
 
 def _fitted(
-    medium: Medium, tops: list[LayerLaw], begun: tuple[Interface, ...] = ()
+    medium: Medium, tops: list[LayerLaw], begun: tuple[Interface, ...] = (), starts: Sequence[ArrayLike] = ()
 ) -> tuple[StackLaw | LayerLaw, tuple[Interface, ...]]:
     """From the last layer up, over the half spaces of the layers.
 
@@ -123,7 +132,7 @@ def _fitted(
             found: tuple[Solution, ...] = (best,)
         else:
             lights += [light_of(here, each, illumination) for each in d]
-            best, found = _searched(top, law, d, lights)
+            best, found = _searched(top, law, d, lights, starts[place] if starts else None)
         law = _law_of(best.parameters, top, law, layer.thickness)
         done.insert(0, Interface(law, here, place > 0, d, lights, best, found))
     return law, tuple(done)
@@ -155,9 +164,7 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
         coarse += [light_of(one.medium, d, one.law.setting.illumination, NODES.fewer) for d in one.thicknesses]
         fewer = refitted(one.thicknesses, coarse)
     count = len(one.thicknesses)
-    left_out = np.array(
-        [refitted(np.delete(one.thicknesses, i), one.lights[:i] + one.lights[i + 1 :]) for i in range(count)]
-    )
+    left_out = np.array([refitted(one.thicknesses, _without(one.lights, i)) for i in range(count)])
     jackknife = np.sqrt((count - 1) * np.mean((left_out - left_out.mean(axis=0)) ** 2, axis=0))
     with jax.enable_x64(True):
         slopes = jax.jacfwd(lambda at: _vector(_made(at, top, below, thickness)))(jnp.asarray(one.best.parameters))
@@ -177,6 +184,14 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
         name: {key: None if each is None else float(each[i]) for key, each in found.items()}
         for i, name in enumerate(StackLaw.constant_names())
     }
+
+
+def _without(lights: Lights, number: int) -> Lights:
+    """The same with one that does not count: lights of one shape are fitted by one compiled program."""
+    light = lights[number]
+    weight = 0.0 * np.asarray(light[2])
+    blind = light._replace(weight=weight) if isinstance(light, TracedRings) else (*light[:2], weight, *light[3:])
+    return [*lights[:number], blind, *lights[number + 1 :]]
 
 
 def _noise(one: Interface) -> Floats:
@@ -263,13 +278,16 @@ def light_of(medium: Medium, d: float, illumination: str, nodes: exact.Nodes = N
 
 
 def _searched(
-    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights
+    top: LayerLaw, below: LayerLaw | StackLaw, d: Floats, lights: Lights, given: ArrayLike | None = None
 ) -> tuple[Solution, tuple[Solution, ...]]:
-    """The best optimum of several starts, and all."""
+    """The best optimum of several starts, or that of constants which are given; and all."""
     random = np.random.default_rng(SEED)
     spread = START + SPREAD * random.standard_normal((STARTS - 2, len(START)))
     starts = [np.array(START), _as_slabs_add(top, below), *spread]
     found = tuple(_solved(start, top, below, d, lights) for start in starts)
+    if given is not None:
+        own = _solved(_unbounded(np.asarray(given, float), top, below), top, below, d, lights)
+        return own, (own, *found)
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf), found
 
 
@@ -304,7 +322,7 @@ def _residual(parameters, data):
     relative = jax.vmap(law.value)(r, d) / value - 1.0
     of_a = jax.vmap(law.whole)(d) / whole - 1.0
     away = TIMID * (parameters - jnp.asarray(START))
-    return jnp.where(weight > 0, jnp.sqrt(weight) * relative, 0.0).ravel(), OF_A * of_a, away
+    return jnp.where(weight > 0, jnp.sqrt(weight) * relative, 0.0).ravel(), OF_A * _counts(weight) * of_a, away
 
 
 def _ring_residual(parameters, data):
@@ -313,7 +331,19 @@ def _ring_residual(parameters, data):
     within = jax.vmap(law.within)(edges, d)
     relative = jnp.diff(within, axis=1) / energy - 1.0
     of_a = jax.vmap(law.whole)(d) / whole - 1.0
-    return (weight * relative).ravel(), OF_A * of_a, TIMID * (parameters - start)
+    return (weight * relative).ravel(), OF_A * _counts(weight) * of_a, TIMID * (parameters - start)
+
+
+def _counts(weight):
+    """1 of each light (m,) that has weights, else 0."""
+    return jnp.any(weight > 0, axis=1).astype(float)
+
+
+def _unbounded(constants: Floats, top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
+    """The parameters (9,) of `_made` that make constants, u moved to where the law is defined."""
+    w, u, *others = constants
+    least = float(_made(jnp.array(START), top, below, 0.0).fading()) * 2.0 * LOWEST * top.mfp
+    return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(max(u + least, 0.01 * least))), *np.log(others)])
 
 
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import jax
-import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 from scipy.optimize import nnls
+from scipy.special import expit, log_softmax
 
 from mcml_sim import Medium, exact
 from mcml_sim.media.setting import require_illumination
 from profilefit.errors import InputError
 from profilefit.fitting.estimate import judged
-from profilefit.fitting.solver import Solution, least_squares
+from profilefit.fitting.solver import Solution, solve
 from profilefit.laws.gaussians import MOST, MediumGaussians
 from profilefit.recipes.stack import fit, photons
 
@@ -155,7 +154,7 @@ def joint(lights: Sequence[SumLight], count: int) -> JointSum:
     for _ in range(TURNS):
         offset, slopes = _places(weights)
         start = slopes.T @ (np.concatenate([np.log(variances), weights.ravel()]) - offset)
-        best = _settled(start, (_rings_of(lights), offset, slopes))
+        best = _settled(start, lights, offset, slopes)
         constants = offset + slopes @ best.parameters
         variances, own = np.exp(constants[:count]), constants[count:].reshape(weights.shape)
         held, weights = weights == 0, _weights(lights, variances)
@@ -171,14 +170,19 @@ def refitted(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     NaN where that fit does not converge.
     """
     offset, slopes = _places(found.weights)
-    best = _settled(found.best.parameters, (_rings_of(lights), offset, slopes))
+    best = _settled(found.best.parameters, lights, offset, slopes)
     return offset + slopes @ best.parameters if best.converged else np.full(len(offset), np.nan)
 
 
-def _settled(start: Floats, data: object) -> Solution:
+def _settled(start: Floats, lights: Sequence[SumLight], offset: Floats, slopes: Floats) -> Solution:
     """The optimum from a start: where few Gaussians leave large residuals, least squares creeps to it."""
+
+    def at(parameters: Floats) -> tuple[Floats, Floats]:
+        values, jacobian = _off(*_parted(offset + slopes @ parameters, len(lights)), lights)
+        return values, jacobian @ slopes
+
     for _ in range(TURNS):
-        best = least_squares(_linear_residual, start, data)
+        best = solve(at, start)
         if best.converged:
             break
         start = best.parameters
@@ -187,13 +191,21 @@ def _settled(start: Floats, data: object) -> Solution:
 
 def curvature(found: JointSum, lights: Sequence[SumLight]) -> Floats:
     """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
-    offset, slopes = _places(found.weights)
-    with jax.enable_x64(True):
-        return np.asarray(_hessian(jnp.asarray(found.best.parameters), (_rings_of(lights), offset, slopes)))
-
-
-def _rings_of(lights: Sequence[SumLight]) -> list[tuple[ArrayLike, ...]]:
-    return [(light.edges, light.energy, light.weight, np.asarray(light.whole)) for light in lights]
+    variances, count = found.variances, found.variances.size
+    values, jacobian = _off(variances, found.weights, lights)
+    whole, end = jacobian.T @ jacobian, 0
+    levels = np.arange(count)
+    for number, (own, light) in enumerate(zip(found.weights, lights, strict=True)):
+        begin, end = end, end + light.energy.size
+        pull = values[begin:end] * light.weight * light.whole / light.energy
+        _, bent, more = (pull @ part for part in _shares(light.edges, variances))
+        places = levels + count * (1 + number)
+        whole[levels, levels] += more * own
+        whole[levels, places] += bent
+        whole[places, levels] += bent
+    slopes = found.slopes
+    curved: Floats = slopes.T @ whole @ slopes
+    return curved
 
 
 def _weights(lights: Sequence[SumLight], variances: Floats) -> Floats:
@@ -227,15 +239,30 @@ def _places(weights: Floats) -> tuple[Floats, Floats]:
     return offset, np.array(columns).T
 
 
-def ring_shares(edges: ArrayLike, variances: ArrayLike, xp: Any = np) -> Any:
+def ring_shares(edges: Floats, variances: Floats) -> Floats:
     """What each Gaussian of variances (N,) [length^2] has in rings between edges (n + 1,) [length]: (n, N) [-]."""
-    depth = 0.5 * xp.asarray(edges)[:, None] ** 2 / variances
+    return _shares(edges, variances)[0]
+
+
+def _shares(edges: Floats, variances: Floats) -> tuple[Floats, Floats, Floats]:
+    """`ring_shares`, and the first and second derivatives by ln variances."""
+    depth = 0.5 * edges[:, None] ** 2 / variances
+    light = np.exp(-depth)
+    seen = np.where(light > 0, depth, 0.0)  # the last edge may be infinity
+    bent = seen * light
     # e^-p - e^-q = e^-p (1 - e^(p - q)), without the cancellation of narrow rings
-    return xp.exp(-depth[:-1]) * -xp.expm1(depth[:-1] - depth[1:])
+    shares = light[:-1] * -np.expm1(depth[:-1] - depth[1:])
+    return shares, -np.diff(bent, axis=0), -np.diff((seen - 1.0) * bent, axis=0)
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Solution:
     """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1 of each light, unbounded."""
+
+    def at(parameters: Floats) -> tuple[Floats, Floats]:
+        level, weights, slopes = _of(parameters, len(lights))
+        values, jacobian = _off(np.exp(level), weights, lights)
+        return values, jacobian @ slopes
+
     shortest, longest = min(light.edges[0] for light in lights), max(light.edges[-1] for light in lights)
     widest = 2.0 * np.log(WIDEST * longest)
     found = []
@@ -245,45 +272,46 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
     for low in lows:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
-        found.append(least_squares(_residual, np.array(start), _rings_of(lights)))
+        found.append(solve(at, np.array(start)))
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
 def made(parameters: Floats, lights: int = 1) -> tuple[Floats, Floats]:
     """Variances (N,) and weights (lights, N) of unbounded parameters."""
-    with jax.enable_x64(True):
-        level, logit = _of(jnp.asarray(parameters), lights)
-    return np.exp(np.asarray(level)), np.exp(np.asarray(logit))
+    level, weights, _ = _of(parameters, lights)
+    return np.exp(level), weights
 
 
-def _of(parameters: jax.Array, lights: int) -> tuple[jax.Array, jax.Array]:
-    """ln v and, of each light, ln w."""
+def _of(parameters: Floats, lights: int) -> tuple[Floats, Floats, Floats]:
+    """ln v (N,), weights (lights, N), and their derivatives (N + lights N, p)."""
     count = (parameters.size + lights) // (lights + 1)
-    level = jnp.cumsum(jnp.concatenate([parameters[:1], jax.nn.softplus(parameters[1:count])]))
-    logits = jnp.concatenate([jnp.zeros((lights, 1)), parameters[count:].reshape(lights, count - 1)], axis=1)
-    return level, jax.nn.log_softmax(logits, axis=1)
+    first, rises, logits = parameters[:1], parameters[1:count], parameters[count:].reshape(lights, count - 1)
+    level = np.cumsum(np.concatenate([first, np.logaddexp(0.0, rises)]))
+    weights = np.exp(log_softmax(np.column_stack([np.zeros(lights), logits]), axis=1))
+    slopes = np.zeros((count * (1 + lights), parameters.size))
+    slopes[:count, :count] = np.tri(count) * np.append(1.0, expit(rises))
+    for number, own in enumerate(weights):
+        rows, columns = count * (1 + number), count + number * (count - 1)
+        by_logit = np.diag(own) - np.outer(own, own)
+        slopes[rows : rows + count, columns : columns + count - 1] = by_logit[:, 1:]
+    return level, weights, slopes
 
 
-def _residual(parameters, data):
-    level, logits = _of(parameters, len(data))
-    return _off(jnp.exp(level), jnp.exp(logits), data)
+def _parted(constants: Floats, lights: int) -> tuple[Floats, Floats]:
+    """Variances (N,) and weights (lights, N) of ln variances and weights in one row."""
+    count = constants.size // (lights + 1)
+    return np.exp(constants[:count]), constants[count:].reshape(lights, count)
 
 
-def _linear_residual(parameters, data):
-    lights, offset, slopes = data
-    constants = offset + slopes @ parameters
-    count = constants.size // (len(lights) + 1)
-    return _off(jnp.exp(constants[:count]), constants[count:].reshape(len(lights), count), lights)
-
-
-@jax.jit
-def _hessian(parameters, data):
-    return jax.hessian(lambda at: 0.5 * sum(jnp.sum(part**2) for part in _linear_residual(at, data)))(parameters)
-
-
-def _off(variances, weights, lights):
-    """Weighted relative errors of all rings."""
-    found = []
-    for own, (edges, energy, weight, whole) in zip(weights, lights, strict=True):
-        found.append(weight * (whole * (ring_shares(edges, variances, jnp) @ own) / energy - 1.0))
-    return tuple(found)
+def _off(variances: Floats, weights: Floats, lights: Sequence[SumLight]) -> tuple[Floats, Floats]:
+    """Weighted relative errors of all rings (n,), and their derivatives (n, N + lights N) by ln variances, weights."""
+    count, values, slopes = variances.size, [], []
+    for number, (own, light) in enumerate(zip(weights, lights, strict=True)):
+        shares, bent, _ = _shares(light.edges, variances)
+        unit = (light.weight * light.whole / light.energy)[:, None]
+        rows = np.zeros((light.energy.size, count * (1 + len(lights))))
+        rows[:, :count] = unit * bent * own
+        rows[:, count * (1 + number) : count * (2 + number)] = unit * shares
+        values.append(unit[:, 0] * (shares @ own) - light.weight)
+        slopes.append(rows)
+    return np.concatenate(values), np.concatenate(slopes)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from mcml_sim import Medium, Setting
 from mcml_sim.files.text_file import read_toml
@@ -30,6 +31,7 @@ from profilefit.recipes.stack.file import LayerStack, read_layers, stack_of
 from profilefit.recipes.toml_tables import Table, Tables
 from profilefit.recipes.work import Made, Work
 
+Floats = NDArray[np.float64]
 FOLDER, PIPELINE = STACKS, "stack"
 TITLE = "Layers under a first one of any thickness"
 EQUATIONS = "R_d = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r), s_i^2 = r^2 + (g_i d)^2, c_i = e^(-b_i d / l)"
@@ -53,17 +55,24 @@ TRACED_NOTE = (
 )
 ALIKE = 1e-4  # relative, of the constants of the half spaces that a record was fitted with and those of today
 # Of STACK.toml, those that only draw a scene among them.
-KEYS = ("title", "unit", "illumination", "layers", "scene", "surface", "uneven", "pose", "technique", "camera", "light")
+KEYS = (
+    *("title", "unit", "illumination", "layers", "start"),
+    *("scene", "surface", "uneven", "pose", "technique", "camera", "light"),
+)
 
 
 @dataclass(frozen=True)
 class StackRequest:
-    """What STACK.toml says: a stack under a light, and its name, that of the file."""
+    """What STACK.toml says: a stack under a light, and its name, that of the file.
+
+    starts  of red, green and blue: constants of each interface at which the fit begins; empty where it searches
+    """
 
     name: str
     title: str
     illumination: str
     stack: LayerStack
+    starts: tuple[Floats, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -115,7 +124,30 @@ def requested(file: str, content: Table) -> StackRequest:
         tables.text("", "title", content, TITLE),
         tables.text("", "illumination", content, "diffuse", ILLUMINATIONS),
         stack,
+        _starts(tables, content, (len(stack.names) - 1, len(StackLaw.constant_names()))),
     )
+
+
+def _starts(tables: Tables, content: Table, shape: tuple[int, int]) -> tuple[Floats, ...]:
+    """Constants of shape (interfaces, 9) for each colour, from a table [start]."""
+    if "start" not in content:
+        return ()
+    table, found = tables.table(content, "start"), []
+    tables.known("start", table, CHANNELS)
+    names = StackLaw.constant_names()
+    accepted = f"lists of {', '.join(names)}, one an interface: w in (0, 1), all but u > 0"
+    for channel in CHANNELS:
+        try:
+            values = np.array(table.get(channel), float)
+        except (TypeError, ValueError):
+            values = np.full(0, np.nan)
+        free = [name == "u" for name in names]
+        if not (values.shape == shape and np.all(np.isfinite(values)) and np.all((values > 0) | free)):
+            raise tables.bad("start", channel, accepted, table.get(channel))
+        if not np.all(values[:, names.index("w")] < 1):
+            raise tables.bad("start", channel, accepted, table[channel])
+        found.append(values)
+    return tuple(found)
 
 
 def require_apart(stacks: Sequence[StackRequest]) -> None:
@@ -135,7 +167,11 @@ def work(of: StackRequest) -> Work:
         colours = zip(CHANNELS, of.stack.media, strict=True)
         return _content(of, {name: found[different.index(medium)] for name, medium in colours}), {}
 
-    return Work(f"{FOLDER}/{of.name}", tuple(partial(_channel, of.illumination, one) for one in different), finish)
+    parts = []
+    for medium in different:
+        starts = list(of.starts[of.stack.media.index(medium)]) if of.starts else []
+        parts.append(partial(_channel, of.illumination, medium, starts))
+    return Work(f"{FOLDER}/{of.name}", tuple(parts), finish)
 
 
 def load(path: Path) -> StackRecord:
@@ -205,9 +241,9 @@ def _shipped(name: str) -> Path:
     return fits_folder() / FOLDER / f"{name}.toml"
 
 
-def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
+def _channel(illumination: str, medium: Medium, starts: Sequence[Floats]) -> dict[str, Any]:
     """All that is recorded of one colour."""
-    law, interfaces = fit.fitted(medium, illumination)
+    law, interfaces = fit.fitted(medium, illumination, starts)
     constants: dict[str, Any] = {}
     for number, one in enumerate(interfaces, start=1):
         errors = fit.errors(one)
@@ -215,7 +251,7 @@ def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
             own = {"published": None, "regenerated": value, "free": True, **errors[name]}
             constants[f"{number}.{name}"] = own
     best = [one.best for one in interfaces]
-    starts = [
+    found = [
         {
             "count": len(one.found),
             "as_good": sum(each.cost <= 1.01 * one.best.cost for each in one.found),
@@ -228,7 +264,7 @@ def _channel(illumination: str, medium: Medium) -> dict[str, Any]:
         "half_spaces": [layer.law.constants() for layer in law.layers],
         "thicknesses": [one.thicknesses for one in interfaces],
         "quality": [quality.between(one) for one in interfaces],
-        "starts": starts,
+        "starts": found,
         "fit": [
             {"result": one.result.partition(" in ")[0], "steps": one.steps, "condition_number": one.condition_number}
             for one in best

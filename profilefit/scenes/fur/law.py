@@ -197,7 +197,7 @@ def misfit(layers: int, exponent: float, slender: float) -> float:
 def best_of(layers: int, slender: float) -> float:
     """The exponent of the least misfit."""
     at = differences(lambda p: _missed(layers, float(p[0]), slender), STEP, LARGEST)
-    return float(solve(at, np.array([FIRST]), (1.0, LARGEST), by_slope=True, tolerance=TOLERANCE).parameters[0])
+    return float(solve(at, np.array([FIRST]), (1.0, LARGEST), tolerance=TOLERANCE).parameters[0])
 
 
 def _missed(layers: int, exponent: float, slender: float) -> Floats:

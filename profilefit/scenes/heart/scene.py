@@ -38,7 +38,7 @@ from profilefit.scenes.stage.world import Mesh, Part, Rgb, Scene, rgb
 Floats = NDArray[np.float64]
 TABLES = {
     **request.TABLES,
-    "": ("title", "scene", "unit", "illumination", "layers", "surface", *request.TABLES),
+    "": ("title", "scene", "unit", "illumination", "layers", "start", "surface", *request.TABLES),
     "surface": ("kind", "size", "steepness", "roughness"),
     "technique": ("kind", *request.TABLES["technique"], "gaussians", "texel", "tolerance"),
 }

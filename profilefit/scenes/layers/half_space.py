@@ -104,5 +104,5 @@ def nearest_length(stack: RingShares, one: RingShares, within: float) -> float:
         return stack.beyond(d) - one.beyond(d / mfp)
 
     bounds = first / SPAN, first * SPAN
-    found = solve(differences(missed, STEP * first), np.array([first]), bounds, by_slope=True, tolerance=TOLERANCE)
+    found = solve(differences(missed, STEP * first), np.array([first]), bounds, tolerance=TOLERANCE)
     return float(found.parameters[0])

@@ -34,7 +34,7 @@ from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 Floats = NDArray[np.float64]
 TABLES = {
     **request.TABLES,
-    "": ("title", "scene", "unit", "illumination", "layers", "uneven", "pose", *request.TABLES),
+    "": ("title", "scene", "unit", "illumination", "layers", "start", "uneven", "pose", *request.TABLES),
     "technique": ("kind", *request.TABLES["technique"], "single"),
 }
 KINDS = ("stack", "dipole", "half space", "none")

@@ -166,7 +166,7 @@ def water_gaussians(omega: float, ct: float, lobes: Lobes, count: int) -> WaterG
     bounds = ends[0] - 3, ends[1] + 3
     start = ends[0] + (ends[1] - ends[0]) * (np.arange(number) + 0.5) / number
     at = differences(lambda here: weighted(here)[1], MOVED)
-    logs = np.sort(solve(at, start, bounds, by_slope=True, tolerance=TOLERANCE, gain=GAIN, longest=1.0).parameters)
+    logs = np.sort(solve(at, start, bounds, tolerance=TOLERANCE, gain=GAIN, longest=1.0).parameters)
     weights, _ = weighted(logs)
     off = np.exp(-0.5 * np.square(wide)[:, None] * np.exp(logs)) @ weights - of_wide
     error = float(np.max(np.abs(off))) * whole / (whole + straight)

@@ -67,7 +67,7 @@ def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
 
     first = np.log(quartile * np.geomspace(0.3, 4.0, count)) if count > 1 else np.log([1.5 * quartile])
     start = np.append(first, np.zeros(count - 1))
-    return split(solve(differences(missed, STEP), start, by_slope=True, tolerance=TOLERANCE).parameters)
+    return split(solve(differences(missed, STEP), start, tolerance=TOLERANCE).parameters)
 
 
 def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floats, Separable, Floats]]:

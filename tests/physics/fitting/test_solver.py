@@ -168,8 +168,8 @@ def test_a_start_at_a_bound_leaves_it():
 
 
 def test_a_bound_on_both_sides_holds_a_parameter():
-    found = solve(differences(noisy, 1e-6), np.array([2.5, 1.0]), ([2.5, 0.0], [2.5, 9.0]), by_slope=True)
-    alone = solve(differences(lambda p: noisy(np.append(2.5, p)), 1e-6), np.array([1.0]), by_slope=True)
+    found = solve(differences(noisy, 1e-6), np.array([2.5, 1.0]), ([2.5, 0.0], [2.5, 9.0]))
+    alone = solve(differences(lambda p: noisy(np.append(2.5, p)), 1e-6), np.array([1.0]))
     assert found.parameters[0] == 2.5
     assert found.parameters[1] == pytest.approx(alone.parameters[0], rel=1e-8)
 
@@ -180,7 +180,7 @@ def test_bounds_of_a_linear_problem_are_those_of_nnls(seed):
     rng = np.random.default_rng(seed)
     design = 1.0 + 0.3 * rng.standard_normal((30, 10))
     y = design @ rng.normal(0.5, 1.0, 10) + 0.1 * rng.standard_normal(30)
-    found = solve(lambda p: (design @ p - y, design), np.ones(10), (0.0, np.inf), by_slope=True)
+    found = solve(lambda p: (design @ p - y, design), np.ones(10), (0.0, np.inf))
     expected, size = optimize.nnls(design, y)
     assert found.converged
     assert found.steps < 20
@@ -197,16 +197,16 @@ def test_steps_are_no_longer_than_the_longest():
         seen.append(p)
         return p - [5.0, 1.0], np.eye(2)
 
-    found = solve(at, np.zeros(2), by_slope=True, longest=[0.5, np.inf])
+    found = solve(at, np.zeros(2), longest=[0.5, np.inf])
     np.testing.assert_allclose(found.parameters, [5.0, 1.0])
     assert np.max(np.abs(np.diff(seen, axis=0))[:, 0]) == pytest.approx(0.5)
     assert np.max(seen, axis=0)[1] > 0.9
-    assert solve(lambda p: (p - [5.0, 1.0], np.eye(2)), np.zeros(2), by_slope=True).steps < found.steps - 4, "a control"
+    assert solve(lambda p: (p - [5.0, 1.0], np.eye(2)), np.zeros(2)).steps < found.steps - 4, "a control"
 
 
 def test_what_gains_little_ends_the_search():
     start = np.array([1.0, 1.0])
-    early, late = (solve(differences(noisy, 1e-6), start, by_slope=True, gain=gain) for gain in (1e-3, 0.0))
+    early, late = (solve(differences(noisy, 1e-6), start, gain=gain) for gain in (1e-3, 0.0))
     assert early.converged
     assert early.steps < late.steps
     assert early.cost - late.cost < 1e-3
@@ -277,11 +277,10 @@ def test_the_optimum_is_that_of_a_trust_region(residual, start, bounds):
     start, bounds = np.array(start), tuple(np.broadcast_to(end, 2) for end in bounds)
     loose = bounds[0], np.maximum(bounds[1], bounds[0] + 1e-9)  # scipy needs room between the bounds
     twin = optimize.least_squares(residual, np.clip(start, *loose), bounds=loose, xtol=1e-14, ftol=1e-14, gtol=1e-14)
-    for by_slope in (False, True):
-        found = solve(differences(residual, 1e-7), np.clip(start, *bounds), bounds, by_slope=by_slope)
-        assert found.converged
-        assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
-        np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
+    found = solve(differences(residual, 1e-7), np.clip(start, *bounds), bounds)
+    assert found.converged
+    assert found.cost == pytest.approx(2.0 * twin.cost, rel=1e-6, abs=1e-12)
+    np.testing.assert_allclose(found.parameters, twin.x, rtol=1e-5)
 
 
 @pytest.mark.slow
