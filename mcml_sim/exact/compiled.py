@@ -1,6 +1,7 @@
 """`jit` and `filter_jit`, as jax and equinox have them, with XLA's options for all but the tracing of photons."""
 
-from functools import partial
+from collections.abc import Callable
+from functools import wraps
 from typing import Any
 
 import equinox as eqx
@@ -9,5 +10,27 @@ import jax
 # Its newer emitters of loops work out anew what several results share: a law's Jacobian takes five times as long, and
 # compiles half as long again (jaxlib 0.10; 0.11 may not know the option).
 OPTIONS = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 11) else {}
-jit: Any = partial(jax.jit, compiler_options=OPTIONS)
-filter_jit: Any = partial(eqx.filter_jit, compiler_options=OPTIONS)
+
+
+def jit(function: Callable, **named: Any) -> Callable:
+    """`jax.jit` with these options."""
+    return _outermost(function, jax.jit(function, compiler_options=OPTIONS, **named), jax.jit(function, **named))
+
+
+def filter_jit(function: Callable) -> Callable:
+    """`equinox.filter_jit` with these options."""
+    compiled: Any = eqx.filter_jit
+    return _outermost(function, compiled(function, compiler_options=OPTIONS), compiled(function))
+
+
+def _outermost(function: Callable, own: Callable, within: Callable) -> Callable:
+    """Options are of a whole program: where others are compiled with it, or differentiated, theirs hold."""
+
+    @wraps(function)
+    def call(*arguments: Any, **named: Any) -> Any:
+        if any(isinstance(leaf, jax.core.Tracer) for leaf in jax.tree.leaves((arguments, named))):
+            return within(*arguments, **named)
+        with jax.core.eval_context():
+            return own(*arguments, **named)
+
+    return call

@@ -39,8 +39,9 @@ NOT_FINITE = "the residual is not finite there: start nearer to the data, or nar
 STALLED, NO_MISFIT = 0.03, 1e-8
 # Where the residuals are orthogonal to rounding, steps that no longer shrink are rounding too.
 ORTHOGONAL = 1e-7
-# A step that promises less than this of the sum of squares cannot be told from rounding.
-ROUNDING = 4.0 * np.finfo(float).eps
+# A step that promises less than this of the sum of squares is lost in rounding, one after a step that was taken back
+# sooner: whether it gains anything cannot be seen.
+ROUNDING, UNSEEN = 0.25 * np.finfo(float).eps, 8.0 * np.finfo(float).eps
 # `solve` decides when it ends. Damping falls to a fifth after each step that gains three quarters of what it promised:
 # optimistix's own 99 hundredths creep along curved valleys, such as those of sums of Gaussians, and beside bounds.
 SOLVER: Any = eqx.tree_at(
@@ -222,7 +223,8 @@ def solve(
     while True:
         slope = _held(values, jacobian * scale, proposed, ends)
         here, aimed, damping, state = _stepped(proposed, unit * values, unit * slope, state, y, size)
-        if steps == 1 or not np.array_equal(here, y):
+        taken = steps == 1 or not np.array_equal(here, y)
+        if taken:
             y, best = here, (point, values, jacobian)
             if rescaled and steps > 1:
                 # Begun anew where each column of the Jacobian has its length here, with the damping that was reached.
@@ -236,10 +238,17 @@ def solve(
         step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
-        if ended or steps >= most or _promised(best, (aimed - y) * scale) < max(gain, worth * float(best[1] @ best[1])):
+        share = worth if taken else max(worth, UNSEEN)
+        if ended or steps >= most or _promised(best, (aimed - y) * scale) < max(gain, share * float(best[1] @ best[1])):
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
+        steps += 1
+    if not (ended or taken or gain) and steps < most:  # a step too small for the sum is none too small for parameters
+        point = np.clip(proposed * scale, low, high)
+        values, jacobian = at(point)
+        if values @ values <= (1.0 + UNSEEN) * (best[1] @ best[1]):
+            best = (point, values, jacobian)
         steps += 1
     active = _active(best[1], best[2] * scale, proposed, ends)  # where the last step ends: beside a bound it is no step
     # A parameter that gains nothing within its longest step has no slope but rounding.

@@ -16,7 +16,6 @@ import numpy as np
 from jax import Array, lax
 
 from mcml_sim.exact import single_scattering
-from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media import fresnel
 from profilefit.errors import SettingError
 from profilefit.laws.base import ProfileLaw, Sampler
@@ -71,18 +70,18 @@ class DiffusionLaw(ProfileLaw):
         """t, the share of the light that enters the surface [-]."""
         return single_scattering.entered(self.setting)
 
-    @filter_jit  # a sum over nodes is fused, not stored
+    @eqx.filter_jit  # a sum over nodes is fused, not stored
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
         x, alpha = _arrays(x, alpha)
         strength = self.entered * self.prefactor(alpha)
         return jnp.where(strength > 0, strength * self.shape_profile(x, alpha), 0.0)
 
-    @filter_jit
+    @eqx.filter_jit
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = _arrays(x, alpha)
         return self.shape_energy(x, alpha) / self.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
 
-    @filter_jit
+    @eqx.filter_jit
     def unscaled_energy(self, x: Array, alpha: Array) -> Array:
         x, alpha = _arrays(x, alpha)
         return self.entered * self.prefactor(alpha) * self.shape_energy(x, alpha)
@@ -101,7 +100,7 @@ class DiffusionSampler(Sampler):
 
     law: DiffusionLaw
 
-    @filter_jit  # the halvings are a loop, which would compile anew at each call
+    @eqx.filter_jit  # the halvings are a loop, which would compile anew at each call
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         xi, alpha = _arrays(xi, alpha)
         target = xi * self.law.shape_energy(jnp.full_like(alpha, jnp.inf), alpha)
@@ -120,7 +119,7 @@ class DiffusionSampler(Sampler):
         x = jnp.exp(lax.fori_loop(0, HALVINGS + NEWTON_STEPS, step, start)[2])
         return jnp.where(xi > 0, jnp.where(xi < 1, x, jnp.inf), 0.0)
 
-    @filter_jit
+    @eqx.filter_jit
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = _arrays(x, alpha)
         x = jnp.maximum(_finite(x), jnp.finfo(x.dtype).tiny ** 0.5)  # the limits at both ends are reached there

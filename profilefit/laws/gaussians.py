@@ -19,7 +19,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 
-from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws.base import ProfileLaw, Sampler
@@ -154,7 +153,7 @@ class GaussiansSampler(Sampler):
 
     law: GaussianSum
 
-    @filter_jit  # the steps are a loop, which would compile anew at each call
+    @eqx.filter_jit  # the steps are a loop, which would compile anew at each call
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
         rates, log_weights = 0.5 / self.law.variances(alpha), self.law.log_weights(alpha)
         target = jnp.log1p(-jnp.asarray(jnp.minimum(xi, 1.0 - jnp.finfo(jnp.result_type(xi, float)).epsneg)))

@@ -13,7 +13,6 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
 
-from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import ProfileLaw, Sampler
 from profilefit.laws.entry import Entry, Range, Text
@@ -162,7 +161,7 @@ class LiangSampler(Sampler):
         """Share of the samples that the clip puts at r_max exactly [-]."""
         return 1.0 - self._share_below(self.law.largest_radius(alpha), alpha)
 
-    @filter_jit  # the halvings are loops, which would compile anew at each call
+    @eqx.filter_jit  # the halvings are loops, which would compile anew at each call
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         x, alpha = jnp.broadcast_arrays(x, alpha)
         turn = self._turning_point(alpha)

@@ -12,7 +12,6 @@ import equinox as eqx
 import jax.numpy as jnp
 from jax import Array, lax
 
-from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.setting import Setting
 from profilefit.laws.base import Sampler
 from profilefit.laws.entry import CLAMPS, Entry, Range, Text
@@ -148,7 +147,7 @@ def radius(t: Array, curve: Curve) -> tuple[Array, Array]:
     return t * m * inverse, (curve.kappa * m * m + spread * (m + t * rise)) * inverse * inverse
 
 
-@filter_jit  # the steps are a loop, which would compile anew at each call
+@eqx.filter_jit  # the steps are a loop, which would compile anew at each call
 def depth(x: Array, curve: Curve) -> Array:
     """t [-] at x [mfp]: the inverse of `radius`."""
     x = jnp.clip(x, NEAREST, FARTHEST)

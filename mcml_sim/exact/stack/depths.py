@@ -27,7 +27,7 @@ FADED = 30.0  # exponent by which light has faded where it is not followed any d
 DARK = 38.0  # optical depth beyond which e^-T is rounding
 FEWEST, MOST = 4, 100  # nodes
 GRADING = 2  # power of the distance to the end of a panel by which nodes crowd there
-NEAR_STEP, NEAR_LAST = 0.15, 3.0  # of the double-exponential rule: 5e-11 of the transform
+NEAR_STEP, NEAR_LAST = 0.1, 3.4  # of the double-exponential rule
 
 
 @dataclass(frozen=True)

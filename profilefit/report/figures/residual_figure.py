@@ -11,7 +11,6 @@ from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
 from mcml_sim import exact
-from mcml_sim.exact.compiled import jit
 from profilefit.laws.base import ProfileLaw
 from profilefit.recipes.recipe import Albedos
 from profilefit.recipes.targets import albedo_values
@@ -91,7 +90,7 @@ def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
         return np.asarray(_energy_within(law, full, np.float64(alpha)))[..., : edges.shape[-1]]
 
 
-@jit
+@jax.jit
 def _energy_within(law: ProfileLaw, edges: jax.Array, alpha: jax.Array) -> jax.Array:
     return law.unscaled_energy(edges, alpha)
 

@@ -7,6 +7,7 @@ import pytest
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Setting, SettingError, simulate_orders
+from profilefit.fitting import estimate, solver
 from profilefit.fitting.estimate import ResidualFunction, fit, misfit_covariance, residual_structure, sensitivity
 from profilefit.fitting.objectives import rings_of
 from profilefit.fitting.profiles import Covariance, Profiles
@@ -161,9 +162,11 @@ def test_a_linear_fit_is_linear_algebra(line):
     assert one.result == "converged"
 
 
-def test_the_jackknife_by_hand(line):
+def test_the_jackknife_by_hand(line, monkeypatch):
     """Six groups of two neighbours left out in turn: sqrt(5/6 sum (theta_g - mean)^2)."""
     alpha, reflectance, design = line
+    soon = fit(line_profiles(reflectance, alpha), Line(Setting()), "reflectance")
+    monkeypatch.setattr(estimate, "JACKKNIFE_WORTH", solver.ROUNDING)
     one = fit(line_profiles(reflectance, alpha), Line(Setting()), "reflectance")
     left = []
     for group in range(6):
@@ -171,6 +174,7 @@ def test_the_jackknife_by_hand(line):
         left.append(np.linalg.lstsq(design[keep], reflectance[keep])[0])
     expected = np.sqrt(5 / 6 * np.sum((np.array(left) - np.mean(left, axis=0)) ** 2, axis=0))
     np.testing.assert_allclose(one.jackknife, expected, rtol=1e-6)
+    np.testing.assert_allclose(soon.jackknife, expected, rtol=1e-3)
     assert one.statistical is None
 
 

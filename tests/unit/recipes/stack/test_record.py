@@ -12,6 +12,7 @@ from PIL import Image
 from mcml_sim import Setting
 from profilefit.errors import DamagedRecord, InputError, OutputError, RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
+from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue, record
 from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.stack import record as stacks
@@ -50,6 +51,7 @@ thickness = 0.05
 
 """
 THREE = VEIL + STACK[STACK.index("[[layers]]") :]
+LAST = "mu_s = [1.13, 1.2, 1.3]\ng = 0.0"
 # Near what a fit of heart muscle gives for its interface; each channel and interface here has its own.
 CONSTANTS = {"w": 0.171, "u": -0.189, "g1": 1.03, "g2": 1.49, "b1": 0.027, "b2": 0.0075, "h0": 0.81, "h1": 1.08}
 CONSTANTS |= {"k0": 1 / 7}  # of more digits than a record has
@@ -63,7 +65,7 @@ def constants(medium, number):
     return {name: value * factor for name, value in CONSTANTS.items()}
 
 
-def made(illumination, medium):
+def made(illumination, medium, starts=()):
     """What `_channel` gives after a minute, at once: exact light has no photons, and nothing was fitted."""
     setting = Setting(illumination, n=medium.layers[0].n)
     own = catalogue.load("hazard", setting=setting).constants()
@@ -156,6 +158,15 @@ def test_grey_layers_are_fitted_once(monkeypatch, file, tmp_path):
     assert len(asked) == 1
     red, green, blue = load(path).laws
     assert red.constants() == green.constants() == blue.constants()
+
+
+def test_starts_of_the_file_are_those_of_its_colours(monkeypatch, file, tmp_path):
+    asked = []
+    monkeypatch.setattr(stacks, "_channel", lambda *given: asked.append(given) or made(*given))
+    rows = {name: [0.2, -0.1, *[1.0] * 6, float(place)] for place, name in enumerate(CHANNELS, start=1)}
+    text = "\n[start]\n" + "\n".join(f"{name} = [{row}]" for name, row in rows.items())
+    alone(stacks.work(request_of(file(text=STACK + text))), tmp_path)
+    assert [given[2][0].tolist() for given in asked] == list(rows.values())
 
 
 def test_the_record_says_what_it_is_worth(written):
@@ -281,6 +292,17 @@ REFUSED = [
     (('illumination = "diffuse"', 'colour = "red"'), r"keys must be of title, unit, illumination, .*, got 'colour'"),
     (('"diffuse"', '"sun"'), r"illumination must be one of searchlight, diffuse, got 'sun'"),
     (('"diffuse"', "3"), r"illumination must be one of searchlight, diffuse, got 3"),
+    (('illumination = "diffuse"', "start = 1"), r"start must be a table \[start\], got 1"),
+    *(
+        ((LAST, f"{LAST}\n[start]\n{text}"), message)
+        for text, message in (
+            ("violet = [[1]]", r"\[start\] keys must be of red, green, blue, got 'violet'"),
+            ("red = [[1, 2]]", r"\[start\] red must be lists of w, u, .* one an interface.*, got \[\[1, 2\]\]"),
+            ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", r"\[start\] red must be .* all but u > 0, got"),
+            ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be .* w in \(0, 1\)"),
+            ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] green must be .*, got nothing"),
+        )
+    ),
     (('"Muscle under its skin"', "7"), r"title must be a text of 60 characters at most, got 7"),
     ((STACK[STACK.rindex("[[layers]]") :], ""), r"layers must be two layers or more: .*, got 1"),
     ((STACK[STACK.index("[[layers]]") :], ""), r"table \[\[layers\]\] is missing"),
@@ -314,7 +336,7 @@ def test_what_no_law_is_for_is_refused_before_any_fit(monkeypatch, file, tmp_pat
 def test_a_fit_that_fails_leaves_nothing_behind(monkeypatch, file, tmp_path):
     """Not after two colours, either; and an old record stays as it was."""
 
-    def fails(illumination, medium):
+    def fails(illumination, medium, starts):
         if medium.layers[0].mu_a > 0.3:
             raise FloatingPointError("blue diverges")
         return made(illumination, medium)
