@@ -20,6 +20,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from mcml_sim.exact import cone
 from mcml_sim.exact.compiled import jit
@@ -218,7 +219,7 @@ def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Comp
         with jax.enable_x64(True):  # which holds for a thread
             return function(part)
 
-    with ThreadPoolExecutor(os.cpu_count()) as pool:
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:  # as of `stack.solution`
         return np.concatenate(list(pool.map(in_double, parts)), axis=1)[:, : k.size]
 
 

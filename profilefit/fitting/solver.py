@@ -50,8 +50,8 @@ SOLVER: Any = eqx.tree_at(
     (0.75, 5.0),
 )
 MINIMISER: Any = optx.BFGS(0.0, 0.0)
-# Length of the Jacobian's columns, by the unit of the residuals: damping, which begins at 1, is its square times 1e-2
-# (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
+# Length of the Jacobian's longest column, by the unit of the residuals: damping, which begins at 1, is its square times
+# 1e-2 (Madsen, Nielsen, Tingleff, Methods for Non-Linear Least Squares, 3.14).
 COLUMN = 10.0
 STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: below it, the parameter is at its bound
 SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
@@ -128,6 +128,7 @@ def least_squares(
     data: object = None,
     bounds: Bounds | None = None,
     worth: float = ROUNDING,
+    scale: ArrayLike | None = None,
 ) -> Solution:
     """Minimise |residual(parameters, data)|^2.
 
@@ -137,7 +138,7 @@ def least_squares(
         start: (p,) parameters to start from, in the caller's units.
         data: any pytree of arrays.
         bounds: lowest and highest parameters, (p,) each or a number; None for none. Steps are projected onto them.
-        worth: as of `solve`.
+        worth, scale: as of `solve`.
     """
     with jax.enable_x64(True):
         arrays = jax.tree.map(lambda leaf: jnp.asarray(np.asarray(leaf)), data)  # a float would be another type
@@ -147,19 +148,27 @@ def least_squares(
             rows = 0 if np.ndim(values[0]) < 2 else 1
             return _joined(values, rows).ravel(), _joined(jacobian, rows).reshape(-1, parameters.size)
 
-        return solve(at, np.asarray(start, np.float64), bounds, worth=worth)
+        return solve(at, np.asarray(start, np.float64), bounds, worth=worth, scale=scale)
 
 
 def solve_batch(
-    residual: Callable[..., Any], starts: ArrayLike, data: object = None, worth: float = ROUNDING
+    residual: Callable[..., Any],
+    starts: ArrayLike,
+    data: object = None,
+    worth: float = ROUNDING,
+    scales: ArrayLike | None = None,
 ) -> tuple[Solution, ...]:
-    """Solve m problems of one shape: `starts` (m, p), every leaf of `data` with a leading axis m.
+    """Solve m problems of one shape: `starts` (m, p), `scales` too, every leaf of `data` with a leading axis m.
 
     One after the other: one program serves them all and `least_squares` too, and none waits for the slowest.
     """
     begins, leaves = np.asarray(starts, np.float64), jax.tree.map(np.asarray, data)
-    items = (jax.tree.map(lambda leaf, row=row: leaf[row], leaves) for row in range(len(begins)))
-    return tuple(least_squares(residual, begin, item, worth=worth) for begin, item in zip(begins, items, strict=True))
+    found = []
+    for row, begin in enumerate(begins):
+        item = jax.tree.map(lambda leaf, row=row: leaf[row], leaves)
+        scale = None if scales is None else np.asarray(scales)[row]
+        found.append(least_squares(residual, begin, item, worth=worth, scale=scale))
+    return tuple(found)
 
 
 @filter_jit
@@ -190,6 +199,7 @@ def solve(
     start: Floats,
     bounds: Bounds | None = None,
     *,
+    scale: ArrayLike | None = None,
     rescaled: bool = False,
     tolerance: float = RELATIVE_TOLERANCE,
     gain: float = 0.0,
@@ -203,8 +213,9 @@ def solve(
         at: residuals and Jacobian; either may be not finite, and then the step is taken back.
         start: (p,) parameters to start from, inside the bounds.
         bounds: lowest and highest parameters; None for none.
-        rescaled: scale parameters by their columns of the Jacobian at each point that is accepted, not at the start
-            alone: where slopes change by decades.
+        scale: (p,) size of each parameter; by default that with which its column of the Jacobian at the start has
+            length 1.
+        rescaled: scale parameters by their columns at each point that is accepted: where slopes change by decades.
         tolerance: relative size of a step at which the search ends.
         gain: reduction of the sum of squares that a step must promise for the search to go on.
         worth: the same as a share of the sum of squares.
@@ -215,8 +226,9 @@ def solve(
     values, jacobian = at(start)
     if not (np.all(np.isfinite(values)) and np.all(np.isfinite(jacobian))):
         return Solution(start, values, jacobian, 1, NOT_FINITE, np.zeros(start.size, bool))
-    sizes, unit = np.linalg.norm(jacobian, axis=0), COLUMN
-    scale = 1.0 / np.where(sizes > 0, sizes, 1.0)
+    sizes = np.linalg.norm(jacobian, axis=0)
+    scale = 1.0 / np.where(sizes > 0, sizes, 1.0) if scale is None else np.asarray(scale, float)
+    unit = COLUMN / (float(np.max(sizes * scale, initial=0.0)) or 1.0)
     ends, reach = (low / scale, high / scale), np.asarray(longest, float) / scale
     size = next((size for size in SIZES if size >= start.size), start.size)
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
@@ -278,7 +290,8 @@ def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: F
 
 def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> NDArray[np.bool_]:
     """True for each parameter (p,) that is at a bound and that descent would move beyond it."""
-    uphill = jacobian.T @ values
+    with np.errstate(over="ignore", invalid="ignore"):  # a point that is no answer may be far out
+        uphill = jacobian.T @ values
     return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
 
 

@@ -1,4 +1,4 @@
-"""Starts of fits: the constants that a recipe names, and random ones around them, to find better optima."""
+"""Starts of fits: the constants that a recipe names, and random ones around them, to see whether optima are better."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ SAME_COST, SAME_CONSTANT, SAME_IN_ERROR = 1e-6, 1e-3, 0.1
 ROUNDING = 1e-20  # a cost that float64 residuals cannot distinguish from zero
 MOST_OUTCOMES = 12
 OWN_IS_BEST = "no random start found a better optimum than the recipe's own start"
-OWN_IS_BEATEN = "a random start found a better optimum than the recipe's own start: the fit is that one"
+OWN_IS_BEATEN = "a random start found a better optimum than the recipe's own start, where the fit stays: begin there"
 NONE_CONVERGED = "no start converged"
 
 
@@ -155,7 +155,9 @@ def random_starts(own: Fit, start: Constants, count: int, seed: int) -> RandomSt
     constants = start.vector(own.free)
     begins = spread_out(constants, count, seed)
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (count, *np.shape(leaf))), (start, own.rings))
-    found = solve_batch(ResidualFunction(own.objective, own.free), begins, data)
+    # By their sizes, which were drawn: where slopes at such a start scale them, half as many find the best optimum.
+    sizes = np.where(begins == 0, 1.0, np.abs(begins))
+    found = solve_batch(ResidualFunction(own.objective, own.free), begins, data, scales=sizes)
     rule = f"constant x e^({SPREAD:.3g} normal), around the recipe's start"
     return summarised(own.solution, [judged(one, own.free) for one in found], own.free, seed, rule)
 

@@ -48,7 +48,7 @@ STARTS, SPREAD, SEED = 6, 0.8, 1
 LOWEST = 0.95  # of 2 kappa l: how far below 0 u may go
 
 
-NODES = exact.Nodes(12, 16, 16, 8)  # of the exact light: right to a tenth of the law's error and better
+NODES = exact.Nodes(12, 16, 16, 10)  # of the exact light: right to a tenth of the law's error and better
 
 
 Lights = list[tuple[Floats, ...] | TracedRings]
