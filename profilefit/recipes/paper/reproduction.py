@@ -187,7 +187,8 @@ _MISFITS = {law: _misfit_of(law) for law in (albedo_law, a_law, b_law, c_law, k1
 def _fit(law: Callable, x: Floats, data: Floats, start, weight: Floats | float = 1.0) -> Solution:
     """Fit a law by least squares, residuals in units of the largest datum."""
     weights = np.broadcast_to(weight / np.max(np.abs(data)), data.shape)
-    return least_squares(_MISFITS[law], start, (x, data, weights))
+    # Some have optima far off: steps are measured by the size of what is printed, not by slopes there.
+    return least_squares(_MISFITS[law], start, (x, data, weights), scale=np.where(start, np.abs(start), 1.0))
 
 
 def _held(columns: list[Floats], data: Floats) -> Floats:
