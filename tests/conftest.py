@@ -7,16 +7,39 @@ from pathlib import Path
 
 import pytest
 
+ROOT = Path(__file__).parents[1]
 os.environ["MPLBACKEND"] = "Agg"
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # every core has a worker
 # XLA takes two thirds of all time: workers, the commands that they start, and the next run share what it made.
-os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(Path(__file__).parents[1] / ".pytest_cache" / "xla"))
+os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".pytest_cache" / "xla"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 # Tables of the exact half space under refracting surfaces: not the user's, and made once.
-os.environ["XDG_CACHE_HOME"] = str(Path(__file__).parents[1] / ".pytest_cache" / "user")
-pytest_plugins = ["tests.fixtures"]  # imports jax, and so comes after the lines above
+os.environ["XDG_CACHE_HOME"] = str(ROOT / ".pytest_cache" / "user")
+pytest_plugins = ["tests.seconds", "tests.fixtures"]  # which import jax, and so come after the lines above
+# Most programs run once, on few numbers: unoptimised they compile three times as fast. `XLA_FLAGS= make test` optimises
+# all; those that trace photons, which have options of their own, and those named here, of exact tables, always are.
+UNOPTIMISED = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
+LONG_RUNNING = {"jit__systems", "jit__series"}
 MOST_MAPS = 20_000  # of 65530 that Linux gives a process; a file of tests takes a few thousand
+
+
+def quickly_compiled(compile_program):
+    """Wrap what compiles for jax."""
+
+    def compile_quickly(backend, computation, devices, options, *arguments, **named):
+        name = computation.operation.attributes["sym_name"].value
+        if not options.env_option_overrides and name not in LONG_RUNNING:
+            options.env_option_overrides = list(UNOPTIMISED.items())
+        return compile_program(backend, computation, devices, options, *arguments, **named)
+
+    return compile_quickly
+
+
+if "XLA_FLAGS" not in os.environ:
+    from jax._src import compiler  # jax has no public option of most programs: XLA_FLAGS are of all
+
+    compiler.compile_or_get_cached = quickly_compiled(compiler.compile_or_get_cached)
 
 
 @pytest.fixture(autouse=True, scope="module")

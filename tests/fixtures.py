@@ -26,6 +26,11 @@ from profilefit.shader.context import open_context
 NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 
 
+def slow(*values):
+    """Values of a parameter that only `make test-all` takes, beside others of every run; a tuple is of several."""
+    return [pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=pytest.mark.slow) for one in values]
+
+
 @pytest.fixture(scope="session")
 def sidak():
     """|z| that the largest of m independent normal deviates exceeds with probability 1e-3."""

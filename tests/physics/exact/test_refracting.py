@@ -1,5 +1,7 @@
 """The half space under a refracting surface: published totals, other ways to the same, and its tables."""
 
+from functools import partial
+
 import jax
 import jax.numpy as jnp
 import numpy as np
@@ -58,7 +60,8 @@ def test_rotated_contour_meets_the_real_axis(light):
     k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 2.0)))
     rate, weighted = transform_density(where)
     with jax.enable_x64(True):
-        systems = jax.jit(lambda k: jax.lax.map(lambda one: cone.system(1.4, one, 160, 160), k, batch_size=16))(k + 0j)
+        solve = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3})  # a thousand systems
+        systems = solve(lambda k: jax.lax.map(lambda one: cone.system(1.4, one, 160, 160), k, batch_size=16))(k + 0j)
         matrix, leaving, source = (np.asarray(part) for part in systems)
     adjoint = np.linalg.solve(np.eye(160) - alpha * matrix, leaving[..., None])[..., 0]
     whole = np.einsum("kx,kx->k", source[:, LIGHTS.index(light)], adjoint).real / np.pi

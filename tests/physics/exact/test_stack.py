@@ -11,6 +11,7 @@ from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.stack import depths, fluence, solution
 from mcml_sim.exact.stack.solution import STANDARD
+from tests.fixtures import slow
 from tests.physics.tracing import adding_doubling
 
 BOTH = pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
@@ -131,7 +132,7 @@ def test_no_light_is_lost(white, illumination):
         assert total == pytest.approx(1, abs=2e-9)
 
 
-@BOTH
+@pytest.mark.parametrize("illumination", ["diffuse", *slow("searchlight")])
 def test_the_way_a_thin_plate_is_solved_is_the_other_in_thicker_ones(illumination, monkeypatch):
     """What is taken away from its transform is the half space by mirror and cone, or in layers like its own."""
     r, plate = np.array([0.001, 0.1, 1.0, 5.0]), Medium((replace(PLATE.layers[0], thickness=1.5),))

@@ -14,6 +14,7 @@ from profilefit.laws.hazard import cumulative, growth
 from profilefit.laws.refracting_hazard import RefractingHazard
 from profilefit.laws.refracting_rational import RefractingRational
 from profilefit.laws.two_parts import TwoPartSampler, drawn
+from tests.fixtures import slow
 
 ALPHA = 1 - np.linspace(1, 0, 41) ** 2
 R = np.geomspace(1e-4, 300, 200)
@@ -23,10 +24,11 @@ ANY = RefractingHazard(
     RefractingRational(Setting(n=1.33), **RefractingRational.entry.start),
     **RefractingHazard.entry.start,
 )
-SETTINGS = [Setting(light, n) for light in ("searchlight", "diffuse") for n in (1.02, 1.37, 1.6)]
+LIGHTS = ("searchlight", "diffuse")
+QUICK, OTHERS = ([Setting(light, n) for light in LIGHTS for n in indices] for indices in ((1.37,), (1.02, 1.6)))
 
 
-@pytest.fixture(scope="module", params=SETTINGS, ids=str)
+@pytest.fixture(scope="module", params=[*QUICK, *slow(*OTHERS)], ids=str)
 def law(request):
     return load("hazard", setting=request.param)
 
@@ -77,8 +79,8 @@ def test_ends_are_finite_and_right(law):
     assert law.profile(0.0, 0.0) == 0.0
 
 
-@pytest.mark.parametrize("n", [1.001, 1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.5, 1.6])
-@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+@pytest.mark.parametrize("n", [1.001, 1.37, 1.6, *slow(1.02, 1.1, 1.2, 1.3, 1.4, 1.5)])
+@pytest.mark.parametrize("light", LIGHTS)
 def test_monotone_in_radius_and_albedo(light, n):
     """As exact light is; in alpha up to 1 - 1e-5: nearer to white it may fall by 1e-5 in all."""
     law = load("hazard", setting=Setting(light, n))
@@ -104,7 +106,7 @@ def test_near_exact_light_at_an_index_that_was_not_fitted(setting):
 
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [1.02, 1.1, 1.2, 1.3, 1.37, 1.4, 1.45, 1.5, 1.6])
-@pytest.mark.parametrize("light", ["searchlight", "diffuse"])
+@pytest.mark.parametrize("light", LIGHTS)
 def test_near_exact_light_at_two_hundred_albedos(light, n):
     alpha = 1 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), 200) ** 2
     quality = profile_quality(load("hazard", setting=Setting(light, n)), alpha)
@@ -124,7 +126,7 @@ def test_inverse_in_a_fixed_number_of_steps(steps, error):
     worst = 0.0
     with jax.enable_x64(True):
         t, alpha = jnp.asarray(-np.log1p(-xi)), jnp.asarray(ALPHA)[:, None]
-        for setting in (*SETTINGS, Setting(n=1.001), Setting("diffuse", n=1.001)):
+        for setting in (*QUICK, *OTHERS, Setting(n=1.001), Setting("diffuse", n=1.001)):
             of = load("hazard", setting=setting).parts(alpha)
             for part, share, is_once in ((of.once, of.share, True), (of.again, 1 - of.share, False)):
                 x = drawn(t, growth(t), of, is_once, steps)
