@@ -14,6 +14,7 @@ from profilefit.measured.beam import Gaussian, Profiled, TopHat, beam_of
 from profilefit.measured.exact_light import exact_light
 from profilefit.measured.instrument import PENCIL, Instrument
 from profilefit.measured.model import Model, u_of
+from tests.fixtures import slow
 
 SETTINGS = Setting(), Setting(n=1.4), Setting("diffuse", n=1.4)
 ALPHA, W = 0.8, 0.5
@@ -69,7 +70,7 @@ def by_area(irradiance, reach, d, mfp):
     return total
 
 
-@pytest.mark.parametrize("mfp", [0.05, 0.5, 2.0])
+@pytest.mark.parametrize("mfp", [0.5, *slow(0.05, 2.0)])
 @pytest.mark.parametrize("name", BEAMS)
 def test_a_beam_is_the_sum_of_its_places(name, mfp):
     if name == "top hat":
@@ -134,7 +135,7 @@ def test_rings_hold_their_energy():
         assert rings @ (np.pi * np.diff(edges**2)) == pytest.approx(total, rel=1e-4)
 
 
-@pytest.mark.parametrize("r", [0.05, 0.2, 0.7])
+@pytest.mark.parametrize("r", [0.05, *slow(0.2, 0.7)])
 def test_a_fibre_averages_over_its_core(r):
     """A hundred thousand places of its end, at random; it may cover the axis."""
     source, radius = np.random.default_rng(3), 0.2

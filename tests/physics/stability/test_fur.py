@@ -64,6 +64,7 @@ def test_gaps_are_those_that_a_ray_may_pass():
     assert gap_share(QUADRATIC, step, 64) < gap_share(LINEAR, step, 64)
 
 
+@pytest.mark.slow
 def test_slabs_hold_below_their_limits_and_a_second_strand_is_missed_beyond(slabs):
     one, two = slabs.value
     assert not any(region.is_failure for region in regions_of(slabs))

@@ -18,6 +18,7 @@ def cells():
         pytest.skip(str(error))
 
 
+@pytest.mark.slow
 def test_poles_and_coarse_texels_fail_and_nothing_else(cells):
     regions = [one for each in cells for one in regions_of(each)]
     assert {one.cause.key for one in regions} == {"wide blur at a pole", "coarse texels"}

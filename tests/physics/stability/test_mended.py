@@ -65,6 +65,7 @@ def test_the_exact_half_space_at_huge_radii():
         assert exact.cdf(x, 0.9) == 1.0
 
 
+@pytest.mark.slow
 def test_a_colour_next_to_white_has_an_albedo():
     reflectance = 1.0 - 2.0 ** -np.array([10.0, 24.0, 40.0, 53.0])
     for light in ("searchlight", "diffuse"):

@@ -8,6 +8,7 @@ from profilefit.studies.stability import refracting
 from profilefit.studies.stability.cells import Verdict
 
 
+@pytest.mark.slow
 def test_plates_are_right_and_others_are_not(monkeypatch):
     monkeypatch.setattr(refracting, "PLATE_ALPHA", (0.0, 0.5, 0.9, 1.0 - 1e-6, 1.0))
     assert np.all(refracting.plates(1.0).codes == Verdict.RIGHT)

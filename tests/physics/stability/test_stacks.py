@@ -24,6 +24,7 @@ def wrong(regions):
     return [(one.subject, one.quantity, one.where) for one in regions if one.is_failure or one.is_unexplained]
 
 
+@pytest.mark.slow
 def test_recorded_stacks_hold_in_float32():
     recorded = list(stacks.recorded_stacks(fits_folder()))
     assert {one.label for one in recorded} >= {"skin, red", "heart, blue", "skimmilk-on-potato, green"}
@@ -37,6 +38,7 @@ def test_recorded_stacks_hold_in_float32():
             assert one.verdicts == {Verdict.RIGHT}, one.subject
 
 
+@pytest.mark.slow
 def test_all_that_fails_at_the_ends_of_albedos_has_a_cause():
     cells = [each for one in ENDS.values() for each in (stacks.energies(one), *stacks.of_law(one, TEXT32))]
     found = reds(*cells, *stacks.stated(list(ENDS.values()), promised=False))

@@ -25,6 +25,7 @@ def test_shafts_over_samples():
     assert all(one.worst.value > one.error.value for one in panel.points)
 
 
+@pytest.mark.slow
 def test_maps_before_and_beyond_the_fold(context):
     before, beyond = sea.maps(context, SMALL)
     for panel in (before, beyond):

@@ -16,6 +16,7 @@ from profilefit.scenes.heart.truth import sphere_blur, summed
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
+from tests.fixtures import slow
 
 KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
 RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24
@@ -169,7 +170,8 @@ def test_elements_are_the_surface(stage):
         assert (sides > 1.015 * area_of(mesh)) == skewed
 
 
-def test_a_heart_is_blurred_as_its_sum(stage):
+@pytest.mark.parametrize("apart", [4, *slow(1)])
+def test_a_heart_is_blurred_as_its_sum(stage, apart):
     """All of it, and next to the seams of six charts; where they lie nearer than margins are wide, that is refused."""
     part = Part(heart(2.0 * RADIUS), WHITE)
     stage.draw(Scene((part,)))
@@ -187,7 +189,10 @@ def test_a_heart_is_blurred_as_its_sum(stage):
         inside = atlas.read("position_map")[..., 3] > 0.5
         found = pixels(atlas.blur(kernel))[..., 0].astype(float)[inside]
         own, seams = atlas.elements(), (inside & ~binary_erosion(inside, np.ones((3, 3))))[inside]
-        for chosen, bound in ((slice(None, None, 51), 0.008), (np.flatnonzero(seams)[::4], 0.01)):
+        for chosen, bound in (
+            (slice(None, None, 51 * apart), 0.008),
+            (np.flatnonzero(seams)[:: 4 * apart], 0.01),
+        ):
             light = own.irradiance[chosen]
             expected = summed(fine.elements(), kernel.variances, kernel.weights, own.points[chosen], light)[:, 0]
             assert rms(found[chosen] - expected, own.areas[chosen]) < bound
