@@ -18,9 +18,11 @@ os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
 os.environ["XDG_CACHE_HOME"] = str(ROOT / ".pytest_cache" / "user")
 pytest_plugins = ["tests.seconds", "tests.fixtures"]  # which import jax, and so come after the lines above
 # Most programs run once, on few numbers: unoptimised they compile three times as fast. `XLA_FLAGS= make test` optimises
-# all; those that trace photons, which have options of their own, and those named here, of exact tables, always are.
+# all; those that trace photons, which have options of their own, always are, and those of exact light, which run for
+# long, are a little.
 UNOPTIMISED = {"xla_backend_optimization_level": 0, "xla_cpu_use_fusion_emitters": False}
-LONG_RUNNING = {"jit__systems", "jit__series"}
+A_LITTLE = {**UNOPTIMISED, "xla_backend_optimization_level": 1}
+EXACT = {"jit__systems", "jit__series", "jit_solve", "jit__of_block", "jit__each"}
 MOST_MAPS = 20_000  # of 65530 that Linux gives a process; a file of tests takes a few thousand
 
 
@@ -28,9 +30,9 @@ def quickly_compiled(compile_program):
     """Wrap what compiles for jax."""
 
     def compile_quickly(backend, computation, devices, options, *arguments, **named):
-        name = computation.operation.attributes["sym_name"].value
-        if not options.env_option_overrides and name not in LONG_RUNNING:
-            options.env_option_overrides = list(UNOPTIMISED.items())
+        if not options.env_option_overrides:
+            name = computation.operation.attributes["sym_name"].value
+            options.env_option_overrides = list((A_LITTLE if name in EXACT else UNOPTIMISED).items())
         return compile_program(backend, computation, devices, options, *arguments, **named)
 
     return compile_quickly

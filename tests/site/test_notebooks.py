@@ -137,6 +137,7 @@ def test_runs_draws_warns_of_nothing_and_leaves_nothing_behind(path):
     assert set(FOLDER.rglob("*")) - before == set()
 
 
+@pytest.mark.slow
 def test_the_first_cells_of_one_run():
     require_opengl(SMOKE)
     require_clean(run(SMOKE, first=FIRST))

@@ -42,6 +42,7 @@ def scripts(wheel, tmp_path_factory) -> Path:
     return folder
 
 
+@pytest.mark.slow
 def test_wheel_holds_the_packages_and_every_recipe_and_record(wheel):
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {name.split("/")[0] for name in names} == {"mcml_sim", "profilefit", "profilefit-0.1.0.dist-info"}
@@ -78,6 +79,7 @@ def test_installed_law_evaluates_away_from_the_checkout(scripts, tmp_path):
     assert value > 0
 
 
+@pytest.mark.slow
 def test_wheel_holds_every_text_that_the_packages_read(wheel):
     """Shaders, pages, scenes: whatever lies beside the modules."""
     names = set(zipfile.ZipFile(wheel).namelist())
