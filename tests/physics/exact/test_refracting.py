@@ -57,7 +57,7 @@ def test_light_scattered_once_is_the_closed_form(light):
 def test_rotated_contour_meets_the_real_axis(light):
     """Light scattered once in closed form; of the rest the real transform, faded out where it is c / k^2."""
     where, alpha, r = Setting(light, n=1.4), 0.8, np.array([1.0, 1.4])
-    k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 2.0)))
+    k, dk = panels(np.append(np.append(0.0, np.geomspace(0.02, 4.0, 10)), np.arange(6.0, 120.0, 4.0)))
     rate, weighted = transform_density(where)
     with jax.enable_x64(True):
         solve = partial(jax.jit, compiler_options={"xla_backend_optimization_level": 3})  # a thousand systems
