@@ -28,7 +28,7 @@ NORMALISATION = Rational(Setting(), 0.45058, 2.35857, 1.36799)
 
 def slow(*values):
     """Values of a parameter that only `make test-all` takes, beside others of every run; a tuple is of several."""
-    return [pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=pytest.mark.slow) for one in values]
+    return [pytest.param(*(one if type(one) is tuple else (one,)), marks=pytest.mark.slow) for one in values]
 
 
 @pytest.fixture(scope="session")

@@ -14,13 +14,14 @@ from mcml_sim.exact import cone, hankel, table, tables
 from mcml_sim.exact.by_albedo import by_alpha
 from mcml_sim.exact.single_scattering import entered, transform_density
 from mcml_sim.exact.transform import STANDARD
+from tests.fixtures import slow
 from tests.physics.tracing.adding_doubling import solve as added
 
 LIGHTS = ("searchlight", "diffuse")
 RADII = np.geomspace(1e-3, 15.0, 60)
 ALPHAS = np.array([0.05, 0.3, 0.8, 0.95, 0.99, 0.999])[:, None]
 
-each_light = pytest.mark.parametrize("light", LIGHTS)
+each_light = pytest.mark.parametrize("light", [LIGHTS[0], *slow(LIGHTS[1])])
 
 
 def test_published_totals():
@@ -53,7 +54,7 @@ def test_light_scattered_once_is_the_closed_form(light):
             assert abs(once / (entered(where) * np.sum(weighted * rate / np.sqrt(rate**2 + k**2))) - 1) < 2e-9
 
 
-@pytest.mark.parametrize("light", [LIGHTS[0], pytest.param(LIGHTS[1], marks=pytest.mark.slow)])
+@pytest.mark.parametrize("light", [LIGHTS[0], *slow(LIGHTS[1])])
 def test_rotated_contour_meets_the_real_axis(light):
     """Light scattered once in closed form; of the rest the real transform, faded out where it is c / k^2."""
     where, alpha, r = Setting(light, n=1.4), 0.8, np.array([1.0, 1.4])

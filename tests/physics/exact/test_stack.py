@@ -14,7 +14,7 @@ from mcml_sim.exact.stack.solution import STANDARD
 from tests.fixtures import slow
 from tests.physics.tracing import adding_doubling
 
-BOTH = pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+BOTH = pytest.mark.parametrize("illumination", ["diffuse", *slow("searchlight")])
 RADII = np.geomspace(1e-3, 15.0, 40)
 CHANCE = 1e-3  # that a right answer fails
 

@@ -79,7 +79,7 @@ def test_ends_are_finite_and_right(law):
     assert law.profile(0.0, 0.0) == 0.0
 
 
-@pytest.mark.parametrize("n", [1.001, 1.37, 1.6, *slow(1.02, 1.1, 1.2, 1.3, 1.4, 1.5)])
+@pytest.mark.parametrize("n", [1.37, *slow(1.001, 1.6, 1.02, 1.1, 1.2, 1.3, 1.4, 1.5)])
 @pytest.mark.parametrize("light", LIGHTS)
 def test_monotone_in_radius_and_albedo(light, n):
     """As exact light is; in alpha up to 1 - 1e-5: nearer to white it may fall by 1e-5 in all."""

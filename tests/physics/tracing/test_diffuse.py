@@ -24,6 +24,7 @@ from mcml_sim import (
 )
 from mcml_sim.exact.single_scattering import entered
 from profilefit.measured import fit
+from tests.fixtures import slow
 from tests.physics.tracing import adding_doubling
 
 EDGES = np.append(0.0, np.geomspace(0.02, 8.0, 24))
@@ -31,6 +32,7 @@ GRID = Grid.from_edges(r=EDGES)
 CHANCE = 1e-3  # that a right answer fails
 FORWARD = Medium((Layer(1.4, 0.2, 2.0, 0.7, 0.3), Layer(1.4, 0.1, 4.0, 0.2, 0.5)))
 STACK = Medium((Layer(1.4, 0.1, 2.0, 0.0, 0.5), Layer(1.4, 0.5, 0.5, 0.0, 0.7)), n_below=1.2)
+MATCHED = Medium((Layer(1.0, 0.1, 2.0, 0.0, 0.5), Layer(1.0, 0.5, 0.5, 0.0, 0.7)))
 GLAZED = Medium((Layer(1.4, 0.0, 0.0, 0.0, 0.2), *STACK.layers))
 UNDER_GLASS = replace(STACK, n_above=1.6)
 
@@ -87,9 +89,7 @@ def test_adding_and_doubling_of_diffuse_light_is_exact_light():
     assert twin.specular == pytest.approx(found.specular, rel=1e-6)
 
 
-@pytest.mark.parametrize(
-    "medium", [STACK, *(pytest.param(one, marks=pytest.mark.slow) for one in (GLAZED, UNDER_GLASS))]
-)
+@pytest.mark.parametrize("medium", [MATCHED, *slow(STACK, GLAZED, UNDER_GLASS)])
 def test_exact_light_agrees(medium):
     tally, found = shone(medium, 2**20), exact.solve(medium, "diffuse")
     assert agrees(tally.diffuse_reflectance, found.reflectance)

@@ -25,7 +25,9 @@ GRID = Grid.from_edges(r=np.append(0.0, np.geomspace(0.1, 20, 12)))
 SEA = Mixture((0.317, 0.6813, 0.0017), (HenyeyGreenstein(0.9933), HenyeyGreenstein(0.8957), HenyeyGreenstein(-0.635)))
 ANGLES = np.radians(np.append(np.geomspace(0.05, 10, 60), np.linspace(12, 180, 80)))
 TABLE = Tabulated(ANGLES, SEA.pdf(np.cos(ANGLES)))  # the same light, but for what goes on within 0.05 degrees
-BY_PHASE = pytest.mark.parametrize("phase", [SEA, TABLE, FournierForand(1.1, 3.6)], ids=["mixture", "table", "Forand"])
+BY_PHASE = pytest.mark.parametrize(
+    "phase", [SEA, *slow(TABLE, FournierForand(1.1, 3.6))], ids=["mixture", "table", "Forand"]
+)
 PHOTONS = pytest.mark.parametrize("photons", [2**14, *slow(2**17)])
 
 

@@ -17,6 +17,7 @@ from profilefit.shader.check.shader_law import PROFILE, _Pass
 from profilefit.shader.context import program
 from profilefit.shader.emit import law_text
 from profilefit.shader.stack_text import gaussians_text, single_text, stack_text
+from tests.fixtures import slow
 from tests.unit.shader.test_compiles import HEADS, MAIN, VERTEX, require_hlsl
 
 NAMES = StackLaw.constant_names()
@@ -79,7 +80,8 @@ LAWS = {
 }
 # Relative, of float32's R_d: ten operations' rounding; in skin's blue light the terms are up to ten times their sum.
 ROUNDING = {**dict.fromkeys(LAWS, 1.2e-5), "three layers": 2e-5}
-every = pytest.mark.parametrize("label", LAWS)
+QUICK = ("two layers", "three layers, matched")
+every = pytest.mark.parametrize("label", [*QUICK, *slow(*(one for one in LAWS if one not in QUICK))])
 
 
 def twin(text):
