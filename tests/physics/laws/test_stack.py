@@ -79,10 +79,11 @@ def test_sampler_has_its_own_density_and_finds_all_the_light(n, thickness):
     assert np.std(weights) < 1.5 * weights.mean()
 
 
-def test_a_stack_over_a_stack():
+@pytest.mark.parametrize("n", [1.0, *slow(1.4)])
+def test_a_stack_over_a_stack(n):
     """A layer cut in two by an interface of no thickness, and one whose lower part is as if it were not there."""
-    inner = stack()
-    outer = StackLaw(inner.setting, layer(0.9, 0.3), inner, 0.2, **CONSTANTS)
+    inner = stack(n)
+    outer = StackLaw(inner.setting, layer(0.9, 0.3, n), inner, 0.2, **CONSTANTS)
     np.testing.assert_allclose(outer.profile(R, 0.0), inner.profile(R), rtol=1e-9)
     np.testing.assert_allclose(outer.cdf(R, 0.0), inner.cdf(R), rtol=1e-8)
     r = outer.sampler.sample(np.array([0.1, 0.5, 0.999]))

@@ -9,6 +9,8 @@ from profilefit.studies.stability import heart
 from profilefit.studies.stability.cells import Verdict
 from profilefit.studies.stability.regions import regions_of
 
+pytestmark = pytest.mark.slow  # an instrument
+
 
 @pytest.fixture(scope="module")
 def cells():
@@ -18,7 +20,6 @@ def cells():
         pytest.skip(str(error))
 
 
-@pytest.mark.slow
 def test_poles_and_coarse_texels_fail_and_nothing_else(cells):
     regions = [one for each in cells for one in regions_of(each)]
     assert {one.cause.key for one in regions} == {"wide blur at a pole", "coarse texels"}
