@@ -20,8 +20,9 @@ LANES = 4096  # measured on a Zen 4 core: 2048 are as fast, 8192 slower by 7 %
 GPU_LANES = 65536  # measured on an H100: 4096 take two to four times as long, 262144 up to 1.4 times
 DRAIN_POOLS = (8,)  # the pool shrinks to 1/8 of its lanes once; a further one to 1/64 is worth 2 % and compiles for 1 s
 COLUMNS = 64  # of the table in which lanes are ranked
-# A Zen 4 core gains a third by it, and hardware without such vectors ignores it: to be given to jax.jit.
-COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512}
+# To be given to jax.jit. A Zen 4 core gains a third by the width, and hardware without such vectors ignores it; the
+# level is XLA's own, whatever a process has for other programs: lower ones trace six times as slowly.
+COMPILER_OPTIONS = {"xla_cpu_prefer_vector_width": 512, "xla_backend_optimization_level": 3}
 
 # Any NamedTuple of arrays (lanes,) that has `place`, `photon` and `ended`, as isotropic_event.IsotropicLanes.
 Lanes = Any

@@ -277,4 +277,5 @@ def _lag_one(table: Floats) -> float:
     """Lag-1 autocorrelation along the rows of a table, about zero: a fit's residuals have no mean to remove."""
     if table.shape[1] < 2 or not np.any(table):
         return 0.0
+    table = table / np.max(np.abs(table))  # squares of small ones would be 0
     return float(np.sum(table[:, 1:] * table[:, :-1]) / np.sqrt(np.sum(table[:, 1:] ** 2) * np.sum(table[:, :-1] ** 2)))

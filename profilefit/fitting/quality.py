@@ -47,7 +47,14 @@ class Quality:
 def profile_quality(law: ProfileLaw, alpha: ArrayLike) -> Quality:
     """Measure a law against the exact profile of its own setting at each (reduced) albedo in `alpha` (m,)."""
     albedos = np.atleast_1d(np.asarray(alpha, float))
-    rows = [_at(law, *pair) for pair in zip(albedos.tolist(), _outer(tuple(albedos), law.setting), strict=True)]
+    truths = [
+        _truth(*pair, law.setting) for pair in zip(albedos.tolist(), _outer(tuple(albedos), law.setting), strict=True)
+    ]
+    own, mfp = np.array([_medium(one, law.setting) for one in albedos.tolist()]).T[:, :, None]
+    # All albedos in one call of each method.
+    profile, even = (law.profile(np.stack(r), own, mfp) for r in ([t.r for t in truths], [t.even for t in truths]))
+    cdf = law.cdf(np.stack([t.far for t in truths]), own, mfp)
+    rows = [_measures(*row) for row in zip(truths, profile, even, cdf, strict=True)]
     return Quality(albedos, *(np.array(column) for column in zip(*rows, strict=True)))
 
 
@@ -94,14 +101,13 @@ def _truth(alpha: float, outer: float, setting: Setting) -> _Truth:
     return _Truth(r, profile[: r.size], far, np.asarray(exact.cdf(far, own, mfp, setting)), even, scaled)
 
 
-def _at(law: ProfileLaw, alpha: float, outer: float) -> tuple[float | tuple[float, float], ...]:
-    truth, (own, mfp) = _truth(alpha, outer, law.setting), _medium(alpha, law.setting)
-    off = np.abs(law.profile(truth.r, own, mfp) / truth.profile - 1.0)
-    law_cdf = law.cdf(truth.far, own, mfp)
+def _measures(truth: _Truth, profile: Floats, even: Floats, law_cdf: Floats) -> tuple[float | tuple[float, float], ...]:
+    """Of a law's R_d at a truth's radii and even radii, and of its cdf at the far ones."""
+    off = np.abs(profile / truth.profile - 1.0)
     ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.
     l1 = 0.5 * np.sum(np.abs(np.diff(law_cdf) - np.diff(truth.cdf)))
-    model = truth.even * law.profile(truth.even, own, mfp)
+    model = truth.even * even
     (mse, r2), *halves = (
         (float(np.mean((truth.scaled[part] - model[part]) ** 2)), r_squared(truth.scaled[part], model[part]))
         for part in (slice(None), slice(RADII // 2), slice(RADII // 2, None))

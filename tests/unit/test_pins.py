@@ -159,7 +159,7 @@ def of_a_process(*names: str) -> dict[str, str]:
     """Bits and arithmetic of a process whose programs are optimised, and its tables its own: those of tests are not."""
     code = f"from tests.unit import test_pins as t; print(t.json.dumps({{n: getattr(t, n)() for n in {names}}}))"
     with tempfile.TemporaryDirectory() as cache:
-        environment = {**os.environ, "XDG_CACHE_HOME": cache}
+        environment = {**os.environ, "XDG_CACHE_HOME": cache, "XLA_FLAGS": ""}
         words = [sys.executable, "-c", code]
         return json.loads(subprocess.run(words, cwd=ROOT, env=environment, capture_output=True, check=True).stdout)
 
