@@ -15,9 +15,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # every core has a worker
 os.environ.setdefault("JAX_COMPILATION_CACHE_DIR", str(ROOT / ".pytest_cache" / "xla"))
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_COMPILE_TIME_SECS", "0.1")
 os.environ.setdefault("JAX_PERSISTENT_CACHE_MIN_ENTRY_SIZE_BYTES", "-1")
-# Most programs run once, on few numbers: unoptimised they compile three times as fast. `XLA_FLAGS= make test` optimises
-# as for users; those that trace photons, and those of exact light and laws, have options of their own.
-QUICKLY = ["--xla_backend_optimization_level=0"]
+# Most programs run once, on few numbers: optimised a little they compile in half the time. `XLA_FLAGS= make test`
+# optimises as for users; programs that trace photons have options of their own.
+QUICKLY = ["--xla_backend_optimization_level=1"]
 if version("jaxlib") < "0.11":  # which may not know it
     QUICKLY.append("--xla_cpu_use_fusion_emitters=false")
 os.environ.setdefault("XLA_FLAGS", " ".join(QUICKLY))

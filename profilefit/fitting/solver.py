@@ -32,7 +32,7 @@ Linearised = Callable[[Floats], tuple[Floats, Floats]]
 CONVERGED = "converged"
 # Far below any error of a constant, far above what float64 residuals of a few thousand bins resolve.
 RELATIVE_TOLERANCE = 1e-10
-MAX_STEPS = 500  # the stack of skin takes more than 300
+MAX_STEPS = 300
 NOT_FINITE = "the residual is not finite there: start nearer to the data, or narrow the range of alpha"
 # Steps that shrink because every longer one leaves the law's domain also look converged; at an optimum the residuals
 # are orthogonal to what the constants can do, unless there is no misfit but rounding.
