@@ -172,8 +172,8 @@ def quick_bits():
 @pytest.mark.parametrize("name", [*(name for name in BITS if name != "record"), *slow("record")])
 def test_bits_are_those_of_before(name, quick_bits):
     pins = json.loads(PINS.read_text())["bits"]
-    if (here := quick_bits["arithmetic"]) not in pins:
-        pytest.skip(f"arithmetic {here} of this machine has no pins")
+    if name not in pins.get(here := quick_bits["arithmetic"], {}):
+        pytest.skip(f"arithmetic {here} of this machine has no pin of {name}")
     assert (quick_bits | of_a_process(name) if name == "record" else quick_bits)[name] == pins[here][name]
 
 
