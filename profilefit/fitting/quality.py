@@ -102,7 +102,7 @@ def _truth(alpha: float, outer: float, setting: Setting) -> _Truth:
 
 
 def _measures(truth: _Truth, profile: Floats, even: Floats, law_cdf: Floats) -> tuple[float | tuple[float, float], ...]:
-    """Of a law's R_d at a truth's radii and even radii, and of its cdf at the far ones."""
+    """Fields of `Quality` for one albedo, from a law's R_d at the truth's radii and even radii and its cdf far out."""
     off = np.abs(profile / truth.profile - 1.0)
     ks = np.max(np.abs(law_cdf - truth.cdf))
     # Half the total variation between two measures on fine rings, each of total A.

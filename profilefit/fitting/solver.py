@@ -84,8 +84,7 @@ class Solution:
     @property
     def cost(self) -> float:
         """Sum of squared residuals; infinite or NaN where they are."""
-        with np.errstate(over="ignore", invalid="ignore"):
-            return float(self.residuals @ self.residuals)
+        return _squares(self.residuals)
 
     @property
     def covariance(self) -> Floats:
@@ -104,6 +103,11 @@ class Solution:
             return float("inf")
         lengths = np.linalg.norm(self.jacobian, axis=0)
         return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
+
+
+def _squares(values: Floats) -> float:
+    with np.errstate(over="ignore", invalid="ignore"):
+        return float(values @ values)
 
 
 def covariance(jacobian: Floats) -> Floats:
@@ -250,23 +254,24 @@ def solve(
         step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
-        share = worth if taken else max(worth, UNSEEN)
-        if ended or steps >= most or _promised(best, (aimed - y) * scale) < max(gain, share * float(best[1] @ best[1])):
+        least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
+        if ended or steps >= most or _promised(best, (aimed - y) * scale) < least:
             break
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
         steps += 1
-    if not (ended or taken or gain) and steps < most:  # a step too small for the sum is none too small for parameters
+    settled = ended or steps < most
+    if not (ended or taken or gain) and settled:  # a step too small for the sum is none too small for parameters
         point = np.clip(proposed * scale, low, high)
         values, jacobian = at(point)
-        if values @ values <= (1.0 + UNSEEN) * (best[1] @ best[1]):
+        if _squares(values) <= (1.0 + UNSEEN) * _squares(best[1]):
             best = (point, values, jacobian)
         steps += 1
     active = _active(best[1], best[2] * scale, proposed, ends)  # where the last step ends: beside a bound it is no step
     # A parameter that gains nothing within its longest step has no slope but rounding.
     uphill = 2.0 * np.abs(best[2].T @ best[1])
     counts = ~active & (np.multiply(uphill, longest, out=np.zeros(start.size), where=uphill > 0) > gain)
-    result = _explain(ended or steps < most, most, best[1], best[2][:, counts], gain)
+    result = _explain(settled, most, best[1], best[2][:, counts], gain)
     return Solution(*best, steps, result, active)
 
 

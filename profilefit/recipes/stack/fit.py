@@ -187,7 +187,7 @@ def errors(one: Interface) -> dict[str, dict[str, float | None]]:
 
 
 def _without(lights: Lights, number: int) -> Lights:
-    """The same with one that does not count: lights of one shape are fitted by one compiled program."""
+    """Copy of the lights in which one has no weight: leaving it out would change the shape, and compile a program."""
     light = lights[number]
     weight = 0.0 * np.asarray(light[2])
     blind = light._replace(weight=weight) if isinstance(light, TracedRings) else (*light[:2], weight, *light[3:])
@@ -294,8 +294,7 @@ def _searched(
 def _as_slabs_add(top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     """A start whose A(d) is that of slabs of isotropic light that add up, T^2 A_2 / (1 - A_1 A_2) beside A_1: u = 0, w
     = A_1 (A_1 - A_2) / (1 - A_1 A_2). Over dark a white layer's A falls as h / (d + h), which no other start finds."""
-    law = _made(jnp.array(START), top, below, 0.0)
-    first, second, rate = (float(one) for one in (top.whole(), below.whole(), 2.0 * law.fading() * top.mfp))
+    first, second, rate = float(top.whole()), float(below.whole()), _fading(top, below)
     w = np.clip(first * (first - second) / (1.0 - first * second + 1e-12), 1e-4, 1.0 - min(rate, 0.5))
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(LOWEST * rate)), *START[2:]])
 
@@ -342,8 +341,13 @@ def _counts(weight):
 def _unbounded(constants: Floats, top: LayerLaw, below: LayerLaw | StackLaw) -> Floats:
     """The parameters (9,) of `_made` that make constants, u moved to where the law is defined."""
     w, u, *others = constants
-    least = float(_made(jnp.array(START), top, below, 0.0).fading()) * 2.0 * LOWEST * top.mfp
+    least = LOWEST * _fading(top, below)
     return np.array([np.log(w / (1.0 - w)), np.log(np.expm1(max(u + least, 0.01 * least))), *np.log(others)])
+
+
+def _fading(top: LayerLaw, below: LayerLaw | StackLaw) -> float:
+    """2 kappa l: u is above -`LOWEST` of it."""
+    return 2.0 * float(_made(jnp.array(START), top, below, 0.0).fading()) * top.mfp
 
 
 def _made(at, top: LayerLaw, below, thickness) -> StackLaw:

@@ -63,7 +63,7 @@ KEYS = (
 
 @dataclass(frozen=True)
 class StackRequest:
-    """What STACK.toml says: a stack under a light, and its name, that of the file.
+    """Content of STACK.toml: a stack under a light. Its name is that of the file.
 
     starts  of red, green and blue: constants of each interface at which the fit begins; empty where it searches
     """
@@ -124,30 +124,35 @@ def requested(file: str, content: Table) -> StackRequest:
         tables.text("", "title", content, TITLE),
         tables.text("", "illumination", content, "diffuse", ILLUMINATIONS),
         stack,
-        _starts(tables, content, (len(stack.names) - 1, len(StackLaw.constant_names()))),
+        _starts(tables, content, stack),
     )
 
 
-def _starts(tables: Tables, content: Table, shape: tuple[int, int]) -> tuple[Floats, ...]:
-    """Constants of shape (interfaces, 9) for each colour, from a table [start]."""
+def _starts(tables: Tables, content: Table, stack: LayerStack) -> tuple[Floats, ...]:
+    """Constants (interfaces, 9) of each colour, from a table [start]; InputError on others."""
     if "start" not in content:
         return ()
-    table, found = tables.table(content, "start"), []
+    table, found, interfaces = tables.table(content, "start"), [], len(stack.names) - 1
     tables.known("start", table, CHANNELS)
     names = StackLaw.constant_names()
     accepted = f"lists of {', '.join(names)}, one an interface: w in (0, 1), all but u > 0"
     for channel in CHANNELS:
-        try:
-            values = np.array(table.get(channel), float)
-        except (TypeError, ValueError):
-            values = np.full(0, np.nan)
-        free = [name == "u" for name in names]
-        if not (values.shape == shape and np.all(np.isfinite(values)) and np.all((values > 0) | free)):
-            raise tables.bad("start", channel, accepted, table.get(channel))
-        if not np.all(values[:, names.index("w")] < 1):
-            raise tables.bad("start", channel, accepted, table[channel])
-        found.append(values)
+        rows = table.get(channel)
+        if not (isinstance(rows, list) and len(rows) == interfaces and all(map(_is_start, rows))):
+            raise tables.bad("start", channel, accepted, rows)
+        found.append(np.array(rows, float))
+    if any(layer.g > 0 for layer in stack.media[0].layers):
+        raise tables.bad("", "start", "left out where a layer scatters forward", "a table")
     return tuple(found)
+
+
+def _is_start(row: Any) -> bool:
+    """Whether they are constants that a law may have."""
+    names = StackLaw.constant_names()
+    if not (isinstance(row, list) and len(row) == len(names) and all(map(kinds.is_number, row))):
+        return False
+    own = dict(zip(names, row, strict=True))
+    return own["w"] < 1 and all(np.isfinite(one) and (one > 0 or name == "u") for name, one in own.items())
 
 
 def require_apart(stacks: Sequence[StackRequest]) -> None:

@@ -83,9 +83,10 @@ def test_a_known_reflectance_counts_at_every_value(measured):
     assert tight.errors(tight.likely)["A"] < 0.0022
 
 
-def test_an_index_without_direction_is_at_hand(measured, monkeypatch):
+@pytest.mark.parametrize("own", [1.4, *slow(1.39)])
+def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     """No table is made for each n that is tried, and between those that are made light is the same."""
-    question, n = Question(exact_light(Setting(n=1.4)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
+    question, n = Question(exact_light(Setting(n=own)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
     exactly = replace(question, law=exact_light(Setting(n=n)), ranges={})
     monkeypatch.setattr("profilefit.measured.exact_light.kept", lambda *_: pytest.fail("a table is made"))
     assert fitted(measured, question).open.error["n"] > 0

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 
+import jax
+import jax.numpy as jnp
 import numpy as np
 import pytest
 
@@ -31,6 +33,39 @@ def lights_of(variances=VARIANCES, weights=WEIGHTS, noise=0.0, random=None):
 
 def constants(found):
     return np.append(found.variances, found.weights)
+
+
+def test_derivatives_are_those_of_the_formula():
+    """The slow twin: the same formula, differentiated by jax, far from the data and beyond all light."""
+    lights = lights_of(noise=0.3, random=np.random.default_rng(1))
+    found = joint(lights, 2)
+    lights = [one._replace(edges=np.append(one.edges[:-1], 1e3)) for one in lights]
+
+    def off(constants):
+        level, weights = constants[:2], constants[2:].reshape(2, 2)
+        parts = []
+        for own, light in zip(weights, lights, strict=True):
+            within = 1.0 - jnp.exp(-0.5 * light.edges[:, None] ** 2 / jnp.exp(level))
+            parts.append(light.weight * (light.whole * (jnp.diff(within, axis=0) @ own) / light.energy - 1.0))
+        return jnp.concatenate(parts)
+
+    def unbounded(parameters):
+        logits = jnp.column_stack([jnp.zeros(2), parameters[2:].reshape(2, 1)])
+        level = jnp.cumsum(jnp.array([parameters[0], jax.nn.softplus(parameters[1])]))
+        return jnp.concatenate([level, jax.nn.softmax(logits, axis=1).ravel()])
+
+    with jax.enable_x64(True):
+        at = jnp.concatenate([jnp.log(found.variances), found.weights.ravel()])
+        bent = jax.hessian(lambda constants: 0.5 * jnp.sum(off(constants) ** 2))(at)
+        values, jacobian = gaussians._off(found.variances, found.weights, lights)
+        np.testing.assert_allclose(values, off(at), rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(jacobian, jax.jacfwd(off)(at), rtol=1e-8, atol=1e-12)
+        whole = found.slopes.T @ bent @ found.slopes
+        np.testing.assert_allclose(gaussians.curvature(found, lights), whole, rtol=1e-8, atol=1e-12)
+        parameters = np.array([-1.0, 0.5, 0.3, -0.7])
+        level, weights, slopes = gaussians._of(parameters, 2)
+        np.testing.assert_allclose(np.append(level, weights), unbounded(jnp.asarray(parameters)), rtol=1e-12)
+        np.testing.assert_allclose(slopes, jax.jacfwd(unbounded)(jnp.asarray(parameters)), rtol=1e-10, atol=1e-15)
 
 
 @pytest.mark.parametrize("count", [2, *slow(3)], ids=["two, which misfit", "three, which do not"])

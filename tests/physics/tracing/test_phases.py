@@ -42,12 +42,13 @@ def tally(phase, g=0.0, seed=1, photons=50_000, **given):
     return simulate(Medium(layers), GRID, photons, seed, **given)
 
 
-def test_an_empty_term_changes_no_bit():
+@PHOTONS
+def test_an_empty_term_changes_no_bit(photons):
     mixed = Mixture((1, 0), (ONE, HenyeyGreenstein(0.1)))
     plain, same = tally(None, 0.9), tally(mixed)
     np.testing.assert_array_equal(plain.deposits.reflected, same.deposits.reflected)
     np.testing.assert_array_equal(plain.deposits.absorbed, same.deposits.absorbed)
-    orders = [simulate_orders(GRID, 2**14, 3, Setting(n=1.2, phase=one)) for one in (ONE, mixed)]
+    orders = [simulate_orders(GRID, photons, 3, Setting(n=1.2, phase=one)) for one in (ONE, mixed)]
     np.testing.assert_array_equal(orders[0].counts.exits, orders[1].counts.exits)
 
 

@@ -301,6 +301,9 @@ REFUSED = [
             ("red = [[0.2, 0, 1, 1, 1, 1, 1, 1, 0]]", r"\[start\] red must be .* all but u > 0, got"),
             ("red = [[1.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be .* w in \(0, 1\)"),
             ("red = [[0.5, 0, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] green must be .*, got nothing"),
+            ('red = [["0.5", 0, 1, 1, 1, 1, 1, 1, 1]]', r"\[start\] red must be "),
+            ("red = [[0.5, inf, 1, 1, 1, 1, 1, 1, 1]]", r"\[start\] red must be "),
+            ("red = 0.5", r"\[start\] red must be .*, got 0.5"),
         )
     ),
     (('"Muscle under its skin"', "7"), r"title must be a text of 60 characters at most, got 7"),
