@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.fitting.estimate import Fit, ResidualFunction, curvature, scaled_inverse
+from profilefit.fitting.estimate import Fit, ResidualFunction, scaled_inverse
 
 Floats = NDArray[np.float64]
 # emcee's own advice: a chain shorter than this many autocorrelation times does not know its autocorrelation time.
@@ -256,7 +256,7 @@ class _Density(eqx.Module):
 
 def _positive_curvature(fit: Fit) -> Floats:
     """The Hessian of Q/2, or J^T J where a saddle of the residuals' own curvature has made it indefinite."""
-    hessian = curvature(ResidualFunction(fit.objective, fit.free), fit.solution, fit.law, fit.rings)
+    hessian, _ = fit.second_derivatives
     scale = np.sqrt(np.abs(np.diag(hessian)))
     if np.all(np.linalg.eigvalsh(hessian / np.outer(scale, scale)) > 0):
         return hessian

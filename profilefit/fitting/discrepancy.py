@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
-from profilefit.fitting.estimate import Fit, ResidualFunction, sensitivity
+from profilefit.fitting.estimate import Fit, ResidualFunction, followed
 from profilefit.fitting.gaussian_process import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
@@ -187,7 +187,7 @@ def _as_large(one: Discrepancy, left: Floats, squares: float) -> Discrepancy:
 def residuals(fit: Fit, profiles: Profiles) -> Residuals:
     """What `discrepancy` looks at: rings from 0.01 mfp to 99.5 % of the energy that the fit used, in groups."""
     problem, rings = ResidualFunction(fit.objective, fit.free), fit.rings
-    gain = sensitivity(problem, fit.solution, fit.law, rings)
+    gain = followed(*fit.second_derivatives)
     energy, slope = predicted(problem, fit.law, rings)
     albedos = np.asarray(rings.weight)[:, None] > 0
     if fit.objective in OF_MAPS:

@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import equinox as eqx
 import jax
@@ -76,6 +77,11 @@ class Fit:
     @property
     def result(self) -> str:
         return self.solution.result
+
+    @cached_property
+    def second_derivatives(self) -> tuple[Floats, Floats]:
+        """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p)."""
+        return _second_derivatives(ResidualFunction(self.objective, self.free), self.solution, self.law, self.rings)
 
 
 @dataclass(frozen=True)
@@ -224,19 +230,18 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
 def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
     """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
     its data."""
-    hessian, mixed = _second_derivatives(problem, solution, law, rings)
+    return followed(*_second_derivatives(problem, solution, law, rings))
+
+
+def followed(hessian: Floats, mixed: Floats) -> Floats:
+    """`sensitivity`, of second derivatives that are known."""
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
-
-
-def curvature(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
-    """Hessian (p, p) of half the sum of squares at the optimum, the curvature of the residuals included."""
-    return _second_derivatives(problem, solution, law, rings)[0]
 
 
 def _second_derivatives(
     problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
 ) -> tuple[Floats, Floats]:
-    """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p); one program."""
+    """`Fit.second_derivatives`; one program."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
         here = jnp.asarray(solution.parameters)

@@ -39,9 +39,9 @@ DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen b
 class Field(NamedTuple):
     """At one wave number; arrays (N,)."""
 
-    phi: Floats
-    """Fluence over the light that arrives [-]."""
-    unscattered: Floats
+    phi: dict[str, Floats]
+    """Fluence over the light that arrives, under each illumination [-]."""
+    unscattered: dict[str, Floats]
     """phi_0 [-]."""
     up: Floats
     """X."""
@@ -54,7 +54,7 @@ class Field(NamedTuple):
 def direct(optical: Floats, height: Floats, k: float) -> Floats:
     """K at optical thicknesses T > 0 and heights Z, of one shape."""
     across = k * height
-    length = np.hypot(optical, across)
+    length = np.sqrt(optical**2 + across**2)
     # a e^v + b e^-v is the exponent
     a = 0.5 * (length + optical)
     b = 0.25 * across**2 / a
@@ -92,10 +92,8 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
     return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
 
 
-def solve(here: Depths, k: float, illumination: str, rule: Nodes) -> Field:
-    """phi, phi_0 and X at wave number k [1/length]."""
-    if not here.panels:
-        return Field(*(np.empty(0) for _ in Field._fields))
+def solve(here: Depths, k: float, rule: Nodes) -> Field:
+    """phi, phi_0 and X at wave number k [1/length]: of both illuminations, which share all but the last step."""
     slants = directions(here, k, rule)
     at_once = _out_at_once(here, slants, k, rule)
     up = at_once + _out_later(here, slants)
@@ -103,10 +101,10 @@ def solve(here: Depths, k: float, illumination: str, rule: Nodes) -> Field:
     if here.height < np.inf:
         turned, slants_turned = _upside_down(here), _slants_upside_down(slants)
         down = _out_at_once(turned, slants_turned, k, rule) + _out_later(turned, slants_turned)
-    unscattered = 4 * here.above**2 * up if illumination == "diffuse" else beam(here, here.tau)
+    unscattered = {"searchlight": beam(here, here.tau), "diffuse": 4 * here.above**2 * up}
     matrix = np.eye(here.z.size) - _scattered(here, slants, k)
-    phi = np.asarray(np.linalg.solve(matrix, unscattered), np.float64)
-    return Field(phi, unscattered, up, at_once, down)
+    phi = np.linalg.solve(matrix, np.column_stack(list(unscattered.values())))
+    return Field(dict(zip(unscattered, phi.T, strict=True)), unscattered, up, at_once, down)
 
 
 def beam(here: Depths, tau: Floats) -> Floats:

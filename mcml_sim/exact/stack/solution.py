@@ -16,11 +16,9 @@ transform of what it gives, of which first is taken apart what k would have to g
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import jax
@@ -55,6 +53,7 @@ LAST_PHASE = 200.0  # k r: light changes little within a hundredth of r
 SMOOTH = 5.0  # k times the depth of the first layer that scatters, where a half space without that depth is no use
 NEAREST, FARTHEST = 1e-9, 1e9  # radii, in units of the medium's own
 PHASE_STEP, PHASE_NODES = 20.0, 24
+KEPT = 4096  # transforms: some ten media under the other illumination need no more work
 
 
 @dataclass(frozen=True)
@@ -158,18 +157,20 @@ def _require_solved(medium: Medium, illumination: str) -> None:
 
 def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
     """R^(k) [-]."""
-    here, answer = _answer(medium, k, illumination, rule)
-    return float(here.weight @ (answer.phi * answer.up)) + fluence.thrown_back(here, k, illumination, rule)
+    here, answer = _answer(medium, k, rule)
+    scattered = float(here.weight @ (answer.phi[illumination] * answer.up))
+    return scattered + fluence.thrown_back(here, k, illumination, rule)
 
 
-def _answer(medium: Medium, k: float, illumination: str, rule: Nodes) -> tuple[Depths, Field]:
+def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, Field]:
     here = depths.stack(medium, k, rule)
-    return here, fluence.solve(here, k, illumination, rule)
+    return here, fluence.solve(here, k, rule)
 
 
 def _transmitted(medium: Medium, illumination: str, rule: Nodes) -> float:
-    here, answer = _answer(medium, 0.0, illumination, rule)
-    through = float(here.weight @ (answer.phi * answer.down)) + fluence.straight_through(here, illumination, rule)
+    here, answer = _answer(medium, 0.0, rule)
+    scattered = float(here.weight @ (answer.phi[illumination] * answer.down))
+    through = scattered + fluence.straight_through(here, illumination, rule)
     return max(through, 0.0)  # below by rounding where hardly any light gets through
 
 
@@ -261,7 +262,7 @@ def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
     base, last = _base(medium)
     edges = _wave_edges(medium, last)
     waves = edges[:-1, None] + np.diff(edges)[:, None] * depths.gauss(rule.wave)[0]
-    rest, share = _each(lambda k: _rest(medium, k, illumination, rule), waves), 0.0
+    rest, share = _each(lambda k: _rests(medium, k, rule)[illumination], waves), 0.0
     if base is not None:
         deep = _rest_of_half_space(base, medium, waves, illumination, rule)
         share = 1.0 if medium.layers[0].n >= medium.n_above else rest.flat[-1] / deep.flat[-1]
@@ -270,9 +271,9 @@ def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
 
 
 def _each(transform: Callable[[float], float], waves: Floats) -> Floats:
-    """A transform at wave numbers of any shape, one on each core: BLAS's own threads only slow such small ones down."""
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
-        return np.reshape(list(pool.map(transform, waves.ravel().tolist())), waves.shape)
+    """A transform at wave numbers of any shape: more threads, BLAS's own or others, only slow such small ones down."""
+    with threadpool_limits(1, "blas"):
+        return np.reshape([transform(k) for k in waves.ravel().tolist()], waves.shape)
 
 
 def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illumination: str, rule: Nodes) -> Floats:
@@ -287,7 +288,7 @@ def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illuminatio
     number = _first_to_scatter(medium)
     heights = [each.thickness for each in medium.layers[number:] if np.isfinite(each.thickness)]
     likewise = replace(base, layers=(*(replace(layer, thickness=height) for height in heights), layer))
-    return _each(lambda k: _rest(likewise, k, illumination, rule), waves)
+    return _each(lambda k: _rests(likewise, k, rule)[illumination], waves)
 
 
 def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
@@ -295,11 +296,12 @@ def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
     return layer, Setting(illumination, n=layer.n)
 
 
-def _rest(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
-    """Transform of the light that `known` has no formula for [-]."""
-    here, answer = _answer(medium, k, illumination, rule)
-    once = answer.unscattered * answer.up_at_once if illumination == "searchlight" else 0.0
-    return float(here.weight @ (answer.phi * answer.up - once))
+@lru_cache(maxsize=KEPT)
+def _rests(medium: Medium, k: float, rule: Nodes) -> dict[str, float]:
+    """Transform of the light that `known` has no formula for, by illumination [-]."""
+    here, answer = _answer(medium, k, rule)
+    once = {"searchlight": answer.unscattered["searchlight"] * answer.up_at_once, "diffuse": 0.0}
+    return {light: float(here.weight @ (phi * answer.up - once[light])) for light, phi in answer.phi.items()}
 
 
 def _base(medium: Medium) -> tuple[Medium | None, float]:

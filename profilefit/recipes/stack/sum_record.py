@@ -104,16 +104,16 @@ class SumRecord:
 
 
 def work(of: StackRequest) -> Work:
-    """Fits of the sums of a stack in both lights, a part each: a minute. InputError on media without a law."""
+    """Fits of the sums of a stack in both lights: a minute. InputError on media without a law."""
     for medium in of.stack.media:
         fit.require(medium)
 
     def finish(found: list[Any]) -> Made:
-        lights = dict(zip(ILLUMINATIONS, found, strict=True))
+        (lights,) = found
         arrays = {f"{light}_{name}": array for light, one in lights.items() for name, array in one["arrays"].items()}
         return _content(of, lights, arrays), arrays
 
-    return Work(f"{SUMS}/{of.name}", tuple(partial(_of_light, of.stack.media, one) for one in ILLUMINATIONS), finish)
+    return Work(f"{SUMS}/{of.name}", (partial(_of_lights, of.stack.media),), finish)
 
 
 def beside(stack: Path) -> Path | None:
@@ -130,6 +130,11 @@ def load(path: Path) -> SumRecord:
     record.record_setting(content)
     with damage(path):
         return SumRecord(told_stack(str(path), content, TOLD), content, path)
+
+
+def _of_lights(media: tuple[Medium, ...]) -> dict[str, dict[str, Any]]:
+    """Of both in one process: they share the better part of the exact light's work."""
+    return {illumination: _of_light(media, illumination) for illumination in ILLUMINATIONS}
 
 
 def _of_light(media: tuple[Medium, ...], illumination: str) -> dict[str, Any]:

@@ -31,6 +31,7 @@ def bumps(eye: float, lamp: float, **technique):
     return scene.read("bumps.toml", told)
 
 
+@pytest.mark.slow
 def test_no_atlas_where_all_is_seen(context):
     found = atlas_need(context, bumps(0.0, 30.0))
     assert found.hidden < 1e-5

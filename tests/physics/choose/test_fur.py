@@ -58,6 +58,7 @@ def test_a_patch_is_wider_than_a_rays_way():
         assert 0.16 * looked.side**2 >= fur.STRANDS - 1e-9
 
 
+@pytest.mark.slow
 def test_more_layers_at_an_angle_and_of_longer_strands(few):
     """Head-on the nearest strand is the highest: one slab is enough."""
     of = {"technique_tolerance": 0.08}

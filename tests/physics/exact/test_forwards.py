@@ -34,6 +34,7 @@ def test_photons_agree(compared):
         assert abs(one.total[0]) < (5e-4 if setting.g <= 0.9 else 2e-3)
 
 
+@pytest.mark.slow
 def test_similarity_is_told_from_it():
     """A negative control: light of g = 0 at the same reduced albedo."""
     found = half_spaces.reference(TISSUE)
@@ -147,6 +148,7 @@ def test_no_light_is_none_at_the_source():
     np.testing.assert_array_equal(exact.profile([0.0, 1.0], 0.0, setting=TISSUE), [0.0, 0.0])
 
 
+@pytest.mark.slow
 def test_derivatives_at_the_ends_of_shares():
     with jax.enable_x64(True):
         by_share, by_albedo = (jax.grad(lambda xi, a: exact.quantile(xi, a, setting=TISSUE), k) for k in (0, 1))

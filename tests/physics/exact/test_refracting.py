@@ -1,6 +1,6 @@
 """The half space under a refracting surface: published totals, other ways to the same, and its tables."""
 
-from functools import partial
+from functools import lru_cache, partial
 
 import jax
 import jax.numpy as jnp
@@ -47,14 +47,16 @@ def test_light_scattered_once_is_the_closed_form(light):
     """`single_scattering` shares no code with the cone."""
     where = Setting(light, n=1.4)
     rate, weighted = transform_density(where)
+    series = jax.jit(lambda k: cone.series(1.4, k, 1, 160, 112))
     with jax.enable_x64(True):
         for size in (1.0, 10.0, 300.0):
             k = size * np.exp(0.25j * np.pi)
-            once = np.asarray(cone.series(1.4, k, 1, 160, 112))[LIGHTS.index(light), 0]
+            once = np.asarray(series(k))[LIGHTS.index(light), 0]
             assert abs(once / (entered(where) * np.sum(weighted * rate / np.sqrt(rate**2 + k**2))) - 1) < 2e-9
 
 
-@pytest.mark.parametrize("light", [LIGHTS[0], *slow(LIGHTS[1])])
+@pytest.mark.slow
+@pytest.mark.parametrize("light", LIGHTS)
 def test_rotated_contour_meets_the_real_axis(light):
     """Light scattered once in closed form; of the rest the real transform, faded out where it is c / k^2."""
     where, alpha, r = Setting(light, n=1.4), 0.8, np.array([1.0, 1.4])
@@ -179,7 +181,8 @@ def test_a_table_is_kept_and_a_damaged_one_is_named_and_made_anew(monkeypatch, t
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
     small = STANDARD.scaled(0.25)
     made = []
-    monkeypatch.setattr(tables, "made", lambda *all: made.append(all) or table.made(*all))
+    anew = lru_cache(table.made)
+    monkeypatch.setattr(tables, "made", lambda *all: made.append(all) or anew(*all))
     tables.table.cache_clear()
     first = tables.table(1.4, small)
     tables.table.cache_clear()
@@ -211,6 +214,7 @@ def changed(path):
     return content
 
 
+@pytest.mark.slow
 def test_fewer_nodes_are_seen():
     """Negative control of the error estimate."""
     where = Setting(n=1.4)

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 from profilefit.fitting.chains import default_moves, laplace_move, walk
+from tests.fixtures import slow
 
 BEND, WIDTH = 0.3, 0.6
 WALKERS, STEPS = 64, 2000
@@ -42,11 +43,16 @@ def deviations(density, moves):
     return found, (values.mean(axis=(0, 1)) - MOMENTS[density]) / error
 
 
-@pytest.mark.parametrize("density", [banana, half])
+ALONE, MIXED, TOP = ((laplace_move(*OFF), 1.0),), default_moves(*OFF), default_moves(*AT_THE_TOP)
+
+
 @pytest.mark.parametrize(
-    "moves",
-    [((laplace_move(*OFF), 1.0),), default_moves(*OFF), default_moves(*AT_THE_TOP)],
-    ids=["alone", "off", "top"],
+    ("moves", "density"),
+    [
+        *((ALONE, banana), (ALONE, half), (MIXED, banana)),
+        *slow((MIXED, half), (TOP, banana), (TOP, half)),
+    ],
+    ids=["alone-banana", "alone-half", "off-banana", "off-half", "top-banana", "top-half"],
 )
 def test_moments_of_a_banana_and_of_half_of_it(density, moves, sidak):
     found, z = deviations(density, moves)

@@ -72,6 +72,7 @@ class Longer(TwoPartSampler):
         return 1.01 * super().scaled_sample(xi, alpha)
 
 
+@pytest.mark.slow
 def test_a_mixture_is_judged_part_by_part():
     """Against the plainest rule over xi, which knows nothing of parts; radii that are too long are found."""
     law = profilefit.load("hazard", setting=Setting("diffuse", n=1.4))

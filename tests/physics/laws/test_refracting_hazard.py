@@ -134,6 +134,7 @@ def test_inverse_in_a_fixed_number_of_steps(steps, error):
     assert error / 1e3 < worst < error
 
 
+@pytest.mark.slow
 def test_the_sampler_draws_its_own_density(law):
     """Means over xi of functions of the radius are integrals of the density; that of the law instead is seen."""
     xi = (np.arange(200_000) + 0.5) / 200_000

@@ -125,6 +125,7 @@ def test_what_is_held_far_off_ends_in_a_name_or_at_an_edge():
         assert not failed.converged or failed.cost > 1e3, held
 
 
+@pytest.mark.slow
 def test_light_that_rises_outwards_runs_away():
     data = rings()
     rising = replace(data, value=data.r, sigma=0.02 * data.r)

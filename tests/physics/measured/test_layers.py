@@ -99,6 +99,7 @@ def test_what_a_table_states_is_what_the_layers_are(tmp_path, statement, message
         fit_layers(data, GUESS, ["d1"], premises(data))
 
 
+@pytest.mark.slow
 def test_its_light_is_that_of_finer_nodes():
     medium, r = Medium((Layer(1.4, 0.02, 2.0, 0.0, 1.0), Layer(1.4, 0.003, 1.0, 0.0))), np.geomspace(0.1, 10, 6)
     wanted = exact.solve(medium).profile(r)

@@ -47,6 +47,7 @@ def test_more_of_them_are_nearer(illumination):
     assert rel[0] > 0.4 > rel[1] > 0.1 > rel[2] > 0.02
 
 
+@pytest.mark.slow
 def test_colours_share_their_variances():
     """In one unit of length, though mean free paths differ; each is a little farther from its light than alone."""
     blue = Medium((Layer(1.4, 0.35, 2.6, 0.0, 0.3), Layer(1.4, 1.2, 1.3, 0.0)))

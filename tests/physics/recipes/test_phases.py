@@ -15,6 +15,7 @@ from profilefit.recipes.phases import record
 from profilefit.recipes.phases.data import read_phase
 from profilefit.recipes.phases.fit import MOMENTS, fit_phase
 from profilefit.recipes.work import alone
+from tests.fixtures import slow
 
 FOLDER = shipped("fits") / "phases"
 PETZOLD = read_phase(FOLDER / "petzold.csv")
@@ -50,9 +51,12 @@ def test_haltrin_elsewhere(g):
         haltrin(g)
 
 
-@pytest.mark.parametrize("form", FORMS.values(), ids=list(FORMS))
-def test_every_form_is_a_phase_function(form):
+@pytest.mark.parametrize(
+    "name", ["1-term", "2-terms", "haltrin", *slow(*(set(FORMS) - {"1-term", "2-terms", "haltrin"}))]
+)
+def test_every_form_is_a_phase_function(name):
     """Normalised, its moments those of the form that a fit uses, and differentiable, wherever fits start from."""
+    form = FORMS[name]
     for start in form.starts(np.random.default_rng(2), 2):
         with jax.enable_x64(True):
             constants = form.constants(jnp.asarray(start))

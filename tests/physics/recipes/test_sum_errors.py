@@ -56,16 +56,18 @@ def test_derivatives_are_those_of_the_formula():
 
     with jax.enable_x64(True):
         at = jnp.concatenate([jnp.log(found.variances), found.weights.ravel()])
-        bent = jax.hessian(lambda constants: 0.5 * jnp.sum(off(constants) ** 2))(at)
+        bent = jax.jit(jax.hessian(lambda constants: 0.5 * jnp.sum(off(constants) ** 2)))(at)
         values, jacobian = gaussians._off(found.variances, found.weights, lights)
         np.testing.assert_allclose(values, off(at), rtol=1e-9, atol=1e-12)
-        np.testing.assert_allclose(jacobian, jax.jacfwd(off)(at), rtol=1e-8, atol=1e-12)
+        np.testing.assert_allclose(jacobian, jax.jit(jax.jacfwd(off))(at), rtol=1e-8, atol=1e-12)
         whole = found.slopes.T @ bent @ found.slopes
         np.testing.assert_allclose(gaussians.curvature(found, lights), whole, rtol=1e-8, atol=1e-12)
         parameters = np.array([-1.0, 0.5, 0.3, -0.7])
         level, weights, slopes = gaussians._of(parameters, 2)
         np.testing.assert_allclose(np.append(level, weights), unbounded(jnp.asarray(parameters)), rtol=1e-12)
-        np.testing.assert_allclose(slopes, jax.jacfwd(unbounded)(jnp.asarray(parameters)), rtol=1e-10, atol=1e-15)
+        np.testing.assert_allclose(
+            slopes, jax.jit(jax.jacfwd(unbounded))(jnp.asarray(parameters)), rtol=1e-10, atol=1e-15
+        )
 
 
 @pytest.mark.parametrize("count", [2, *slow(3)], ids=["two, which misfit", "three, which do not"])

@@ -115,6 +115,7 @@ def test_unscattered_light_is_told_apart():
     assert agrees(thin.ballistic_transmittance, np.sum(weight * mu * np.exp(-0.5 / mu)))
 
 
+@pytest.mark.slow
 def test_lanes_and_workers_change_no_bit():
     one, other = (simulate(STACK, GRID, 2**18 + 7, illumination="diffuse", workers=w, progress=False) for w in (1, 2))
     assert np.array_equal(one.deposits.reflected, other.deposits.reflected)
@@ -151,6 +152,7 @@ def test_other_light_is_refused_by_name(tmp_path):
         read_results(tmp_path / "b.npz")
 
 
+@pytest.mark.slow
 def test_a_fit_takes_the_light_that_was_simulated(tmp_path):
     grid = Grid.from_edges(r=np.append(0.0, np.geomspace(0.05, 6.0, 25)))
     tally = simulate(half_space(0.9), grid, 2**18, illumination="diffuse", progress=False)

@@ -52,6 +52,7 @@ def test_an_empty_term_changes_no_bit(photons):
     np.testing.assert_array_equal(orders[0].counts.exits, orders[1].counts.exits)
 
 
+@pytest.mark.slow
 def test_equal_terms_are_one():
     def reflected(phase, seed):
         layer = Layer(1.2, 0.1, 1.0, 0.0, phase=phase)
@@ -65,7 +66,11 @@ def test_equal_terms_are_one():
 
 @pytest.mark.parametrize(
     ("phase", "illumination"),
-    [(SEA, "searchlight"), (SEA, "diffuse"), (TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight")],
+    [
+        (SEA, "searchlight"),
+        (SEA, "diffuse"),
+        *slow((TABLE, "searchlight"), (FournierForand(1.1, 3.6), "searchlight")),
+    ],
     ids=["mixture", "mixture, diffuse", "table", "Forand"],
 )
 @PHOTONS

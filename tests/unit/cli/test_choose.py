@@ -51,6 +51,7 @@ def test_nothing_serves(tmp_path):
     assert "light: diffuse, n = 1.4." in found.stdout
 
 
+@pytest.mark.slow
 def test_whether_a_heart_needs_an_atlas(opengl):
     found = run(HEART, "--json")
     told = json.loads(found.stdout)

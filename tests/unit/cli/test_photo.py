@@ -311,6 +311,7 @@ def test_files_after_an_equals_sign_are_the_options_too():
     assert seen == [["one"], ["two", "three", "four"]]
 
 
+@pytest.mark.slow
 def test_a_jpeg_is_read_with_a_warning(command, folder, tmp_path):
     """Of a spot that eight bits hold; the answer says that it is no measurement."""
     for name in ("spot", "grey"):

@@ -236,7 +236,7 @@ def test_glsl(context, label, head):
     program(context, label, fragment, HEADS[head] + VERTEX).release()
 
 
-@pytest.mark.parametrize("head", HEADS)
+@pytest.mark.parametrize("head", ["glsl", *slow("glsl-es")])
 def test_glsl_takes_two_stacks_and_each_twice_but_no_prefix_for_two(context, head):
     vertex = HEADS[head] + VERTEX
     heart, skin = whole("two layers", name="heart"), whole("three layers", name="skin")

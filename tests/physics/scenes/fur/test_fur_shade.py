@@ -8,6 +8,7 @@ from profilefit.scenes.fur.law import lobe_mean, occlusion, shadow, shared_shado
 from profilefit.scenes.fur.passes import BACKGROUND, Coat, FurPasses, FurSurface
 from profilefit.scenes.fur.request import Shading
 from profilefit.scenes.stage.world import Camera, Light
+from tests.fixtures import slow
 
 SIZE = 20, 15
 DENSITY, RADIUS, LENGTH, FORCE = 0.5, 0.5, 4.0, (0.1, -0.3, 0.2)
@@ -55,7 +56,7 @@ def written_out(shading, hit, to_eye):
     return seen
 
 
-@pytest.mark.parametrize("normalised", [True, False])
+@pytest.mark.parametrize("normalised", [True, *slow(False)])
 def test_the_shader_says_what_is_written_out(context, normalised):
     shading = Shading(rim=(0.1, 0.6, 3.0), normalised=normalised)
     view = FurView.of(Camera((0.0, 0.0, 100.0), (0.0, 0.0, 0.0), 32.0), SIZE)
@@ -88,6 +89,7 @@ def test_a_lobe_is_as_bright_at_every_exponent():
     assert lobe_mean(400.0) == pytest.approx(lobe_mean(100.0) / 2.0, rel=0.01)
 
 
+@pytest.mark.slow
 def test_rays_are_averaged_before_they_are_encoded(context):
     """The bench's picture is the mean of linear radiance: one of encoded rays is darker where a pixel has contrast."""
     from profilefit.scenes.fur import scene

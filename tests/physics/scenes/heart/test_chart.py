@@ -35,6 +35,7 @@ def test_ways_and_frames(context, request_small):
         assert min(frames.values()) > 0
 
 
+@pytest.mark.slow
 def test_a_finer_atlas_is_nearer(context, request_small):
     """The screen by itself has none."""
     light = scene.light_of(request_small.stack, 6)

@@ -70,6 +70,7 @@ def coarse(monkeypatch, request):
     monkeypatch.setattr(scene, "FINE", scene.FINE // request.param)
 
 
+@pytest.mark.slow
 def test_the_split_is_nearest_to_the_truth(context, coarse):
     """Of a small heart; its layers are those of a record. Next to no light is lost on it."""
     of = scene.read("heart.toml", {**content(), **SMALL})

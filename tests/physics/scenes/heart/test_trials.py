@@ -17,6 +17,7 @@ WEIGHTS = np.stack([[0.2, 0.5, 0.3], [0.3, 0.5, 0.2], [0.5, 0.3, 0.2]], axis=1)
 KERNEL = Kernel(np.array([0.04, 0.5, 4.0]), WEIGHTS)
 
 
+@pytest.mark.slow
 def test_a_trial_is_what_the_passes_draw(context):
     """Near, far and atlas of each split are put together to the picture of the technique itself."""
     (trial,) = trials.drawn([KERNEL], 1, 5)

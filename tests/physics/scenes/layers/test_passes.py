@@ -248,6 +248,7 @@ def test_a_half_space_everywhere(stage):
     assert np.all(np.diff(known) < -0.05)
 
 
+@pytest.mark.slow
 def test_a_table_of_one_material_draws_the_exact_half_space(stage, monkeypatch):
     """Whatever the map says of thicknesses; half of the light lies left of an edge. Another albedo is seen."""
     monkeypatch.setattr(truth, "THICKNESSES", 4)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium, exact
-from tests.fixtures import slow
 
 AWAY = np.array([0.0, 0.25, 0.5, 1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0, 12.0, 20.0])  # from the step [mfp]
 NO_STEP, BESIDE = -1, 0  # places in lists that go along AWAY and end where there is no step
@@ -86,7 +85,8 @@ def strip(error: np.ndarray) -> float:
 VEIL, DARK = Step(0.9, 0.99, 0.1, 0.4), Step(0.6, 0.99, 0.3, 1.5)
 
 
-@pytest.mark.parametrize("step", [VEIL, *slow(DARK)], ids=["veil", "dark"])
+@pytest.mark.slow
+@pytest.mark.parametrize("step", [VEIL, DARK], ids=["veil", "dark"])
 def test_the_tracer_is_right_where_there_is_no_step(step):
     """And beside one the light is another: of photons by the ten thousand."""
     true, found = exact_of(step), traced(step, 40_000, seed=3)

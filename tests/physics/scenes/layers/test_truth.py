@@ -87,6 +87,7 @@ def test_of_one_material_it_is_the_half_space(alike):
     assert within[-1] == pytest.approx(1.0, abs=1e-5)
 
 
+@pytest.mark.slow
 def test_hardly_a_first_layer(few):
     """Thinner than exact light has digits for: A is that of what lies below, and R_d is a number."""
     table = stack_table((HEART,) * 3, 0.0, 1e-5)

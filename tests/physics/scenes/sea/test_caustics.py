@@ -49,6 +49,7 @@ def test_photons_and_cells_are_exact_in_one_dimension(context, amplitude, tilt):
     assert exact.std() > 0.1
 
 
+@pytest.mark.slow
 def test_photons_in_boxes_against_photons_at_points():
     """4096^2 photons, each in the pixel that it meets, agree within their lattice's noise; a deeper floor doesn't."""
     waves, pixels, side = sea(BEYOND), 64, 4096
@@ -94,6 +95,7 @@ def test_light_that_is_conserved(context, f):
     assert lengths > (0.1 if f > 1.0 else 0.002)
 
 
+@pytest.mark.slow
 def test_errors_against_fragments(context):
     """The table of splats at 256^2 pixels: rms, and light that is missing where it is bright and dark."""
     table = {}

@@ -85,6 +85,7 @@ def test_the_first_of_three_crossings():
     np.testing.assert_allclose(dense_hit(wave, origin, ray, -0.5, 0.56), changes[0], atol=2e-5)
 
 
+@pytest.mark.slow
 def test_where_iterations_fail():
     """S = 0.66, 2.5, 5: shares off by more than 1 % of the depth. Iterations alone fail where S > 1, steps do not."""
     ways = ["newton_1m", "newton", "shah", 1, 8, 16]

@@ -122,6 +122,7 @@ def test_against_many_photons(sidak, depth, tilt):
     assert np.abs(wrong).max() > 2.0 * sidak(off.size)
 
 
+@pytest.mark.slow
 def test_a_fold_is_infinite_under_a_point_sun_only():
     """Toward a fold irradiance grows without end, as 1 / sqrt of the distance; pixels and a sun's disc bound it."""
     depth = 5.0

@@ -19,6 +19,7 @@ from profilefit.recipes.stack import record as stacks
 from profilefit.recipes.stack.record import StackRequest, find, load, matching, request_of, require_apart
 from profilefit.recipes.stack.schema import read
 from profilefit.recipes.work import alone
+from tests.fixtures import slow
 
 STACK = """\
 title = "Muscle under its skin"
@@ -125,7 +126,7 @@ def by_hand(of: StackRequest, channel: int) -> StackLaw:
     return law
 
 
-@pytest.mark.parametrize("text", [STACK, THREE], ids=["two layers", "three"])
+@pytest.mark.parametrize("text", [STACK, *slow(THREE)], ids=["two layers", "three"])
 def test_a_record_is_read_as_the_laws_that_were_written(at_once, file, tmp_path, text):
     said: list[str] = []
     of = request_of(file(text=text))
