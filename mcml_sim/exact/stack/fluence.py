@@ -30,6 +30,7 @@ from scipy.special import exp1, expn, j0
 
 from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss, near_end, near_node, slowest
 from mcml_sim.exact.stack.slants import Complexes, Slants, cones, deepest, directions, reflectance, steepest
+from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule
 SERIES_TERMS = 16
@@ -94,6 +95,9 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
 
 def solve(here: Depths, k: float, rule: Nodes) -> Field:
     """phi, phi_0 and X at wave number k [1/length]: of both illuminations, which share all but the last step."""
+    if not here.panels:
+        none = np.empty(0)
+        return Field(dict.fromkeys(ILLUMINATIONS, none), dict.fromkeys(ILLUMINATIONS, none), none, none, none)
     slants = directions(here, k, rule)
     at_once = _out_at_once(here, slants, k, rule)
     up = at_once + _out_later(here, slants)

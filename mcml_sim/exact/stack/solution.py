@@ -300,7 +300,7 @@ def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
 def _rests(medium: Medium, k: float, rule: Nodes) -> dict[str, float]:
     """Transform of the light that `known` has no formula for, by illumination [-]."""
     here, answer = _answer(medium, k, rule)
-    once = {"searchlight": answer.unscattered["searchlight"] * answer.up_at_once, "diffuse": 0.0}
+    once = {"searchlight": answer.unscattered["searchlight"] * answer.up_at_once, "diffuse": np.zeros_like(answer.up)}
     return {light: float(here.weight @ (phi * answer.up - once[light])) for light, phi in answer.phi.items()}
 
 

@@ -24,9 +24,13 @@ ALPHAS = np.array([0.05, 0.3, 0.8, 0.95, 0.99, 0.999])[:, None]
 each_light = pytest.mark.parametrize("light", [LIGHTS[0], *slow(LIGHTS[1])])
 
 
-def test_published_totals():
-    """Giovanelli (1955) at n = 1.5, and adding-doubling at n = 1.4."""
+@pytest.mark.slow
+def test_giovanellis_total():
+    """Of 1955, at n = 1.5."""
     assert exact.reflectance(0.9, Setting(n=1.5)) == pytest.approx(0.219919, abs=1e-6)
+
+
+def test_totals_of_adding_and_doubling():
     for alpha in (0.5, 0.99):
         twin = added(Medium((Layer(1.4, 1 - alpha, alpha, 0.0, 200.0),)), 18).reflected.sum()
         assert exact.reflectance(alpha, Setting(n=1.4)) == pytest.approx(twin, abs=2e-5)

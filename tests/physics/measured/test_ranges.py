@@ -33,7 +33,8 @@ def measured():
     return own_data.rows(ONE, np.random.default_rng(3))
 
 
-@pytest.mark.parametrize("nearest", [0.1, *slow(2.0)], ids=["narrowed", "hardly narrowed"])
+@pytest.mark.slow
+@pytest.mark.parametrize("nearest", [0.1, 2.0], ids=["narrowed", "hardly narrowed"])
 def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
     """Mean and error of g, and the covariance of the coordinates, are those of sixty fits."""
     question = asked({"g": RANGE})

@@ -8,7 +8,6 @@ from profilefit.errors import InputError
 from profilefit.laws.gaussians import MediumGaussians
 from profilefit.recipes.stack import gaussians
 from profilefit.recipes.stack.gaussians import SumLight, medium_gaussians
-from tests.fixtures import slow
 
 HEART = Medium((Layer(1.4, 0.20, 2.2, 0.0, 0.3), Layer(1.4, 0.80, 1.2, 0.0)))
 
@@ -34,7 +33,8 @@ def test_a_sum_is_found_again():
     assert gaussians.fitted([light], 2).cost > 1e4 * best.cost  # two are not three
 
 
-@pytest.mark.parametrize("illumination", ["diffuse", *slow("searchlight")])
+@pytest.mark.slow
+@pytest.mark.parametrize("illumination", ["diffuse", "searchlight"])
 def test_more_of_them_are_nearer(illumination):
     light = gaussians.sum_light(HEART, illumination)
     rel = []

@@ -10,7 +10,6 @@ import pytest
 from mcml_sim import Layer, Medium
 from profilefit.recipes.stack import gaussians, sum_errors
 from profilefit.recipes.stack.gaussians import SumLight, joint, refitted, ring_shares
-from tests.fixtures import slow
 
 MEDIA = tuple(Medium((Layer(1.4, mu_a, 1.0, 0.0, 0.5), Layer(1.4, 0.3, 1.0, 0.0))) for mu_a in (0.02, 0.1))
 EDGES = np.geomspace(0.02, 8.0, 61)
@@ -70,7 +69,8 @@ def test_derivatives_are_those_of_the_formula():
         )
 
 
-@pytest.mark.parametrize("count", [2, *slow(3)], ids=["two, which misfit", "three, which do not"])
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [2, 3], ids=["two, which misfit", "three, which do not"])
 def test_the_statistical_error_is_that_of_repeated_runs(count):
     """Over 400 runs a spread is known to 3.5 %; four standard errors, Sidak over nine constants."""
     random, noise = np.random.default_rng(5), 0.01

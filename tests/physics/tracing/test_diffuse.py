@@ -54,6 +54,7 @@ def likelihood(tally, known):
     return chi2.sf(np.sum(((rings.value - wanted) / rings.standard_error) ** 2), wanted.size)
 
 
+@pytest.mark.slow
 def test_giovanelli_at_n_1_5():
     tally = shone(half_space(0.9, n=1.5))
     assert agrees(tally.diffuse_reflectance, 0.2161120812)
@@ -121,6 +122,7 @@ def test_lanes_and_workers_change_no_bit():
     assert np.array_equal(one.deposits.reflected, other.deposits.reflected)
 
 
+@pytest.mark.slow
 def test_files_and_stores_keep_the_light(tmp_path):
     grid = Grid(0.1, 5, dz=0.1, nz=3)
     tally = shone(STACK, 2000, grid=grid)

@@ -113,6 +113,7 @@ def test_results_keep_the_phase_function(tmp_path):
     assert not (tmp_path / "sea.mco").exists()
 
 
+@pytest.mark.slow
 def test_stores_of_different_phase_functions_do_not_mix(tmp_path):
     other = Tabulated(ANGLES, TABLE.pdf(np.cos(ANGLES)) * np.where(ANGLES > 1, 1.01, 1.0))
     tally(TABLE, photons=1000, store=tmp_path / "layers")

@@ -19,6 +19,7 @@ def small(monkeypatch):
     monkeypatch.setattr(law_cost, "SIZE", (16, 16))
 
 
+@pytest.mark.slow
 def test_both_tables(context, small):
     laws = LAWS["three layers"]
     stack = SimpleNamespace(names=("a", "b", "c"), media=media(3))

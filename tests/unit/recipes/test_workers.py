@@ -12,6 +12,7 @@ import warnings
 import pytest
 
 from profilefit.recipes.workers import Workers, cores
+from tests.fixtures import slow
 
 # Starts two processes that would sleep for a minute, says who they are, and waits for them.
 SLEEPERS = """
@@ -51,7 +52,7 @@ def test_a_process_that_is_ended_from_outside_is_missed():
 
 
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
-@pytest.mark.parametrize("by", ["SIGINT", "SIGTERM", "SIGKILL"])
+@pytest.mark.parametrize("by", ["SIGKILL", *slow("SIGINT", "SIGTERM")])
 def test_no_process_outlives_the_one_that_started_it(by):
     """Ctrl-C reaches all of them, a kill only the first."""
     script = [sys.executable, "-c", SLEEPERS]

@@ -15,6 +15,7 @@ from mcml_sim.runs.batches import AHEAD, run_batches
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing.counts import Counts
 from mcml_sim.tracing.orders_batch import BATCH_PHOTONS
+from tests.fixtures import slow
 
 GRID = Grid(0.5, 8)
 PHOTONS = 5 * BATCH_PHOTONS // 2  # two batches and a half
@@ -29,7 +30,7 @@ def alone():
     return simulate_orders(GRID, PHOTONS, seed=9, workers=1)
 
 
-@pytest.mark.parametrize("workers", [2, 7])
+@pytest.mark.parametrize("workers", [2, *slow(7)])
 def test_any_number_of_workers_gives_the_same_bits(alone, workers):
     assert equal(simulate_orders(GRID, PHOTONS, seed=9, workers=workers), alone)
 

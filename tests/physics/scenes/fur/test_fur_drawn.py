@@ -56,6 +56,7 @@ def small_ball(force=(0.0, -0.3, 0.1)):
     return ball, view
 
 
+@pytest.mark.slow
 def test_the_truth_of_a_ball_against_steps_along_each_ray():
     """Which strand is the first to be inside of, at five hundred places a ray, each against all strands."""
     ball, view = small_ball()

@@ -16,7 +16,6 @@ from profilefit.scenes.heart.truth import sphere_blur, summed
 from profilefit.scenes.stage.buffers import pixels
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Part, Scene
-from tests.fixtures import slow
 
 KERNEL = Kernel(np.array([0.02, 0.1, 0.5, 2.0, 6.0]), np.array([0.1, 0.2, 0.3, 0.25, 0.15]))
 RADIUS, SIZE, MARGIN = 8.0, (240, 144), 24
@@ -170,7 +169,8 @@ def test_elements_are_the_surface(stage):
         assert (sides > 1.015 * area_of(mesh)) == skewed
 
 
-@pytest.mark.parametrize("apart", [4, *slow(1)])
+@pytest.mark.slow
+@pytest.mark.parametrize("apart", [4, 1])
 def test_a_heart_is_blurred_as_its_sum(stage, apart):
     """All of it, and next to the seams of six charts; where they lie nearer than margins are wide, that is refused."""
     part = Part(heart(2.0 * RADIUS), WHITE)

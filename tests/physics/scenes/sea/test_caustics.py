@@ -136,6 +136,7 @@ def test_the_way_that_is_chosen_on_other_seas(context, seed):
         assert max(abs(found.bright), abs(found.dark)) < 0.005
 
 
+@pytest.mark.slow
 def test_a_low_sun(context):
     """Its F is larger: at 1 rad faces of a sea whose F under an overhead sun is 0.32 lie over one another."""
     low = 1.0
@@ -199,6 +200,7 @@ def test_hits_on_an_uneven_floor(context):
     np.testing.assert_allclose(light.light.mean(), 1.0, atol=1e-6)
 
 
+@pytest.mark.slow
 def test_the_published_filter_gains_light(context):
     """By its own brightness a map gathers more than there is; spread by it, all stays. Peaks are real beyond folds."""
     for f, least in ((BEFORE, 0.002), (BEYOND, 0.002)):
