@@ -27,6 +27,7 @@ ALONE = 8  # starts of one Gaussian
 SEED = 300
 # Of the row by which non-negative least squares makes weights sum to one: the optimum that follows does so to rounding.
 TO_ONE = 1e3
+SEARCH_WORTH = 1e-8  # as of `solve`, of starts: `joint` goes on from the best of them
 TURNS = 10  # of weights that are held at 0 and variances that move, and of fits that go on; three do
 
 
@@ -256,7 +257,7 @@ def _shares(edges: Floats, variances: Floats) -> tuple[Floats, Floats, Floats]:
 
 
 def fitted(lights: Sequence[SumLight], count: int) -> Solution:
-    """The best optimum of several starts: ln v_1, how ln v rises, and ln w_i / w_1 of each light, unbounded."""
+    """The best of several starts, nearly at its optimum: ln v_1, how ln v rises, ln w_i / w_1 of each, unbounded."""
 
     def at(parameters: Floats) -> tuple[Floats, Floats]:
         level, weights, slopes = _of(parameters, len(lights))
@@ -272,7 +273,7 @@ def fitted(lights: Sequence[SumLight], count: int) -> Solution:
     for low in lows:
         rise = (widest - low) / max(count - 1, 1)
         start = [low, *[np.log(np.expm1(rise))] * (count - 1), *[0.0] * ((count - 1) * len(lights))]
-        found.append(solve(at, np.array(start)))
+        found.append(solve(at, np.array(start), worth=SEARCH_WORTH))
     return min(found, key=lambda one: one.cost if np.isfinite(one.cost) else np.inf)
 
 
