@@ -57,8 +57,8 @@ def regenerate(
     far its constants moved, in units of their stated error. The command ends with status 1 where a constant moves by
     more than 0.05 of its error, or an interval by more than the Monte Carlo error of its chain.
 
-    A file of layers is a stack. Its law is fitted to exact light in one to four minutes, longer where a layer scatters
-    forward, and its record goes to OUT/stacks. The record of its sums of Gaussians, two minutes more, goes to
+    A file of layers is a stack. Its law is fitted to exact light in one to three minutes, longer where a layer scatters
+    forward, and its record goes to OUT/stacks. The record of its sums of Gaussians, half a minute more, goes to
     OUT/gaussians. A table of a phase function is fitted by every form in a minute, and its record goes to OUT/phases.
 
     \b
