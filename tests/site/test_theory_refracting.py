@@ -325,6 +325,7 @@ def test_the_code_has_the_page_s_transform(light, n):
     )
 
 
+@pytest.mark.slow
 def test_the_code_s_matrix_is_the_page_s_and_its_powers_are_orders():
     """(18), (19) on the ray, where no node is shared."""
     k = 0.5j + 3.0 * RAY
@@ -560,6 +561,7 @@ def test_the_code_has_the_page_s_layers(light, k):
     assert other != pytest.approx(solved.transform(k), rel=1e-2)
 
 
+@pytest.mark.slow
 def test_the_code_has_the_page_s_layers_under_a_denser_medium():
     found = without_cells(lambda cells: plate_in_cells(1.0, "searchlight", cells, 1.5), 15)[0]
     a, b, optical = (0.1 / 2.9) ** 2, (0.2 / 2.6) ** 2, sum((one[0] + one[1]) * one[2] for one in LAYERS)

@@ -40,6 +40,7 @@ def test_no_atlas_where_all_is_seen(context):
     assert not atlas_need(context, bumps(0.0, 30.0, tolerance=0.05)).is_broken
 
 
+@pytest.mark.slow
 def test_an_atlas_where_lit_walls_are_hidden(context):
     found = atlas_need(context, bumps(55.0, -55.0))
     assert found.error > found.hidden > 0.05

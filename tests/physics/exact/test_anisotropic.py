@@ -60,6 +60,7 @@ def test_the_blocks_inverse_is_one(one_wave):
     np.testing.assert_allclose(np.asarray(spread - 0.9 * flown), one, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_without_direction_it_is_the_other_exact_solution():
     k, alpha = np.array([0.05, 0.4, 1.1]), np.array([0.3, 0.9, 0.999])
     found = high_orders.transforms(N, 0.0, 0, k + 0j, alpha, high_orders.Fineness(2, 8))

@@ -46,6 +46,7 @@ def test_similarity_is_told_from_it():
     assert stats.chi2.sf(np.sum(z[rings] ** 2), rings.sum()) < 1e-9
 
 
+@pytest.mark.slow
 def test_next_to_no_direction_it_is_the_other_exact_solution():
     for light in ("searchlight", "diffuse"):
         there, near = Setting(light, 1.37), Setting(light, 1.37, 1e-6)

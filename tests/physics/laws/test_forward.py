@@ -45,6 +45,7 @@ def test_profile_is_the_slope_of_the_energy_which_tends_to_all_of_it():
     assert float(LAW.unscaled_energy(jnp.asarray(0.0), alpha)) == 0
 
 
+@pytest.mark.slow
 def test_radii_have_the_density_that_is_said():
     """The mean of the law over its sampler's density is 1; over that of another medium it is not."""
     xi, alpha = (np.arange(100_000) + 0.5) / 100_000, jnp.asarray(0.0)

@@ -117,6 +117,7 @@ def test_a_brackets_times_gain_and_light_are_those_of_the_camera(shots, light):
     assert off.std() == pytest.approx(1.0, abs=0.08)
 
 
+@pytest.mark.slow
 def test_what_spills_out_of_full_pixels_does_not_change_times():
     """A card's spot is so steep that pixels that count lie beside those that overflow."""
     off = []
@@ -291,6 +292,7 @@ def test_whole_photographs_give_their_medium(cards):
     assert np.sqrt(np.mean(z**2)) < 1.5
 
 
+@pytest.mark.slow
 def test_few_photons_are_a_picture_too():
     optics = replace(OPTICS, glare=1e-9)
     radii = simulated.radii(bench.FARTHEST, optics)

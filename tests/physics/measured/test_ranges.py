@@ -98,6 +98,7 @@ def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     np.testing.assert_allclose(light, right, rtol=3e-4)
 
 
+@pytest.mark.slow
 def test_ranges_of_data_without_absorption_leave_the_limit():
     """Light brighter than any medium's: the albedo runs to 1 at every g, and the middle of the range is fitted."""
     white = own_data.Medium(Setting(n=1.4, g=0.8), 1.0 - 1e-9, 1.0, 0.005)

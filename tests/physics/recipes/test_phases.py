@@ -100,6 +100,7 @@ def test_moments_are_kept():
     assert fit_phase(PETZOLD, "2-terms").rms < found.rms
 
 
+@pytest.mark.slow
 def test_what_cannot_keep_both_says_so():
     found = fit_phase(PETZOLD, "fournier-forand", MOMENTS)
     assert found.result == "backscattered cannot be kept by this form"

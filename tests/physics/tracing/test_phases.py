@@ -98,12 +98,14 @@ def test_layers_and_orders_agree(phase, photons):
         assert np.all(np.abs(np.asarray(one.value) - other.value) < 4.5 * error)
 
 
+@pytest.mark.slow
 def test_a_table_and_the_terms_that_made_it():
     one, other = tally(SEA, seed=1), tally(TABLE, seed=2)
     a, b = one.diffuse_reflectance, other.diffuse_reflectance
     assert abs(a.value - b.value) < 4 * np.hypot(a.standard_error, b.standard_error)
 
 
+@pytest.mark.slow
 def test_results_keep_the_phase_function(tmp_path):
     found = tally(SEA, photons=1000)
     write_results(found, tmp_path / "sea.npz")

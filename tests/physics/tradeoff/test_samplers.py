@@ -43,6 +43,7 @@ def test_an_exact_inverse_has_its_laws_bias_only():
     assert by_law_density == pytest.approx(own, abs=samplers.ROUNDING)
 
 
+@pytest.mark.slow
 def test_a_law_with_g_is_judged_by_light_that_scatters_forwards():
     law = profilefit.load("hazard", setting=Setting(n=1.4, g=0.8))
     own, by_law_density = samplers.asymptotic_bias(law.sampler, ALPHA, EDGE)

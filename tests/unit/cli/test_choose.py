@@ -110,6 +110,7 @@ def test_how_many_layers_fur_needs(fur):
     assert str(refused) == f"{fur}: --measure must be left out of a fur's file, of which no cost is asked"
 
 
+@pytest.mark.slow
 def test_fur_that_no_way_serves(fur):
     """Exit status 1; and one line for what rays do not tell."""
     text = fur.read_text(encoding="utf-8")

@@ -102,6 +102,7 @@ def linear(folder, name):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_floats_clip_where_they_have_a_plateau_only(command, folder, tmp_path):
     shares = linear(folder, "spot")
     for at, one in enumerate(shares):
@@ -116,6 +117,7 @@ def test_floats_clip_where_they_have_a_plateau_only(command, folder, tmp_path):
             assert abs(np.log(one["values"][name] / truth)) < 3.5 * one["errors"][name] / one["values"][name]
 
 
+@pytest.mark.slow
 def test_a_colour_of_noise_alone_changes_no_time(command, folder, tmp_path):
     """Floats, red on a pedestal of noise or of one value, the longest exposure first."""
     noise = np.random.default_rng(2).normal(0.002, 0.0005, linear(folder, "spot").shape).astype(np.float32)

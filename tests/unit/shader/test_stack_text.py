@@ -112,6 +112,7 @@ def test_the_twin_is_the_three_laws(label):
         assert max(mismatch(names, law, float(channel))) < 1e-10  # twelve digits of each constant
 
 
+@pytest.mark.slow
 def test_a_constant_that_is_off_in_the_eighth_digit_is_found():
     red, *others = LAWS["three layers"]
     for wrong in (replace(red, g1=red.g1 * (1 + 1e-7)), replace(red, below=replace(red.below, h0=red.below.h0 + 1e-7))):

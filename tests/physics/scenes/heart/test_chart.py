@@ -20,6 +20,7 @@ def request_small(monkeypatch):
     return replace(scene.read("heart.toml", EXAMPLE), size=(48, 36))
 
 
+@pytest.mark.slow
 def test_ways_and_frames(context, request_small):
     light = scene.light_of(request_small.stack, 6)
     with scene.bench(context, request_small, light, KEPT) as found:

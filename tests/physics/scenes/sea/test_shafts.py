@@ -23,7 +23,6 @@ from profilefit.scenes.sea.shafts import (
     scaled_once,
     share_once,
 )
-from tests.fixtures import slow
 
 WAVES = ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))
 OVERHEAD, TILTED = Bundle(0.0, WAVES), Bundle(0.4, WAVES)
@@ -83,7 +82,8 @@ def test_error_over_samples():
     assert by_lines(OVERHEAD, at, SHARP, 1 << 17) == pytest.approx(truths(OVERHEAD, SHARP)[0], rel=2e-5)
 
 
-@pytest.mark.parametrize("bundle", [OVERHEAD, *slow(TILTED)])
+@pytest.mark.slow
+@pytest.mark.parametrize("bundle", [OVERHEAD, TILTED])
 def test_slices(bundle):
     for phase in (Isotropic(), SHARP):
         assert rms(by_slices, 64, bundle, phase) < 0.01

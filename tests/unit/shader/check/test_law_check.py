@@ -76,6 +76,7 @@ def refracting():
     return dense_grid.reference(REFRACTING.law, dense_grid.arguments())
 
 
+@pytest.mark.slow
 def test_a_law_of_two_parts_passes_with_room(context, refracting):
     """Its radii begin anew where the other part does, and its density is that of both."""
     found = check_law(context, REFRACTING, FITS, exact=refracting)
