@@ -1,7 +1,9 @@
 """Processes that work side by side: each does one job after the other, and none outlives the one that started it.
 
 They are spawned, since the threads of JAX do not survive a fork, and nothing here imports JAX, so that all of them
-start at once. What XLA compiles for one of them serves all. What a job warns of is warned of where it was asked for.
+start at once. Each has its own share of the cores, where the system allows that: XLA and BLAS start a thread for each
+core that they see, and more threads than cores take a tenth more time. What XLA compiles for one process serves all.
+What a job warns of is warned of where it was asked for.
 """
 
 from __future__ import annotations
@@ -34,6 +36,12 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+def _shares(processes: int) -> list[list[int]]:
+    """The cores of each process; none where there are too few, or none can be had."""
+    known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+    return [known[number::processes] if len(known) >= processes else [] for number in range(processes)]
+
+
 class Workers:
     """So many processes; jobs are done here if that is one.
 
@@ -49,7 +57,11 @@ class Workers:
             self._left.enter_context(_sharing_programs())
         pairs = [context.Pipe() for _ in range(self._processes)]
         self._pipes = [ours for ours, _ in pairs]
-        self._started = [context.Process(target=_work, args=(theirs,), daemon=True) for _, theirs in pairs]
+        own = _shares(self._processes)
+        self._started = [
+            context.Process(target=_work, args=(theirs, cores), daemon=True)
+            for (_, theirs), cores in zip(pairs, own, strict=True)
+        ]
         for process, (_, theirs) in zip(self._started, pairs, strict=True):
             process.start()
             theirs.close()  # or the end of a process would not be seen
@@ -111,8 +123,10 @@ def _received(pipe: Connection) -> Any:
     return result
 
 
-def _work(pipe: Connection) -> None:
+def _work(pipe: Connection, own: list[int]) -> None:
     """Do jobs until nobody asks for one any more."""
+    if own:
+        os.sched_setaffinity(0, own)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one that started this
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(EOFError, BrokenPipeError):

@@ -82,3 +82,12 @@ def _is_alive(pid):
 
 def test_cores_are_those_that_this_process_may_use():
     assert 1 <= cores() <= os.cpu_count()
+
+
+@pytest.mark.skipif(not hasattr(os, "sched_getaffinity") or cores() < 2, reason="shares of two cores or more")
+def test_each_process_has_cores_of_its_own():
+    with Workers(2) as workers:
+        first, second = (found for _, found in workers.each(os.sched_getaffinity, [0, 0]))
+    assert first.isdisjoint(second)
+    assert first | second <= os.sched_getaffinity(0)
+    assert len(first) < cores()
