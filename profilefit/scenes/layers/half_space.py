@@ -21,7 +21,8 @@ WHITE = 1e-6  # 1 - alpha of the whitest half space that stands for a stack
 RINGS, NEAREST, FARTHEST = 200, 1e-3, 200.0  # that light is summed over [mfp]
 PLACES = 40  # beside the edge
 SPAN = 4.5  # of l, over the first guess and under it, that is searched
-STEP, TOLERANCE = 1e-3, 1e-5  # of the first guess, for derivatives; of l
+STEP = 0.02  # of the first guess, for derivatives: on a smaller scale the rings make the misfit uneven
+TOLERANCE = 1e-5  # of l
 
 
 @dataclass(frozen=True)
