@@ -237,7 +237,7 @@ def solve(
     size = next((size for size in SIZES if size >= start.size), start.size)
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
-        slope = _held(values, jacobian * scale, proposed, ends)
+        slope = _held(values, _scaled(jacobian, scale), proposed, ends)
         here, aimed, damping, state = _stepped(proposed, unit * values, unit * slope, state, y, size)
         taken = steps == 1 or not np.array_equal(here, y)
         if taken:
@@ -247,10 +247,10 @@ def solve(
                 sizes, unit = np.linalg.norm(jacobian, axis=0), unit / np.sqrt(damping)
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
-                slope = _held(values, jacobian * scale, y, ends)
+                slope = _held(values, _scaled(jacobian, scale), y, ends)
                 _, aimed, damping, state = _stepped(y, unit * values, unit * slope, None, y, size)
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
-        slope = _held(best[1], best[2] * scale, y, ends)
+        slope = _held(best[1], _scaled(best[2], scale), y, ends)
         step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
@@ -298,6 +298,12 @@ def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Flo
     with np.errstate(over="ignore", invalid="ignore"):  # a point that is no answer may be far out
         uphill = jacobian.T @ values
     return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
+
+
+def _scaled(jacobian: Floats, scale: Floats) -> Floats:
+    """Of a point that is no answer it may overflow, and the step is taken back."""
+    with np.errstate(over="ignore"):
+        return jacobian * scale
 
 
 def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:

@@ -244,7 +244,10 @@ SEARCHLIGHT = Setting()
 
 @dataclass(frozen=True)
 class TabulatedRadii:
-    """The exact half space under a searchlight, cubics between knots of ln r: as a law answers, one albedo a call."""
+    """The exact half space under a searchlight, cubics between knots of ln r: as a law answers.
+
+    Of one albedo, or of several (m, 1) at radii (m, n) with mean free paths (m, 1).
+    """
 
     setting: Setting = SEARCHLIGHT
 
@@ -252,14 +255,21 @@ class TabulatedRadii:
         """The cubics of one albedo."""
         return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
 
-    def profile(self, r: ArrayLike, alpha: float, mfp: float = 1.0) -> Floats:
-        """R_d [1/length^2] at radii (n,), looked up in float32: its rounding is nearly all of the error."""
-        x = np.asarray(r, float) / mfp
-        return np.asarray(looked_up(self.curves(alpha), jnp.asarray(x, jnp.float32)), float) / mfp**2
+    def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
+        """R_d [1/length^2], looked up in float32: its rounding is nearly all of the error."""
+        length = np.asarray(mfp, float)
+        x = np.asarray(r, float) / length
+        return self._each(lambda curves, x: looked_up(curves, jnp.asarray(x, jnp.float32)), x, alpha) / length**2
 
-    def cdf(self, r: ArrayLike, alpha: float, mfp: float = 1.0) -> Floats:
-        """Share of the energy within radii (n,) [-]."""
-        return self.curves(alpha).share((np.asarray(r, float) / mfp)[None])[0]
+    def cdf(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
+        """Share of the energy within radii [-]."""
+        x = np.asarray(r, float) / np.asarray(mfp, float)
+        return self._each(lambda curves, x: curves.share(x[None])[0], x, alpha)
+
+    def _each(self, answer: Callable[[Curves, Floats], Any], x: Floats, alpha: ArrayLike) -> Floats:
+        if np.ndim(alpha) == 0:
+            return np.asarray(answer(self.curves(float(np.asarray(alpha))), x), float)
+        return np.stack([self._each(answer, row, one) for row, one in zip(x, np.ravel(alpha), strict=True)])
 
 
 def looked_up(curves: Curves, x: Array) -> Array:
