@@ -238,7 +238,7 @@ def solve(
     y, proposed, point, state, steps = start / scale, start / scale, start, None, 1
     while True:
         slope = _held(values, _scaled(jacobian, scale), proposed, ends)
-        here, aimed, damping, state = _stepped(proposed, unit * values, unit * slope, state, y, size)
+        here, aimed, damping, state = _stepped(proposed, _scaled(values, unit), _scaled(slope, unit), state, y, size)
         taken = steps == 1 or not np.array_equal(here, y)
         if taken:
             y, best = here, (point, values, jacobian)
@@ -248,10 +248,10 @@ def solve(
                 scale = np.where(sizes > 0, 1.0 / np.where(sizes > 0, sizes, 1.0), scale)
                 y, ends, reach = point / scale, (low / scale, high / scale), np.asarray(longest, float) / scale
                 slope = _held(values, _scaled(jacobian, scale), y, ends)
-                _, aimed, damping, state = _stepped(y, unit * values, unit * slope, None, y, size)
+                _, aimed, damping, state = _stepped(y, _scaled(values, unit), _scaled(slope, unit), None, y, size)
         room = np.maximum(ends[0] - y, -reach), np.minimum(ends[1] - y, reach)
         slope = _held(best[1], _scaled(best[2], scale), y, ends)
-        step = _within(room, aimed - y, damping, unit * best[1], unit * slope)
+        step = _within(room, aimed - y, damping, _scaled(best[1], unit), _scaled(slope, unit))
         proposed = np.clip(y + step, *ends)
         ended = bool(np.linalg.norm(proposed - y) <= tolerance * (tolerance + np.linalg.norm(y)))
         least = max(gain, (worth if taken else max(worth, UNSEEN)) * _squares(best[1]))
@@ -300,10 +300,10 @@ def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Flo
     return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
 
 
-def _scaled(jacobian: Floats, scale: Floats) -> Floats:
-    """Of a point that is no answer it may overflow, and the step is taken back."""
-    with np.errstate(over="ignore"):
-        return jacobian * scale
+def _scaled(numbers: Floats, scale: Floats | float) -> Floats:
+    """Those of a point that is no answer may overflow, and the step is taken back."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return numbers * scale
 
 
 def _held(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> Floats:
