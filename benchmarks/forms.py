@@ -32,7 +32,7 @@ from profilefit.studies.tradeoff.counting import count, described
 Floats = NDArray[np.float64]
 # Weights of the relative error, of that in the tail, and what more than thrice as bright counts for.
 RELATIVE, TAIL, MOST = 0.1, 0.0, 3.0
-EVALUATIONS, GAIN = 300, 1e-9  # of a start; of a sum of squares, that another step must gain
+EVALUATIONS, GAIN = 300, 1e-15  # of a start; of a sum of squares, that another step must gain
 WIDEST = 9.0  # largest |ln| of a shape
 
 
