@@ -126,7 +126,8 @@ def _received(pipe: Connection) -> Any:
 def _work(pipe: Connection, own: list[int]) -> None:
     """Do jobs until nobody asks for one any more."""
     if own:
-        os.sched_setaffinity(0, own)
+        with suppress(OSError):  # a sandbox may forbid it; then all share all cores
+            os.sched_setaffinity(0, own)
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one that started this
     threading.Thread(target=_end_with_parent, daemon=True).start()
     with suppress(EOFError, BrokenPipeError):
