@@ -219,7 +219,7 @@ def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Comp
         with jax.enable_x64(True):  # which holds for a thread
             return function(part)
 
-    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:  # as of `stack.solution`
+    with threadpool_limits(1, "blas"), ThreadPoolExecutor(os.cpu_count()) as pool:
         return np.concatenate(list(pool.map(in_double, parts)), axis=1)[:, : k.size]
 
 

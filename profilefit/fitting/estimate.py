@@ -80,7 +80,7 @@ class Fit:
 
     @cached_property
     def second_derivatives(self) -> tuple[Floats, Floats]:
-        """Of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p)."""
+        """Derivatives of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p)."""
         return _second_derivatives(ResidualFunction(self.objective, self.free), self.solution, self.law, self.rings)
 
 
@@ -234,14 +234,14 @@ def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, r
 
 
 def followed(hessian: Floats, mixed: Floats) -> Floats:
-    """`sensitivity`, of second derivatives that are known."""
+    """The result of `sensitivity`, from second derivatives (p, p) and (m, n + 1, p) that are known."""
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
 
 
 def _second_derivatives(
     problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
 ) -> tuple[Floats, Floats]:
-    """`Fit.second_derivatives`; one program."""
+    """The same as `Fit.second_derivatives`, by one compiled program."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
         here = jnp.asarray(solution.parameters)

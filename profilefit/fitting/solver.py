@@ -301,7 +301,7 @@ def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Flo
 
 
 def _scaled(numbers: Floats, scale: Floats | float) -> Floats:
-    """Those of a point that is no answer may overflow, and the step is taken back."""
+    """Multiply without a warning: the numbers of a failed point may overflow, and its step is taken back."""
     with np.errstate(over="ignore", invalid="ignore"):
         return numbers * scale
 

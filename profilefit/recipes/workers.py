@@ -37,7 +37,7 @@ def cores() -> int:
 
 
 def _shares(processes: int) -> list[list[int]]:
-    """The cores of each process; none where there are too few, or none can be had."""
+    """Numbers of the cores that each process may use. Lists are empty where cores are too few or cannot be chosen."""
     known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
     return [known[number::processes] if len(known) >= processes else [] for number in range(processes)]
 
@@ -57,10 +57,9 @@ class Workers:
             self._left.enter_context(_sharing_programs())
         pairs = [context.Pipe() for _ in range(self._processes)]
         self._pipes = [ours for ours, _ in pairs]
-        own = _shares(self._processes)
         self._started = [
-            context.Process(target=_work, args=(theirs, cores), daemon=True)
-            for (_, theirs), cores in zip(pairs, own, strict=True)
+            context.Process(target=_work, args=(theirs, share), daemon=True)
+            for (_, theirs), share in zip(pairs, _shares(self._processes), strict=True)
         ]
         for process, (_, theirs) in zip(self._started, pairs, strict=True):
             process.start()

@@ -94,7 +94,7 @@ def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
 
 
 def solve(here: Depths, k: float, rule: Nodes) -> Field:
-    """phi, phi_0 and X at wave number k [1/length]: of both illuminations, which share all but the last step."""
+    """Solve for phi, phi_0 and X at wave number k [1/length]. Both illuminations share all steps but the last."""
     if not here.panels:
         none = np.empty(0)
         return Field(dict.fromkeys(ILLUMINATIONS, none), dict.fromkeys(ILLUMINATIONS, none), none, none, none)

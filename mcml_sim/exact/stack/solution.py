@@ -53,7 +53,7 @@ LAST_PHASE = 200.0  # k r: light changes little within a hundredth of r
 SMOOTH = 5.0  # k times the depth of the first layer that scatters, where a half space without that depth is no use
 NEAREST, FARTHEST = 1e-9, 1e9  # radii, in units of the medium's own
 PHASE_STEP, PHASE_NODES = 20.0, 24
-KEPT = 4096  # transforms: some ten media under the other illumination need no more work
+KEPT = 4096  # transforms of some ten media, so that their other illumination takes no more work
 
 
 @dataclass(frozen=True)
@@ -298,7 +298,7 @@ def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
 
 @lru_cache(maxsize=KEPT)
 def _rests(medium: Medium, k: float, rule: Nodes) -> dict[str, float]:
-    """Transform of the light that `known` has no formula for, by illumination [-]."""
+    """Transform of the light that `known` has no formula for, of each illumination [-]."""
     here, answer = _answer(medium, k, rule)
     once = {"searchlight": answer.unscattered["searchlight"] * answer.up_at_once, "diffuse": np.zeros_like(answer.up)}
     return {light: float(here.weight @ (phi * answer.up - once[light])) for light, phi in answer.phi.items()}

@@ -27,7 +27,7 @@ ALONE = 8  # starts of one Gaussian
 SEED = 300
 # Of the row by which non-negative least squares makes weights sum to one: the optimum that follows does so to rounding.
 TO_ONE = 1e3
-SEARCH_WORTH = 1e-8  # as of `solve`, of starts: `joint` goes on from the best of them
+SEARCH_WORTH = 1e-8  # as `worth` in `solve`, for the starts. `joint` goes on from the best of them
 TURNS = 10  # of weights that are held at 0 and variances that move, and of fits that go on; three do
 
 

@@ -133,7 +133,7 @@ def load(path: Path) -> SumRecord:
 
 
 def _of_lights(media: tuple[Medium, ...]) -> dict[str, dict[str, Any]]:
-    """Of both in one process: they share the better part of the exact light's work."""
+    """Fit both illuminations in one process, since they share most of the work of the exact light."""
     return {illumination: _of_light(media, illumination) for illumination in ILLUMINATIONS}
 
 

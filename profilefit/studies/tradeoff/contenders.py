@@ -244,9 +244,9 @@ SEARCHLIGHT = Setting()
 
 @dataclass(frozen=True)
 class TabulatedRadii:
-    """The exact half space under a searchlight, cubics between knots of ln r: as a law answers.
+    """The exact half space under a searchlight, by cubics between knots of ln r, with the methods of a law.
 
-    Of one albedo, or of several (m, 1) at radii (m, n) with mean free paths (m, 1).
+    Methods take one albedo, or several (m, 1) at radii (m, n) with mean free paths (m, 1).
     """
 
     setting: Setting = SEARCHLIGHT

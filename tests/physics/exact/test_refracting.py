@@ -26,7 +26,7 @@ each_light = pytest.mark.parametrize("light", [LIGHTS[0], *slow(LIGHTS[1])])
 
 @pytest.mark.slow
 def test_giovanellis_total():
-    """Of 1955, at n = 1.5."""
+    """A total that Giovanelli published in 1955, at n = 1.5."""
     assert exact.reflectance(0.9, Setting(n=1.5)) == pytest.approx(0.219919, abs=1e-6)
 
 
