@@ -80,7 +80,7 @@ class Fit:
 
     @cached_property
     def second_derivatives(self) -> tuple[Floats, Floats]:
-        """Derivatives of half the sum of squares: by two constants (p, p), by an energy and a constant (m, n + 1, p)."""
+        """Derivatives of half the sum of squares, by two constants (p, p) and by an energy and one (m, n + 1, p)."""
         return _second_derivatives(ResidualFunction(self.objective, self.free), self.solution, self.law, self.rings)
 
 
