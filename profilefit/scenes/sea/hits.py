@@ -38,6 +38,7 @@ def first_hit(
     steps: int = 16,
     slope: Slope | None = None,
     newton: int = NEWTON,
+    precision: type[np.floating] = np.float64,
 ) -> Floats | float:
     """Distance along a ray to where it first comes through z = height(x, y) from above [m]; nan where it never does.
 
@@ -46,16 +47,17 @@ def first_hit(
     steps              equal ones between the two planes; of them the first with a change of sign holds the hit
     slope              by which Newton's iteration goes; without it, by short secants along the ray
     newton             iterations; one that would leave the bracket halves it instead
+    precision          of the arithmetic; np.float32 is that of a shader
 
     Of two crossings within one step the first is found if the rates at its ends show the dip between. A level ray
     counts as one that never hits. InputError, too, for an origin below the floor.
     """
-    where, along = _rays(origin, direction)
+    where, along = (one.astype(precision) for one in _rays(origin, direction))
     low, high = _bounds(lowest, highest)
     number = checked_whole("steps", steps, 1, MOST_STEPS)
     last = checked_whole("newton", newton, 0, MOST_STEPS)
-    below = np.asarray(height(where[..., 0], where[..., 1]), float) - where[..., 2]
-    if np.any(below > SLACK * (1.0 + np.abs(where[..., 2]))):
+    below = -_gap(height, where, along, np.zeros_like(where[..., 2]))
+    if np.any(below > _slack(where) * (1.0 + np.abs(where[..., 2]))):
         raise InputError(f"origin must not be below the floor, got one that is {np.nanmax(below):g} m below it")
 
     def rate(k: Floats) -> Floats:
@@ -63,7 +65,7 @@ def first_hit(
             return _rate(slope, where, along, k)
         return (_gap(height, where, along, k + short) - _gap(height, where, along, k)) / short
 
-    short = SHORT * (high - low)
+    short = SHORT * ((high - low) or 1.0)
     near, far = _bracket(height, where, along, low, high, number, rate)
     found = _safeguarded(height, rate, where, along, near, far, last)
     return float(found) if found.ndim == 0 else found
@@ -185,14 +187,14 @@ def _bracket(
     """
     z, down = origin[..., 2], direction[..., 2]
     with np.errstate(divide="ignore", invalid="ignore"):
-        ends = (np.array([lowest, highest]).reshape(2, *[1] * z.ndim) - z) / down
+        ends = (np.array([lowest, highest], z.dtype).reshape(2, *[1] * z.ndim) - z) / down
     slanting = down != 0.0
     near = np.where(slanting, np.maximum(ends.min(axis=0), 0.0), np.nan)
     far = np.where(slanting, ends.max(axis=0), np.nan)
-    far = np.where(far >= 0.0, far + SLACK * (far + highest - lowest), np.nan)
+    far = np.where(far >= 0.0, far + _slack(origin) * (far + highest - lowest), np.nan)
     width = (far - near) / steps
     before = _gap(height, origin, direction, near)
-    if np.any(before < -SLACK * (1.0 + np.abs(z) + abs(highest))):
+    if np.any(before < -_slack(origin) * (1.0 + np.abs(z) + abs(highest))):
         raise InputError(f"highest must be no lower than the floor is, got {highest:g} m")
     before = np.maximum(before, 0.0)
     ends_at = None if rate is None else rate(near)
@@ -207,7 +209,9 @@ def _bracket(
             dip = np.where((gap >= 0.0) & (begins_at < 0.0) & (ends_at > 0.0), dip, np.nan)
             under = _gap(height, origin, direction, dip) < 0.0
             end, ahead = np.where(under, dip, here), np.where(under, -1.0, gap)
-        crossed = (before >= 0.0) & (ahead < 0.0) & np.isnan(first)
+        # At the lower plane every ray that descends has come through, whatever rounding makes of the gap.
+        through = (ahead < 0.0) | ((down < 0.0) & (ahead >= 0.0) & (number == steps))
+        crossed = (before >= 0.0) & through & np.isnan(first)
         first, last = np.where(crossed, here - width, first), np.where(crossed, end, last)
         before = gap
         if not np.any(np.isnan(first) & ~np.isnan(near)):
@@ -235,7 +239,8 @@ def _safeguarded(
     """Newton's iteration from the chord of a bracket: a step that would leave it is a bisection instead."""
     above, below = (_gap(height, origin, direction, end) for end in (near, far))
     with np.errstate(divide="ignore", invalid="ignore"):
-        k = near + np.clip(above / (above - below), 0.0, 1.0) * (far - near)
+        share = np.where(above > np.minimum(below, 0.0), above / (above - np.minimum(below, 0.0)), 0.0)
+        k = near + np.clip(share, 0.0, 1.0) * (far - near)
         for _ in range(iterations):
             gap = _gap(height, origin, direction, k)
             near, far = np.where(gap >= 0.0, k, near), np.where(gap >= 0.0, far, k)
@@ -247,13 +252,19 @@ def _safeguarded(
 def _gap(height: Height, origin: Floats, direction: Floats, k: Floats) -> Floats:
     """How far a ray is above the surface after a distance [m]."""
     x, y, z = (origin[..., axis] + k * direction[..., axis] for axis in range(3))
-    return np.asarray(z - np.asarray(height(x, y), float))
+    return np.asarray(z - np.asarray(height(x, y), k.dtype))
+
+
+def _slack(lengths: Floats) -> float:
+    """Relative tolerance of lengths in their precision [-]."""
+    return max(SLACK, 4.0 * float(np.finfo(lengths.dtype).eps))
 
 
 def _rate(slope: Slope, origin: Floats, direction: Floats, k: Floats) -> Floats:
     """Change of that with the distance [-]."""
     zx, zy = slope(*(origin[..., axis] + k * direction[..., axis] for axis in range(2)))
-    return np.asarray(direction[..., 2] - np.asarray(zx) * direction[..., 0] - np.asarray(zy) * direction[..., 1])
+    zx, zy = np.asarray(zx, k.dtype), np.asarray(zy, k.dtype)
+    return np.asarray(direction[..., 2] - zx * direction[..., 0] - zy * direction[..., 1])
 
 
 def _rays(origin: ArrayLike, direction: ArrayLike) -> tuple[Floats, Floats]:
@@ -284,6 +295,6 @@ def _bounds(lowest: object, highest: object) -> tuple[float, float]:
         if not is_number(value) or not np.isfinite(value):
             raise InputError(f"{name} must be a finite level [m], got {shown(value)}")
     low, high = float(lowest), float(highest)  # type: ignore[arg-type]
-    if low >= high:
-        raise InputError(f"lowest must be below highest, got {low:g} and {high:g} m")
+    if low > high:
+        raise InputError(f"lowest must not be above highest, got {low:g} and {high:g} m")
     return low, high

@@ -149,7 +149,7 @@ class Passes:
         }
         given = {
             "tile": world.sea.tile,
-            "bed": (world.floor.mean, world.floor.lowest, max(world.floor.highest, world.floor.lowest + 1e-6)),
+            "bed": (world.floor.mean, world.floor.lowest, world.floor.highest),
             "crest": max(world.sea.highest, 1e-6),
             "steps": checked_whole("steps", steps, 1, 64),
             "eye": camera.eye,

@@ -9,6 +9,7 @@ from profilefit.studies.stability.cells import Cells, Mask, Verdict
 
 SHARE, BEAM, SEGMENT = "rays with a wrong hit", "beam, cw 0.1", "segment"  # quantities
 WAY, STEEP, NEAR, LENGTH, ALBEDO, DEPTH = "way", "S", "1+m", "c t1", "ω", "ct"  # axes
+SLOPE, FLOOR, EYE = "slope", "depth", "eye above the floor"
 # Ways to a hit, as `hits.wrong_shares` calls them, 3 iterations each; and S below which each is held to be right.
 WAYS: dict[str, int | str] = {
     "16 steps": 16,

@@ -8,19 +8,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.scenes.sea import law
-from profilefit.scenes.sea.hits import wrong_shares
+from profilefit.scenes.sea.hits import first_hit, wrong_shares
 from profilefit.scenes.sea.law import beam_share, failing_depth, segment_integral
 from profilefit.scenes.sea.request import PHASE, lobes_of
+from profilefit.scenes.sea.waves import Waves, random_floor
 from profilefit.shader.emit import text_beside
 from profilefit.shader.sea_file import segment_text
 from profilefit.studies.stability.causes_of_sea import (
     ALBEDO,
     BEAM,
     DEPTH,
+    EYE,
+    FLOOR,
     LENGTH,
     NEAR,
     SEGMENT,
     SHARE,
+    SLOPE,
     STEEP,
     WAY,
     WAYS,
@@ -33,6 +37,12 @@ Floats = NDArray[np.float64]
 STEEPNESSES = (0.5, 0.9, 1.5, 3.0, 5.0, 10.0)  # slope x tangent
 RAYS, WRONG = 600, 0.01  # a floor, and the share of them that may be off
 OURS = 3  # of `WAYS`, the first; the others were published
+# Level and nearly level floors: rms slope [-], depth [m], and the eye's height above the highest place [m].
+SLOPES = (0.0, 1e-9, 1e-7, 1e-5, 1e-3)
+FLOORS = (0.1, 1.0, 4.0, 5.0, 10.0, 100.0, 1000.0)
+EYES = (0.01, 0.03, 0.1, 0.2, 0.5, 1.0)
+VIEWS, STEPS = 20, 16  # rays per cell, steps of the search
+GRAZING, OFF = 0.01, 1e-6  # least cosine of a ray to the vertical; height [depths] beyond which a hit is wrong
 RADIUS, DARKER = 0.1, 0.1  # cw, and the share of e^-ct by which there may be more light
 ALBEDOS = (0.05, 0.1, 0.2, 0.4, 0.6, 0.8)
 DEPTHS = (0.02, 0.05, 0.1, 0.2, 0.3, 0.5, 1.0, 2.0, 4.0)  # as far as photons were compared
@@ -46,6 +56,7 @@ DIGITS = 1e-6  # relative: a few roundings in float32
 def cells_of() -> Iterator[Cells]:
     """Hits over S, a narrow beam over albedo and depth, a segment over direction, length and attenuation."""
     yield from of_hits()
+    yield of_level_floors()
     yield of_beam()
     yield from of_segment()
 
@@ -63,6 +74,31 @@ def of_hits() -> Iterator[Cells]:
         inside = np.array(STEEPNESSES) < holds_to(places)[:, None]
         name = "hits" if own else "hits, as published"
         yield judged_cells(name, own, SHARE, FLOAT64, axes, value, right, absolute(value, right), WRONG, inside)
+
+
+def of_level_floors() -> Cells:
+    """Share of views whose hit on a level or nearly level floor is wrong in float32, over slope, depth and eye."""
+    axes = (
+        ArgumentAxis(SLOPE, "-", np.array(SLOPES)),
+        ArgumentAxis(FLOOR, "m", np.array(FLOORS)),
+        ArgumentAxis(EYE, "m", np.array(EYES)),
+    )
+    value = np.array([[[_missed(slope, depth, eye) for eye in EYES] for depth in FLOORS] for slope in SLOPES])
+    right, everywhere = np.zeros_like(value), np.ones(value.shape, bool)
+    return judged_cells("level floors", True, SHARE, FLOAT32, axes, value, right, value, WRONG, everywhere)
+
+
+def _missed(slope: float, depth: float, eye: float) -> float:
+    """Share of `VIEWS` random rays whose hit in float32 is missing, or off in height by more than `OFF` depths."""
+    rng = np.random.default_rng(0)
+    floor = random_floor(slope, 2.0 * depth, depth) if slope else Waves(2.0 * depth, mean=-depth)
+    down, turn = rng.uniform(GRAZING, 1.0, VIEWS), rng.uniform(0.0, 2.0 * np.pi, VIEWS)
+    level = np.sqrt(1.0 - down * down)
+    ray = np.column_stack([level * np.cos(turn), level * np.sin(turn), -down]).astype(np.float32)
+    origin = np.column_stack([rng.uniform(0.0, 2.0 * depth, (VIEWS, 2)), np.full(VIEWS, floor.highest + eye)])
+    given = floor.height, origin.astype(np.float32), ray, floor.lowest, floor.highest, STEPS, floor.slope
+    single, double = (np.asarray(first_hit(*given, precision=one)) for one in (np.float32, np.float64))
+    return float(np.mean(~(np.abs(single - double) * down <= OFF * depth)))
 
 
 def of_beam() -> Cells:

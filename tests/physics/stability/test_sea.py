@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from profilefit.scenes.sea.hits import first_hit
 from profilefit.studies.stability import sea
 from profilefit.studies.stability.causes_of_sea import LENGTH, NEAR
 from profilefit.studies.stability.cells import Verdict
@@ -36,6 +37,17 @@ def test_steps_hold_and_iterations_fail_where_rays_cross_twice(hits):
     assert causes(ours) <= {"several crossings", "few steps"}
     assert causes(published) == {"several crossings", "a start off the floor, or no slopes"}
     assert np.all(published.value[:, -1] > 0.8)
+
+
+def test_level_floors_are_hit_from_every_depth(monkeypatch):
+    """No view of a level or nearly level floor misses it in float32; views that miss are counted."""
+    assert sea.of_level_floors().verdicts == {Verdict.RIGHT}
+    monkeypatch.setattr(
+        sea,
+        "first_hit",
+        lambda *given, precision: np.nan * first_hit(*given) if precision == np.float32 else first_hit(*given),
+    )
+    assert sea.of_level_floors().verdicts == {Verdict.INACCURATE}
 
 
 def test_e_to_the_minus_ct_fails_from_the_depth_that_is_told():

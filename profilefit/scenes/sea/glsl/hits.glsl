@@ -22,7 +22,8 @@ float newton_hit(vec3 origin, vec3 along, float level, int iterations) {
     return k;
 }
 
-// Distance to the first hit between two planes that the surface keeps to, or -1 where there is none. The ray descends.
+// Distance to the first hit between two planes that the surface keeps to, or -1 where the ray does not descend. At the
+// lower plane every ray has come through, also where float32 rounds a level surface to above it.
 float first_hit(vec3 origin, vec3 along, float lowest, float highest, int steps) {
     if (along.z >= 0.0 || origin.z < lowest) return -1.0;
     float near = max((highest - origin.z) / along.z, 0.0);
@@ -53,12 +54,15 @@ float first_hit(vec3 origin, vec3 along, float lowest, float highest, int steps)
                 break;
             }
         }
+        if (i == steps) {
+            end = here;
+            break;
+        }
         start = here;
         above = gap.x;
         before = gap;
     }
-    if (end < 0.0) return -1.0;
-    float k = start + clamp(above / (above - below), 0.0, 1.0) * (end - start);
+    float k = start + (above > below ? above / (above - below) : 0.0) * (end - start);
     for (int i = 0; i < NEWTON; ++i) {
         vec2 gap = gap_at(origin, along, k);
         if (gap.x >= 0.0) start = k; else end = k;

@@ -127,6 +127,20 @@ def test_a_calm_sea_that_scatters_nothing(context, few_depths, kind):
     assert np.max(np.abs(found - once) / bright) > 0.1
 
 
+@pytest.mark.parametrize("above", [1.0, 0.2, 0.01])
+def test_a_level_floor_from_near_it(context, few_depths, above):
+    """No pixel is black, down to a centimetre above the floor."""
+    world = absorbing(0.5)
+    camera = toward((0.0, 2.5, above - DEPTH), (1.0, 0.0, -0.2), 1.2)
+    with Passes(context, world, FACES, 16, 16, 4) as passes:
+        passes.light()
+        found, _ = passes.view(camera, (24, 20), SINGLE, 8, 16)
+    way = directions(camera, (24, 20))
+    down = way[..., 2] < -0.05
+    assert down.sum() > 200
+    np.testing.assert_allclose(found[down], optics(world, camera.eye, way)[down], rtol=2e-3)
+
+
 def test_the_truth_where_nothing_is_scattered():
     """The same by paths, in twelve directions."""
     world, eye = absorbing(0.5), np.array([1.0, 2.0, -1.5])
