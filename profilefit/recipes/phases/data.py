@@ -36,6 +36,7 @@ ACCEPTED = "angle [deg], value [1/sr] or [1/(m sr)] and, if known, sigma"
 LONGEST_SHOWN = 40
 LEAST_DEGREES = 7.0  # more than 2 pi: a table that ends before is one in radians
 WIDEST = 20.0  # [degrees] between rows; wider gaps are named
+MOST_SHARE = 1e3  # beyond which a rule estimates nothing
 
 
 @dataclass(frozen=True)
@@ -170,9 +171,14 @@ def _spans(angles: Floats, values: Floats) -> tuple[Span, ...]:
         rules = "ln p linear in ln(1 - cosine)", "p linear in 1 - cosine"
         found.append((angles[at], angles[at + 1], below[at + 1] - below[at], rules[0], line, rules[1]))
     if u[-1] < 2:
-        on = u[-1] * (2 / u[-1]) ** t
-        power = np.trapezoid(f[-1] * (on / u[-1]) ** (np.log(f[-1] / f[-2]) / np.log(u[-1] / u[-2])), on)
-        found.append((angles[-1], np.pi, 1 - below[-1], "the last value", power, "the last rows' power law"))
+        # Noise of two rows side by side would decide the law.
+        first = int(np.clip(np.searchsorted(angles, angles[-1] - np.radians(WIDEST) - 1e-9), 1, u.size - 2))
+        on, slope = u[-1] * (2 / u[-1]) ** t, np.log(f[-1] / f[first]) / np.log(u[-1] / u[first])
+        with np.errstate(over="ignore"):
+            power = min(np.trapezoid(f[-1] * (on / u[-1]) ** slope, on), MOST_SHARE)
+        found.append(
+            (angles[-1], np.pi, 1 - below[-1], "the last value", power, f"the power law of the last {WIDEST:g} degrees")
+        )
     return tuple(
         Span(float(np.degrees(low)), float(np.degrees(high)), float(share), rule, float(other), other_rule)
         for low, high, share, rule, other, other_rule in found

@@ -122,6 +122,14 @@ def test_shares_of_angles_without_rows(tmp_path):
                 assert min(span.share, span.other) * 0.99 < share < max(span.share, span.other) * 1.01
 
 
+@pytest.mark.parametrize(("last", "other"), [(0.09, pytest.approx(0.0759, rel=0.05)), (1e300, 1e3)])
+def test_a_last_row_that_is_noise(tmp_path, last, other):
+    """Two rows side by side do not decide what lies beyond, and no share is infinite."""
+    path = tmp_path / "table.csv"
+    path.write_text(HEAD + "".join(f"{a}, 0.08\n" for a in range(1, 151)) + f"150.01, {last}\n")
+    assert read_phase(path).spans[-1].other == other
+
+
 def test_the_lines_of_the_guide(tmp_path):
     path, degrees = tmp_path / "gaps.csv", np.degrees(PETZOLD.angles)
     kept = (degrees > 0.3) & ((degrees < 26) | (degrees > 64)) & (degrees < 161)
