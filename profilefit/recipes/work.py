@@ -34,11 +34,13 @@ class Work:
     name    of the record in a folder of records, for example "hazard" or "stacks/skin"
     parts   functions without arguments that processes can do in any order
     finish  content and arrays of the record, from the results of the parts in their order
+    notes   lines on its data, to be said before the parts begin
     """
 
     name: str
     parts: tuple[Callable[[], Any], ...]
     finish: Callable[[list[Any]], Made]
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,9 @@ class Step:
 
 def written(works: Sequence[Work], out: Path, workers: Workers, say: Callable[[str], None] = silent) -> Iterator[Step]:
     """Write the records of `works` into the folder `out`, each as soon as its parts are done; parts begin in order."""
+    for work in works:
+        for note in work.notes:
+            say(note)
     parts = [(at, place) for at, work in enumerate(works) for place in range(len(work.parts))]
     results: list[dict[int, Any]] = [{} for _ in works]
     seconds = [0.0] * len(works)

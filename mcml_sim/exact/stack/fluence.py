@@ -296,3 +296,37 @@ def straight_through(here: Depths, illumination: str, rule: Nodes) -> float:
     a, b, whole = slants.a, slants.b, slants.whole
     flux = slants.weight * slants.mu**2
     return float(4 * here.above**2 * np.sum(flux * (1 - a) * (1 - b) * whole / (1 - a * b * whole**2)).real)
+
+
+def net_flux(here: Depths, phi: Floats, tau: Floats, illumination: str, rule: Nodes) -> Floats:
+    """Return the net flux downwards through interfaces at optical depths `tau`, k = 0, over the light that arrives [-].
+
+    phi  (N,) fluences at the nodes;  tau  (interfaces,)
+
+    Light that was not scattered, and that of the sources: one at optical depth T sends E2(|tau - T|) / 2 straight
+    through (Case & Zweifel, Linear Transport Theory, 1967). Both surfaces' reflections are summed as those of G.
+    """
+    slants, finite = directions(here, 0.0, rule), np.isfinite(here.height)
+    a, b, whole, weight = slants.a, slants.b, slants.whole, slants.weight * slants.mu
+    down = np.exp(-np.multiply.outer(tau, 1 / slants.mu))
+    up = np.exp(-np.multiply.outer(here.optical - tau, 1 / slants.mu)) if finite else np.zeros_like(down)
+    series = weight / (1 - a * b * whole**2)
+    if illumination == "searchlight":
+        top, bottom = normal_reflectances(here)
+        back = bottom * np.exp(tau - 2 * here.optical)
+        flux = (1 - top) * (np.exp(-tau) - back) / (1 - top * bottom * np.exp(-2 * here.optical))
+    else:
+        once = series * slants.mu * (1 - a)
+        flux = 4 * here.above**2 * ((here.above != 1) * down @ once - up @ (once * b * whole)).real
+        flux += 2 * expn(3, tau) if here.above == 1 else 0.0
+    sources = here.weight * phi
+    apart = np.subtract.outer(tau, here.tau)
+    passes = np.sign(apart) * expn(2, np.abs(apart))
+    for sign, (_, mirror) in zip((1, -1) if here.above != 1 else (-1,), _mirrors(here), strict=False):
+        passes += sign * expn(2, np.abs(mirror - np.add.outer(tau, here.tau)))
+    from_top = slants.from_top @ sources
+    from_bottom = slants.to_bottom @ sources if finite else np.zeros_like(whole)
+    across = a * b * whole * series
+    falls = (a * series - (here.above != 1) * weight) * from_top + across * from_bottom
+    rises = (b * series - (here.below != 1) * weight) * from_bottom + across * from_top
+    return flux + 0.5 * passes @ sources + (down @ falls - up @ rises).real

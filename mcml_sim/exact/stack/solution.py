@@ -4,7 +4,7 @@
 
     skin = Medium((Layer(1.4, 0.2, 20.0, 0.0, 0.01), Layer(1.4, 0.03, 18.0, 0.0)))
     light = exact.solve(skin)
-    light.reflectance, light.profile([0.01, 0.1]), light.cdf(0.1)
+    light.reflectance, light.absorbed, light.profile([0.01, 0.1]), light.cdf(0.1)
 
 `fluence` has the equation, at one transverse wave number k, and its numerics. The profile is the inverse Hankel
 transform of what it gives, of which first is taken apart what k would have to go far out for:
@@ -72,6 +72,14 @@ class Solution:
     """Light that entered and left above [-]."""
     transmittance: float | None
     """Light that left below, whether it was scattered or not [-]; None where there is no below."""
+    absorbed: Floats = field(compare=False)
+    """Light that each layer absorbs, from the top, (layers,) [-].
+
+    It is the net flux that enters a layer less the net flux that leaves it (`fluence.net_flux`). With `specular`,
+    `reflectance` and `transmittance` the sum is 1 to rounding, if any layer absorbs.
+    """
+    absorbed_error: float
+    """Largest change of `absorbed` with fewer nodes [-]: above its error."""
     error: float
     """Relative change of `reflectance`, and of the transform at k = 1 / mfp, with fewer nodes: above their error."""
     nodes: Nodes = field(default=STANDARD, repr=False)
@@ -109,9 +117,10 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
 
     InputError on any other medium and illumination.
 
-    Relative error of the reflectance, and of the transform up to k = 5 / mfp, and absolute error of the transmittance:
-    below 1e-7, mostly 1e-9, in layers of up to 1000 mfp (3e-7 under diffuse light if the index above is all but the
-    same); beyond, see `Solution.error`. Where the index above is another the transform's grows to 5e-4 at k = 25 / mfp.
+    Relative error of the reflectance, and of the transform up to k = 5 / mfp, and absolute error of the transmittance
+    and of what layers absorb: below 1e-7, mostly 1e-9, in layers of up to 1000 mfp (3e-7 under diffuse light if the
+    index above is all but the same); beyond, see `Solution.error`. Where the index above is another the transform's
+    grows to 5e-4 at k = 25 / mfp.
 
     That of the profile is below 1e-5 as far as R_d is more than 1e-3 of what it is at one mean free path. Where the
     index above is another it is 1e-4 at the radii at which light comes just from the next interface under the critical
@@ -125,16 +134,19 @@ def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STAN
     if not isinstance(nodes, Nodes):
         raise InputError(f"nodes must be a mcml_sim.exact.Nodes, got {shown(nodes)}")
     first = next((layer for layer in medium.layers if layer.mu_s > 0), medium.layers[0])
-    waves = np.array([0.0, first.mu_t])
-    fine = _each(lambda k: _reflected(medium, k, illumination, nodes), waves)
-    coarse = _each(lambda k: _reflected(medium, k, illumination, nodes.fewer), waves)
-    changes = np.abs(fine - coarse) / np.where(fine > 0, fine, 1.0)
+    (fine, down, absorbed), (coarse, _, other) = (_shares(medium, illumination, rule) for rule in (nodes, nodes.fewer))
+    waves = np.array([first.mu_t])
+    fines = np.append(fine, _each(lambda k: _reflected(medium, k, illumination, nodes), waves))
+    coarses = np.append(coarse, _each(lambda k: _reflected(medium, k, illumination, nodes.fewer), waves))
+    changes = np.abs(fines - coarses) / np.where(fines > 0, fines, 1.0)
     return Solution(
         medium,
         illumination,
         specular=_specular(medium, illumination),
-        reflectance=float(fine[0]),
-        transmittance=None if medium.is_half_space else _transmitted(medium, illumination, nodes),
+        reflectance=fine,
+        transmittance=None if medium.is_half_space else down,
+        absorbed=absorbed,
+        absorbed_error=float(np.max(np.abs(absorbed - other))),
         error=float(changes.max()),
         nodes=nodes,
     )
@@ -157,9 +169,7 @@ def _require_solved(medium: Medium, illumination: str) -> None:
 
 def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
     """R^(k) [-]."""
-    here, answer = _answer(medium, k, rule)
-    scattered = float(here.weight @ (answer.phi[illumination] * answer.up))
-    return scattered + fluence.thrown_back(here, k, illumination, rule)
+    return _leaves_above(*_answer(medium, k, rule), k, illumination, rule)
 
 
 def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, Field]:
@@ -167,11 +177,29 @@ def _answer(medium: Medium, k: float, rule: Nodes) -> tuple[Depths, Field]:
     return here, fluence.solve(here, k, rule)
 
 
-def _transmitted(medium: Medium, illumination: str, rule: Nodes) -> float:
-    here, answer = _answer(medium, 0.0, rule)
-    scattered = float(here.weight @ (answer.phi[illumination] * answer.down))
-    through = scattered + fluence.straight_through(here, illumination, rule)
-    return max(through, 0.0)  # below by rounding where hardly any light gets through
+def _leaves_above(here: Depths, answer: Field, k: float, illumination: str, rule: Nodes) -> float:
+    scattered = float(here.weight @ (answer.phi[illumination] * answer.up))
+    return scattered + fluence.thrown_back(here, k, illumination, rule)
+
+
+def _shares(medium: Medium, illumination: str, rule: Nodes) -> tuple[float, float, Floats]:
+    """Light that leaves above and below, and that each layer absorbs, (layers,) [-]."""
+    with threadpool_limits(1, "blas"):
+        here, answer = _answer(medium, 0.0, rule)
+        reflected, transmitted = _leaves_above(here, answer, 0.0, illumination, rule), 0.0
+        if not medium.is_half_space:
+            scattered = float(here.weight @ (answer.phi[illumination] * answer.down))
+            # Below 0 by rounding where hardly any light gets through.
+            transmitted = max(scattered + fluence.straight_through(here, illumination, rule), 0.0)
+        absorbed = np.zeros(len(medium.layers))
+        absorbs = np.flatnonzero([layer.mu_a > 0 for layer in medium.layers])
+        if absorbs.size:
+            # Between two layers that absorb any depth has the same flux.
+            tau = np.cumsum([layer.mu_t * layer.thickness for layer in medium.layers[: absorbs[-1]]])
+            between = fluence.net_flux(here, answer.phi[illumination], tau[absorbs[:-1]], illumination, rule)
+            enters = 1 - _specular(medium, illumination) - reflected
+            absorbed[absorbs] = -np.diff(np.concatenate([[enters], between, [transmitted]]))
+    return reflected, transmitted, np.maximum(absorbed, 0.0)
 
 
 def _specular(medium: Medium, illumination: str) -> float:

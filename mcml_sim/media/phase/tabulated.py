@@ -15,7 +15,7 @@ from mcml_sim.errors import InputError
 from mcml_sim.media.arrays import namespace
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.phase.base import Phase
-from mcml_sim.media.phase.pieces import Pieces
+from mcml_sim.media.phase.pieces import Floats, Pieces
 
 MOST_ROWS = 2**16
 TOLERANCE = 0.02  # by which an integral may miss 1: a table's own interpolation does
@@ -53,12 +53,7 @@ class Tabulated(Phase):
             raise InputError(f"values must be as many as angles, got {values.size} and {angles.size}")
         if np.any(values < 0):
             raise InputError(f"values must be densities >= 0, got {values.min():g}")
-        u = 2 * np.sin(np.minimum(angles, np.pi) / 2) ** 2
-        if u[-1] < 2:
-            u, f = np.append(u, 2.0), np.append(values, values[-1])
-        else:
-            f = values
-        pieces = Pieces.of(u, 2 * np.pi * f)
+        pieces = self.through(angles, values)
         total = pieces.total
         if not abs(total - 1) <= TOLERANCE:  # infinite, or NaN, where the first power law has no integral
             raise InputError(
@@ -68,6 +63,14 @@ class Tabulated(Phase):
         object.__setattr__(self, "values", tuple(values.tolist()))
         object.__setattr__(self, "pieces", pieces.normalised())
         object.__setattr__(self, "integral", total)
+
+    @staticmethod
+    def through(angles: Floats, values: Floats) -> Pieces:
+        """Return the pieces through rows of angles [rad] and values [1/sr], both (rows,), not normalised."""
+        u = 2 * np.sin(np.minimum(angles, np.pi) / 2) ** 2
+        if u[-1] < 2:
+            u, values = np.append(u, 2.0), np.append(values, values[-1])
+        return Pieces.of(u, 2 * np.pi * values)
 
     def __repr__(self) -> str:
         """Short, and another one for other numbers: it says what a run was made with."""

@@ -81,7 +81,7 @@ class PhaseFit:
 def fit_phase(
     data: PhaseData, form: str, hold: Sequence[str] = (), angles: tuple[float, float] = ALL_ANGLES
 ) -> PhaseFit:
-    """The form nearest to a table, all rows alike in ln p (or by sigma, where the table has it).
+    """The form nearest to a table, all rows alike in ln p (or by sigma, where the table has it), but for one at 0.
 
     form    a name of `FORMS`;  hold  of the table's mean cosine and backscattered share, those that are kept
     angles  of the rows that count [degrees]; moments are those of the whole table
@@ -95,13 +95,15 @@ def fit_phase(
         raise InputError(f"hold must be of {', '.join(MOMENTS)}, got {unknown[0]!r}")
     if len(held) > own.free:
         raise InputError(f"hold must be at most {own.free} of the moments for {form}, got {len(held)}")
+    moments = data.mean_cosine, data.backscattered
+    data = data.off_axis
     used = data.within(*angles)
     if np.count_nonzero(used) < 2 * own.free:
         raise InputError(
             f"angles must hold {2 * own.free} rows or more for {form}, got {np.count_nonzero(used)} "
             f"in {angles[0]:g} ... {angles[1]:g} degrees"
         )
-    arrays = _arrays(data, used)
+    arrays = _arrays(data, used, moments)
     residual = _residual(form, held)
     random = np.random.default_rng(SEED)
     found = [least_squares(residual, start, arrays) for start in own.starts(random, STARTS)]
@@ -113,7 +115,6 @@ def fit_phase(
     off = np.log(phase.pdf(np.cos(data.angles)) / data.values)
     bands = tuple(_rms(off[used & data.within(low, high - ROUNDING)]) for low, high in pairwise(BANDS))
     errors = _errors(own, held, best, arrays, data, used)
-    moments = data.mean_cosine, data.backscattered
     return PhaseFit(own, held, angles, best, constants, errors, phase, _rms(off[used]), bands, moments)
 
 
@@ -126,11 +127,11 @@ def _rms(off: Floats) -> float:
     return float(np.sqrt(np.mean(off**2))) if off.size else float("nan")
 
 
-def _arrays(data: PhaseData, used: NDArray[np.bool_]) -> tuple[Floats, ...]:
+def _arrays(data: PhaseData, used: NDArray[np.bool_], moments: tuple[float, float]) -> tuple[Floats, ...]:
     """Cosines, ln values, weights whose squares have the mean 1, and moments."""
     weight = np.where(used, 1.0 if data.sigma is None else 1.0 / data.sigma, 0.0)
     weight = weight / np.sqrt(np.sum(weight**2) / np.count_nonzero(used))
-    return np.cos(data.angles), np.log(data.values), weight, np.array([data.mean_cosine, data.backscattered])
+    return np.cos(data.angles), np.log(data.values), weight, np.array(moments)
 
 
 @lru_cache(maxsize=64)

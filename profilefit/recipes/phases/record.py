@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -16,7 +16,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, regression
 from profilefit.recipes import record
 from profilefit.recipes.folder import LOCAL, PHASES, fits_folder
-from profilefit.recipes.kinds import COUNT, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS
+from profilefit.recipes.kinds import COUNT, LIST, MEASURE, MEASURES, NUMBER, TABLE, TEXT, TEXTS
 from profilefit.recipes.phases.data import PhaseData, read_phase
 from profilefit.recipes.phases.fit import ALL_ANGLES, MOMENTS, SEED, PhaseFit, built, fit_phase
 from profilefit.recipes.schema import Kinds
@@ -31,6 +31,9 @@ NOTE = (
 )
 HELD, FREE = "held", "free"
 DEFAULT = ("4-terms", HELD)
+FULL_SPHERE = 4 * np.pi  # [sr], the integral of values that are said relative to isotropic ones
+NEAR_ONE = 0.1
+SMALLEST = 1e-4  # share that is printed
 OF_FIT: Kinds = {
     "": TABLE,
     ".held": TEXTS,
@@ -45,6 +48,10 @@ SHOWN: Kinds = {
     **{"data": TABLE, "data.source": TEXT, "data.rows": COUNT, "phases": TABLE},
     **dict.fromkeys(("data.integral", "data.mean_cosine", "data.backscattered", "data.second"), NUMBER),
     "data.angles": MEASURES,
+    # Of no older records.
+    **{"data.unit?": TEXT, "data.spans?": LIST, "data.spans?.*": TABLE},
+    **dict.fromkeys((f"data.spans?.*.{name}" for name in ("low", "high", "share", "other")), NUMBER),
+    **dict.fromkeys(("data.spans?.*.rule", "data.spans?.*.other_rule"), TEXT),
     **{f"phases.{form}": TABLE for form in FORMS},
     **{f"phases.{form}.{how}{key}": kind for form in FORMS for how in (FREE, HELD) for key, kind in OF_FIT.items()},
 }
@@ -90,7 +97,53 @@ def work(path: Path) -> Work:
     """Fits of every form to a table, one part: a minute. InputError on a damaged table."""
     data = read_phase(path)
     arrays = {"angles": data.angles, "values": data.values}
-    return Work(f"{PHASES}/{path.stem}", (partial(fits_of, data),), lambda found: (content(data, found[0]), arrays))
+    return Work(
+        f"{PHASES}/{path.stem}",
+        (partial(fits_of, data),),
+        lambda found: (content(data, found[0]), arrays),
+        tuple(table_lines(described(data))),
+    )
+
+
+def table_lines(data: Mapping[str, Any]) -> list[str]:
+    """Return lines on the scale of a table and on the angles where it has no rows.
+
+    data  the table `data` of a record; older records have neither `unit` nor `spans`
+    """
+    factor, unit, spans = data["integral"], data.get("unit"), data.get("spans", [])
+    turns = factor / FULL_SPHERE
+    of = f"b = {factor:#.4g} {unit}" if unit else f"{factor:#.4g}"
+    of += f" (4 pi times {turns:#.4g})" if not unit and abs(turns - 1) < NEAR_ONE else ""
+    lines = [f"{data['source']}: values were divided by their integral over all directions, {of}."]
+    if data["angles"][0] == 0:
+        lines.append("The row at 0 degrees counts in the integral and in the moments, and in no fit.")
+    lines += [
+        f"No rows between {one['low']:g} and {one['high']:g} degrees: {_percent(one['share'])} of the integral with "
+        f"{one['rule']}, {_percent(one['other'])} with {one['other_rule']}."
+        for one in spans
+    ]
+    unsure = sum(abs(one["share"] - one["other"]) for one in spans)
+    return [*lines, f"The choice between these changes the integral by up to {_percent(unsure)}."] if spans else lines
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %" if share > SMALLEST else f"less than {100 * SMALLEST:g} %"
+
+
+def described(data: PhaseData) -> dict[str, Any]:
+    """Return the table `data` of a record."""
+    return {
+        "source": Path(data.source).name,
+        "rows": data.angles.size,
+        "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
+        "integral": data.integral,
+        "unit": data.unit,
+        "spans": [asdict(span) for span in data.spans],
+        "mean_cosine": data.mean_cosine,
+        "backscattered": data.backscattered,
+        "second": float(data.table.moment(2)),
+        "regression": regression(data.backscattered),
+    }
 
 
 def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:
@@ -126,16 +179,7 @@ def content(data: PhaseData, found: Sequence[PhaseFit]) -> dict[str, Any]:
         "setting": Setting(),
         "constants": constants,
         "phases": phases,
-        "data": {
-            "source": Path(data.source).name,
-            "rows": data.angles.size,
-            "angles": [float(np.degrees(data.angles[at])) for at in (0, -1)],
-            "integral": data.integral,
-            "mean_cosine": data.mean_cosine,
-            "backscattered": data.backscattered,
-            "second": float(data.table.moment(2)),
-            "regression": regression(data.backscattered),
-        },
+        "data": described(data),
         "fit": {"result": next((one for one in results if one != "converged"), "converged")},
         "quality": {"regenerated": {"rms": [one.rms for one in found]}},
         "truth": {"kind": "table"},

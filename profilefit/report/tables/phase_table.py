@@ -13,7 +13,7 @@ from profilefit.laws.phases import FORMS
 from profilefit.recipes import record
 from profilefit.recipes.folder import PHASES
 from profilefit.recipes.phases.fit import BANDS
-from profilefit.recipes.phases.record import FREE, HELD, load
+from profilefit.recipes.phases.record import FREE, HELD, load, table_lines
 from profilefit.report.records import known_errors, largest_error
 from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
@@ -54,14 +54,15 @@ def phase_tables(content: Content) -> list[RenderableType]:
 
 
 def premise_lines(content: Content) -> list[str]:
-    """Whether the table is as Haltrin's form takes it to be."""
+    """Return the scale of the table, its angles without rows, and whether it is as Haltrin's form takes it to be."""
     data, haltrin = content["data"], content["phases"]["haltrin"][FREE]
     best = min((one["rms"], FORMS[form].title) for form, _, one in _each(content))
     own, second = (f"{data[name]:.3f}" for name in ("mean_cosine", "second"))
     return [
+        *table_lines(data),
         f"Haltrin's form is off by a factor of e^{haltrin['rms']:.2f} (rms), {best[1]} by e^{best[0]:.2f}. "
         f"Its premises: the mean of P_2 is the mean cosine (here {second} and {own}), "
-        f"and that follows from the backscattered share by a regression (here {data['regression']:.3f} for {own})."
+        f"and that follows from the backscattered share by a regression (here {data['regression']:.3f} for {own}).",
     ]
 
 

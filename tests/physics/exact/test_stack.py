@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.special import j0
+from scipy.special import expn, j0
 from scipy.stats import chi2
 
 from mcml_sim import Grid, InputError, Layer, Medium, Setting, exact, half_space, simulate
@@ -63,9 +63,10 @@ def random_stack(rng, white=False):
 
 
 def absorbed(medium, illumination):
-    """Integral of mu_a phi over layers that all scatter."""
+    """Integrals of mu_a phi over layers that all scatter and end."""
     here = depths.stack(medium, 0.0, STANDARD)
-    return here.absorbs @ fluence.solve(here, 0.0, STANDARD).phi[illumination]
+    light = here.absorbs * fluence.solve(here, 0.0, STANDARD).phi[illumination]
+    return np.bincount(np.searchsorted(medium.z_edges[1:-1], here.z), light, minlength=len(medium.layers))
 
 
 @pytest.mark.parametrize("alpha", [0.3, 0.9, 0.999, 1.0])
@@ -122,14 +123,42 @@ def test_adding_and_doubling_agrees_in_twenty_stacks():
 
 
 @BOTH
-@pytest.mark.parametrize("white", [True, pytest.param(False, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("white", [False, pytest.param(True, marks=pytest.mark.slow)])
 def test_no_light_is_lost(white, illumination):
     rng = np.random.default_rng(6)
     for above, below in ((1.0, 1.0), (1.0, 1.6), (1.6, 1.0), (1.6, 1.6)):
         medium = replace(random_stack(rng, white), n_above=above, n_below=below)
         found = exact.solve(medium, illumination)
-        total = found.specular + found.reflectance + found.transmittance + absorbed(medium, illumination)
-        assert total == pytest.approx(1, abs=2e-9)
+        total = found.specular + found.reflectance + found.transmittance
+        assert total + absorbed(medium, illumination).sum() == pytest.approx(1, abs=2e-9)
+        np.testing.assert_allclose(found.absorbed, absorbed(medium, illumination), atol=2e-9)
+        assert found.absorbed_error < 1e-7
+        if not white:
+            assert total + found.absorbed.sum() == pytest.approx(1, abs=1e-14)
+
+
+@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
+def test_light_that_layers_absorb(illumination):
+    """Layers that do not scatter, as ones that all but don't; without any that does, Beer's law; endless ones."""
+    hazy = replace(GLAZED, layers=tuple(replace(layer, mu_s=layer.mu_s or 1e-9) for layer in GLAZED.layers))
+    found = exact.solve(GLAZED, illumination)
+    np.testing.assert_allclose(found.absorbed, absorbed(hazy, illumination), atol=2e-9)
+    assert found.absorbed[0] == 0
+    dark = Medium(
+        (Layer(1.3, 0.5, 0.0, 0.0, 1.0), Layer(1.3, 0.0, 0.0, 0.0, 1.0), Layer(1.3, 2.0, 0.0, 0.0)), n_above=1.3
+    )
+    left = np.exp(-0.5) if illumination == "searchlight" else 2 * expn(3, 0.5)
+    np.testing.assert_allclose(exact.solve(dark, illumination).absorbed, [1 - left, 0.0, left], atol=1e-12)
+    for medium in (MATCHED, REFRACTING):
+        found, same = exact.solve(medium, illumination), exact.solve(replace(medium, layers=(
+            *medium.layers[:2], replace(medium.layers[2], thickness=2.0), medium.layers[2])), illumination)  # fmt: skip
+        assert found.specular + found.reflectance + found.absorbed.sum() == pytest.approx(1, abs=1e-14)
+        np.testing.assert_allclose(found.absorbed, [*same.absorbed[:2], same.absorbed[2:].sum()], atol=2e-9)
+
+
+def test_a_white_stack_absorbs_nothing():
+    white = Medium((Layer(1.4, 0.0, 1.0, 0.0, 0.5), Layer(1.4, 0.0, 3.0, 0.0, 0.5)))
+    np.testing.assert_array_equal(exact.solve(white).absorbed, [0.0, 0.0])
 
 
 @pytest.mark.slow
@@ -222,8 +251,12 @@ def test_photons_agree_in_chi_square_over_the_rings(medium):
 
     assert likelihood(medium) > CHANCE
     assert likelihood(milkier(medium)) < CHANCE
-    for seen, known in ((tally.diffuse_reflectance, "reflectance"), (tally.specular_reflectance, "specular")):
-        assert abs(seen.value - getattr(exact.solve(medium), known)) <= 4 * seen.standard_error + 1e-12
+    for seen, known in (
+        (tally.diffuse_reflectance, "reflectance"),
+        (tally.specular_reflectance, "specular"),
+        (tally.absorbed_per_layer, "absorbed"),
+    ):
+        assert np.all(np.abs(seen.value - getattr(exact.solve(medium), known)) <= 4 * seen.standard_error + 1e-12)
 
 
 @pytest.mark.parametrize(

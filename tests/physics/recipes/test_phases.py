@@ -1,6 +1,7 @@
 """Phase functions fitted to tables: Petzold's mean, one that is known, bad tables, and the shipped record."""
 
 import json
+from pathlib import Path
 
 import jax
 import jax.numpy as jnp
@@ -17,6 +18,7 @@ from profilefit.recipes.phases.fit import MOMENTS, fit_phase
 from profilefit.recipes.work import alone
 from tests.fixtures import slow
 
+ROOT = Path(__file__).resolve().parents[3]
 FOLDER = shipped("fits") / "phases"
 PETZOLD = read_phase(FOLDER / "petzold.csv")
 SHIPPED = record.load(FOLDER / "petzold.json")
@@ -69,6 +71,84 @@ def test_every_form_is_a_phase_function(name):
         left = 1 - float(form.phase(np.asarray(constants)).invert(np.cos(1e-4)))
         assert total + left == pytest.approx(1, abs=5e-4)
         assert mean == pytest.approx(2 * np.pi * np.trapezoid(p * x, x) + left, abs=5e-4)
+
+
+@pytest.mark.parametrize(
+    ("factor", "unit", "line"),
+    [
+        (1.0, " [1/sr]", "over all directions, 0.9993."),
+        (0.4367, " [1/(m sr)]", "over all directions, b = 0.4364 1/m."),
+        (0.4367, " [cm^-1 sr^-1]", "over all directions, b = 0.4364 1/cm."),
+        (4 * np.pi, "", "over all directions, 12.56 (4 pi times 0.9993)."),
+    ],
+)
+def test_a_table_of_any_scale_with_a_row_at_zero(tmp_path, factor, unit, line):
+    degrees, path = np.arange(181.0), tmp_path / "table.csv"
+    values = factor * HenyeyGreenstein(0.8).pdf(np.cos(np.radians(degrees)))
+    rows = (f"{a:g}, {value:.12g}" for a, value in zip(degrees, values, strict=True))
+    path.write_text("\n".join([f"angle [deg], value{unit}, sigma", *(f"{row}, {factor * 1e-3}" for row in rows)]))
+    data = read_phase(path)
+    assert data.integral == pytest.approx(factor, rel=1e-3)
+    assert data.mean_cosine == pytest.approx(0.8, abs=1e-3)
+    assert data.sigma[0] == pytest.approx(1e-3 * factor / values[0])
+    lines = record.table_lines(record.described(data))
+    assert lines[0].endswith(line)
+    assert "row at 0 degrees" in lines[1]
+
+
+def test_a_row_at_zero_is_in_the_moments_and_in_no_fit(tmp_path):
+    """Fournier and Forand's form is infinite there, and so is ln angle, along which the misfit is correlated."""
+    degrees = np.append(0.0, np.append(np.geomspace(0.1, 10, 30), np.linspace(15, 180, 34)))
+    data = read_phase(table(tmp_path / "known.csv", KNOWN, degrees=degrees))
+    found = fit_phase(data, "2-terms")
+    np.testing.assert_allclose(found.constants, [0.95, 0.3, 0.7, 0.3], atol=2e-3)
+    assert found.moments == (data.mean_cosine, data.backscattered)
+    assert all(np.all(np.isfinite(error)) for error in found.errors.values() if error is not None)
+
+
+def test_shares_of_angles_without_rows(tmp_path):
+    """Of an isotropic function (cos low - cos high) / 2 by either rule; of another one the rules enclose it."""
+    degrees = np.array([1.0, 3, 10, 20, 40, 60.5, 70, 80, 85, 115, 120, 140])
+    named = [(0.0, 1.0), (40.0, 60.5), (85.0, 115.0), (140.0, 180.0)]
+    for phase in (HenyeyGreenstein(0.0), HenyeyGreenstein(0.7), KNOWN):
+        data = read_phase(table(tmp_path / "table.csv", phase, degrees=degrees))
+        assert [(span.low, span.high) for span in data.spans] == [pytest.approx(one) for one in named]
+        for span in data.spans:
+            ends = np.cos(np.radians([span.low, span.high]))
+            share = float(np.ptp(phase.invert(ends))) / data.integral
+            if phase.mean_cosine == 0:
+                assert (span.share, span.other) == (pytest.approx(share, rel=1e-5), pytest.approx(share, rel=1e-5))
+            else:
+                assert min(span.share, span.other) * 0.99 < share < max(span.share, span.other) * 1.01
+
+
+@pytest.mark.parametrize(("last", "other"), [(0.09, pytest.approx(0.0759, rel=0.05)), (1e300, 1e3)])
+def test_a_last_row_that_is_noise(tmp_path, last, other):
+    """Two rows side by side do not decide what lies beyond, and no share is infinite."""
+    path = tmp_path / "table.csv"
+    path.write_text(HEAD + "".join(f"{a}, 0.08\n" for a in range(1, 151)) + f"150.01, {last}\n")
+    assert read_phase(path).spans[-1].other == other
+
+
+def test_the_lines_of_the_guide(tmp_path):
+    path, degrees = tmp_path / "gaps.csv", np.degrees(PETZOLD.angles)
+    kept = (degrees > 0.3) & ((degrees < 26) | (degrees > 64)) & (degrees < 161)
+    values = 0.4367 * PETZOLD.integral * PETZOLD.values
+    rows = (f"{a:.6g}, {value:.9g}\n" for a, value in zip(degrees[kept], values[kept], strict=True))
+    path.write_text("angle, value [1/(m sr)]\n" + "".join(rows))
+    lines = "\n".join(record.table_lines(record.described(read_phase(path))))
+    assert lines in (ROOT / "docs" / "guide" / "phases.md").read_text()
+
+
+def test_a_first_gap_under_a_row_at_zero(tmp_path):
+    """A peak that 5 degrees do not resolve: the scale is 30 % off, and the difference of both rules says so."""
+    data = read_phase(table(tmp_path / "table.csv", HenyeyGreenstein(0.95), degrees=np.arange(0.0, 181, 5)))
+    (span,) = data.spans
+    assert (span.low, span.high) == (0.0, pytest.approx(5.0))
+    assert data.integral == pytest.approx(1.325, abs=1e-3)
+    right = 1 - HenyeyGreenstein(0.95).invert(np.cos(np.radians(5.0)))
+    assert span.other * data.integral < right < span.share * data.integral
+    assert abs(data.integral - 1) < (span.share - span.other) * data.integral
 
 
 def test_a_known_function_comes_back(tmp_path):
@@ -130,11 +210,18 @@ def test_shipped_record():
     assert data["mean_cosine"] - data["second"] > 0.06
     assert data["regression"] - data["mean_cosine"] > 0.03
     assert record.find("petzold").content == SHIPPED.content
+    # An older record than units and spans.
+    assert record.table_lines(data) == [
+        "petzold.csv: values were divided by their integral over all directions, 0.9924."
+    ]
 
 
 @pytest.mark.slow
 def test_the_record_comes_out_again(tmp_path):
-    again = record.load(alone(record.work(FOLDER / "petzold.csv"), tmp_path))
+    said = []
+    again = record.load(alone(record.work(FOLDER / "petzold.csv"), tmp_path, say=said.append))
+    assert said[:-1] == record.table_lines(again.content["data"])
+    assert len(said) == 4
     for name, one in SHIPPED.content["constants"].items():
         error = max(value for key, value in one.items() if key.endswith("error") and value is not None)
         assert abs(again.content["constants"][name]["regenerated"] - one["regenerated"]) <= 0.01 * error + 1e-9, name
@@ -149,15 +236,19 @@ ROWS = "".join(f"{a}, {1 / (4 * np.pi):.9f}\n" for a in (1, 10, 30, 60, 90, 120,
     [
         ("", "expected a header of angle .*, got an empty file"),
         ("angle, p\n" + ROWS, ":1: expected a header of angle .*, got 'p'"),
-        ("angle [rad], value\n" + ROWS, r":1: expected angle in deg, got \[rad\]"),
+        ("angle [rad], value\n" + ROWS, r":1: expected angle in deg, degrees or without a unit, got \[rad\]"),
         ("angle\n" + ROWS, ":1: expected a header of angle .*, got 'angle'"),
         (HEAD + "1, 2\n", "expected 8 to 5000 rows under the header, got 1"),
-        (HEAD + ROWS + "170, 0.08\n", ":10: expected an angle in .* that rises, got 170"),
+        (HEAD + ROWS + "170, 0.08\n", r":10: expected an angle in \[0, 180\] degrees that rises, got 170"),
+        (HEAD + "0, 1\n0, 1\n" + ROWS, ":3: expected an angle in .* that rises, got 0"),
         (HEAD + ROWS.replace("60,", "nan,"), ":5: column angle: expected a finite number, got 'nan'"),
         (HEAD + ROWS.replace("60, ", "60, -"), ":5: expected a value > 0, got -0.0795775"),
         (HEAD + ROWS.replace("60, ", "60, 3, "), ":5: expected 2 cells, as the header has, got 3"),
         (HEAD + "".join(f"{0.3 * i}, 0.08\n" for i in range(1, 11)), "angles in degrees up to 180, got 3 at most"),
-        (HEAD + ROWS.replace("0.0", "1.0"), "integral over all directions is 1, got 13.57"),
+        (HEAD + "0.1, 9000\n" + ROWS, r"slower than angle\^-2, .*, got angle\^-5.05: a row at 0 degrees"),
+        (HEAD.replace("1/sr", "1/m"), r":1: expected value in 1/sr, .* or without a unit, got \[1/m\]"),
+        ("angle, value [1/(m sr)], sigma [1/sr]\n" + ROWS, r":1: expected sigma in the unit of value, \[1/\(m sr\)\]"),
+        (HEAD + ROWS.replace("0.079577472", "9e307"), "expected values whose integral is finite and > 0, got "),
         ("angle, value, sigma\n" + ROWS.replace("\n", ", 0\n"), ":2: expected a sigma > 0, got 0"),
     ],
 )
@@ -203,6 +294,9 @@ def test_damaged_records(tmp_path):
         with pytest.raises(RecordError, match=message):
             record.load(path).phase("4-terms")
 
+    content["data"]["spans"] = [{"low": "none"}]
+    damaged("data.spans.0.low must be a number")
+    del content["data"]["spans"]
     content["constants"]["4-terms.held.w1"]["regenerated"] = 0.9
     damaged(r"petzold\.json: is damaged: weights must sum to 1")
     del content["constants"]["4-terms.held.w1"]
