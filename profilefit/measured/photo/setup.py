@@ -6,7 +6,6 @@
 from __future__ import annotations
 
 import io
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact.half_space import require_solved
+from mcml_sim.files.text_file import read_toml
 from mcml_sim.files.whole_file import read_whole, write_whole
 from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import Setting
@@ -79,11 +79,7 @@ class Setup:
 
 def read_setup(path: Path) -> Setup:
     """InputError, in one line, of what is no setup."""
-    content = read_whole(path, MAX_BYTES)
-    try:
-        tables = tomllib.loads(content.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path} is not TOML: {error}") from None
+    tables = read_toml(path, MAX_BYTES)
     read = Tables(str(path), KEYS)
     read.known("", tables, KEYS[""])
     of, lens, camera, cards = (read.table(tables, name, {} if name != "medium" else None) for name in KEYS[""])
