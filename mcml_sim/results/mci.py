@@ -121,6 +121,11 @@ class Run:
         """The bins, in cm. Made on first use: thousands of runs with fine grids would fill the memory."""
         return Grid(self.dr, self.nr, self.dz, self.nz, na=self.na)
 
+    @property
+    def cells(self) -> int:
+        """Number of values that its results hold, about."""
+        return (self.nr + 1) * (self.nz + 1) + 2 * (self.nr + 1) * (self.na + 1) + len(self.medium.layers)
+
 
 def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
     """Return the runs of a .mci file of MCML V1 or 2, in their order. Lengths in cm, coefficients in 1/cm.

@@ -12,7 +12,7 @@ import jax.monitoring
 
 from mcml_sim.errors import ELSEWHERE, NAMED, InputError, StoreError
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import read_whole, require_target, require_writable, write_together
+from mcml_sim.files.whole_file import ROOM, read_whole, require_target, require_writable, write_together
 from mcml_sim.media.medium import Medium
 from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
@@ -21,6 +21,7 @@ from mcml_sim.results.tally_file import Results, read_results, results_bytes
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
 
+BYTES = 32  # of a cell: value and error in the .npz, and twelve letters in the .mco
 EVENTS = "/jax/core/compile/"  # tracing, lowering and compiling
 
 
@@ -202,9 +203,10 @@ def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
             taken[place] = job.run.output
         _require_ours(job)
         job.is_in_the_way()
+    room = ROOM + BYTES * sum(job.run.cells for job in jobs if not job.npz.exists())
     for job in jobs:
         for path in (job.mco, job.npz):
-            require_writable(path)
+            require_writable(path, 0 if job.npz.exists() else room)
 
 
 def _require_ours(job: Job) -> None:

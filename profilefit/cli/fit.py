@@ -28,6 +28,7 @@ WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
 PROFILE, PHASE = KINDS = ("profile", "phase")
 OF_HALF_SPACE = ("law", "constants", "fix", "total", "oblique", "n", "g", "seed")
+FIGURES = tuple(f"fit-{name}.{kind}" for name in ("residuals", "corner") for kind in ("png", "svg"))
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 
@@ -154,7 +155,7 @@ def fit(
     if free is not None:
         raise InputError("--free must be left out where there are no --layers")
     if out is not None:
-        require_folder(out)
+        require_folder(out, "fit.json", *FIGURES)
     try:
         with working("fitting", quiet):
             result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=slanted)
@@ -191,7 +192,7 @@ def _of_phase(
     options.require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
     table = read_phase(table_of(str(data)) or data)
     if out is not None:
-        require_folder(out)
+        require_folder(out, "fit.json")
     with working("fitting", quiet):
         body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
     if out is not None:

@@ -106,6 +106,8 @@ def photo(
         surface=_known("--surface", surface), glare=_known("--glare", glare),
     )  # fmt: skip
     setting = Setting(n=n, g=g)
+    if out is not None:
+        require_folder(out, "medium.glsl", "photo.html", "photo.json", make=False)
     law = None if out is None else diffuse_law(setting)
     with working("measuring", quiet):
         found = measured(
@@ -144,7 +146,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
         from mcml_sim.cli.screen import notes, print_json, screen, show
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
-        from profilefit.measured.photo.setup import read_setup, told, written
+        from profilefit.measured.photo.setup import read_setup, room, told, written
         from profilefit.report.tables.photo_tables import setup_tables
 
     if shots:
@@ -152,7 +154,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
     if out is None:
         raise InputError("--out must be a folder for the simulated photographs, got none")
     setup = read_setup(file)
-    require_folder(out)
+    require_folder(out, room=room(setup))
     with working("simulating", quiet):
         bounds = told(setup)
         files = written(setup, out)
