@@ -256,6 +256,8 @@ def read_media(lines: Lines) -> dict[str, Optics]:
             raise lines.error(f"a medium's name, n, mu_a, mu_s and g, {MOST_MEDIA} media at most", shown(name))
         if name in found:
             raise lines.error("each medium once", f"{shown(name)} again")
+        if len(name) > MAX_NAME:
+            raise lines.error(f"a medium's name of at most {MAX_NAME} characters", shown(name))
         of = f"of {shown(name)}"
         mu_s = lines.coefficient(f"mu_s {of} in 1/cm", words[2])
         n, g = lines.decimal(f"n {of}", words[0], INDICES), require_g(lines, of, words[3], mu_s)
@@ -324,7 +326,7 @@ def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
         if name == "end":
             break
         if name not in media or len(found) == MAX_LAYERS + 2:
-            raise lines.error(f"one of the media {', '.join(list(media)[:8])}", shown(name))
+            raise lines.error(f"one of the media {', '.join(media)[:MAX_NAME]}", shown(name))
         found.append((media[name], thickness[0] if thickness else ""))
     if len(found) < 3 or not all(word for _, word in found[1:-1]):
         raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(found)} lines")
