@@ -92,7 +92,7 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
 def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
     """The report of a run that is done."""
     kept = done.results
-    yield f"{kept.photons} photons, seed {options.seed}, {pace(done, options.scheduler is not None)}"
+    yield f"{kept.photons} photons, seed {job.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)
     if options.goal is not None:
         yield precision_reached(kept.estimates[options.goal.quantity], options.goal, kept.photons)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated
@@ -10,7 +11,7 @@ from typing import Annotated
 import typer
 
 from mcml_sim.cli.lazy import interruptible
-from mcml_sim.errors import InputError
+from mcml_sim.errors import InputError, Notice
 
 # Numbers and names of what takes a second to import; a test holds them against it.
 FIRST_LOOKS = ("2.1 million", "8.4 million")
@@ -52,11 +53,14 @@ def _quantities(incomplete: str) -> Iterator[str]:
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="Input file of MCML V1 (.mci).")],
+    file: Annotated[Path, typer.Argument(help="Input file of MCML 1 or 2 (.mci).")],
     photons: Annotated[
         str | None, typer.Option(metavar="NUMBER", help="Photons of each run, such as 1e7.", show_default="the file's")
     ] = None,
-    seed: Annotated[str, typer.Option(metavar="NUMBER", help="Seed of the photons, >= 0.")] = "0",
+    seed: Annotated[
+        str | None,
+        typer.Option(metavar="NUMBER", help="Seed of the photons, >= 0.", show_default="the file's, of MCML 2, else 0"),
+    ] = None,
     precision: Annotated[float | None, typer.Option(help=PRECISION)] = None,
     quantity: Annotated[
         str | None,
@@ -111,13 +115,15 @@ def run(
     if quantity is not None and precision is None:
         raise InputError(f"quantity is what --precision looks at, got {quantity!r} without --precision")
     options = input_runs.RunOptions(
-        seed=_whole("seed", seed, lowest=0),
+        seed=None if seed is None else _whole("seed", seed, lowest=0),
         goal=None if precision is None else Precision(precision, quantity or QUANTITY),
         workers=checked_workers(workers, scheduler),
         scheduler=scheduler,
         progress=False if quiet else None,
     )
     jobs = input_runs.jobs(file, runs, number, out, options)
+    if not quiet and any(one.limit for one in runs):
+        warnings.warn(f"{file}: time limits end no run: each traces all its photons", Notice, stacklevel=2)
     console = Console(highlight=False, soft_wrap=True, quiet=quiet or as_json)
     found = []
     with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines

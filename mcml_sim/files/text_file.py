@@ -24,7 +24,10 @@ from mcml_sim.files.whole_file import read_whole
 MOST_JSON = 2**21  # bytes; the largest file that ships, where arithmetic fails, has two fifths of it
 MOST_TOML = 2**18  # a thousand layers are a third of it
 MOST_LEVELS = 32  # records nest seven deep
-MOST_DIGITS = 300  # of a whole number in JSON, which floating point can hold
+MOST_DIGITS = 300  # of a whole number, which floating point can hold
+LONG_NUMBER = re.compile(r"""(?<![\w.'"])\d[\d_]{%d,}(?![\w.'"])""" % MOST_DIGITS)  # noqa: UP031
+KEY = re.compile(r"""(?:"([^"\n]*)"|([\w.-]+))\s*[:=][^"'=:]*$""")  # at the end of a text, whose value is to follow
+LONGEST_BEFORE = 1000  # characters between a key and its value
 # The time of tomllib goes with the square of the names in a key: a.a.a.a = 1.
 LONG_KEY = re.compile(
     r"""(?<![\w-])(?:(?:[\w-]++|"[^"\n]*+"|'[^'\n]*+')[ \t]*+\.[ \t]*+){%d}""" % MOST_LEVELS  # noqa: UP031
@@ -57,6 +60,11 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
     """
     text = _text(content, most)
 
+    def whole(literal: str) -> int:
+        if len(literal) > MOST_DIGITS:
+            raise _too_long(text, literal)
+        return int(literal)
+
     def constant(name: str) -> float:
         if infinite and name == "Infinity":
             return math.inf
@@ -64,7 +72,11 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
 
     try:
         found = json.loads(
-            text, parse_float=_number, parse_int=_whole, parse_constant=constant, object_pairs_hook=_object
+            text,
+            parse_float=lambda literal: _number(text, literal),
+            parse_int=whole,
+            parse_constant=constant,
+            object_pairs_hook=_object,
         )
     except RecursionError:
         raise ValueError(_too_deep()) from None
@@ -76,11 +88,18 @@ def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
     text = _text(content, most)
     if LONG_KEY.search(text):
         raise ValueError(_too_deep())
+    long = LONG_NUMBER.search(text)
     try:
-        found = tomllib.loads(text, parse_float=_number)
+        found = tomllib.loads(text, parse_float=lambda literal: _number(text, literal))
     except RecursionError:
         raise ValueError(_too_deep()) from None
+    except ValueError as error:
+        if long is None or not str(error).startswith("Exceeds the limit"):
+            raise
+        raise _too_long(text, long[0]) from None
     _checked(found)
+    if long is not None and _has_long(found):
+        raise _too_long(text, long[0])
     return found
 
 
@@ -90,17 +109,31 @@ def _text(content: bytes, most: int) -> str:
     return content.decode("utf-8-sig")
 
 
-def _number(text: str) -> float:
-    number = float(text)
-    if math.isinf(number) and "inf" not in text:  # TOML may say inf
-        raise ValueError(f"the number {_short(text)}, beyond floating point")
+def _number(text: str, literal: str) -> float:
+    number = float(literal)
+    if math.isinf(number) and "inf" not in literal:  # TOML may say inf
+        raise ValueError(f"the number {_short(literal)}, beyond floating point{_place(text, literal)}")
     return number
 
 
-def _whole(text: str) -> int:
-    if len(text) > MOST_DIGITS:
-        raise ValueError(f"a whole number of {len(text)} digits")
-    return int(text)
+def _too_long(text: str, literal: str) -> ValueError:
+    digits = len(literal.replace("_", "").lstrip("-"))
+    return ValueError(f"a whole number of {digits} digits, of {MOST_DIGITS} at most{_place(text, literal)}")
+
+
+def _place(text: str, literal: str) -> str:
+    """Return the key of a number, where there is one, and the line where the number first stands in a text."""
+    at = text.find(literal)
+    key = KEY.search(text[max(at - LONGEST_BEFORE, 0) : at].rstrip("-+"))
+    name = f", of {_short(repr(key[1] or key[2]))}" if key else ""
+    return f"{name} (at line {text.count(chr(10), 0, at) + 1})"
+
+
+def _has_long(value: Any) -> bool:
+    """Return whether a whole number somewhere inside has more digits than floating point holds."""
+    if isinstance(value, dict | list):
+        return any(_has_long(one) for one in (value.values() if isinstance(value, dict) else value))
+    return isinstance(value, int) and abs(value) >= 10**MOST_DIGITS
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:

@@ -17,6 +17,7 @@ import errno
 import os
 import reprlib
 import secrets
+import shutil
 import stat
 import sys
 import tempfile
@@ -28,6 +29,8 @@ from mcml_sim.errors import InputError, OutputError
 UNFINISHED = ".part"  # ends the name of a file that is not whole yet, or about to be replaced
 NAME_KEPT = 30  # characters of its name in that name: file systems hold 255 bytes, some of them 143
 LONGEST_CHAIN = 40  # links, as in Linux
+ROOM = 2**22  # bytes that a disk must have free before work begins: a command's numbers and figures are smaller
+MEGABYTE = 1e6
 
 
 def checked_path(path: object) -> Path:
@@ -50,14 +53,27 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
         raise InputError(f"{path}: expected a file that can be read, got: {reason}") from None
 
 
-def require_folder(folder: Path) -> None:
-    """OutputError unless files can be made in `folder`: better now than after an hour of photons. Makes the folder."""
+def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = True) -> None:
+    """Raise OutputError unless files can be made in `folder`: better now than after an hour of photons.
+
+    files  names in the folder that must be free, or of what can be replaced
+    room   bytes that its disk must have free
+    make   whether to make the folder; else the nearest folder above that exists is looked at
+    """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
+        if make:
+            folder.mkdir(parents=True, exist_ok=True)
+        place = next(one for one in (folder, *folder.absolute().parents) if os.path.lexists(one))
+        with tempfile.TemporaryFile(dir=place):
             pass
+        disk = shutil.disk_usage(place)
+        if disk.total and disk.free < room:  # some network disks say 0 of both
+            got = f"{disk.free / MEGABYTE:.1f} MB are free, {room / MEGABYTE:.0f} MB may be needed"
+            raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)}: {got}")
     except (OSError, ValueError) as error:
         raise OutputError(f"cannot write into {folder}: {_reason(error)}") from None
+    for name in files:
+        require_target(folder / name)
 
 
 def require_target(path: Path) -> None:
@@ -66,16 +82,19 @@ def require_target(path: Path) -> None:
         _target(path)
 
 
-def require_writable(path: Path) -> None:
+def require_writable(path: Path, room: float = ROOM) -> None:
     """OutputError unless `write_whole(path)` can work, as far as can be known before. Makes its folder."""
     with _named(path):
         target = _target(path)
     if target is not None:
-        require_folder(target.parent if path.is_symlink() else path.parent)
+        require_folder(target.parent if path.is_symlink() else path.parent, room=room)
 
 
 def write_whole(path: Path, content: bytes | str) -> None:
-    """Write a file, whole or not at all; text in UTF-8. OutputError names file and reason."""
+    """Write a file, whole or not at all; text in UTF-8, with half characters of file names as their escapes.
+
+    OutputError names file and reason.
+    """
     write_together({path: content})
 
 
@@ -91,7 +110,7 @@ def write_together(contents: Mapping[Path, bytes | str]) -> None:
     try:
         for path, content in contents.items():
             with _named(path):
-                data = content.encode() if isinstance(content, str) else content
+                data = content.encode("utf-8", "backslashreplace") if isinstance(content, str) else content
                 target = _target(path)
                 if target is None:
                     streams[path] = data

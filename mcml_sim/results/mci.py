@@ -1,7 +1,7 @@
 """MCML's input files: a .mci names runs, each with an output file, photons, bins and layers. Lengths in cm.
 
-The format is that of MCML V1 (Wang, Jacques & Zheng 1995, and the function ReadParm of its mcmlio.c): a version, the
-number of runs, and for each run
+The first format is that of MCML V1 (Wang, Jacques & Zheng 1995, and the function ReadParm of its mcmlio.c): a version,
+the number of runs, and for each run
 
     NAME.mco A              output file, and A or B
     1000000                 photons
@@ -17,17 +17,45 @@ is what follows the last run. Comments may have any bytes. Unlike V1, a number t
 a line too many, and so is a word that is not quite a number, of which V1 reads what it can: 1 photon of 1e6. V1 wrote
 text for B as for A, so B is read and makes no difference. Beyond V1, g may be negative, and the last thickness may be
 `inf`; the 1E8 that V1's users write for that stays a length.
+
+The second is that of MCML 2 (Wang & Jacques 1996, ReadMediumListQ and ReadParam of its mcmlio.c): media by name, then
+runs until `end`.
+
+    mcmli2.0                file version
+    air   1.0 0 0 0         media by name: n mu_a mu_s g
+    skin  1.37 1 100 0.9
+    end
+    NAME.mco A              output file, and A or B
+    air                     layers from the top: the medium above, each layer with its thickness, the medium below
+    skin 0.1
+    air
+    end
+    pencil                  source, and the depth that it starts from
+    0
+    0.01 0.01 0.1           dz dr dt
+    40 50 1 1               nz nr nt na
+    Rd_r A_rz               what is scored; a line that ends in \\ goes on in the next
+    1000000 10:00           photons, and a time limit
+    1E-4                    threshold weight of the roulette
+    1                       seed
+    end                     of all runs
+
+What is simulated here is a pencil beam onto the surface without times: an isotropic or a buried source, a quantity
+resolved in time and a number of photons that only a time limits are refused. Everything else that can be scored is, in
+the format of V1. The roulette has no bias, so its threshold makes no difference, and no time limit ends a run.
 """
 
 from __future__ import annotations
 
 import io
 import itertools
+import math
 import os
 import posixpath
 import re
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.whole_file import read_whole
@@ -45,6 +73,14 @@ LENGTHS = (1e-12, 1e12)  # [cm]
 COEFFICIENTS = (1e-12, 1e12)  # [1/cm]; or 0
 INDICES = (0.01, 100.0)
 
+VERSION_2 = "mcmli2."
+PENCIL = "pencil"
+MOST_MEDIA = 1000
+MOST_SEED = 2**31 - 1
+SCORED = ("Rd_r", "Rd_a", "Rd_ra", "Td_r", "Td_a", "Td_ra", "A_z", "A_rz")
+PICOSECONDS = (1e-12, 1e12)
+LARGEST = 1e30  # of a number that makes no difference
+
 WHOLE = re.compile(r"[+-]?[0-9]{1,30}")
 DECIMAL = re.compile(r"[+-]?([0-9]+(\.[0-9]*)?|\.[0-9]+)([eE][+-]?[0-9]{1,4})?")
 INFINITE = re.compile(r"\+?inf(inity)?", re.IGNORECASE)
@@ -54,6 +90,7 @@ STRAY = re.compile(r"[\udc80-\udcff]")
 # What V1 drops from a line: control characters that are no white space (old DOS files end in one).
 CONTROL = re.compile(r"[\x00-\x08\x0e-\x1f\x7f]")
 LONGEST_SHOWN = 40  # characters of a word in a message
+OUTPUT = "the name of an output file, and A or B"
 
 
 @dataclass(frozen=True)
@@ -74,15 +111,24 @@ class Run:
     na: int
     """Numbers of depths, rings and exit angles."""
     medium: Medium
+    seed: int | None = None
+    """Of an input of MCML 2."""
+    limit: str = ""
+    """Time limit of an input of MCML 2, which ends no run here."""
 
     @property
     def grid(self) -> Grid:
         """The bins, in cm. Made on first use: thousands of runs with fine grids would fill the memory."""
         return Grid(self.dr, self.nr, self.dz, self.nz, na=self.na)
 
+    @property
+    def cells(self) -> int:
+        """Number of values that its results hold, about."""
+        return (self.nr + 1) * (self.nz + 1) + 2 * (self.nr + 1) * (self.na + 1) + len(self.medium.layers)
+
 
 def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
-    """The runs of a V1 .mci file, in their order. Lengths in cm, coefficients in 1/cm.
+    """Return the runs of a .mci file of MCML V1 or 2, in their order. Lengths in cm, coefficients in 1/cm.
 
     InputError in one line, `FILE:LINE: expected ..., got ...`, for everything that is not such a file, and for runs
     beyond the bounds above: 1e13 photons, 65536 bins an axis, 2^21 cells a table, 1000 layers, 10000 runs, 2 MiB.
@@ -93,9 +139,11 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
     """What `read_mci` gives for a file of this name and content."""
     lines = Lines(name, _checked(name, content))
-    (version,) = lines.take(1, "the file version, 1.0")
+    (version,) = lines.take(1, "the file version, 1.0 or mcmli2.0")
+    if version.startswith(VERSION_2):
+        return tuple(_runs_of_2(lines, read_media(lines)))
     if not (DECIMAL.fullmatch(version) and 1 <= float(version) < 2):
-        raise lines.error("the file version, 1.0", shown(version))
+        raise lines.error("the file version, 1.0 or mcmli2.0", shown(version))
     (word,) = lines.take(1, "the number of runs")
     taken: set[str] = set()
     return tuple(read_run(lines, taken) for _ in range(lines.whole("the number of runs", word, MAX_RUNS)))
@@ -146,11 +194,13 @@ class Lines:
         """What to raise about the line that was read last."""
         return InputError(f"{self._name}:{self._number}: expected {expected}, got {got}")
 
-    def whole(self, name: str, word: str, most: int) -> int:
-        """A whole number from 1 to `most`."""
-        if WHOLE.fullmatch(word) and 1 <= int(word) <= most:
+    def whole(self, name: str, word: str, most: int, least: int = 1, decimal: bool = False) -> int:
+        """Return a whole number from `least` to `most`; `decimal` takes 1e6, too."""
+        if decimal and DECIMAL.fullmatch(word) and float(word).is_integer() and least <= float(word) <= most:
+            return int(float(word))
+        if WHOLE.fullmatch(word) and least <= int(word) <= most:
             return int(word)
-        raise self.error(f"{name}, a whole number from 1 to {most}", shown(word))
+        raise self.error(f"{name}, a whole number from {least} to {most}", shown(word))
 
     def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
         """A number within bounds, both included."""
@@ -167,23 +217,131 @@ class Lines:
 
 def read_run(lines: Lines, taken: set[str]) -> Run:
     """The run that the next lines are of; `taken` are the output files of those before it."""
-    output, form = _output(lines, taken)
+    output, form = _output(lines, taken, *lines.take(1, OUTPUT, optional=1))
     (word,) = lines.take(1, "the number of photons")
     photons = lines.whole("the number of photons", word, MAX_PHOTONS)
     words = lines.take(2, "dz and dr")
     dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words, strict=True))
     words = lines.take(3, "nz, nr and na")
-    axes = zip(("nz", "nr", "na"), words, strict=True)
-    nz, nr, na = (lines.whole(f"{name}, a number of bins", word, MAX_BINS) for name, word in axes)
-    for name, cells in (("nr nz", nr * nz), ("nr na", nr * na)):
-        if cells > MAX_CELLS:
-            raise lines.error(f"{name}, the cells of a table, to be at most {MAX_CELLS}", str(cells))
+    nz, nr, na = _bins(lines, dict(zip(("nz", "nr", "na"), words, strict=True)))
     return Run(output, form, photons, dz, dr, nz, nr, na, _medium(lines))
 
 
-def _output(lines: Lines, taken: set[str]) -> tuple[str, str]:
+def _bins(lines: Lines, words: dict[str, str], decimal: bool = False) -> tuple[int, int, int]:
+    """Return nz, nr and na."""
+    of = {name: lines.whole(f"{name}, a number of bins", word, MAX_BINS, 1, decimal) for name, word in words.items()}
+    for other in ("nz", "na"):
+        if (cells := of["nr"] * of[other]) > MAX_CELLS:
+            raise lines.error(f"nr {other}, the cells of a table, to be at most {MAX_CELLS}", str(cells))
+    return of["nz"], of["nr"], of["na"]
+
+
+class Optics(NamedTuple):
+    """Of a medium of MCML 2 [-, 1/cm]."""
+
+    n: float
+    mu_a: float
+    mu_s: float
+    g: float
+
+
+def read_media(lines: Lines) -> dict[str, Optics]:
+    """Return the media that the next lines of a file of MCML 2 define, up to `end`."""
+    found: dict[str, Optics] = {}
+    while True:
+        name, *words = lines.take(1, "a medium, its n, mu_a, mu_s and g, or end", optional=4)
+        if name == "end":
+            return found
+        if len(words) < 4 or len(found) == MOST_MEDIA:
+            raise lines.error(f"a medium's name, n, mu_a, mu_s and g, {MOST_MEDIA} media at most", shown(name))
+        if name in found:
+            raise lines.error("each medium once", f"{shown(name)} again")
+        if len(name) > MAX_NAME:
+            raise lines.error(f"a medium's name of at most {MAX_NAME} characters", shown(name))
+        of = f"of {shown(name)}"
+        mu_s = lines.coefficient(f"mu_s {of} in 1/cm", words[2])
+        n, g = lines.decimal(f"n {of}", words[0], INDICES), require_g(lines, of, words[3], mu_s)
+        found[name] = Optics(n, lines.coefficient(f"mu_a {of} in 1/cm", words[1]), mu_s, g)
+
+
+def _runs_of_2(lines: Lines, media: dict[str, Optics]) -> Iterator[Run]:
+    taken: set[str] = set()
+    while True:
+        name, *form = lines.take(1, f"{OUTPUT}, or end", optional=1)
+        if name == "end":
+            if not taken:
+                raise lines.error(OUTPUT, "'end'")
+            return
+        if len(taken) == MAX_RUNS:
+            raise lines.error("end", f"more than {MAX_RUNS} runs")
+        yield read_run_2(lines, media, *_output(lines, taken, name, *form), scored=())
+
+
+def read_run_2(lines: Lines, media: dict[str, Optics], output: str, form: str, scored: tuple[str, ...]) -> Run:
+    """Return the run of a file of MCML 2 whose layers come next.
+
+    scored  quantities that an output file must have; () of an input file, whose quantities must be of `SCORED`
+    """
+    medium = _medium_of_2(lines, media)
+    (source,) = lines.take(1, "the source, pencil")
+    if source != PENCIL:
+        raise lines.error("a pencil beam, pencil", shown(source))
+    depth, *_ = lines.take(1, "the depth that light starts from", optional=1)
+    if lines.decimal("the depth that light starts from, 0", depth, (0.0, LARGEST)) != 0:
+        raise lines.error("light that starts at the surface, 0", shown(depth))
+    words = lines.take(3, "dz, dr and dt")
+    dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words[:2], strict=True))
+    lines.decimal("dt in ps", words[2], PICOSECONDS)
+    words = lines.take(4, "nz, nr, nt and na")
+    lines.whole("nt, a number of bins", words[2], MAX_BINS, decimal=True)
+    nz, nr, na = _bins(lines, {"nz": words[0], "nr": words[1], "na": words[3]}, decimal=True)
+    _require_scored(lines, scored)
+    word, *rest = lines.take(1, "the number of photons", optional=1)
+    photons = lines.whole("the number of photons", word, MAX_PHOTONS, decimal=True)
+    (word,) = lines.take(1, "the threshold weight")
+    lines.decimal("the threshold weight", word, (0.0, 1.0))
+    (word,) = lines.take(1, "the seed")
+    seed = lines.whole("the seed", word, MOST_SEED, least=0)
+    return Run(output, form, photons, dz, dr, nz, nr, na, medium, seed, rest[0] if rest else "")
+
+
+def _require_scored(lines: Lines, needed: tuple[str, ...]) -> None:
+    words = lines.take(1, "what is scored", optional=20)
+    while words[-1] == "\\":
+        words[-1:] = lines.take(1, "what is scored", optional=20)
+    names = {word.upper() for word in words}
+    for one in needed:
+        if one.upper() not in names:
+            raise lines.error(f"{one} among what was scored", shown(" ".join(words)))
+    known = {one.upper() for one in SCORED}
+    for word in () if needed else words:
+        if word.upper() not in known:
+            raise lines.error(f"quantities of {', '.join(SCORED)}, none resolved in time", shown(word))
+
+
+def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
+    found: list[tuple[Optics, str]] = []
+    while True:
+        name, *thickness = lines.take(1, "a layer's medium and thickness, or end", optional=1)
+        if name == "end":
+            break
+        if name not in media or len(found) == MAX_LAYERS + 2:
+            raise lines.error(f"one of the media {', '.join(media)[:MAX_NAME]}", shown(name))
+        found.append((media[name], thickness[0] if thickness else ""))
+    if len(found) < 3 or not all(word for _, word in found[1:-1]):
+        raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(found)} lines")
+    layers: list[Layer] = []
+    for at, (optics, word) in enumerate(found[1:-1], start=1):
+        of, endless = f"of layer {at} of {len(found) - 2}", INFINITE.fullmatch(word) and at == len(found) - 2
+        if endless and optics.mu_a == optics.mu_s == 0:
+            raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", "0 and 0")
+        thick = math.inf if endless else lines.decimal(f"thickness {of} in cm", word, LENGTHS)
+        layers.append(Layer(*optics, thickness=thick))
+    return Medium(tuple(layers), found[0][0].n, found[-1][0].n)
+
+
+def _output(lines: Lines, taken: set[str], name: str, *form: str) -> tuple[str, str]:
     """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
-    name, *form = lines.take(1, "the name of an output file, and A or B", optional=1)
     if len(name) > MAX_NAME or not name.isprintable():
         raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", shown(name))
     if form and not FORMAT.fullmatch(form[0]):

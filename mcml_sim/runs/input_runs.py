@@ -12,7 +12,7 @@ import jax.monitoring
 
 from mcml_sim.errors import ELSEWHERE, NAMED, InputError, StoreError
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import read_whole, require_target, require_writable, write_together
+from mcml_sim.files.whole_file import ROOM, read_whole, require_target, require_writable, write_together
 from mcml_sim.media.medium import Medium
 from mcml_sim.results.mci import Run
 from mcml_sim.results.mco import HEAD_BYTES, begins_mco, made_by, mco_text
@@ -21,6 +21,7 @@ from mcml_sim.results.tally_file import Results, read_results, results_bytes
 from mcml_sim.runs.simulation import batch_photons, is_store_of, require_store, simulate
 from mcml_sim.runs.store import batches, discard, strange
 
+BYTES = 32  # of a cell: value and error in the .npz, and twelve letters in the .mco
 EVENTS = "/jax/core/compile/"  # tracing, lowering and compiling
 
 
@@ -58,10 +59,11 @@ class Compiling:
 class RunOptions:
     """What all runs have in common; arguments as for `simulate`.
 
+    seed  of all runs; None is the seed that an input of MCML 2 gives each, else 0
     goal  the precision at which a run may stop early
     """
 
-    seed: int
+    seed: int | None
     goal: Precision | None
     workers: int | None
     scheduler: str | None
@@ -74,6 +76,7 @@ class Job:
 
     run: Run
     photons: int
+    seed: int
     mco: Path
     npz: Path
     store: Path
@@ -88,13 +91,13 @@ class Job:
         """True if the store holds batches beyond this run's photons, which are a longer run's."""
         return self._holds_more(self.run.medium, self.photons)
 
-    def is_in_the_way(self, seed: int) -> bool:
+    def is_in_the_way(self) -> bool:
         """True if the store holds what another run left, finished: no more photons than the results to be replaced.
 
         StoreError if it holds anything else of another run.
         """
         try:
-            require_store(self.store, self.run.medium, self.run.grid, seed)
+            require_store(self.store, self.run.medium, self.run.grid, self.seed)
         except StoreError:
             done = _results(self.npz) if self.store.is_dir() else None
             if done is None or self._holds_more(done.medium, done.photons):
@@ -128,7 +131,10 @@ def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | 
     photons  instead of the file's;  folder  for the results instead of the current one
     InputError, OutputError or StoreError where a run could not keep its results: better now than hours later.
     """
-    found = [Job(one, photons or one.photons, *_outputs(one, folder)) for one in runs]
+    seeds = [(one.seed or 0) if options.seed is None else options.seed for one in runs]
+    found = [
+        Job(one, photons or one.photons, seed, *_outputs(one, folder)) for one, seed in zip(runs, seeds, strict=True)
+    ]
     _require_room(file, found, options)
     return found
 
@@ -145,7 +151,7 @@ def done(job: Job, options: RunOptions) -> Done:
 
 
 def _traced(job: Job, options: RunOptions) -> Done:
-    if job.is_in_the_way(options.seed):
+    if job.is_in_the_way():
         discard(job.store)
     resumed, start = job.is_begun, time.perf_counter()
     with Compiling() as compiling:
@@ -153,7 +159,7 @@ def _traced(job: Job, options: RunOptions) -> Done:
             job.run.medium,
             job.run.grid,
             job.photons,
-            seed=options.seed,
+            seed=job.seed,
             store=job.store,
             workers=options.workers,
             precision=options.goal,
@@ -196,10 +202,11 @@ def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
                 raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
             taken[place] = job.run.output
         _require_ours(job)
-        job.is_in_the_way(options.seed)
+        job.is_in_the_way()
+    room = ROOM + BYTES * sum(job.run.cells for job in jobs if not job.npz.exists())
     for job in jobs:
         for path in (job.mco, job.npz):
-            require_writable(path)
+            require_writable(path, 0 if job.npz.exists() else room)
 
 
 def _require_ours(job: Job) -> None:
@@ -218,12 +225,12 @@ def _require_ours(job: Job) -> None:
 def _finished(job: Job, options: RunOptions) -> Results | None:
     """The run's results, if its files are there and of this very run."""
     found = _results(job.npz)
-    if found is None or not job.mco.is_file() or made_by(options.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
+    if found is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
     if (found.medium, found.grid, found.seed, found.version) != (
         job.run.medium,
         job.run.grid,
-        options.seed,
+        job.seed,
         __version__,
     ):
         return None

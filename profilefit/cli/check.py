@@ -70,7 +70,7 @@ def check(
     folder = records_folder(fits, quiet)
     those = chosen(names or [], constants, folder)
     if out is not None:
-        require_apart(out, folder)
+        require_apart(out, folder, "check.json")
     found = checked(those, folder, precision is FloatFormat.HALF, quiet)
     if out is not None or as_json:
         whole = content(found.laws, found.maps, found.costs, found.halves, found.device)

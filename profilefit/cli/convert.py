@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import math
 import re
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import LIGHTS, LIGHTS_HELP, AsJson
+from profilefit.cli.options import LIGHTS, LIGHTS_HELP, AsJson, percent
 from profilefit.errors import InputError
 
 if TYPE_CHECKING:
@@ -114,13 +115,21 @@ def convert(
 
 def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None, n: float) -> Floats:
     if alpha is not None:
-        return _numbers("--alpha", alpha)[0]
+        return _shares("--alpha", alpha)
     if illumination is None:
         raise InputError(f"--illumination must be one of {', '.join(LIGHTS)} with --reflectance, got none")
     with interruptible(__name__):
         from profilefit.convert import alpha_of
 
-    return alpha_of(_numbers("--reflectance", reflectance or "")[0], illumination, n)
+    return alpha_of(_shares("--reflectance", reflectance or ""), illumination, n)
+
+
+def _shares(option: str, text: str) -> Floats:
+    """Return numbers between commas, none of them a percent."""
+    for word in text.split(","):
+        if hint := percent(word):
+            raise InputError(f"{option} must be numbers in [0, 1], between commas, got {word.strip()!r}{hint}")
+    return _numbers(option, text)[0]
 
 
 def _of_length(alpha: Floats, given: dict[str, str]) -> tuple[Optical, str]:
@@ -163,13 +172,17 @@ def _numbers(option: str, text: str, units: tuple[str, ...] = ()) -> tuple[Float
     with interruptible(__name__):
         import numpy as np
 
+        from mcml_sim.media.checks import shown
+
     numbers, found = [], set()
     for word in text.split(","):
         match = NUMBER.fullmatch(word.strip())
         if match is None or match[2] not in ("", *units):
             accepted = f"numbers, with a unit of {', '.join(units)} or none" if units else "numbers"
-            raise InputError(f"{option} must be {accepted}, between commas, got {text!r}")
-        numbers.append(float(match[1]))
+            raise InputError(f"{option} must be {accepted}, between commas, got {shown(text)}")
+        if not math.isfinite(number := float(match[1])):
+            raise InputError(f"{option} must be numbers that floating point holds, got {shown(word)}")
+        numbers.append(number)
         found.add(match[2])
     if len(found - {""}) > 1:
         raise InputError(f"{option} must have one unit, got {', '.join(sorted(found))}")

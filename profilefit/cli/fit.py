@@ -28,6 +28,7 @@ WITH_ERROR = re.compile(r"(?P<value>[^±]+?)\s*(?:±|\+-)\s*(?P<error>.+)")
 FREE = "free"
 PROFILE, PHASE = KINDS = ("profile", "phase")
 OF_HALF_SPACE = ("law", "constants", "fix", "total", "oblique", "n", "g", "seed")
+FIGURES = tuple(f"fit-{name}.{kind}" for name in ("residuals", "corner") for kind in ("png", "svg"))
 PAIR = re.compile(r"([0-9.]+)\s*:\s*([0-9.]+)")
 
 
@@ -72,7 +73,7 @@ def fit(
     beam: Annotated[
         str | None,
         typer.Option(
-            help="1/e² radius of a Gaussian beam (0.5mm), a range of it (0.3mm:0.7mm), tophat:0.5mm, or a .csv.",
+            help="1/e² radius of a Gaussian beam (0.5mm), its range (0.3mm:0.7mm), fwhm:0.6mm, tophat:0.5mm, a .csv.",
             show_default="a pencil beam",
         ),
     ] = None,
@@ -154,7 +155,7 @@ def fit(
     if free is not None:
         raise InputError("--free must be left out where there are no --layers")
     if out is not None:
-        require_folder(out)
+        require_folder(out, "fit.json", *FIGURES)
     try:
         with working("fitting", quiet):
             result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=slanted)
@@ -191,7 +192,7 @@ def _of_phase(
     options.require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
     table = read_phase(table_of(str(data)) or data)
     if out is not None:
-        require_folder(out)
+        require_folder(out, "fit.json")
     with working("fitting", quiet):
         body = content(table, fits_of(table, ALL_ANGLES if angles is None else _range(angles)))
     if out is not None:
@@ -208,10 +209,13 @@ def _of_phase(
 
 
 def _range(text: str) -> tuple[float, float]:
+    with interruptible(__name__):
+        from mcml_sim.media.checks import shown
+
     match = PAIR.fullmatch(text.strip())
     low, high = (_number("--angles", match[at]) for at in (1, 2)) if match else (1.0, 0.0)
     if not 0 <= low < high <= 180:
-        raise InputError(f"--angles must be two rising angles in 0 ... 180 degrees, such as 1:180, got {text!r}")
+        raise InputError(f"--angles must be two rising angles in 0 ... 180 degrees, such as 1:180, got {shown(text)}")
     return low, high
 
 
@@ -248,16 +252,19 @@ def _radius(option: str, text: str | None, unit: str) -> float | None:
 def _held(fix: list[str], unit: str) -> dict[str, float]:
     """What `--fix` holds: alpha or A, and l."""
     with interruptible(__name__):
+        from mcml_sim.media.checks import shown
         from profilefit.measured.lengths import length
 
     held: dict[str, float] = {}
     for text in fix:
         match = FIXED.fullmatch(text.strip())
         if match is None:
-            raise InputError(f"--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got {text!r}")
+            raise InputError(f"--fix must be l=LENGTH, alpha=NUMBER or A=NUMBER, got {shown(text)}")
         name, value, option = match[1], match[2], f"--fix {match[1]}"
         if name in held or {"alpha", "A"} <= {name, *held}:
             raise InputError(f"--fix must hold each of l and alpha (or A) once, got {' and '.join(fix)}")
+        if name != "l" and (hint := options.percent(value)):
+            raise InputError(f"{option} must be a number in (0, 1), got {shown(value)}{hint}")
         held[name] = length(option, value, unit) if name == "l" else _number(option, value)
     return held
 
@@ -271,14 +278,18 @@ def _scale(text: str) -> float | Known | None:
 
 
 def _total(text: str) -> Known:
+    accepted, hint = "a reflectance in (0, 1) with its error, such as 0.52+-0.01", options.percent(text)
+    if hint:
+        raise InputError(f"--total must be {accepted}, got {text!r}{hint}")
     known = _known("--total", text)
     if known.error == 0 or known.value >= 1:
-        raise InputError(f"--total must be a reflectance in (0, 1) with its error, such as 0.52+-0.01, got {text!r}")
+        raise InputError(f"--total must be {accepted}, got {text!r}")
     return known
 
 
 def _oblique(text: str, unit: str) -> Oblique:
     with interruptible(__name__):
+        from mcml_sim.media.checks import shown
         from profilefit.measured.lengths import length
         from profilefit.measured.oblique import Oblique
 
@@ -286,7 +297,7 @@ def _oblique(text: str, unit: str) -> Oblique:
     match = WITH_ERROR.fullmatch(shift.strip())
     if match is None:
         accepted = "an angle in degrees, a radius and a shift with its error, such as 45:4mm:0.52mm+-0.01mm"
-        raise InputError(f"--oblique must be {accepted}, got {text!r}")
+        raise InputError(f"--oblique must be {accepted}, got {shown(text)}")
     degrees = _number("--oblique's angle", angle)
     if not 0 < degrees < 90:
         raise InputError(f"--oblique's angle must lie between 0 and 90 degrees, got {angle!r}")
@@ -297,6 +308,7 @@ def _oblique(text: str, unit: str) -> Oblique:
 def _known(option: str, text: str) -> Known:
     """A number > 0, with or without an error."""
     with interruptible(__name__):
+        from mcml_sim.media.checks import shown
         from profilefit.measured import Known
         from profilefit.measured.data import LARGEST, SMALLEST
 
@@ -307,17 +319,20 @@ def _known(option: str, text: str) -> Known:
         accepted = (
             f"a number > 0, {'free, ' if option == '--scale' else ''}or a number with its error such as 1.0+-0.02"
         )
-        raise InputError(f"{option} must be {accepted}, got {text!r}")
-    if not SMALLEST <= value <= LARGEST:
-        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {text!r}")
+        raise InputError(f"{option} must be {accepted}, got {shown(text)}")
+    if not SMALLEST <= value <= LARGEST or error > LARGEST:
+        raise InputError(f"{option} must lie between {SMALLEST:g} and {LARGEST:g}, got {shown(text)}")
     return Known(value, error)
 
 
 def _number(option: str, text: str) -> float:
+    with interruptible(__name__):
+        from mcml_sim.media.checks import shown
+
     try:
         number = float(text)
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
-        raise InputError(f"{option} must be a number, got {text!r}")
+        raise InputError(f"{option} must be a number, got {shown(text)}")
     return number

@@ -40,7 +40,7 @@ def fit_of_layers(
 
     medium = _medium(file, measured.unit)
     if out is not None:
-        require_folder(out)
+        require_folder(out, "fit.json")
     with working("fitting layers", quiet):
         found = fit_layers(measured, medium, [name.strip() for name in free.split(",")], premises, scale)
     body = layers_content(found)

@@ -48,6 +48,7 @@ OPTIONS = {
     "scaled": "--scale free",
     "unit": "--unit",
 }
+PERCENT = re.compile(r"(\d+\.?\d*|\.\d+)\s*(%?)")
 ARGUMENT = re.compile(r"^(\w+)(?=[\w ]* must )|`(\w+)`")
 
 
@@ -57,6 +58,13 @@ def require_left_out(context: typer.Context, names: Iterable[str], where: str) -
         source = context.get_parameter_source(name)
         if source is not None and source.name == "COMMANDLINE":
             raise InputError(f"--{name.replace('_', '-')} must be left out where {where}")
+
+
+def percent(text: str) -> str:
+    """Return a hint for the end of a message, where a share was written as a percent; else an empty text."""
+    match = PERCENT.match(text.strip())
+    is_one = match is not None and (match[2] or 2 < float(match[1]) <= 100)
+    return f" (a share: {float(match[1]) / 100:g} for {match[1]} %)" if match is not None and is_one else ""
 
 
 def in_options(text: Any) -> Any:

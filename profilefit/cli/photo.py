@@ -9,7 +9,7 @@ import typer
 from typer.core import TyperCommand
 
 from mcml_sim.cli.lazy import interruptible
-from profilefit.cli.options import AsJson, Quiet, require_left_out
+from profilefit.cli.options import AsJson, Quiet, percent, require_left_out
 from profilefit.errors import InputError
 
 if TYPE_CHECKING:
@@ -53,7 +53,7 @@ def photo(
     scale: Annotated[
         str | None, typer.Option(help="0.05mm/px, a ruler's two points X,Y:X,Y=10mm, or aruco:20mm, a marker's side.")
     ] = None,
-    beam: Annotated[str | None, typer.Option(help="1/e² radius, as far as known: 0.5mm+-0.05mm.")] = None,
+    beam: Annotated[str | None, typer.Option(help="1/e² radius, or fwhm:, as far as known: 0.5mm+-0.05mm.")] = None,
     surface: Annotated[str, typer.Option(help="Share of the light that the surface scatters.")] = "0.01+-0.01",
     glare: Annotated[str, typer.Option(help="Share of the light that the lens scatters.")] = "0.02+-0.02",
     reflectance: Annotated[str, typer.Option(help="Of the grey card.")] = "0.18+-0.005",
@@ -106,6 +106,8 @@ def photo(
         surface=_known("--surface", surface), glare=_known("--glare", glare),
     )  # fmt: skip
     setting = Setting(n=n, g=g)
+    if out is not None:
+        require_folder(out, "medium.glsl", "photo.html", "photo.json", make=False)
     law = None if out is None else diffuse_law(setting)
     with working("measuring", quiet):
         found = measured(
@@ -144,7 +146,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
         from mcml_sim.cli.screen import notes, print_json, screen, show
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
-        from profilefit.measured.photo.setup import read_setup, told, written
+        from profilefit.measured.photo.setup import read_setup, room, told, written
         from profilefit.report.tables.photo_tables import setup_tables
 
     if shots:
@@ -152,7 +154,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
     if out is None:
         raise InputError("--out must be a folder for the simulated photographs, got none")
     setup = read_setup(file)
-    require_folder(out)
+    require_folder(out, room=room(setup))
     with working("simulating", quiet):
         bounds = told(setup)
         files = written(setup, out)
@@ -164,24 +166,29 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
 
 
 def _known(option: str, text: str, lengths: bool = False) -> Known:
-    """A value and its error, 0.18+-0.005; of lengths, in mm."""
+    """Return a value and its error, 0.18+-0.005; of lengths, in mm, where fwhm: may stand before."""
     with interruptible(__name__):
+        from mcml_sim.media.checks import shown
         from profilefit.cli.fit import WITH_ERROR
         from profilefit.measured import Known
+        from profilefit.measured.beam import BY_FWHM, FWHM
         from profilefit.measured.lengths import length
 
-    match = WITH_ERROR.fullmatch(text.strip())
-    example = "0.5mm+-0.05mm" if lengths else "0.02+-0.02"
+    is_fwhm = lengths and text.strip().lower().startswith(FWHM)
+    match = WITH_ERROR.fullmatch(text.strip()[len(FWHM) if is_fwhm else 0 :])
+    example = "0.5mm+-0.05mm or fwhm:0.6mm+-0.06mm" if lengths else "0.02+-0.02"
+    got = f"got {shown(text)}{'' if lengths else percent(text)}"
     if match is None:
-        raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}")
+        raise InputError(f"{option} must be a value with its error, such as {example}, {got}")
     try:
         value, error = (
             length(option, match[name], "mm") if lengths else float(match[name]) for name in ("value", "error")
         )
     except ValueError:
-        raise InputError(f"{option} must be a value with its error, such as {example}, got {text!r}") from None
+        raise InputError(f"{option} must be a value with its error, such as {example}, {got}") from None
     most = 1e6 if lengths else 1.0
     if not (0 < value < most and 0 < error < most):
         accepted = "> 0" if lengths else "between 0 and 1"
-        raise InputError(f"{option} must be a value {accepted} with an error {accepted}, got {text!r}")
-    return Known(value, error)
+        raise InputError(f"{option} must be a value {accepted} with an error {accepted}, {got}")
+    factor = BY_FWHM if is_fwhm else 1.0
+    return Known(factor * value, factor * error)

@@ -18,6 +18,7 @@ from profilefit.recipes.folder import LOCAL, PHASES, STACKS, fits_folder
 PHOTON_STORE = ".photons"
 SEED = 1
 MAX_SEED = 2**32 - 1  # numpy's RandomState, which moves the chains, takes 32 bits
+ROOM = 2**25  # bytes: more than all that is shipped
 PRESETS = "quick: 2.1e7 photons, minutes. full: 4.2e8. Fewer in each setting whose surface refracts."
 
 
@@ -101,7 +102,7 @@ def regenerate(
     is_named = getattr(context.get_parameter_source("out"), "name", "") == "COMMANDLINE"
     if out.resolve() == fits_folder() and not is_named:
         raise InputError("--out must be given where ./fits holds the shipped records, for example --out mine, got none")
-    require_folder(out)
+    require_folder(out, room=ROOM)
     begin = time.perf_counter()
     run = RecipeRun(
         preset=str(preset),

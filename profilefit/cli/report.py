@@ -73,6 +73,7 @@ def report(
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, screen, show
+        from mcml_sim.files.whole_file import require_folder
         from profilefit.recipes import record
         from profilefit.report import every_law
         from profilefit.report.tables import law_tables
@@ -99,6 +100,8 @@ def report(
         stacks = known_stacks(folder)
     others = [name for name in names if name not in stacks] if names else list(ordinary)
     contents = record.chosen(folder, others, list(known) if names else ()) if others or not stacks else {}
+    if figures_to is not None:
+        require_folder(figures_to)
     if markdown is not None:
         _fill(markdown, contents, folder, stacks, quiet)
     elif html is not None:
@@ -228,12 +231,9 @@ def _measured(folder: Path, names: list[str] | None, quiet: bool) -> Qualities:
 def _draw(folder: Path, out: Path, names: list[str] | None, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
-        from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import tracked
         from profilefit.recipes.workers import cores
         from profilefit.report import draw_all
-
-    require_folder(out)
 
     def track(plans: Iterable[Any]) -> Iterator[Any]:
         return tracked(plans, "drawing", "figures", quiet=quiet)
@@ -260,7 +260,7 @@ def _fill(
 ) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
-        from mcml_sim.files.whole_file import read_whole, write_whole
+        from mcml_sim.files.whole_file import read_whole, require_writable, write_whole
         from mcml_sim.runs.progress import working
         from profilefit.report import fill, markdown_sections, sections
         from profilefit.report.tables.phase_table import phase_sections
@@ -276,6 +276,7 @@ def _fill(
         text = content.decode("utf-8")
     except ValueError as error:
         raise InputError(f"{path}: cannot be read ({error})") from None
+    require_writable(path)
     measured = {}
     made = markdown_sections(folder) | stack_sections(stacks) | sum_sections(stacks) | phase_sections(folder)
     for name, make in made.items():

@@ -69,7 +69,8 @@ def scene(
 
     request = home.read(file, content)
     stem = out / Path(file).stem
-    require_writable(Path(f"{stem}.json"))
+    for end in (".json", ".png", "-truth.png", "-error.png"):
+        require_writable(Path(f"{stem}{end}"))
     with working("drawing, and summing the truth", quiet), opened() as context:
         drawn, device = home.draw(context, request), renderer(context)
     files: dict[Path, Any] = {

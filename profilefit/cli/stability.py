@@ -61,7 +61,7 @@ def stability(
     folder = records_folder(fits, quiet)
     todo = jobs(names or [], folder, quick)
     if out is not None:
-        require_apart(out, folder)
+        require_apart(out, folder, "stability.json", "stability.csv")
     parts = list(tracked(run(todo), "looking", "subjects", len(todo), quiet))
     if out is not None or as_json:
         body = {"made": made(typed(), folder), "of": names or ("quick" if quick else "all"), **content(parts)}

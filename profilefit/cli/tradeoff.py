@@ -59,7 +59,7 @@ def tradeoff(
 
     names = chosen(parts or [])
     folder = records_folder(fits, quiet)
-    require_apart(out, folder)
+    require_apart(out, folder, "tradeoff.json", *(f"tradeoff-{name}.csv" for name in names))
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": made(typed(), folder)}
     if file.exists() and not is_alike(read(file), origin):

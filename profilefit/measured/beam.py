@@ -33,7 +33,12 @@ OCTAVES = 10  # of a measured beam's radii, down from its last, as panels
 STEEP, STEEPEST = 0.05, 8  # change over its brightest in a straight piece that is a panel, too; as many of these
 AROUND = np.polynomial.legendre.leggauss(8)  # of a circle, in each panel
 LEAST = 1e-12  # of a beam's radius, from a point to a circle about it
-TOPHAT = "tophat:"
+FWHM, TOPHAT = "fwhm:", "tophat:"
+BY_FWHM = 1.0 / math.sqrt(2.0 * math.log(2.0))  # 1/e^2 radius of a Gaussian beam over its full width at half maximum
+ACCEPTED = (
+    "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or a range of it (0.3mm:0.7mm), fwhm:0.6mm, its full "
+    "width at half maximum, tophat:0.5mm, a radius, or a .csv file"
+)
 MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
 CELLS = re.compile(r"[\s,;]+")
 
@@ -131,16 +136,23 @@ class Profiled:
 
 
 def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
-    """A beam from words: 0.5mm, a Gaussian one's 1/e^2 radius; tophat:0.5mm, a radius; or a file of irradiances.
+    """Return the beam of a text, one of `ACCEPTED` but a range.
 
     unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.
     folder  where the file lies, if its path is not absolute
     """
     if text.lower().endswith((".csv", ".tsv", ".txt")):
         return _read(folder / text)
-    if text.startswith(TOPHAT):
-        return TopHat(length(option, text.removeprefix(TOPHAT), unit))
-    return Gaussian(length(option, text, unit))
+    if text.lower().startswith(TOPHAT):
+        return TopHat(length(option, text[len(TOPHAT) :], unit, ACCEPTED))
+    return gaussian(option, text, unit)
+
+
+def gaussian(option: str, text: str, unit: str) -> Gaussian:
+    """Return the Gaussian beam of a 1/e^2 radius, 0.5mm, or of a full width at half maximum, fwhm:0.6mm."""
+    if text.lower().startswith(FWHM):
+        return Gaussian(BY_FWHM * length(option, text[len(FWHM) :], unit, ACCEPTED))
+    return Gaussian(length(option, text, unit, ACCEPTED))
 
 
 def _read(path: Path) -> Profiled:

@@ -9,10 +9,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.media.medium import Medium
+from mcml_sim.media.medium import Layer, Medium
 from profilefit.errors import InputError
 
 Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Fact:
+    """Fact that a comment of a table states, as text, and the line where it stands."""
+
+    text: str
+    line: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +42,7 @@ class Measured:
     medium     what a simulation was of, lengths in `unit`; None of what was measured
     illumination  under which light it was; None of what was measured
     notes      what was left out or merged, for the reader
-    stated     what a table's comments state of light, n, g, beam and fibre, as texts
+    stated     what a table's comments state of light, n, g, beam and fibre
     """
 
     source: str
@@ -53,7 +61,7 @@ class Measured:
     medium: Medium | None = None
     illumination: str | None = None
     notes: tuple[str, ...] = ()
-    stated: Mapping[str, str] = field(default_factory=dict)
+    stated: Mapping[str, Fact] = field(default_factory=dict)
 
     @property
     def rings(self) -> bool:
@@ -71,14 +79,19 @@ class Measured:
         return float(np.median(np.abs(self.sigma) / np.maximum(np.abs(self.value), np.finfo(float).tiny)))
 
     @property
+    def layer(self) -> Layer | None:
+        """Layer of a simulated medium that scatters most, not the glass on top; None of what was measured."""
+        return None if self.medium is None else max(self.medium.layers, key=lambda layer: layer.similar.mu_s)
+
+    @property
     def n(self) -> float | None:
-        """Refractive index of a simulated medium over that above it [-]; None of what was measured."""
-        return None if self.medium is None else self.medium.layers[0].n / self.medium.n_above
+        """Refractive index of that layer over that above the medium [-]; None of what was measured."""
+        return None if self.medium is None or self.layer is None else self.layer.n / self.medium.n_above
 
     @property
     def g(self) -> float | None:
-        """Mean cosine of the scattering of a simulated medium [-]; None of what was measured."""
-        return None if self.medium is None or self.medium.layers[0].phase else self.medium.layers[0].g
+        """Mean cosine of the scattering of that layer [-]; None of what was measured."""
+        return None if self.layer is None or self.layer.phase else self.layer.g
 
     def within(self, r_min: float | None, r_max: float | None) -> Measured:
         """Only the rows that lie wholly between two radii [unit]; InputError if none does."""

@@ -101,6 +101,7 @@ def fit_layers(
            names that it has not, and of data that state another n, or a g
     """
     require_workable(data)
+    data = replace(data, notes=(*data.notes, *premises.notes))
     names = tuple(free) + (("scale",) if not isinstance(scale, float | int) else ())
     _require_free(medium, free)
     if data.value.size <= len(names):
@@ -127,13 +128,15 @@ def fit_layers(
 def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
     """That of the layers; InputError where a table states another, or what is open is more than the layers."""
     for name in told.ranges:
-        of, what = f"{data.source}: " if name in data.stated else "", "width" if name == "beam" else "number"
+        of = f"{data.source}:{data.stated[name].line}: " if name in data.stated else ""
+        what = "width" if name == "beam" else "number"
         raise InputError(f"{of}{name} must be one {what} where layers are fitted, got a range")
     own = Setting(told.setting.illumination, medium.layers[0].n / medium.n_above)
     for name, value in (("n", own.n), ("g", own.g)):
         if name in data.stated and not math.isclose(got := getattr(told.setting, name), value):
             raise InputError(
-                f"{data.source}: {name} must be {value:g} or left out, as of the layers that are fitted, got {got:g}"
+                f"{data.source}:{data.stated[name].line}: {name} must be {value:g} or left out, as of the layers that "
+                f"are fitted, got {got:g}"
             )
     return own
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 
+from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
+from profilefit.measured.data import LARGEST, SMALLEST
 
 # In millimetres.
 UNITS = {
@@ -29,19 +31,25 @@ def checked_unit(name: str, unit: str) -> str:
     """A unit of length that is known; InputError names what `name` was given."""
     if unit in UNITS:
         return unit
-    raise InputError(f"{name} must be a unit of length ({', '.join(UNITS)}), got {unit!r}")
+    raise InputError(f"{name} must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
 
 
-def length(name: str, text: str, unit: str) -> float:
-    """A length > 0 such as 1.2mm, in `unit`; a bare number is in `unit` already."""
+def length(name: str, text: str, unit: str, accepted: str = "a length > 0 such as 1.2mm") -> float:
+    """Return a length > 0 such as 1.2mm, in `unit`; a bare number is in `unit` already.
+
+    InputError says that `name` must be what is `accepted`, and that `SMALLEST` and `LARGEST` bound it.
+    """
     match = NUMBER.fullmatch(text.strip())
     if match is None or not float(match[1]) > 0 or (match[2] and match[2] not in UNITS):
-        raise InputError(f"{name} must be a length > 0 such as 1.2mm (units: {', '.join(UNITS)}), got {text!r}")
-    if not match[2] or match[2] == unit:
-        return float(match[1])
-    if not unit:
-        raise InputError(f"{name} must be without a unit where the data has none (`unit` gives it one), got {text!r}")
-    return float(match[1]) * factor(match[2], unit)
+        raise InputError(f"{name} must be {accepted} (units: {', '.join(UNITS)}), got {shown(text)}")
+    if match[2] and not unit:
+        raise InputError(
+            f"{name} must be without a unit where the data has none (`unit` gives it one), got {shown(text)}"
+        )
+    found = float(match[1]) * (factor(match[2], unit) if match[2] and match[2] != unit else 1.0)
+    if not SMALLEST <= found <= LARGEST:
+        raise InputError(f"{name} must lie between {SMALLEST:g} and {LARGEST:g} {unit or 'in size'}, got {shown(text)}")
+    return found
 
 
 def factor(source: str, target: str) -> float:

@@ -8,10 +8,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
 from profilefit.laws import takes_g
-from profilefit.measured.beam import TOPHAT, Gaussian, Irradiance, beam_of
+from profilefit.measured.beam import FWHM, TOPHAT, Gaussian, Irradiance, beam_of, gaussian
 from profilefit.measured.data import Measured
 from profilefit.measured.exact_light import EXACT
 from profilefit.measured.instrument import PENCIL, Instrument
@@ -32,12 +33,14 @@ class Premises:
     instrument  the beam, and what a row is averaged over
     ranges      (low, high) of n, g, and a Gaussian beam's 1/e^2 radius [unit of r], where these are known no better
     assumed     those of n and g that nobody named
+    notes       facts of the file that others replace
     """
 
     setting: Setting
     instrument: Instrument = PENCIL
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     assumed: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 def premises(
@@ -53,11 +56,17 @@ def premises(
     """
     spoken = {name: text for name, text in (told or {}).items() if text is not None}
     options = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
-    options |= {name: f"{data.source}: {name}" for name in data.stated.keys() - spoken.keys()}
-    given = {**data.stated, **spoken}
+    notes = tuple(
+        f"the file's {name} is {shown(fact.text)} (line {fact.line}), fitted with {options[name]} {spoken[name]}"
+        for name, fact in data.stated.items()
+        if name in spoken and spoken[name].strip() != fact.text
+    )
+    stated = {name: fact for name, fact in data.stated.items() if name not in spoken}
+    options |= {name: f"{data.source}:{fact.line}: {name}" for name, fact in stated.items()}
+    given = {name: fact.text for name, fact in stated.items()} | spoken
     light = given.get("light", data.illumination or "searchlight")
     if light not in ILLUMINATIONS:
-        raise InputError(f"{options['light']} must be one of {', '.join(ILLUMINATIONS)}, got {light!r}")
+        raise InputError(f"{options['light']} must be one of {', '.join(ILLUMINATIONS)}, got {shown(light)}")
     if data.illumination not in (None, light):
         raise InputError(
             f"{options['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
@@ -71,7 +80,9 @@ def premises(
         setting = forward
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:
-        raise InputError(f"{options[min(ranges)]} must be a number where a law is fitted, got {given[min(ranges)]!r}")
+        raise InputError(
+            f"{options[min(ranges)]} must be a number where a law is fitted, got {shown(given[min(ranges)])}"
+        )
     if "fibre" in given and data.rings:
         raise InputError(f"{options['fibre']} must be left out where rows are averages over annuli")
     # What a file states lies beside it; a pipe has no place.
@@ -81,21 +92,23 @@ def premises(
     ranges |= {} if widths is None else {"beam": widths}
     fibre = length(options["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
     assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
-    return Premises(setting, Instrument(beam, fibre), ranges, assumed)
+    return Premises(setting, Instrument(beam, fibre), ranges, assumed, notes)
 
 
 def _beam(
     option: str, text: str | None, unit: str, folder: Path
 ) -> tuple[Irradiance | None, tuple[float, float] | None]:
-    """A beam, and the range of its width, LOW:HIGH, if it has one."""
+    """Return a beam, and the range of its 1/e^2 radius if it has one: LOW:HIGH, or fwhm:LOW:HIGH."""
     if text is None:
         return None, None
-    parts = text.split(":")
-    if len(parts) != 2 or parts[0] == TOPHAT.rstrip(":"):
+    text = text.strip()
+    kind = next((one for one in (FWHM, TOPHAT) if text.lower().startswith(one)), "")
+    ends = text[len(kind) :].split(":")
+    if len(ends) != 2 or kind == TOPHAT:
         return beam_of(option, text, unit, folder), None
-    low, high = (length(option, part, unit) for part in parts)
+    low, high = (gaussian(option, kind + end, unit).w for end in ends)
     if not low < high:
-        raise InputError(f"{option} must have a range that rises, such as 0.3mm:0.7mm, got {text!r}")
+        raise InputError(f"{option} must have a range that rises, such as 0.3mm:0.7mm, got {shown(text)}")
     return Gaussian(0.5 * (low + high)), (low, high)
 
 
@@ -108,5 +121,5 @@ def parsed(option: str, text: Any, name: str) -> tuple[float, float]:
         ends = []
     least, most = (0.0, math.inf) if name == "n" else (-1.0, 1.0)
     if not (1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]):
-        raise InputError(f"{option} must be {ACCEPTED[name]}, got {text!r}")
+        raise InputError(f"{option} must be {ACCEPTED[name]}, got {shown(text)}")
     return ends[0], ends[-1]

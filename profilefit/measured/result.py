@@ -192,10 +192,10 @@ def _inside(found: MediumFit, judgement: Identifiability) -> MediumFit:
 
 
 def known_medium(data: Measured) -> dict[str, float]:
-    """The first layer of the medium that a simulation was of, by the quantities that it has."""
-    if data.medium is None:
+    """Return the quantities of the layer that scatters most, of the medium that a simulation was of."""
+    if data.layer is None:
         return {}
-    layer = data.medium.layers[0].similar
+    layer = data.layer.similar
     return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
 
 

@@ -5,10 +5,10 @@
     r_in, r_out, value, sigma            averages over annuli
 
 Cells are separated by tabs, else semicolons, else commas, else spaces, by what the header has. Units stand in brackets,
-in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment; above the header, # n = 1.4 states a fact
-(light, n, g, beam, fibre or unit). The value's unit, if it is not the one of
-r, is converted; [a.u.] or any other word needs an unknown scale. Numbers have decimal points: a comma may part
-thousands as well, so it is an error and no guess.
+in parentheses or after a slash: r [mm], r (mm), r/mm. A # starts a comment; a line such as # n = 1.4 states a fact
+(light, n, g, beam, fibre or unit, or a name of `FACTS`), and a note names what else comments state. The value's unit,
+if it is not the one of r, is converted; [a.u.] or any other word needs an unknown scale. Numbers have decimal points: a
+comma may part thousands as well, so it is an error and no guess.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pathlib import Path
 import numpy as np
 
 from profilefit.errors import InputError
-from profilefit.measured.data import Floats, Measured
+from profilefit.measured.data import Fact, Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
 from profilefit.measured.replicates import FEWEST, Steadied, moderated_variances
 
@@ -48,8 +48,27 @@ NAMES = {
 }
 REPLICATE = re.compile(r"value[_ ]?\d+")
 DECIMAL_COMMA = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")
-STATED = ("light", "n", "g", "beam", "fibre", "unit")
-STATEMENT = re.compile(r"#+\s*(?P<name>\w+)\s*[=:]\s*(?P<value>.{1,200}?)")
+# Accepted names of facts, in lower case and with spaces for _ and -.
+FACTS = {
+    "light": ("light", "lighting", "illumination", "incident light"),
+    "n": ("n", "refractive index", "refractive index n", "index of refraction", "refraction index", "ior"),
+    "g": ("g", "anisotropy", "anisotropy g", "anisotropy factor", "anisotropy factor g", "mean cosine", "asymmetry"),
+    "beam": ("beam", "beam radius", "spot radius", "1/e^2 radius", "1/e2 radius", "1/e² radius"),
+    "fibre": (
+        "fibre",
+        "fiber",
+        "fibre radius",
+        "fiber radius",
+        "fibre core radius",
+        "fiber core radius",
+        "core radius",
+    ),
+    "unit": ("unit", "units", "unit of r", "units of r", "unit of length", "length unit"),
+}
+FACT = {spelling: name for name, spellings in FACTS.items() for spelling in spellings}
+BRACKETED = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
+LONGEST_NAME = 6  # words; more are a sentence
+MOST_SHOWN = 5  # statements that a note names
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
 LONGEST_SHOWN = 40  # characters of a cell in a message
@@ -64,8 +83,10 @@ def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool
         raise InputError(f"{path}: expected a profile of at most {MAX_BYTES} bytes, got a longer file")
     lines = _text(path, content).replace("\r\n", "\n").replace("\r", "\n").split("\n")
     header, rows = _cells(path, lines)
-    stated = _stated(path, lines[: header.line - 1])
-    unit = stated.pop("unit", None) if unit is None else unit
+    stated, others = _stated(path, lines)
+    named = stated.pop("unit", None)
+    notes = _notes(others, named, unit)
+    unit = named.text if named is not None and unit is None else unit
     numbers = _numbers(path, header, rows)
     inner, outer = _radii(path, header, rows, numbers)
     length = _length_unit(path, header, unit)
@@ -83,6 +104,7 @@ def read_table(path: Path, content: bytes, unit: str | None = None, scaled: bool
         errors,
         length,
         pooled=found.pooled,
+        notes=notes,
         stated=stated,
     )
 
@@ -126,17 +148,41 @@ def _text(path: Path, content: bytes) -> str:
     return text
 
 
-def _stated(path: Path, lines: list[str]) -> dict[str, str]:
-    """What comments above the header state, such as # n = 1.4; other comments are passed over."""
-    found: dict[str, str] = {}
+def _stated(path: Path, lines: list[str]) -> tuple[dict[str, Fact], list[Fact]]:
+    """Return the facts that comments state, such as # n = 1.4, by name, and the statements that are none of these."""
+    found: dict[str, Fact] = {}
+    others: list[Fact] = []
     for at, line in enumerate(lines, start=1):
-        match = STATEMENT.fullmatch(line.strip())
-        if match is None or (name := match["name"].lower()) not in STATED:
+        if not line.lstrip().startswith("#"):
+            continue
+        spelled, value = (part.strip() for part in (*re.split("[=:]", line.strip().lstrip("# "), maxsplit=1), "")[:2])
+        words = re.sub(r"[\s_-]+", " ", BRACKETED.sub(" ", spelled)).strip().lower()
+        name = FACT.get(words)
+        if name is None:
+            is_sentence = (
+                len(words.split()) > LONGEST_NAME or value.startswith("//") or not re.search(r"[^\W\d]", words)
+            )
+            others += [] if is_sentence or not value else [Fact(spelled, at)]
             continue
         if name in found:
             raise InputError(f"{path}:{at}: expected {name} once, got it again")
-        found[name] = match["value"]
-    return found
+        if not value:
+            raise InputError(f"{path}:{at}: expected a value of {name}, got none")
+        unit = next((word for word in BRACKETED.findall(spelled) for word in word if word in UNITS), "")
+        found[name] = Fact(f"{value} {unit}" if unit and value[-1:].isdigit() else value, at)
+    return found, others
+
+
+def _notes(others: list[Fact], named: Fact | None, unit: str | None) -> tuple[str, ...]:
+    """Return notes on statements that are not understood, and on a unit that another one replaces."""
+    notes = []
+    if others:
+        shown = ", ".join(f"{_shown(one.text)} (line {one.line})" for one in others[:MOST_SHOWN])
+        more = f" and {len(others) - MOST_SHOWN} more" if len(others) > MOST_SHOWN else ""
+        notes.append(f"comments state what is not understood: {shown}{more}; known are {', '.join(FACTS)}")
+    if named is not None and unit is not None and UNITS.get(named.text) != UNITS.get(unit):
+        notes.append(f"the file's unit is {_shown(named.text)} (line {named.line}), read with `unit` {unit}")
+    return tuple(notes)
 
 
 def _cells(path: Path, lines: list[str]) -> tuple[_Header, list[_Row]]:

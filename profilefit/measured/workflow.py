@@ -62,7 +62,7 @@ def fit(
         raise InputError(f"{measured.source}: a simulation of {got}")
     if oblique is not None and where.illumination != Setting().illumination:
         raise InputError(f"oblique light must be a {Setting().illumination}, got {where.illumination} light to fit")
-    measured = _noted(measured, where)
+    measured = _noted(measured, where, told.notes)
     chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
     question = Question(
@@ -81,11 +81,11 @@ def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
     return catalogue.load(law, constants, setting, folder)
 
 
-def _noted(measured: Measured, setting: Setting) -> Measured:
-    """The data, with a note where a simulation's surface is not the one that is fitted."""
-    if measured.n is None or math.isclose(measured.n, setting.n):
-        return measured
-    return replace(measured, notes=(*measured.notes, f"the file's n is {measured.n:g}, fitted as n = {setting.n:g}"))
+def _noted(measured: Measured, setting: Setting, notes: tuple[str, ...]) -> Measured:
+    """Return the data with more notes, one where a simulation's surface is not the one that is fitted."""
+    if measured.n is not None and not math.isclose(measured.n, setting.n):
+        notes = (*notes, f"the file's n is {measured.n:g}, fitted as n = {setting.n:g}")
+    return replace(measured, notes=(*measured.notes, *notes))
 
 
 def _held(law: Light, held: Mapping[str, float], scale: float | Known | None) -> dict[str, float]:

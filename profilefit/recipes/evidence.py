@@ -50,12 +50,12 @@ def digest(folder: Path) -> str:
     return sha.hexdigest()
 
 
-def require_apart(out: Path, records: Path) -> None:
+def require_apart(out: Path, records: Path, *files: str) -> None:
     """InputError where a measurement's .json in `out` would be taken for a record; OutputError where none can be."""
     taken = {records.resolve(), LOCAL.resolve()}
     if out.resolve() in taken:
         raise InputError(f"out must be another folder than that of the records, got {out}")
-    require_folder(out)
+    require_folder(out, *files)
 
 
 def processor() -> str:

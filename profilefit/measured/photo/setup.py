@@ -6,7 +6,7 @@
 from __future__ import annotations
 
 import io
-import tomllib
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -16,7 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim.exact.half_space import require_solved
-from mcml_sim.files.whole_file import read_whole, write_whole
+from mcml_sim.files.text_file import read_toml
+from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
 from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
@@ -79,11 +80,7 @@ class Setup:
 
 def read_setup(path: Path) -> Setup:
     """InputError, in one line, of what is no setup."""
-    content = read_whole(path, MAX_BYTES)
-    try:
-        tables = tomllib.loads(content.decode("utf-8"))
-    except (UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise InputError(f"{path} is not TOML: {error}") from None
+    tables = read_toml(path, MAX_BYTES)
     read = Tables(str(path), KEYS)
     read.known("", tables, KEYS[""])
     of, lens, camera, cards = (read.table(tables, name, {} if name != "medium" else None) for name in KEYS[""])
@@ -192,6 +189,12 @@ def written(setup: Setup, out: Path) -> list[Path]:
             files.append(out / f"{name}-{at}.dng")
             write_whole(files[-1], as_dng(one))
     return files
+
+
+def room(setup: Setup) -> float:
+    """Return bytes that the photographs take on a disk, and as many as a command's other files may take."""
+    scenes = 1 + setup.white + (setup.grey is not None)
+    return ROOM + scenes * setup.exposures * 2 * math.prod(setup.camera.sides)
 
 
 def as_dng(one: Taken) -> bytes:

@@ -33,6 +33,7 @@ CONVENTIONS = (
     "1 / (mu_s' + mu_a), the unit of r; searchlight: a pencil beam (normal, collimated); diffuse: cosine-weighted "
     "light from all sides. Errors are one standard error."
 )
+ROOM = 2**25  # bytes of a disk; the page of all shipped records has 2.5 MB
 PARTS = {
     "fits": "What was fitted, from what",
     "explorer": "Explore",
@@ -92,7 +93,7 @@ def write_page(
     tracked   wraps the keys of the parts as these are made: in a bar, say
     RecordError, InputError on files that are damaged; OutputError where `path` cannot be written.
     """
-    require_writable(path)
+    require_writable(path, room=ROOM)
     source = Source(folder, tuple(names) if names else None)
     found = EvidenceFolder(evidence, folder)
     for file in source.paths.values():  # damage is reported now, not after a minute

@@ -89,7 +89,7 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         caption += "; alpha is the reduced albedo, l = 1 / (mu_s' + mu_a)"
     if truth:
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
-        caption += "; of file: its first layer, scattering reduced by 1 - g"
+        caption += "; of file: its layer that scatters most, with scattering reduced by 1 - g"
     return column_table(title, columns, caption, left=("", "unit"))
 
 
@@ -190,11 +190,9 @@ def _estimated(result: Answer) -> Iterator[str]:
 
 
 def _forward(result: Answer) -> float | None:
-    """g of the first layer of a simulation whose scattering the law takes for isotropic."""
-    medium = result.found.data.medium
-    if medium is None or result.found.question.law.setting.g:
-        return None
-    return medium.layers[0].g or None
+    """Return g of a simulation whose scattering the law takes for isotropic."""
+    layer = result.found.data.layer
+    return None if layer is None or result.found.question.law.setting.g else layer.g or None
 
 
 def p_value(value: float) -> str:

@@ -85,10 +85,10 @@ def test_errors_of_few_replicates_are_estimates():
 @pytest.mark.parametrize(
     ("statement", "message"),
     [
-        ("n = 1.4", r"made\.csv: n must be 1 or left out, as of the layers that are fitted, got 1\.4"),
-        ("g = 0.8", r"made\.csv: g must be 0 or left out, as of the layers that are fitted, got 0\.8"),
-        ("n = 1.33:1.45", r"made\.csv: n must be one number where layers are fitted, got a range"),
-        ("beam = 1mm:2mm", r"made\.csv: beam must be one width where layers are fitted, got a range"),
+        ("n = 1.4", r"made\.csv:1: n must be 1 or left out, as of the layers that are fitted, got 1\.4"),
+        ("g = 0.8", r"made\.csv:1: g must be 0 or left out, as of the layers that are fitted, got 0\.8"),
+        ("n = 1.33:1.45", r"made\.csv:1: n must be one number where layers are fitted, got a range"),
+        ("beam = 1mm:2mm", r"made\.csv:1: beam must be one width where layers are fitted, got a range"),
     ],
 )
 def test_what_a_table_states_is_what_the_layers_are(tmp_path, statement, message):

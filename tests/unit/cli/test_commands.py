@@ -2,11 +2,13 @@
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -41,6 +43,34 @@ def recipe(tmp_path) -> Path:
 
 def small(recipe: Path, out: str = "out", *more: str) -> tuple[str, ...]:
     return ("regenerate", str(recipe), "--out", out, "--photons", "20000", *more)
+
+
+EXAMPLES = Path(__file__).parents[3] / "examples"
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("fit", EXAMPLES / "phantom.csv", "--out", "out"),
+        ("fit", "petzold", "--kind", "phase", "--out", "out"),
+        ("photo", "--simulate", EXAMPLES / "photo.toml", "--out", "out"),
+        ("report", "hazard", "--html", "page.html"),
+        ("report", "hazard", "--figures", "out"),
+        ("regenerate", "burley-whole", "--out", "out"),
+        ("check", "hazard", "--out", "out"),
+        ("stability", "liang", "--out", "out"),
+        ("tradeoff", "laws", "--out", "out"),
+        ("scene", EXAMPLES / "sea.toml", "--out", "out"),
+    ],
+    ids=lambda words: " ".join(map(str, words[:2])).replace(str(EXAMPLES), ""),
+)
+def test_a_full_disk_is_met_before_the_work(command, monkeypatch, tmp_path, words):
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=10**12, free=10**6))
+    status, out, err = command(*map(str, words))
+    assert (status, out) == (2, "")
+    assert "No space left on device: 1.0 MB are free, " in err
+    assert err.count("\n") == 1
+    assert not [path for path in tmp_path.rglob("*") if path.is_file()]
 
 
 @pytest.mark.slow

@@ -15,7 +15,7 @@ import rawpy
 import tifffile
 import typer
 
-from profilefit.cli.photo import SeveralFiles
+from profilefit.cli.photo import SeveralFiles, _known
 from profilefit.errors import InputError
 from profilefit.measured.photo import setup
 from profilefit.measured.photo.exposure import read
@@ -91,6 +91,11 @@ def test_a_bracket_and_its_cards_give_the_medium(command, folder, tmp_path):
 
 
 SCALE = ("--scale", "0.1mm/px")
+
+
+def test_a_beam_by_its_full_width_at_half_maximum():
+    found = _known("--beam", "fwhm:0.2mm+-0.02mm", lengths=True)
+    assert (found.value, found.error) == pytest.approx((0.16986436, 0.016986436), rel=1e-7)
 
 
 def linear(folder, name):
@@ -241,6 +246,12 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
             "--glare must be a value between 0 and 1 with an error",
         ),
         (("SPOT", *SCALE, "--reflectance", "0.2+-0.01"), "--reflectance must be left out"),
+        (("SPOT", *SCALE, "--grey", "SPOT", "--reflectance", "97.1"), "got '97.1' (a share: 0.971 for 97.1 %)"),
+        (
+            ("SPOT", *SCALE, "--surface", "9" * 5000),
+            f"--surface must be a value with its error, such as 0.02+-0.02, got '{'9' * 59}...",
+        ),
+        (("SPOT", *SCALE, "--beam", "fwhm:wide"), "such as 0.5mm+-0.05mm or fwhm:0.6mm+-0.06mm, got 'fwhm:wide'"),
         (("SPOT", *SCALE, "--n", "3"), "n = 3"),
         (("SPOT", *SCALE, "--n", "1.7", "--g", "0", "--out", "out"), "without --out the medium alone is measured"),
         (("--simulate", "SETUP.toml"), "--out must be a folder"),

@@ -1,5 +1,6 @@
 """The one writer: what it does with everything that a name may stand for, and what is left when it fails."""
 
+import json
 import os
 import shutil
 import signal
@@ -12,6 +13,7 @@ import threading
 import time
 from pathlib import Path
 from textwrap import indent
+from types import SimpleNamespace
 
 import pytest
 
@@ -82,10 +84,31 @@ def test_writes_and_replaces(tmp_path, content):
     assert names(tmp_path) == {"file"}
 
 
-def test_text_that_is_no_text_is_one_line(tmp_path):
-    with pytest.raises(OutputError, match=r"cannot write .*file: 'utf-8' codec can't encode [^\n]*$"):
-        write_whole(tmp_path / "file", "\ud800")
-    assert not names(tmp_path)
+def test_half_a_character_of_a_file_name_is_escaped(tmp_path):
+    """A page that names a file of other bytes than UTF-8 took two minutes, and was refused at the end."""
+    write_whole(tmp_path / "file", '{"file": "µ\udcff.csv"}')
+    assert json.loads((tmp_path / "file").read_bytes()) == {"file": "µ\udcff.csv"}
+
+
+@pytest.mark.parametrize("make", [True, False])
+def test_room_and_names_are_looked_at_before(tmp_path, monkeypatch, make):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "out" / "fit.json").mkdir()
+    (tmp_path / "file").touch()
+    require_folder(tmp_path / "out", "fit.png", make=make)
+    with pytest.raises(OutputError, match=r"^cannot write .*out/fit\.json: it is a folder$"):
+        require_folder(tmp_path / "out", "fit.png", "fit.json", make=make)
+    with pytest.raises(OutputError, match=r"^cannot write into .*file/in: Not a directory$"):
+        require_folder(tmp_path / "file" / "in", make=make)
+    require_folder(tmp_path / "new" / "deep", make=make)
+    assert (tmp_path / "new" / "deep").is_dir() == make
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(total=10**12, free=3_000_000))
+    told = r"^cannot write into .*out: No space left on device: 3\.0 MB are free, {} MB may be needed$"
+    with pytest.raises(OutputError, match=told.format(4)):
+        require_folder(tmp_path / "out", make=make)
+    with pytest.raises(OutputError, match=told.format(50)):
+        require_writable(tmp_path / "out" / "page.html", room=50e6)
+    require_folder(tmp_path / "out", room=2e6, make=make)
 
 
 def test_a_device_is_written_into(tmp_path):

@@ -1,4 +1,4 @@
-"""Files as a careless or a hostile hand leaves them: records, .npz, tables, scenes, recipes and .mci, from a seed.
+"""Files as a careless or a hostile hand leaves them, of every kind that is read, from a seed.
 
 The same seed gives the same bytes. What a payload would do, were it run anywhere, is to make a file named CANARY.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import io
 import json
+import math
 import random
 import re
 import struct
@@ -122,6 +123,39 @@ MCI_WORDS = (
     *("a\x1b[31m.mco", "a\u2028.mco", "a\0", "x" * 300, "é" * 255, ".", "..", "~", "$(touch CANARY)", "-1e400", "1_0"),
 )  # fmt: skip
 MCI_LINES = ("1.0", "1", "0 0", "1 2 3 4 5", "slab.mco A", "#", "1.0  10  90  0.75  0.02", "9" * 5000, "x" * DEEP)
+MCI_2 = """mcmli2.0 # version
+air 1.0 0 0 0
+skin 1.4 1 100 0.9
+fat 1.44 0.5 10 0
+end
+one.mco A
+air
+skin 0.1
+fat 1E8
+air
+end
+pencil
+0
+0.01 0.02 0.1
+3 4 1 2
+Rd_r A_rz
+1000 0:10
+1E-4
+1
+end
+"""
+MCO_2 = "mcmloA2.0\n" + MCI_2.replace("1000 0", "1000000 0")
+MCO_2 += "RAT\n0.028\n0.028 0\n0.238 0\n0.64 0\n0 0\n0.09 0\nRd_r\n12.5\n3.25\n1.5\n0.25\n"
+MCI_2_WORDS = (
+    *("end", "air", "skin", "isotropic", "pencil", "Rd_t", "Td_ra", "\\", "10:00", "1e6", "0", "fat 0.1", "a b c"),
+)  # fmt: skip
+FACTS = ("n = 1.4", "anisotropy: 0.8", "beam radius [mm] = 0.5", "light = searchlight", "Sample: 3")
+FACT_LINES = (
+    *("# n =", "# n = 1.5", "# unit = cm", "# unit = furlong", "# fibre = 0.2mm", "# beam = none.csv", "# = 3", "# :"),
+    *(f"# n = {'9' * 5000}", f"# g: {'9' * 5000}", "# beam = 1e400 mm", "# fibre = 1e-300", f"# {'n' * DEEP} = 1"),
+    *("# beam = fwhm:0.2mm:0.3mm", "# beam = tophat:", "# beam = fwhm:", "# n = 1.3:1.4:1.5", f"# x = {'=' * DEEP}"),
+    *(f"# {'(' * DEEP} = 1", f"# {'[' * 1000}n{']' * 1000} = 1", "# light = sun", "# N: 1e6", "# \x1b[31m = 1", "#=="),
+)  # fmt: skip
 TOKEN = re.compile(r'"[^"\n]*"|[^\s,;=\[\]{}#"]+')
 
 
@@ -238,14 +272,14 @@ def json_mutant(rng: random.Random, content: Any) -> bytes:
     return damaged(rng, tree.spelled()) if rng.random() < 0.08 else tree.spelled()
 
 
-def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequence[str]) -> bytes:
-    """A text with one to three words or lines changed, or its bytes damaged."""
+def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequence[str], comment: str = "#") -> bytes:
+    """A text with one to three words or lines changed, or its bytes damaged; no words behind a comment's mark."""
     found = text.split("\n")
     for _ in range(rng.choice((1, 1, 1, 2, 3))):
         at, other = rng.randrange(len(found)), rng.randrange(len(found))
         way = rng.random()
         if way < 0.55:
-            places = [place for line, one in enumerate(found) for place in _words(line, one)]
+            places = [place for line, one in enumerate(found) for place in _words(line, one, comment)]
             if places:
                 line, begin, end = rng.choice(places)
                 word = rng.choice((rng.choice(words), rng.choice(words), _scaled(rng, found[line][begin:end])))
@@ -262,8 +296,8 @@ def text_mutant(rng: random.Random, text: str, words: Sequence[str], lines: Sequ
     return damaged(rng, data) if rng.random() < 0.1 else data
 
 
-def _words(line: int, text: str) -> Iterator[tuple[int, int, int]]:
-    return ((line, *found.span()) for found in TOKEN.finditer(text.partition("#")[0]))
+def _words(line: int, text: str, comment: str) -> Iterator[tuple[int, int, int]]:
+    return ((line, *found.span()) for found in TOKEN.finditer(text.partition(comment)[0] if comment else text))
 
 
 def _scaled(rng: random.Random, word: str) -> str:
@@ -506,14 +540,71 @@ def mci(seed: int) -> bytes:
     return text_mutant(random.Random(seed), _text("examples/slab.mci"), MCI_WORDS, MCI_LINES)
 
 
-def scene(seed: int) -> bytes:
-    """A .toml of `profilefit choose`."""
-    return toml_mutant(random.Random(seed), _text("examples/skin.toml"))
+def mci2(seed: int) -> bytes:
+    """An .mci of MCML 2."""
+    return text_mutant(random.Random(seed), MCI_2, (*MCI_WORDS, *MCI_2_WORDS), (*MCI_LINES, *MCI_2_WORDS))
 
 
-def head(seed: int) -> bytes:
-    """A .toml of `profilefit scene`."""
-    return toml_mutant(random.Random(seed), _text("examples/skin-head.toml"))
+def mco2(seed: int) -> bytes:
+    """An .mco of MCML 2."""
+    return text_mutant(random.Random(seed), MCO_2, (*MCI_WORDS, *MCI_2_WORDS), (*MCI_LINES, *MCI_2_WORDS))
+
+
+def facts(seed: int) -> bytes:
+    """A .csv of `profilefit fit` whose comments state facts."""
+    stated = "".join(f"# {line}\n" for line in FACTS)
+    return text_mutant(random.Random(seed), stated + _text("examples/phantom.csv"), (*CELLS, *NUMBERS), FACT_LINES, "")
+
+
+def beam(seed: int) -> bytes:
+    """A .csv of a measured beam."""
+    rows = "".join(f"{0.05 * at:g}, {math.exp(-0.02 * at * at):.4g}\n" for at in range(30))
+    return text_mutant(random.Random(seed), f"r, irradiance\n{rows}", CELLS, CELL_LINES)
+
+
+def phase(seed: int) -> bytes:
+    """A .csv of `profilefit fit --kind phase`."""
+    return text_mutant(random.Random(seed), _text("fits/phases/petzold.csv"), CELLS, CELL_LINES)
+
+
+def translucency(seed: int) -> bytes:
+    """A text file of a TLS850."""
+    rows = (
+        f"{record} {pixel} {math.exp(-0.3 * pixel) * (1 + 0.01 * record):.4g}"
+        for record in range(1, 10)
+        for pixel in range(1, 33)
+    )
+    return text_mutant(random.Random(seed), "\n".join(["Record Pixel Value", *rows]), CELLS, CELL_LINES)
+
+
+def toml(path: str) -> Callable[[int], bytes]:
+    """Return what mutates a .toml of the repository."""
+    return lambda seed: toml_mutant(random.Random(seed), _text(path))
+
+
+def claims(seed: int) -> bytes:
+    """A .json that `make claims` writes."""
+    return json_mutant(random.Random(seed), _json("fits/evidence/claims.json"))
+
+
+def stack(seed: int) -> bytes:
+    """A record of a stack."""
+    return json_mutant(random.Random(seed), _json("fits/stacks/skin.json"))
+
+
+def sum_record(seed: int) -> bytes:
+    """A record of sums of Gaussians."""
+    return json_mutant(random.Random(seed), _json("fits/gaussians/skin.json"))
+
+
+def phase_record(seed: int) -> bytes:
+    """A record of a phase function."""
+    return json_mutant(random.Random(seed), _json("fits/phases/petzold.json"))
+
+
+@cache
+def _json(path: str) -> Any:
+    return json.loads(_text(path))
 
 
 def recipe(seed: int) -> bytes:

@@ -22,8 +22,10 @@ from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from html.parser import HTMLParser
+from importlib import import_module
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import pytest
 
@@ -34,9 +36,21 @@ from mcml_sim.results.tally_file import read_results
 from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading
+from profilefit.measured.beam import beam_of
+from profilefit.measured.photo.setup import read_setup
+from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record
 from profilefit.recipes.inventory import Named, find
+from profilefit.recipes.phases import record as phase_record
+from profilefit.recipes.phases.data import read_phase
+from profilefit.recipes.stack import record as stack_record
+from profilefit.recipes.stack import schema as stack_schema
+from profilefit.recipes.stack import sum_record
+from profilefit.recipes.stack.file import read_layers
 from profilefit.report.page.document import write_page
+from profilefit.report.tables.claims_table import read_claims
+from profilefit.scenes import SCENES
+from profilefit.scenes.heart import scene as heart
 from profilefit.scenes.skin import scene as skin
 from profilefit.shader import emit
 from profilefit.shader.law_file import LANGUAGES, export
@@ -90,17 +104,55 @@ def read_samples(path: Path) -> object:
     return record.read_arrays(path.with_suffix(".json"))
 
 
+def read_claims_of(path: Path) -> object:
+    shutil.copy(path, path.with_name("claims.json"))
+    return read_claims(path.parent)
+
+
+def read_layers_of(path: Path) -> object:
+    return read_layers(path, read_toml(path))
+
+
+def read_scene(name: str) -> Callable[[Path], object]:
+    return lambda path: import_module(SCENES[name][0]).read(str(path), read_toml(path))
+
+
+def read_heart(path: Path) -> object:
+    """A scene without its mesh, which takes more than a second."""
+    with (
+        mock.patch.object(heart.HeartRequest, "mesh", None),
+        mock.patch.object(heart, "atlas_size", return_value=((1, 1), 0)),
+    ):
+        return heart.read(str(path), read_toml(path))
+
+
 # Kind -> the ending of its files, what mutates it, and all that reads it.
 KINDS: dict[str, tuple[str, Callable[[int], bytes], tuple[Callable[[Path], object], ...]]] = {
     "record": (".json", lambda seed: mutations.record(seed)[1], (lambda path: record.read(path, whole=True),)),
-    "scene": (".toml", mutations.scene, (requirements.read,)),
-    "head": (".toml", mutations.head, (lambda path: skin.read(str(path), read_toml(path)),)),
+    "stack-record": (".json", mutations.stack, (stack_schema.read,)),
+    "sum-record": (".json", mutations.sum_record, (sum_record.load,)),
+    "phase-record": (".json", mutations.phase_record, (phase_record.load,)),
+    "claims": (".json", mutations.claims, (read_claims_of,)),
+    "scene": (".toml", mutations.toml("examples/skin.toml"), (requirements.read,)),
+    "head": (".toml", mutations.toml("examples/skin-head.toml"), (lambda path: skin.read(str(path), read_toml(path)),)),
+    "layers": (".toml", mutations.toml("examples/layers-head.toml"), (read_layers_of, read_scene("layers"))),
+    "heart": (".toml", mutations.toml("examples/heart.toml"), (read_heart,)),
+    "sea": (".toml", mutations.toml("examples/sea.toml"), (read_scene("sea"),)),
+    "fur": (".toml", mutations.toml("examples/fur.toml"), (read_scene("fur"),)),
+    "photo": (".toml", mutations.toml("examples/photo.toml"), (read_setup,)),
     "recipe": (".toml", mutations.recipe, (recipe.read,)),
+    "stack": (".toml", mutations.toml("fits/stacks/skin.toml"), (lambda path: stack_record.request_of(str(path)),)),
     "table": (".csv", mutations.table, (read_profile,)),
+    "facts": (".csv", mutations.facts, (lambda path: premises(reading.read(path)),)),
+    "beam": (".csv", mutations.beam, (lambda path: beam_of("beam", str(path), "mm"),)),
+    "phase": (".csv", mutations.phase, (read_phase,)),
+    "translucency": (".txt", mutations.translucency, (lambda path: reading.read(path, None, True, "red"),)),
     "results": (".npz", mutations.results, (read_results, read_profile)),
     "samples": (".npz", mutations.samples, (read_samples,)),
     "mco": (".mco", mutations.mco, (read_profile,)),
     "mci": (".mci", mutations.mci, (read_mci,)),
+    "mco2": (".mco", mutations.mco2, (read_profile,)),
+    "mci2": (".mci", mutations.mci2, (read_mci,)),
 }
 
 
@@ -348,10 +400,14 @@ AS_PROCESSES: dict[str, tuple[str, tuple[str, ...], int]] = {
     "export": ("profilefit", ("export", "NAME", "--fits", ".", "--lang", "python", "--out", "out.txt"), 200),
     "report": ("profilefit", ("report", "NAME", "--fits", ".", "-q"), 200),
     "scene": ("profilefit", ("choose", "FILE", "-q"), 2),
+    "photo": ("profilefit", ("photo", "--simulate", "FILE", "--out", "mine", "-q"), 2),
+    "facts": ("profilefit", ("fit", "FILE", "--out", "mine", "-q"), 2),
+    "phase": ("profilefit", ("fit", "FILE", "--kind", "phase", "--out", "mine", "-q"), 1),
     "recipe": ("profilefit", ("regenerate", "FILE", "--photons", "1000", "--out", "mine", "-q"), 1),
     "table": ("profilefit", ("fit", "FILE", "--unit", "mm", "--out", "mine", "-q"), 5),
     "results": ("profilefit", ("fit", "FILE", "--out", "mine", "-q"), 5),
     "mci": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 5),
+    "mci2": ("mcml_sim", ("run", "FILE", "--photons", "1000", "--out", "mine", "-q"), 2),
 }
 PROCESSES = 200
 BESIDE = 2

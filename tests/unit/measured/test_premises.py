@@ -3,13 +3,16 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from mcml_sim import Layer, Medium, Setting, phase
 from profilefit.errors import InputError
-from profilefit.measured import read
-from profilefit.measured.beam import Gaussian
+from profilefit.measured import fit, read
+from profilefit.measured.beam import Gaussian, TopHat
 from profilefit.measured.premises import Premises, premises
+from profilefit.measured.result import known_medium
+from profilefit.measured.table_file import FACTS
 
 DATA = Path(__file__).parents[3] / "examples"
 ROWS = "r [mm],value,sigma\n0.5,0.1,0.01\n1,0.05,0.01\n2,0.01,0.001\n"
@@ -36,7 +39,68 @@ def test_a_file_states_and_options_go_before_it(stated):
     assert (found.instrument.beam, found.assumed) == (Gaussian(0.5), ())
     assert premises(data, told={"g": "0.8", "beam": None}).setting.g == 0.8
     assert stated("# unit = cm\n", ROWS.replace(" [mm]", "")).unit == "cm"
-    assert stated(ROWS.splitlines()[0] + "\n# n = 1.4\n", ROWS.partition("\n")[2]).stated == {}, "above the header only"
+    assert premises(stated("", ROWS + "# n = 1.4\n")).setting.n == 1.4, "wherever the comment stands"
+
+
+@pytest.mark.parametrize(
+    ("lines", "setting", "beam", "fibre", "unit"),
+    [
+        (("illumination = diffuse", "Illumination: diffuse", "LIGHT = diffuse", "lighting:diffuse", "light =diffuse"),
+         Setting("diffuse"), None, 0.0, "mm"),
+        (("N: 1.4", "refractive index = 1.4", "Refractive_Index: 1.4", "index of refraction (633 nm) = 1.4", "n=1.4"),
+         Setting(n=1.4), None, 0.0, "mm"),
+        (("G: 0.8", "anisotropy = 0.8", "mean cosine: 0.8", "anisotropy-factor (g) = 0.8", "# g=0.8"),
+         Setting(g=0.8), None, 0.0, "mm"),
+        (("Beam: 0.5mm", "beam radius [mm] = 0.5", "1/e^2 radius = 0.5 mm", "spot_radius = 500um", "beam = 0.5"),
+         Setting(), Gaussian(0.5), 0.0, "mm"),
+        (("fiber = 0.2mm", "Fibre core radius: 0.2 mm", "core radius (mm) = 0.2", "fibre_radius=200um", "FIBRE: 0.2"),
+         Setting(), None, 0.2, "mm"),
+        (("units = cm", "Unit: cm", "unit of r = cm", "length_unit: cm", "UNITS of R =cm"), Setting(), None, 0.0, "cm"),
+    ],
+)  # fmt: skip
+def test_each_fact_is_read_under_five_spellings(stated, lines, setting, beam, fibre, unit):
+    for line in lines:
+        data = stated(f"# {line}\n", ROWS if unit == "mm" else ROWS.replace(" [mm]", ""))
+        found = premises(data)
+        assert (found.setting, found.instrument.beam, data.unit) == (setting, beam, unit), line
+        assert found.instrument.fibre == pytest.approx(fibre), line
+        assert data.notes == found.notes == (), line
+
+
+def test_what_comments_state_besides_is_told_in_one_line(stated):
+    others = ("beam diameter = 1 mm", "NA: 0.22", "wavelength [nm] = 633", "Refr. index=1.4", "fibre diameter = .4mm")
+    for other in others:
+        (note,) = stated(f"# measured by hand, see https://example.org\n# columns:\n# {other}\n").notes
+        name = other.partition(":" if ":" in other else "=")[0].strip()
+        assert note == f"comments state what is not understood: '{name}' (line 3); known are {', '.join(FACTS)}"
+    (note,) = stated("".join(f"# {other}\n" for other in (*others, "date: today", "by = me"))).notes
+    assert "'beam diameter' (line 1), " in note
+    assert note.endswith(f"(line 5) and 2 more; known are {', '.join(FACTS)}")
+    assert stated("# 0.3: the first row\n# as said by those who have measured it: noise\n").notes == ()
+
+
+def test_an_option_in_place_of_a_fact_is_noted(stated):
+    data = stated("# n = 1.4\n# g = 0.9\n# unit = mm\n", ROWS.replace(" [mm]", ""))
+    assert premises(data, told={"n": "1.33", "g": "0.9"}, names={"n": "--n"}).notes == (
+        "the file's n is '1.4' (line 1), fitted with --n 1.33",
+    )
+    found = fit(data, setting=premises(data, told={"n": "1.33"}), walk=False).found.data.notes
+    assert found == ("the file's n is '1.4' (line 1), fitted with n 1.33",)
+    converted = read(Path(data.source), unit="cm")
+    assert converted.notes == ("the file's unit is 'mm' (line 3), read with `unit` cm",)
+
+
+def test_a_full_width_at_half_maximum_is_a_beam(stated):
+    """exp(-2 r^2 / w^2) is 1/2 at r = w sqrt(ln 2 / 2)."""
+    for text, w in (("fwhm:0.2mm", 0.1698643600577), ("FWHM:.02cm", 0.1698643600577), ("0.5mm", 0.5)):
+        beam = premises(stated(f"# beam = {text}\n")).instrument.beam
+        assert beam.w == pytest.approx(w, rel=1e-12)
+        if text != "0.5mm":
+            half = 0.1 / beam.w
+            assert np.exp(-2 * half**2) == pytest.approx(0.5, rel=1e-12)
+    found = premises(stated("# beam = fwhm:0.2mm:0.4mm\n"))
+    assert found.ranges["beam"] == pytest.approx((0.1698643600577, 0.3397287201154))
+    assert premises(stated("# beam = TopHat:0.3mm\n")).instrument.beam == TopHat(0.3)
 
 
 def test_a_beam_that_a_file_states_lies_beside_it(stated, tmp_path, monkeypatch):
@@ -68,7 +132,8 @@ def test_a_simulation_states_its_medium():
     assert premises(tissue, "hazard") == Premises(Setting(n=1.4, g=0.9))
     assert premises(tissue, "burley") == Premises(Setting(n=1.4)), "which scatters without direction"
     glass = replace(one, medium=Medium((Layer(1.5, 0.0, 0.0, 1.0, thickness=0.1), forward)))
-    assert premises(glass) == premises(glass, "hazard") == Premises(Setting(n=1.5)), "no light scatters in glass"
+    assert premises(glass) == premises(glass, "hazard") == Premises(Setting(n=1.4, g=0.9)), "not the glass on top"
+    assert known_medium(glass) == known_medium(tissue)
     other = replace(forward, phase=phase.HenyeyGreenstein(0.9))
     assert premises(replace(one, medium=Medium((other,)))).setting in (Setting(n=1.4), Setting(n=1.4, g=0.9))
 
@@ -77,8 +142,19 @@ def test_a_simulation_states_its_medium():
     ("comments", "told", "message"),
     [
         ("# n = 1.4\n# n = 1.5\n", {}, r"own\.csv:2: expected n once, got it again"),
-        ("# n = water\n", {}, r"own\.csv: n must be a refractive index > 0, or a range such as 1.33:1.45, got 'water'"),
-        ("# beam = wide\n", {}, r"own\.csv: beam must be a length > 0"),
+        ("# n =\n", {}, r"own\.csv:1: expected a value of n, got none"),
+        (
+            "# n = water\n",
+            {},
+            r"own\.csv:1: n must be a refractive index > 0, or a range such as 1.33:1.45, got 'water'",
+        ),
+        (f"#\n# n = {'9' * 5000}\n", {}, r"own\.csv:2: n must be a refractive index > 0, .*, got '9{59}\.\.\."),
+        (f"# g: {'9' * 5000}\n", {}, r"own\.csv:1: g must be a mean cosine"),
+        ("# beam = wide\n", {}, r"own\.csv:1: beam must be a length > 0, .*fwhm:0\.6mm, .*tophat:0\.5mm, .*\.csv file"),
+        ("# beam = 1e400 mm\n", {}, r"own\.csv:1: beam must lie between 1e-40 and 1e\+40 mm, got '1e400 mm'"),
+        ("# beam = 1e-300 mm\n", {}, r"own\.csv:1: beam must lie between 1e-40 and 1e\+40 mm, got '1e-300 mm'"),
+        (f"# fibre = {'9' * 5000}\n", {}, r"own\.csv:1: fibre must lie between 1e-40 and 1e\+40 mm, got '9{59}\.\.\."),
+        ("# beam = tophat:0.2mm:0.3mm\n", {}, r"own\.csv:1: beam must be a length > 0"),
         ("", {"g": "1"}, r"g must be a mean cosine in \(-1, 1\), or a range"),
         ("", {"g": "0.1:0.2:0.3"}, r"g must be a mean cosine in \(-1, 1\), or a range"),
         ("", {"n": "nan"}, r"n must be a refractive index"),

@@ -114,8 +114,8 @@ def test_clear_glass_may_have_any_mean_cosine_up_to_one(tmp_path):
 @pytest.mark.parametrize(
     ("number", "line", "expected", "got"),
     [
-        (1, "mcmli2.0", "the file version, 1.0", "'mcmli2.0'"),
-        (1, "2.0", "the file version, 1.0", "'2.0'"),
+        (1, "mcmli_3.0", "the file version, 1.0 or mcmli2.0", "'mcmli_3.0'"),
+        (1, "2.0", "the file version, 1.0 or mcmli2.0", "'2.0'"),
         (2, "0", "the number of runs, a whole number from 1 to 10000", "'0'"),
         (2, "10001", "the number of runs, a whole number from 1 to 10000", "'10001'"),
         (2, "2", "the name of an output file, and A or B", "the end of the file"),
@@ -187,8 +187,8 @@ def test_two_runs_cannot_have_one_output(tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"", r":1: expected the file version, 1.0, got the end of the file"),
-        (b"\n# only this\n", r":3: expected the file version, 1.0, got the end of the file"),
+        (b"", r":1: expected the file version, 1.0 or mcmli2.0, got the end of the file"),
+        (b"\n# only this\n", r":3: expected the file version, 1.0 or mcmli2.0, got the end of the file"),
         (b"1.0\r\n1\r\nout\x00.mco A\n", r":3: expected text in UTF-8, got the byte 0x00"),
         (SMALL.encode().replace(b"out", b"\xb5"), r":3: expected text in UTF-8, got the byte 0xb5"),
         (SMALL.encode().replace(b"90", b"9\xff"), r":9: expected text in UTF-8, got the byte 0xff"),

@@ -117,6 +117,50 @@ def test_photons_seed_and_folder_are_the_users(command, mci):
     assert read_results("a/first.npz").photons == 1000
 
 
+# The first layer and grid of `RUN`, in the format of MCML 2.
+RUN_2 = """mcmli2.0
+air 1.0 0 0 0
+skin 1.4 5 90 0.5
+end
+{}
+end
+"""
+ONE_2 = """{name} A
+air
+skin 0.05
+air
+end
+pencil
+0
+0.01 0.02 0.1
+4 5 1 3
+Rd_r A_rz
+{photons}
+1E-4
+{seed}"""
+
+
+@pytest.mark.slow
+def test_an_input_of_mcml_2_is_run_with_its_seed(command, tmp_path):
+    def made(name, *seeds):
+        ones = [ONE_2.format(name=f"{name}{seed}.mco", photons="2E3 0:10", seed=seed) for seed in seeds]
+        (tmp_path / f"{name}.mci").write_text(RUN_2.format("\n".join(ones)))
+        return command("run", f"{name}.mci")
+
+    status, out, err = made("two", 0, 3)
+    assert (status, err) == (0, "mcml-sim: two.mci: time limits end no run: each traces all its photons\n")
+    assert "seed 0," in out
+    assert "seed 3," in out
+    (tmp_path / "one.mci").write_text(runs(("one.mco", 2000, 5.0)))
+    assert command("run", "one.mci", "-q", "--seed", 3)[0] == 0
+    mine, other, zero = (read_results(tmp_path / f"{name}.npz") for name in ("two3", "one", "two0"))
+    assert (mine.seed, mine.medium, mine.grid) == (3, other.medium, other.grid)
+    np.testing.assert_array_equal(mine.estimates["reflectance_r"].value, other.estimates["reflectance_r"].value)
+    assert np.any(mine.estimates["reflectance_r"].value != zero.estimates["reflectance_r"].value)
+    assert command("run", "two.mci", "-q", "--seed", 9) == (0, "", "")
+    assert read_results(tmp_path / "two3.npz").seed == 9, "an option goes before the file"
+
+
 @pytest.mark.slow
 def test_results_of_another_run_are_replaced(command, mci):
     assert command("run", mci, "--seed", 3)[0] == 0
