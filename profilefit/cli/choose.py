@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 UNSERVED = 1  # exit status
 
 
-class Answer(NamedTuple):
+class SceneNeed(NamedTuple):
     """What a scene needs: as data, as printed, and whether anything is within its limits."""
 
     content: dict[str, Any]
@@ -58,12 +58,9 @@ def choose(
       profilefit choose examples/layers-head.toml
     """
     with interruptible(__name__):
-        from importlib import import_module
-
         from mcml_sim.cli.screen import print_json, screen
         from mcml_sim.files.text_file import read_toml
         from profilefit.errors import InputError
-        from profilefit.scenes import SCENES
 
     content = read_toml(scene)
     kind = str(content.get("scene"))
@@ -72,7 +69,7 @@ def choose(
     elif measure:
         raise InputError(f"{scene}: --measure must be left out of a {kind}'s file, of which no cost is asked")
     else:
-        answer = OTHERS[kind](import_module(SCENES[kind][0]).read(str(scene), content), quiet)
+        answer = OTHERS[kind](str(scene), content, quiet)
     if as_json:
         print_json(answer.content)
     for part in () if as_json else answer.printed:
@@ -81,7 +78,7 @@ def choose(
         raise typer.Exit(UNSERVED)
 
 
-def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> Answer:
+def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> SceneNeed:
     with interruptible(__name__):
         from mcml_sim.runs.progress import tracked, working
         from profilefit.report.tables import choose_table as table
@@ -100,40 +97,45 @@ def _technique(scene: Path, content: Table, measure: bool, quiet: bool) -> Answe
     stack, bar = of.layers, False if quiet else None
     layers = () if stack is None else of_each_colour(stack, of.tolerance, of.within, bar, of.setting.illumination)
     printed = table.choose_table(choice, ratios, layers)
-    return Answer(table.content(choice, ratios, layers), [printed], choice.chosen is not None)
+    return SceneNeed(table.content(choice, ratios, layers), [printed], choice.chosen is not None)
 
 
-def _heart(request: Any, quiet: bool) -> Answer:
+def _heart(file: str, content: Table, quiet: bool) -> SceneNeed:
     with interruptible(__name__):
         from mcml_sim.runs.progress import working
         from profilefit.report.tables.choose_table import atlas_content, atlas_line
+        from profilefit.scenes.heart.scene import read
         from profilefit.shader import opened
         from profilefit.studies.choose.atlas import atlas_need
 
+    request = read(file, content)
     with working("summing what the screen does not see", quiet), opened() as context:
         need = atlas_need(context, request)
-    return Answer(atlas_content(need), [atlas_line(need)])
+    return SceneNeed(atlas_content(need), [atlas_line(need)])
 
 
-def _sea(request: Any, quiet: bool) -> Answer:
+def _sea(file: str, content: Table, quiet: bool) -> SceneNeed:
     with interruptible(__name__):
         from mcml_sim.runs.progress import working
         from profilefit.report.tables.choose_table import sea_content, sea_lines
+        from profilefit.scenes.sea.scene import read
         from profilefit.studies.choose.sea import sea_need
 
+    request = read(file, content)
     with working("summing the haze", quiet):
         need = sea_need(request)
-    return Answer(sea_content(need), sea_lines(need))
+    return SceneNeed(sea_content(need), sea_lines(need))
 
 
-def _fur(request: Any, quiet: bool) -> Answer:
+def _fur(file: str, content: Table, quiet: bool) -> SceneNeed:
     with interruptible(__name__):
         from mcml_sim.runs.progress import tracked
         from profilefit.report.tables.choose_table import fur_content, fur_lines
+        from profilefit.scenes.fur.request import read
         from profilefit.studies.choose.fur import ANGLES, fur_need
 
-    need = fur_need(request, tracked(ANGLES, "casting rays", "angles", quiet=quiet))
-    return Answer(fur_content(need), fur_lines(need), need.way is not None)
+    need = fur_need(read(file, content), tracked(ANGLES, "casting rays", "angles", quiet=quiet))
+    return SceneNeed(fur_content(need), fur_lines(need), need.way is not None)
 
 
 OTHERS = {"heart": _heart, "sea": _sea, "fur": _fur}  # scenes of which another question is answered
