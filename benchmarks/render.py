@@ -4,7 +4,8 @@
                                 [--quick] [--size WxH] [--figure FILE] [--json FILE] [--reference FILE]
 
 Needs the extra `benchmark` and an OpenGL without a window; the first line names the device. The exact picture takes
-minutes: `--reference FILE` keeps it there for the next time. README.md beside this file says what the numbers mean.
+minutes: `--reference FILE` keeps it there for the next time. All but `refracting` is of n = 1, as published.
+README.md beside this file says what the numbers mean.
 """
 
 from __future__ import annotations

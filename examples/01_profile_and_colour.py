@@ -8,7 +8,7 @@ import numpy as np
 import profilefit
 from mcml_sim import Setting
 
-light = Setting("diffuse")  # light from everywhere, as a renderer blurs it
+light = Setting("diffuse", n=1.4)  # light from everywhere, as a renderer blurs it, on skin
 colour = np.array([0.65, 0.40, 0.30])  # total reflectance of red, green, blue [-]
 mfp = np.array([1.2, 0.8, 0.55])  # transport mean free path [mm]
 

@@ -61,9 +61,8 @@ def export(
 
     \b
     Examples:
-      profilefit export hazard-diffuse --lang hlsl --name skin --out skin.hlsl
+      profilefit export hazard-diffuse --n 1.4 --g 0.9 --lang hlsl --out skin.hlsl
       profilefit export hazard-diffuse --n 1.37
-      profilefit export hazard --n 1.4 --g 0.9
     """
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole

@@ -43,7 +43,7 @@ class Text:
 
     file    its own; `profilefit.shader.emit.prefix` is its name, too
     parts   files that it needs, before it in order; ends files that need it
-    clamps  arguments that the source replaces by others, in words
+    clamps  arguments besides A that the source replaces by others, in words
     count   how often its `//% for` blocks stand
     prefix  of its names, if not its file's name
     """
@@ -51,7 +51,7 @@ class Text:
     file: str
     parts: tuple[str, ...] = RATIONAL
     ends: tuple[str, ...] = WRAPPERS
-    clamps: str = "none"
+    clamps: str = ""
     count: int = 0
     prefix: str = ""
 

@@ -48,7 +48,7 @@ class ForwardRational(FoldedRational):
         n=INDICES,
         g=COSINES,
         own=True,
-        text=Text("refracting_rational", (), prefix="rational", clamps="A to the light that enters"),
+        text=Text("refracting_rational", (), prefix="rational"),
     )
 
     @classmethod

@@ -31,7 +31,7 @@ class LiangAlbedo(AlbedoLaw):
         is_map=True,
         records=("albedo-liang",),
         as_fitted=True,
-        text=Text("liang_albedo", (), clamps="A to where it turns; alpha to 1"),
+        text=Text("liang_albedo", (), clamps="A(alpha) to where it turns; alpha(A) to 1"),
     )
 
     def text_numbers(self) -> dict[str, float]:

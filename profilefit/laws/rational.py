@@ -52,7 +52,7 @@ class Rational(Normalisation):
         records=("albedo-rational",),
         start={"b": 0.5, "c": 2.0, "d": 1.0},  # the limits hold for any, and these give A within 0.1
         own=True,
-        text=Text("rational", (), clamps="A to [0, 1]"),
+        text=Text("rational", ()),
     )
 
     @property

@@ -161,7 +161,7 @@ class RefractingRational(FoldedRational):
         },
         n=REFRACTING,
         own=True,
-        text=Text("refracting_rational", (), prefix="rational", clamps="A to the light that enters"),
+        text=Text("refracting_rational", (), prefix="rational"),
     )
 
     @classmethod

@@ -10,8 +10,11 @@ from mcml_sim.media.checks import is_number, shown
 from profilefit.errors import InputError
 
 Table = dict[str, Any]
+Range = tuple[float, float]
 T = TypeVar("T")
 LONGEST_TEXT = 60  # characters
+LENGTHS = 1e-9, 1e9  # between which lengths have squares and ratios to compute with
+MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
 
 
 class Tables:
@@ -47,6 +50,16 @@ class Tables:
         if not is_number(value) or not (value == default or math.isfinite(value)) or not 0 < value <= most:
             raise self.bad(where, key, "a number > 0" + (f" and <= {most:g}" if most < math.inf else ""), value)
         return float(value)
+
+    def range(self, where: str, key: str, table: Table, least: float = 0.0, most: float = math.inf) -> Range:
+        """Two numbers > 0, the smaller first, or one that is both."""
+        value = table.get(key)
+        ends: list[Any] = value if isinstance(value, list) else [value, value]
+        numbers = len(ends) == 2 and all(is_number(end) for end in ends)
+        if not (numbers and 0 < ends[0] <= ends[1] <= most and least <= ends[0] and ends[1] < MOST_ASIDE * ends[0]):
+            limits = f" and >= {least:g}" * (least > 0) + f" and <= {most:.3g}" * (most < math.inf)
+            raise self.bad(where, key, f"a number > 0{limits}, or two of them, the smaller first", value)
+        return float(ends[0]), float(ends[1])
 
     def whole(self, where: str, key: str, table: Table, default: int, least: int, most: int) -> int:
         """A whole number from least to most."""
@@ -90,7 +103,7 @@ class Tables:
         try:
             return make()
         except InputError as error:
-            raise InputError(f"{self.file}: [{where}] {error}") from None
+            raise type(error)(f"{self.file}: [{where}] {error}") from None
 
     def bad(self, where: str, key: str, accepted: str, value: object) -> InputError:
         """The error of a key's value; None is a value that is missing."""

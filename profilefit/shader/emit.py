@@ -27,6 +27,7 @@ from profilefit.shader.languages import translated
 
 Numbers = dict[str, float]
 PLACEHOLDER = "LAW_"
+HIGHEST = "MAX_REFLECTANCE"  # the constant that NAME_alpha clamps A to
 NORMALISED = "rational"  # the part that stands for the text of the map which normalises a law
 # A block that stands once for each number: //% for 2 ... N   ...   //% end, with @i the number and @h the one before;
 # @n is the last one, anywhere.
@@ -83,7 +84,14 @@ def law_text(
 def numbers(law: ProfileLaw) -> Numbers:
     """Every number of a law's text, by its name less the prefix."""
     albedo = _normalisation(law) if NORMALISED in _text(law, ProfileLaw).parts else None
-    return {**(_prefixed(albedo) if albedo else {}), **law.text_numbers(), **law.text_constants()}
+    own = {**law.text_numbers(), **law.text_constants()}
+    return {HIGHEST: max_reflectance(law), **(_prefixed(albedo) if albedo else {}), **own}
+
+
+def max_reflectance(law: Constants) -> float:
+    """Largest total reflectance A [-] that a law's source gives an albedo to: it takes a larger A for this one."""
+    albedo = law if isinstance(law, AlbedoLaw) else getattr(law, "albedo", None)
+    return albedo.reflectances.high if isinstance(albedo, AlbedoLaw) else float(law.total(1.0))  # type: ignore[attr-defined]
 
 
 def parts(law: ProfileLaw) -> list[str]:
@@ -120,7 +128,7 @@ def shape_numbers(law: ProfileLaw, alpha: float) -> Numbers:
 def map_text(law: AlbedoLaw, lang: str = "glsl", name: str | None = None, told: Mapping[str, str] | None = None) -> str:
     """The map between alpha and A: NAME_alpha(A) and NAME_map_reflectance(alpha); arguments as for `law_text`."""
     text = _text(law, AlbedoLaw)
-    constants = _prefixed(law)
+    constants = {HIGHEST: max_reflectance(law), **_prefixed(law)}
     remarks = {f"map_{key}": value for key, value in (told or {}).items()}
     files = [read_text(part) for part in ("common", *text.parts, text.file)]
     return filled(files, name or prefix(law), constants, 0, lang, remarks)
@@ -153,8 +161,9 @@ def _normalisation(law: Any) -> Normalisation:
 
 
 def _prefixed(albedo: AlbedoLaw) -> Numbers:
-    """The numbers of a map's text."""
-    return {f"map_{key}": value for key, value in {**albedo.text_numbers(), **albedo.text_constants()}.items()}
+    """The numbers of a map's text, but `HIGHEST`, which is the share of the light that enters."""
+    every = {**albedo.text_numbers(), **albedo.text_constants()}
+    return {f"map_{key}": value for key, value in every.items() if key != "entered"}
 
 
 def read_text(file: str) -> str:

@@ -57,7 +57,7 @@ MAP_NAMES = (
     ("alpha(A)", "single-scattering albedo alpha for a total reflectance A"),
     ("map_reflectance(alpha)", "and back"),
 )
-DOMAIN = "domain, which nothing checks: alpha and A in [0, 1]"
+DOMAIN = "domain, which nothing checks: alpha in [0, 1]"
 CONVENTIONS = """\
 alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
@@ -166,7 +166,11 @@ def _head(named: Named, sources: Sequence[_Source], lang: str, name: str | None)
     start = name or emit.prefix(named.law)
     lines += [f"{start}_{called:30}{text}" for called, text in (MAP_NAMES if is_map else PROFILE_NAMES)]
     lines += ["", *_setting_lines(named.setting), ""]
-    lines += [DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"), f"clamps: {emit.clamps(named.law)}", ""]
+    most = f"{start}_{emit.HIGHEST}"
+    lines.append(DOMAIN + ("" if is_map else ", r >= 0, mfp > 0, xi in [0, 1)"))
+    lines.append(f"{most} = {emit.max_reflectance(named.law):.3g}: no half space of this n reflects more")
+    clamps = [f"A to [0, {most}]", *filter(None, [emit.clamps(named.law)])]
+    lines += [f"clamps: {'; '.join(clamps)}", ""]
     if printed := _printed(named):
         lines.append(f"constants as printed: {printed.source}")
     for source in sources:
@@ -261,6 +265,7 @@ def _plain(named: Named, sources: Sequence[_Source]) -> dict[str, Any]:
         "setting": {"illumination": law.setting.illumination, "n": law.setting.n, "g": law.setting.g},
         "units": "lengths in mean free paths 1 / (mu_s' + mu_a)",
         "constants": law.text_constants(),
+        "max_reflectance": emit.max_reflectance(law),
         "printed_in": printed.source if printed else None,
         "records": {source.path.stem: _record_data(source, named.law) for source in sources},
     }

@@ -57,7 +57,7 @@ ALIKE = 1e-4  # relative, of the constants of the half spaces that a record was 
 # Of STACK.toml, those that only draw a scene among them.
 KEYS = (
     *("title", "unit", "illumination", "layers", "start"),
-    *("scene", "surface", "uneven", "pose", "technique", "camera", "light"),
+    *("scene", "surface", "uneven", "pose", "technique", "camera", "light", "choose"),
 )
 
 

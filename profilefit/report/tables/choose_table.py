@@ -277,10 +277,11 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     colour = "of one colour" if len(layers) == 1 else f"of three colours, {CHANNELS[worst]} the worst"
     unit = choice.scene.unit
     noise = f" ± {_percent(layer.standard_error)}" if layer.photons else ""
+    light = {"searchlight": "a pencil beam", "diffuse": "diffuse illumination"}[choice.scene.setting.illumination]
     together = math.hypot(layer.error, choice.nearest.error.total)
     text = (
         f"Layers, {colour}: {LAYERS[verdict]}. The nearest single one (A {significant(layer.reflectance, 3)}, "
-        f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under a pencil beam) is off by "
+        f"transport mean free path {significant(layer.mfp, 3)} {unit}, n = {layer.n:g}, under {light}) is off by "
         f"{_percent(layer.error)}{noise} %; with the choice {_percent(together)} %."
     )
     single = max(one.single for one in layers)
@@ -290,7 +291,7 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     )
     index = choice.scene.setting.n
     if not math.isclose(layer.n, index, rel_tol=0.01):
-        text += f" The choice is for n = {index:g}, as material.index says, and these layers are not."
+        text += f" The choice is for n = {index:g}, as the file says, and these layers are not."
     return text
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Medium
+from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.errors import InputError
 from profilefit.laws.gaussians import MOST
 from profilefit.recipes.folder import LOCAL, STACKS, fits_folder
@@ -177,9 +178,9 @@ class Bench:
 def staged(context: moderngl.Context, of: HeartRequest, light: Scattering) -> Iterator[tuple[Stage, Part]]:
     """A stage that has drawn what is requested, and its one part."""
     part = Part(of.mesh, np.full((1, 1, 3), light.colour, np.float32), of.roughness)
-    n = of.media[0].layers[0].n
+    f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     with Stage(context, of.size) as stage:
-        stage.draw(Scene((part,), of.light, of.ambient, of.camera, ((n - 1.0) / (n + 1.0)) ** 2))
+        stage.draw(Scene((part,), of.light, of.ambient, of.camera, f0))
         request.require_lit(of.file, stage.buffers())
         yield stage, part
 

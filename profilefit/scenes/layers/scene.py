@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Medium, Setting
+from mcml_sim.media.fresnel import normal_reflectance
 from profilefit.laws.stack import StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
@@ -34,8 +35,8 @@ from profilefit.scenes.stage.world import Part, Rgb, Scene, deformed, rgb
 Floats = NDArray[np.float64]
 TABLES = {
     **request.TABLES,
-    "": ("title", "scene", "unit", "illumination", "layers", "start", "uneven", "pose", *request.TABLES),
-    "technique": ("kind", *request.TABLES["technique"], "single"),
+    "": ("title", "scene", "unit", "illumination", "layers", "start", "uneven", "pose", *request.TABLES, "choose"),
+    "technique": ("kind", *request.TABLES["technique"], "tolerance", "single"),
 }
 KINDS = ("stack", "dipole", "half space", "none")
 OF_LAW = ("stack", "none")  # which take the law's colour at each thickness
@@ -165,8 +166,7 @@ def laws_of(stack: StackRequest) -> tuple[StackLaw, StackLaw, StackLaw]:
 
 def scene_of(of: LayersRequest) -> Scene:
     """The head in its pose; what its texture holds is the share of the way from the least thickness to the most."""
-    n = of.media[0].layers[0].n
-    f0 = ((n - 1.0) / (n + 1.0)) ** 2  # what the surface mirrors head-on
+    f0 = normal_reflectance(1.0, of.media[0].layers[0].n)
     values = np.repeat(of.values[::-1, :, None], len(CHANNELS), axis=-1)
     meshes = (head.head(), head.ear(-1), head.ear(1), head.neck())
     parts = tuple(Part(deformed(mesh, lambda points: posed(points, of.pose)), values) for mesh in meshes)

@@ -6,6 +6,7 @@ A reflectance texture of skin is drawn by formulas: blotches, freckles of a mill
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +16,8 @@ from scipy.ndimage import gaussian_filter
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
 from profilefit.materials import BY_NAME
+from profilefit.recipes.toml_tables import Range
+from profilefit.scenes.skin.law import albedo_of
 from profilefit.scenes.stage.exact_law import DIFFUSE
 from profilefit.scenes.stage.world import Rgb, rgb
 
@@ -35,6 +38,30 @@ class Translucent:
     alpha: Rgb
     mfp: Rgb
     reflectance: Rgb
+
+
+@dataclass(frozen=True)
+class Painted:
+    """Ranges of a painted material, least and most of red, green, blue.
+
+    reflectance  A [-];  mfp  transport mean free path [mm]
+    """
+
+    reflectance: tuple[Range, Range, Range]
+    mfp: tuple[Range, Range, Range]
+
+    @classmethod
+    def even(cls, reflectance: Iterable[float], mfp: Iterable[float]) -> Painted:
+        """A material of one A and one mean free path a colour."""
+        first, second = (rgb(np.fromiter(values, float)) for values in (reflectance, mfp))
+        (a, b, c), (d, e, f) = (tuple((one, one) for one in values) for values in (first, second))
+        return cls((a, b, c), (d, e, f))
+
+    def middle(self, setting: Setting = DIFFUSE) -> Translucent:
+        """The material in the middle of the ranges: mean A, geometric mean of the mean free paths."""
+        reflectance = np.mean(self.reflectance, axis=1)
+        alpha = [albedo_of(one, setting) for one in reflectance.tolist()]
+        return Translucent("painted", rgb(alpha), rgb(np.prod(np.sqrt(self.mfp), axis=1)), rgb(reflectance))
 
 
 def translucent(name: str = "skin1", setting: Setting = DIFFUSE) -> Translucent:

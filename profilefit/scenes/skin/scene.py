@@ -7,13 +7,16 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from mcml_sim import Setting
+from mcml_sim import Setting, exact
+from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.errors import InputError
-from profilefit.materials import BY_NAME
+from profilefit.errors import InputError, SettingError
+from profilefit.laws.refracting_rational import REFRACTING
+from profilefit.materials import BY_NAME, CHANNELS
 from profilefit.recipes import catalogue
-from profilefit.recipes.toml_tables import Table, Tables
-from profilefit.scenes.skin.material import Translucent, plain, skin, translucent
+from profilefit.recipes.toml_tables import LENGTHS, Table, Tables
+from profilefit.scenes.skin.law import Separable
+from profilefit.scenes.skin.material import Painted, Translucent, plain, skin, translucent
 from profilefit.scenes.skin.passes import SeparableFilter
 from profilefit.scenes.stage import head, request
 from profilefit.scenes.stage.buffers import INSIDE
@@ -39,19 +42,25 @@ FACE = Camera(eye=(-95.0, 20.0, 690.0), target=(0.0, -6.0, 0.0), height=290.0)
 
 
 def head_scene(
-    material: str = "skin1", camera: Camera = FACE, detail: int = 1, columns: int = 2048, setting: Setting = DIFFUSE
+    material: str | Painted = "skin1",
+    camera: Camera = FACE,
+    detail: int = 1,
+    columns: int = 2048,
+    setting: Setting = DIFFUSE,
 ) -> Head:
     """A head under grazing light with a thin band before it; all of one material, freckles and stubble on the face.
 
+    material  by its name, or the middle of a painted one
     detail  of the meshes, a whole number >= 1;  columns  of the skin's texture
-    setting  in which the material has its A
+    setting  in which the material has its A: by default n = 1, as in published comparisons; skin has n = 1.4
     """
     if detail < 1:
         raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
-    what = translucent(material, setting)
-    face = skin(what.reflectance, columns)
+    what = material.middle(setting) if isinstance(material, Painted) else translucent(material, setting)
+    most = float(exact.reflectance(1.0, setting))  # a colour that the surface lets out
+    face = np.minimum(skin(what.reflectance, columns), np.float32(most))
     even = plain(what.reflectance)
-    pale = plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), 0.9))
+    pale = plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), min(0.9, most)))
     parts = (
         Part(head.head(detail), face),
         Part(head.ear(-1, detail), even),
@@ -64,35 +73,55 @@ def head_scene(
 
 TABLES = {
     **request.TABLES,
-    "": ("scene", "material", *request.TABLES),
-    "technique": ("kind", "law", "constants", "illumination", *request.TABLES["technique"]),
+    "": ("title", "scene", "unit", "material", "n", "layers", *request.TABLES, "choose"),
+    "material": CHANNELS,
+    "technique": ("kind", "law", "constants", "illumination", *request.TABLES["technique"], "tolerance"),
 }
-SAMPLED = "samples"
-KINDS: dict[str, Technique] = {"separable": SeparableFilter(), "none": Lambert()}
+SAMPLED, SEPARABLE, NONE = KINDS = ("samples", "separable", "none")
 OF_LAW = ("law", "constants", "illumination")
+SKIN = 1.4  # refractive index
 
 
 @dataclass(frozen=True)
 class SceneRequest(ViewRequest):
-    """What a file requests."""
+    """What a file requests.
+
+    material  by its name, or painted;  setting  of its A and of the reference: diffuse illumination, n of the file
+    illumination  of the law
+    """
 
     label: str
     technique: Technique
-    material: str
+    material: str | Painted
+    setting: Setting
+    illumination: str
 
 
 def read(file: str, content: Table) -> SceneRequest:
     """A scene of a file's content; InputError that names file, table and key, what was got and what is accepted."""
     tables = Tables(file, TABLES)
     tables.known("", content)
-    label, by = _technique(tables, tables.table(content, "technique", {}))
-    material = tables.text("", "material", content, "skin1", tuple(BY_NAME))
-    return SceneRequest(**request.view(tables, content), label=label, technique=by, material=material)
+    tables.text("", "title", content, "")
+    tables.text("", "unit", content, "mm", ("mm",))
+    setting = Setting("diffuse", n=tables.number("", "n", content, SKIN))
+    if not 1.0 <= setting.n <= REFRACTING.high:
+        raise tables.bad("", "n", f"a refractive index in [1, {REFRACTING.high:g}]", setting.n)
+    label, by, light = _technique(tables, tables.table(content, "technique", {}), setting)
+    return SceneRequest(
+        **request.view(tables, content),
+        label=label,
+        technique=by,
+        material=_material(tables, content, setting),
+        setting=setting,
+        illumination=light,
+    )
 
 
 def draw(context: moderngl.Context, of: SceneRequest) -> Drawn:
     """The picture, its truth, error and cost: a minute for 26 000 pixels, which the truth takes."""
-    scene = replace(head_scene(of.material, of.camera), light=of.light, ambient=of.ambient, camera=of.camera)
+    scene = replace(head_scene(of.material, of.camera, setting=of.setting), light=of.light, ambient=of.ambient)
+    if of.setting.n > 1.0:  # else the scattering has no interface, and highlights are those of skin
+        scene = replace(scene, f0=normal_reflectance(1.0, of.setting.n))
     mfp = scene.material.mfp
     with Stage(context, (2 * of.size[0], 2 * of.size[1])) as stage:
         stage.draw(scene)
@@ -101,22 +130,39 @@ def draw(context: moderngl.Context, of: SceneRequest) -> Drawn:
         stage.draw(scene)
         buffers = stage.buffers()
         request.require_lit(of.file, buffers)
-        judge = Judge(stage, mfp, exitance_of(buffers, mfp), buffers.mask > INSIDE)
+        judge = Judge(stage, mfp, exitance_of(buffers, mfp, of.setting), buffers.mask > INSIDE)
         shown = Shown(of.label, of.technique, of.technique)
-        return request.drawn(judge, of, shown, own_error(fine, mfp))
+        return request.drawn(judge, of, shown, own_error(fine, mfp, of.setting))
 
 
-def _technique(tables: Tables, named: Table) -> tuple[str, Technique]:
-    """Its name for a reader, and itself."""
-    kind = tables.text("technique", "kind", named, SAMPLED, (SAMPLED, *KINDS))
+def _material(tables: Tables, content: Table, setting: Setting) -> str | Painted:
+    if not isinstance(content.get("material"), dict):
+        return tables.text("", "material", content, "skin1", tuple(BY_NAME))
+    found, most = [], float(exact.reflectance(1.0, setting))
+    for channel in CHANNELS:
+        where = f"material.{channel}"
+        one = tables.table(tables.table(content, "material"), channel, within="material")
+        tables.known(where, one, ("reflectance", "mfp"))
+        found.append((tables.range(where, "reflectance", one, most=most), tables.range(where, "mfp", one, *LENGTHS)))
+    (a, d), (b, e), (c, f) = found
+    return Painted((a, b, c), (d, e, f))
+
+
+def _technique(tables: Tables, named: Table, setting: Setting) -> tuple[str, Technique, str]:
+    """Return the technique's name for a reader, the technique, and the illumination of its law."""
+    kind = tables.text("technique", "kind", named, SAMPLED, KINDS)
     if kind != SAMPLED:
         for key in OF_LAW:
             if key in named:
                 raise tables.bad("technique", key, f"left out where kind is {kind}", named[key])
-        return kind, KINDS[kind]
+        return kind, SeparableFilter(Separable(setting=setting)) if kind == SEPARABLE else Lambert(), "diffuse"
     law = tables.text("technique", "law", named, "hazard")
     constants = tables.text("technique", "constants", named, "regenerated")
     light = tables.text("technique", "illumination", named, "diffuse", ILLUMINATIONS)
-    return f"{law}, {constants}", tables.made(
-        "technique", lambda: technique(catalogue.load(law, constants, Setting(light)))
-    )
+    try:
+        one = tables.made("technique", lambda: catalogue.load(law, constants, replace(setting, illumination=light)))
+    except SettingError as error:
+        if setting.n == 1.0:
+            raise
+        raise SettingError(f"{error}: write n = 1 at the top of the file, or name another law") from None
+    return f"{law}, {constants}", tables.made("technique", lambda: technique(one)), light

@@ -25,6 +25,6 @@ float LAW_map_reflectance(float alpha) {
 
 // Single-scattering albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
-    float t = LAW_exponent(reflectance);
+    float t = LAW_exponent(clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE));
     return t * pf_mean_decay(t);
 }

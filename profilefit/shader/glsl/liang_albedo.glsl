@@ -7,5 +7,6 @@ float LAW_map_reflectance(float alpha) {
 
 // Single-scattering albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
-    return min(LAW_map_p * reflectance / (LAW_map_w + reflectance * (reflectance + LAW_map_q)), 1.0);
+    float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
+    return min(LAW_map_p * share / (LAW_map_w + share * (share + LAW_map_q)), 1.0);
 }

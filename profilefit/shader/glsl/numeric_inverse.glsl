@@ -28,14 +28,14 @@ float LAW_radius_density(float x, LAW_Shape s) {
 }
 
 // The alpha [-] at which this law itself reflects A, as those who render with it invert it (Jensen and Buhler 2002,
-// Hery 2012): a texture of A stays what it is. The half space of that alpha reflects otherwise. 1 where A is out of
-// reach.
+// Hery 2012): a texture of A stays what it is. The half space of that alpha reflects otherwise.
 float LAW_alpha(float reflectance) {
+    float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
     float low = 0.0; // of s = sqrt(1 - alpha)
     float high = 1.0;
     for (int i = 0; i < ALBEDO_HALVINGS; ++i) {
         float middle = 0.5 * (low + high);
-        bool brighter = LAW_reflectance(LAW_shape((1.0 - middle) * (1.0 + middle))) > reflectance;
+        bool brighter = LAW_reflectance(LAW_shape((1.0 - middle) * (1.0 + middle))) > share;
         low = PF_SELECT(brighter, middle, low);
         high = PF_SELECT(brighter, high, middle);
     }

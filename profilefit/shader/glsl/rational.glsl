@@ -14,7 +14,7 @@ float LAW_map_alpha_over_reflectance(float alpha) {
 // Single-scattering albedo alpha [-] for a total reflectance A [-]: the root s of a quadratic where A is large, and
 // 1 - s where it is small, so that neither cancels.
 float LAW_alpha(float reflectance) {
-    float share = clamp(reflectance, 0.0, 1.0);
+    float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
     float bright_linear = 1.0 - LAW_map_b + share * LAW_map_c;
     float quadratic = LAW_map_b + share * LAW_map_d;
     float rest = 1.0 - share;

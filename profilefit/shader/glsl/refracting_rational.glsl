@@ -1,7 +1,7 @@
 // A = t (1 - rho) R / (1 - rho R), R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2), s = sqrt(1 - alpha); t is the share of
 // the light that enters, rho that of cosine-weighted light from inside which the surface reflects back.
 // A / alpha = p (1 + b s + f s^2) / ((1 + s) G(s)); at alpha = 0 it is once, by light scattered once, which b follows from.
-const float LAW_map_p = LAW_map_entered * (1.0 - LAW_map_trapped);
+const float LAW_map_p = LAW_MAX_REFLECTANCE * (1.0 - LAW_map_trapped);
 const float LAW_map_b = 2.0 * LAW_map_once / LAW_map_p * (1.0 + LAW_map_c + LAW_map_d) - 1.0 - LAW_map_f;
 const float LAW_map_g0 = 1.0 - LAW_map_trapped;
 const float LAW_map_g1 = LAW_map_c - LAW_map_trapped * (LAW_map_b - 1.0);
@@ -46,7 +46,7 @@ float LAW_map_root(float rest, float linear_term, float quadratic) {
 // Single-scattering albedo alpha [-] for a total reflectance A [-]: the root s where A is large, and 1 - s where it is
 // small, so that neither cancels.
 float LAW_alpha(float reflectance) {
-    float share = clamp(reflectance / LAW_map_entered, 0.0, 1.0);
+    float share = clamp(reflectance / LAW_MAX_REFLECTANCE, 0.0, 1.0);
     float inside = 1.0 - LAW_map_trapped * (1.0 - share);
     float light = share / inside;
     float dark = (1.0 - LAW_map_trapped) * (1.0 - share) / inside;

@@ -9,7 +9,7 @@ float LAW_map_reflectance(float alpha) {
 
 // Single-scattering albedo alpha [-] for a total reflectance A [-]
 float LAW_alpha(float reflectance) {
-    float square = LAW_map_q0 + reflectance * (LAW_map_q1 + reflectance * LAW_map_q2);
-    float s = LAW_map_p0 + LAW_map_p1 * reflectance - sqrt(square);
+    float share = clamp(reflectance, 0.0, LAW_MAX_REFLECTANCE);
+    float s = LAW_map_p0 + LAW_map_p1 * share - sqrt(LAW_map_q0 + share * (LAW_map_q1 + share * LAW_map_q2));
     return clamp((1.0 - s) * (1.0 + s), 0.0, 1.0);
 }

@@ -3,7 +3,7 @@
 By exact light where all layers scatter isotropically under one index; else both are traced, the stack as it is, and a
 half space of the upper layer's index that scatters alike in all directions, at every albedo from one run. The half
 space's albedo is the one that gives the stack's reflectance back; its mean free path is the one whose light near an
-edge is nearest to the stack's. Light is a searchlight's, as photons are started.
+edge is nearest to the stack's.
 
 And does light scattered once need a pass of its own? What it costs to let it leave like all other light.
 """
@@ -66,7 +66,12 @@ class OneLayer:
 
 
 def one_layer(
-    stack: Medium, tolerance: float, within: Within, photons: int | None = None, progress: bool | None = None
+    stack: Medium,
+    tolerance: float,
+    within: Within,
+    photons: int | None = None,
+    progress: bool | None = None,
+    illumination: str = "searchlight",
 ) -> OneLayer:
     """Compare both, by exact light or traced; InputError where nothing comes back. Seconds to a minute.
 
@@ -75,7 +80,7 @@ def one_layer(
     """
     n = stack.layers[0].n / stack.n_above
     if photons is None and _is_solved(stack):
-        near = one_half_space(stack, "searchlight", within.mfp)
+        near = one_half_space(stack, illumination, within.mfp)
         return OneLayer(near.reflectance, near.alpha, near.mfp, n, near.error, 0.0, 0, alike_error(stack))
     number = int(np.clip((PRECISE / tolerance) ** 2, FEWEST, MOST)) if photons is None else photons
     reduced = [layer.mu_a + layer.mu_s * (1.0 - layer.g) for layer in stack.layers]
@@ -83,10 +88,11 @@ def one_layer(
     if not lengths:
         raise InputError(f"layers must scatter or absorb somewhere, got {len(reduced)} that are clear")
     edges = np.append(0.0, np.geomspace(NEAREST * min(lengths), FARTHEST * max(lengths), RINGS))
-    tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress)
+    tally = simulate(stack, Grid.from_edges(r=edges), number, seed=SEED, progress=progress, illumination=illumination)
     reflectance = float(tally.diffuse_reflectance.value)
     scaled = np.append(0.0, np.geomspace(NEAREST, FARTHEST, RINGS))
-    white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=Setting(n=n), progress=progress)
+    setting = Setting(illumination, n)
+    white = simulate_orders(Grid.from_edges(r=scaled), number, seed=SEED + 1, setting=setting, progress=progress)
     alpha = _alpha(white, reflectance)
     of_stack = _rings(edges, tally.reflectance_r.scaled(tally.grid.r_areas), tally.reflectance_r_overflow)
     of_one = _rings(scaled, white.energy(alpha), white.overflow(alpha))
@@ -104,10 +110,17 @@ def _is_solved(stack: Medium) -> bool:
 
 
 def of_each_colour(
-    stack: LayerStack, tolerance: float, within: Within, progress: bool | None = None
+    stack: LayerStack,
+    tolerance: float,
+    within: Within,
+    progress: bool | None = None,
+    illumination: str = "searchlight",
 ) -> tuple[OneLayer, ...]:
     """`one_layer` of red, green and blue, of which equal ones are traced once; one alone where all three are equal."""
-    found = {medium: one_layer(medium, tolerance, within, progress=progress) for medium in dict.fromkeys(stack.media)}
+    found = {
+        medium: one_layer(medium, tolerance, within, progress=progress, illumination=illumination)
+        for medium in dict.fromkeys(stack.media)
+    }
     return tuple(found[medium] for medium in stack.media[: 1 if stack.is_grey else None])
 
 

@@ -1,35 +1,38 @@
-"""A scene's requirements of its translucent material: SCENE.toml, read and checked."""
+"""A scene's requirements of its translucent material: the file of a scene of skin or layers, read and checked."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from mcml_sim import Setting
 from mcml_sim.files.text_file import read_toml
-from mcml_sim.media.checks import is_number
-from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.materials import BY_NAME, CHANNELS
+from profilefit.errors import InputError
 from profilefit.recipes.stack.file import LayerStack, stack_of
-from profilefit.recipes.toml_tables import Table, Tables
+from profilefit.recipes.toml_tables import LENGTHS, Range, Table, Tables
+from profilefit.scenes import SCENES
+from profilefit.scenes.layers import scene as layers
+from profilefit.scenes.layers.half_space import one_half_space
+from profilefit.scenes.skin import scene as skin
+from profilefit.scenes.skin.material import Painted, translucent
+from profilefit.scenes.stage.request import ViewRequest
 from profilefit.studies.choose.case import Within
 from profilefit.studies.choose.cost import GPUS, YARDSTICK
-from profilefit.studies.choose.response import reference_light
 
-Range = tuple[float, float]
-TABLES = {
-    "": ("unit", "view", "material", "tolerance", "budget", "layers"),
-    "view": ("pixel", "radius", "world", "resolution", "coverage"),
-    "material": ("light", "index", "name", *CHANNELS),
-    "channel": ("reflectance", "mfp"),
-    "tolerance": ("error", "mfp", "pixels"),
-    "budget": ("ms", "gpu"),
+CHOOSE = "choose"
+TABLES = {CHOOSE: ("pixel", "radius", "mfp", "pixels", "ms", "gpu", "resolution", "coverage")}
+# Keys of files before one format served `choose` and `scene`, by table, and what is written today.
+OLDER = {
+    "view": {key: f"[{CHOOSE}] {key}" for key in ("pixel", "radius", "resolution", "coverage")}
+    | {"world": "lengths in mm"},
+    "material": {"light": "[technique] illumination", "index": "n", "name": "material"},
+    "tolerance": {"error": "[technique] tolerance", "mfp": f"[{CHOOSE}] mfp", "pixels": f"[{CHOOSE}] pixels"},
+    "budget": {"ms": f"[{CHOOSE}] ms", "gpu": f"[{CHOOSE}] gpu"},
 }
+TOLERANCE = 0.02
 LEAST_RADIUS = 2.0  # of curvature, in the longest mean free path: below, light goes through rather than along
-LENGTHS = (1e-9, 1e9)  # in the unit of the mean free paths
-MOST_ASIDE = 1e6  # ratio of the ends of a range: beyond, it is a slip of the pen
 
 
 @dataclass(frozen=True)
@@ -67,102 +70,79 @@ class Requirements:
     layers: LayerStack | None = None
 
 
-def read(path: Path) -> Requirements:
-    """A scene from its file; InputError that names file, table and key, what was got and what is accepted."""
-    return _Reader(str(path), TABLES).scene(read_toml(path))
+def read(path: Path | str, content: Table | None = None) -> Requirements:
+    """Read a scene of skin or layers; InputError that names file, table and key, what was got and what is accepted.
 
+    content  of the file, where it is known already
 
-def _three(ranges: tuple[Range, ...]) -> tuple[Range, Range, Range]:
-    red, green, blue = ranges
-    return red, green, blue
+    Requirements of layers are those of the half space nearest to each colour's stack, which takes seconds.
+    """
+    content = read_toml(path) if content is None else content
+    reader, kind = _Reader(str(path), TABLES), content.get("scene")
+    reader.refuse_older(content)
+    if kind == "skin":
+        return reader.skin(content)
+    if kind == "layers":
+        return reader.layers(content)
+    known = ("skin", "layers") if isinstance(kind, str) and kind in SCENES else SCENES
+    raise reader.bad("", "scene", f"one of {', '.join(known)}", kind)
 
 
 class _Reader(Tables):
     """The tables of one file, whose name every message begins with."""
 
-    def scene(self, content: Table) -> Requirements:
-        self.known("", content)
-        view, material = (self.table(content, name) for name in ("view", "material"))
-        tolerance, budget = self.table(content, "tolerance"), self.table(content, "budget", {})
-        setting = self.setting(material)
-        reflectance, mfp = self.channels(material, setting)
-        world = self.number("view", "world", view, 1.0)
-        pixel = self.range("view", "pixel", view)
-        radius = world * self.number("view", "radius", view, math.inf)
-        longest = max(most for _, most in mfp)
-        pixel = (world * pixel[0], world * pixel[1])
-        curved = math.isfinite(view.get("radius", math.inf))
-        self.lengths("view", "pixel", pixel)
-        self.lengths("view", "radius", (radius,) if curved else ())
-        for channel, ends in zip(CHANNELS, mfp, strict=True):
-            self.lengths(f"material.{channel}", "mfp", ends)
-        if radius < LEAST_RADIUS * longest:
-            least = f"at least {LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest / world:.3g}"
-            raise self.bad("view", "radius", least, view["radius"])
-        unit = self.text("", "unit", content, "mm")
-        return Requirements(
-            unit=unit,
-            setting=setting,
-            reflectance=_three(reflectance),
-            mfp=_three(mfp),
-            pixel=pixel,
-            radius=radius,
-            tolerance=self.number("tolerance", "error", tolerance, most=1.0),
-            within=self.within(tolerance),
-            budget=self.budget(budget, view),
-            resolution=self.sides("view", "resolution", view, (1920, 1080), 16384),
-            layers=stack_of(self, content["layers"], unit) if "layers" in content else None,
-        )
+    def refuse_older(self, content: Table) -> None:
+        """InputError that says what is written today for the keys of an older format."""
+        tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
+        if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
+            words = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
+            first = "" if "scene" in content else 'scene = "skin" and '
+            raise InputError(f"{self.file}: keys are of an older format: write {first}{words}")
 
-    def within(self, tolerance: Table) -> Within:
-        pixels = tolerance.get("pixels", 2)
-        if type(pixels) is not int:
-            raise self.bad("tolerance", "pixels", "a whole number in 1 ... 100", pixels)
-        mfp = self.number("tolerance", "mfp", tolerance, 4.0)
-        return self.made("tolerance", lambda: Within(mfp, pixels))
+    def skin(self, content: Table) -> Requirements:
+        """Requirements of a painted or published material."""
+        request = skin.read(self.file, content)
+        limits = self.limits(content, request)
+        setting, material = replace(request.setting, illumination=request.illumination), request.material
+        if not isinstance(material, Painted):
+            one = translucent(material, setting)
+            material = Painted.even(one.reflectance, one.mfp)
+        stack = stack_of(self, content["layers"]) if "layers" in content else None
+        return self.limited(limits, setting, material, stack)
 
-    def setting(self, material: Table) -> Setting:
-        light = self.text("material", "light", material, "diffuse", ILLUMINATIONS)
-        index = self.number("material", "index", material, 1.0)
-        return self.made("material", lambda: reference_light(Setting(light, index)).setting)
+    def layers(self, content: Table) -> Requirements:
+        """Requirements of the half space nearest to each colour's stack."""
+        request = layers.read(self.file, content)
+        limits = self.limits(content, request)
+        stack, illumination = request.stack.stack, request.stack.illumination
+        near = [one_half_space(medium, illumination, limits["within"].mfp) for medium in stack.media]
+        material = Painted.even([one.reflectance for one in near], [one.mfp for one in near])
+        return self.limited(limits, Setting(illumination, n=stack.media[0].layers[0].n), material, stack)
 
-    def channels(self, material: Table, setting: Setting) -> tuple[tuple[Range, ...], tuple[Range, ...]]:
-        """Ranges of A and of the mean free path, three each."""
-        if "name" in material:
-            if given := [name for name in CHANNELS if name in material]:
-                raise self.bad("material", "name", f"left out where {', '.join(given)} are given", material["name"])
-            known = BY_NAME[self.text("material", "name", material, accepted=tuple(BY_NAME))]
-            light = reference_light(setting)
-            colours = [light.reflectance(alpha) for alpha in known.alpha]
-            return tuple((a, a) for a in colours), tuple((length, length) for length in known.mfp)
-        found: list[tuple[Range, Range]] = []
-        for channel in CHANNELS:
-            where = f"material.{channel}"
-            one = self.table(material, channel, within="material")
-            self.known(where, one, TABLES["channel"])
-            found.append((self.range(where, "reflectance", one, most=1.0), self.range(where, "mfp", one)))
-        return tuple(a for a, _ in found), tuple(length for _, length in found)
+    def limits(self, content: Table, request: ViewRequest) -> dict[str, Any]:
+        """The fields of `Requirements` that no material has a part in."""
+        own, named = (self.table(content, name, {}) for name in (CHOOSE, "technique"))
+        side, mfp = request.camera.height / request.size[1], self.number(CHOOSE, "mfp", own, 4.0)
+        pixels = self.whole(CHOOSE, "pixels", own, 2, 1, 100)
+        return {
+            "pixel": self.range(CHOOSE, "pixel", own, *LENGTHS) if "pixel" in own else (side, side),
+            "radius": self.number(CHOOSE, "radius", own, math.inf),
+            "tolerance": self.number("technique", "tolerance", named, TOLERANCE, most=1.0),
+            "within": self.made(CHOOSE, lambda: Within(mfp, pixels)),
+            "budget": Budget(
+                self.number(CHOOSE, "ms", own) if "ms" in own else None,
+                self.text(CHOOSE, "gpu", own, YARDSTICK, tuple(GPUS)),
+                self.number(CHOOSE, "coverage", own, 0.5, most=1.0),
+            ),
+            "resolution": self.sides(CHOOSE, "resolution", own, request.size, 16384),
+        }
 
-    def budget(self, budget: Table, view: Table) -> Budget:
-        return Budget(
-            self.number("budget", "ms", budget) if "ms" in budget else None,
-            self.text("budget", "gpu", budget, YARDSTICK, tuple(GPUS)),
-            self.number("view", "coverage", view, 0.5, most=1.0),
-        )
-
-    def range(self, where: str, key: str, table: Table, most: float = math.inf) -> Range:
-        """A number, or the least and the most."""
-        value = table.get(key)
-        ends: list[Any] = value if isinstance(value, list) else [value, value]
-        numbers = len(ends) == 2 and all(is_number(end) for end in ends)
-        if not (numbers and 0 < ends[0] <= ends[1] <= most and ends[1] < MOST_ASIDE * ends[0]):
-            accepted = "a number > 0 or two of them, the smaller first" + (f", <= {most:g}" if most < math.inf else "")
-            raise self.bad(where, key, accepted, value)
-        return float(ends[0]), float(ends[1])
-
-    def lengths(self, where: str, key: str, found: tuple[float, ...]) -> None:
-        """InputError unless ratios and squares of these lengths can be computed with."""
-        for one in found:
-            if not LENGTHS[0] <= one <= LENGTHS[1]:
-                words = f"between {LENGTHS[0]:g} and {LENGTHS[1]:g} in the unit of the mean free paths"
-                raise self.bad(where, key, words, one)
+    def limited(
+        self, limits: dict[str, Any], setting: Setting, material: Painted, stack: LayerStack | None
+    ) -> Requirements:
+        """Requirements of a material; InputError where the surface bends within its mean free paths."""
+        longest = max(most for _, most in material.mfp)
+        if not LEAST_RADIUS * longest <= limits["radius"] <= LENGTHS[1] and math.isfinite(limits["radius"]):
+            least = f"{LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest:.3g}"
+            raise self.bad(CHOOSE, "radius", f"at least {least}, and at most {LENGTHS[1]:g} mm", limits["radius"])
+        return Requirements("mm", setting, material.reflectance, material.mfp, layers=stack, **limits)

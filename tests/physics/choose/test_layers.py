@@ -31,7 +31,7 @@ def test_equal_colours_are_traced_once(monkeypatch):
     """One answer of a grey stack, three of a coloured one, from as many runs as there are different media."""
     pale, dark = (Medium((Layer(1.0, mu_a, 0.9, 0.0),)) for mu_a in (0.1, 0.2))
     traced = []
-    monkeypatch.setattr(module, "one_layer", lambda medium, *_, progress: traced.append(medium) or medium)
+    monkeypatch.setattr(module, "one_layer", lambda medium, *_, **__: traced.append(medium) or medium)
     grey = LayerStack("mm", (pale, pale, pale), ("",), ("",))
     assert of_each_colour(grey, 0.02, WITHIN) == (pale,)
     assert of_each_colour(LayerStack("mm", (pale, dark, pale), ("",), ("",)), 0.02, WITHIN) == (pale, dark, pale)

@@ -1,19 +1,21 @@
-"""SCENE.toml: what is read, and one line for every mistake."""
+"""SCENE.toml: one file for `choose` and `scene`, and one line for every mistake."""
 
 import math
+import tomllib
 from pathlib import Path
 
 import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
+from profilefit.scenes.layers.half_space import one_half_space
+from profilefit.scenes.skin import scene as skin
 from profilefit.studies.choose.requirements import read
 
-SKIN = Path(__file__).resolve().parents[3] / "examples" / "skin.toml"
+EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 SMALL = """\
-[view]
-pixel = 0.5
-[material]
+scene = "skin"
+n = 1.0
 [material.red]
 reflectance = 0.6
 mfp = [1, 2]
@@ -23,8 +25,13 @@ mfp = 0.7
 [material.blue]
 reflectance = 0.2
 mfp = 0.5
-[tolerance]
-error = 0.01
+[technique]
+tolerance = 0.01
+[camera]
+height = 30.0
+resolution = [80, 60]
+[choose]
+gpu = "ps5"
 """
 
 
@@ -41,13 +48,43 @@ def written(tmp_path):
     return write
 
 
-def test_example():
-    scene = read(SKIN)
+def test_a_painted_face():
+    scene = read(EXAMPLES / "skin.toml")
+    assert scene.setting == Setting("diffuse", n=1.4)
     assert scene.reflectance[0] == (0.55, 0.75)
-    assert scene.radius == 5.0
-    assert scene.budget.ms == 5.0
+    assert (scene.pixel, scene.radius, scene.resolution) == ((0.15, 0.8), 5.0, (1920, 1080))
+    assert (scene.tolerance, scene.budget.ms) == (0.02, 5.0)
     assert scene.layers.is_grey
-    assert [layer.g for layer in scene.layers.media[0].layers] == [0.8, 0.9]
+    assert [(layer.n, layer.g) for layer in scene.layers.media[0].layers] == [(1.4, 0.8), (1.4, 0.9)]
+
+
+def test_a_file_of_a_scene_is_one_of_choose():
+    """Material, index and pixel are those that `scene` draws; the example says what holds without it."""
+    said = read(EXAMPLES / "skin-head.toml")
+    assert said == read("here.toml", {"scene": "skin"})
+    alpha = 0.74 / 0.772
+    assert said.mfp[0] == (pytest.approx(1 / 0.772),) * 2
+    assert said.reflectance[0] == (pytest.approx(exact.reflectance(alpha, Setting("diffuse", n=1.4))),) * 2
+    assert said.pixel == (130.0 / 120.0,) * 2
+    assert (said.resolution, said.tolerance, said.budget.ms) == ((160, 120), 0.02, None)
+
+
+def test_a_painted_face_is_drawn_in_the_middle_of_its_ranges():
+    content = tomllib.loads((EXAMPLES / "skin.toml").read_text(encoding="utf-8"))
+    request = skin.read("skin.toml", content)
+    middle = request.material.middle(request.setting)
+    assert middle.reflectance == pytest.approx((0.65, 0.40, 0.275))
+    assert middle.mfp[0] == pytest.approx(math.sqrt(1.1 * 1.4))
+    assert exact.reflectance(middle.alpha[0], request.setting) == pytest.approx(0.65)
+
+
+@pytest.mark.slow
+def test_layers_require_what_the_half_space_nearest_to_them_does():
+    scene = read(EXAMPLES / "layers-head.toml")
+    near = [one_half_space(medium, "diffuse", 4.0) for medium in scene.layers.media]
+    assert scene.setting == Setting("diffuse", n=1.4)
+    assert scene.reflectance == tuple((one.reflectance,) * 2 for one in near)
+    assert scene.mfp == tuple((one.mfp,) * 2 for one in near)
 
 
 def test_defaults(written):
@@ -55,88 +92,103 @@ def test_defaults(written):
     assert scene.mfp == ((1.0, 2.0), (0.7, 0.7), (0.5, 0.5))
     assert scene.setting == Setting("diffuse")
     assert math.isinf(scene.radius)
-    assert scene.budget.ms is None
-    assert (scene.unit, scene.resolution, scene.layers) == ("mm", (1920, 1080), None)
+    assert (scene.pixel, scene.resolution) == ((0.5, 0.5), (80, 60))
+    assert (scene.unit, scene.budget.ms, scene.layers) == ("mm", None, None)
 
 
-def test_layers_have_colours_and_the_unit_of_the_scene(written):
+def test_layers_beside_a_material_have_colours(written):
     stack = "[[layers]]\nn = 1\nmu_a = [1, 2, 3]\nmu_s = 9\ng = 0\n"
     scene = read(written("", stack))
     assert [medium.layers[0].mu_a for medium in scene.layers.media] == [1.0, 2.0, 3.0]
-    assert scene.layers.unit == "mm"
-    with pytest.raises(InputError, match=r'material must be left out unless unit = "mm", .* got .marble'):
-        read(written("[view]", 'unit = "cm"\n[[layers]]\nn = 1\nmaterial = "marble"\n[view]'))
 
 
-def test_world_scale_and_materials(tmp_path):
-    path = tmp_path / "milk.toml"
-    path.write_text(
-        '[view]\npixel = [0.001, 0.002]\nradius = 0.1\nworld = 1000\n[material]\nname = "skimmilk"\n'
-        "[tolerance]\nerror = 0.01\n",
-        encoding="utf-8",
+OLD = """\
+[view]
+pixel = [0.15, 0.8]
+world = 1.0
+[material]
+light = "diffuse"
+index = 1.4
+name = "skin1"
+[tolerance]
+error = 0.02
+[budget]
+ms = 5.0
+"""
+
+
+def test_an_older_file_is_told_what_to_write(tmp_path):
+    path = tmp_path / "old.toml"
+    path.write_text(OLD, encoding="utf-8")
+    with pytest.raises(InputError) as caught:
+        read(path)
+    assert str(caught.value) == (
+        f'{path}: keys are of an older format: write scene = "skin" and [choose] pixel for [view] pixel, '
+        "lengths in mm for [view] world, [technique] illumination for [material] light, n for [material] index, "
+        "material for [material] name, [technique] tolerance for [tolerance] error, [choose] ms for [budget] ms"
     )
-    scene = read(path)
-    assert scene.pixel == (1.0, 2.0)
-    assert scene.radius == 100.0
-    alpha = 0.70 / 0.7014
-    assert scene.mfp[0][0] == pytest.approx(1.0 / 0.7014)
-    assert scene.reflectance[0][0] == pytest.approx(exact.reflectance(alpha, Setting("diffuse")))
 
 
+BAD_PIXEL = r"\[choose\] pixel must be a number > 0 and >= 1e-09 and <= 1e\+09, or two of them, the smaller first, got "
+GPU = 'gpu = "ps5"'
 WRONG = [
-    ("pixel = 0.5", "pixel = 0", r"\[view\] pixel must be a number > 0 or two of them, the smaller first, got 0"),
-    ("pixel = 0.5", "pixel = [2, 1]", r"\[view\] pixel must be .* got \[2, 1\]"),
-    ("pixel = 0.5", "pixels = 1", r"\[view\] keys must be of pixel, .* got 'pixels'"),
-    ("pixel = 0.5", "pixel = 1\nradius = 1", r"\[view\] radius must be at least 2 times the longest .*, 4, got 1"),
-    ("pixel = 0.5", "pixel = 1\nradius = true", r"\[view\] radius must be a number > 0, got True"),
-    ("pixel = 0.5", "pixel = 1\nresolution = [1]", r"\[view\] resolution must be two whole numbers .* got \[1\]"),
-    ("pixel = 0.5", "pixel = 1\ncoverage = 2", r"\[view\] coverage must be a number > 0 and <= 1, got 2"),
-    ("reflectance = 0.4", "reflectance = 1.4", r"\[material.green\] reflectance must be .*, <= 1, got 1.4"),
+    (GPU, "pixel = 0", BAD_PIXEL + "0"),
+    (GPU, "pixel = [2, 1]", BAD_PIXEL + r"\[2, 1\]"),
+    (GPU, "pixel = [1, 2e6]", BAD_PIXEL + r"\[1, 2000000.0\]"),
+    (GPU, "pixels = 1.5", r"\[choose\] pixels must be a whole number in 1 ... 100, got 1.5"),
+    (GPU, "size = 1", r"\[choose\] keys must be of pixel, .* got 'size'"),
+    (GPU, "radius = 1", r"\[choose\] radius must be at least 2 times the longest .*, 4, and at most .*, got 1"),
+    (GPU, "radius = true", r"\[choose\] radius must be a number > 0, got True"),
+    (GPU, "radius = nan", r"\[choose\] radius must be a number > 0, got nan"),
+    (GPU, "radius = 1e305", r"\[choose\] radius must be at least .* and at most 1e\+09 mm, got 1e\+305"),
+    (GPU, "resolution = [1]", r"\[choose\] resolution must be two whole numbers .* got \[1\]"),
+    (GPU, "coverage = 2", r"\[choose\] coverage must be a number > 0 and <= 1, got 2"),
+    (GPU, "mfp = -1", r"\[choose\] mfp must be a number > 0, got -1"),
+    (GPU, 'mfp = "4"', r"\[choose\] mfp must be a number > 0, got '4'"),
+    (GPU, "mfp = true", r"\[choose\] mfp must be a number > 0, got True"),
+    (GPU, "mfp = 101", r"\[choose\] within.mfp must be .* \(0, 100\], got 101"),
+    (GPU, "gpu = 'voodoo'", r"\[choose\] gpu must be one of switch, .* got 'voodoo'"),
+    (GPU, "gpu = ['voodoo']", r"\[choose\] gpu must be one of switch, .* got \['voodoo'\]"),
+    ("reflectance = 0.4", "reflectance = 1.4", r"\[material.green\] reflectance must be .* and <= 1, or .*, got 1.4"),
     ("reflectance = 0.4", "", r"\[material.green\] reflectance must be .* got nothing"),
     ("mfp = 0.5", 'mfp = "0.5"', r"\[material.blue\] mfp must be .* got '0.5'"),
     ("mfp = 0.5", "mfp = 0.5\ncolour = 1", r"\[material.blue\] keys must be of reflectance, mfp, got 'colour'"),
-    ("[material]", "[material]\nlight = 'sun'", r"\[material\] light must be one of searchlight, diffuse, got 'sun'"),
-    ("[material]", "[material]\nindex = 1.7", r"\[material\] index must be a refractive index in \[1, 1.6\], got 1.7"),
-    ("[material]", "[material]\nname = 'skin1'", r"\[material\] name must be left out where red, green, blue are"),
-    ("[tolerance]\nerror = 0.01", "", r"table \[tolerance\] is missing"),
-    ("error = 0.01", "error = 0.01\nmfp = -1", r"\[tolerance\] mfp must be a number > 0, got -1"),
-    ("", "[budget]\ngpu = 'voodoo'", r"\[budget\] gpu must be one of switch, .* got 'voodoo'"),
-    ("", "[extra]", "keys must be of unit, view, .* got 'extra'"),
+    ("mfp = 0.5", "mfp = 1e-300", r"\[material.blue\] mfp must be a number > 0 and >= 1e-09"),
+    (
+        "[technique]",
+        "[technique]\nillumination = 'sun'",
+        r"\[technique\] illumination must be one of searchlight, diff",
+    ),
+    ("n = 1.0", "n = 1.7", r"toml: n must be a refractive index in \[1, 1.6\], got 1.7"),
+    ("n = 1.0", 'n = 1.0\nunit = "cm"', r"toml: unit must be one of mm, got 'cm'"),
+    ("n = 1.0", 'n = 1.0\nunit = "\\u001b[31m"', r"unit must be one of mm, got '\\x1b\[31m'"),
+    ("tolerance = 0.01", "tolerance = 2", r"\[technique\] tolerance must be a number > 0 and <= 1, got 2"),
+    ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
+    ('"skin"', '"sea"', "scene must be one of skin, layers, got 'sea'"),
+    ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
+    ('"skin"', "[1]", r"scene must be one of skin, layers, heart, sea, fur, got \[1\]"),
+    ("", "[extra]", "keys must be of title, scene, .* got 'extra'"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1", r"\[layers 1\] g must be a number, got nothing"),
     ("", "[[layers]]\nn = 1\nmu_a = -1\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be a coefficient >= 0.* got -1"),
     ("", "[[layers]]\nn = 1\nmu_a = 1\nmu_s = 1\ng = 0\ndepth = 2", r"\[layers 1\] keys must be of .* got 'depth'"),
     ("", "[[layers]]\nn = 1\nmu_a = [1, 2]\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .* or three .* got \[1, 2\]"),
-    ("[view]", "layers = []\n[view]", r"toml: layers must be tables \[\[layers\]\], got \[\]"),
-    ("[view]", "[view", "is not TOML: "),
-    ("pixel = 0.5", f"pixel = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'pixel' \(at line"),
-    ("pixel = 0.5", f"pixel = 0x1{'0' * 5000}", r"\[view\] pixel must be .*, got one of more than 4300 digits"),
-    ("pixel = 0.5", f"pixel = {'9' * 5000}", r"a whole number of 5000 digits, of 300 at most, of 'pixel' \(at line"),
-    ("pixel = 0.5", "pixel = 1e400", r"is not TOML: the number 1e400, beyond floating point, of 'pixel' \(at line"),
-    ("pixel = 0.5", "pixel = 1e300", r"\[view\] pixel must be between 1e-09 and 1e\+09 in the unit .*, got 1e\+300"),
-    ("pixel = 0.5", "pixel = 1e300\nworld = 1e300", r"\[view\] pixel must be between .*, got inf"),
-    ("pixel = 0.5", "pixel = 1\nradius = 1e300\nworld = 1e5", r"\[view\] radius must be between .*, got 1.*e\+305"),
-    ("pixel = 0.5", "pixel = 1\nradius = nan", r"\[view\] radius must be a number > 0, got nan"),
-    ("pixel = 0.5", f"pixel = 1\n{'a.' * 100_000}b = 1", "is not TOML: tables or lists nested more than 32 deep"),
-    ("pixel = 0.5", f"pixel = {'[' * 100_000}", "is not TOML: tables or lists nested more than 32 deep"),
-    ("pixel = 0.5", f"pixel = {[1] * 1000}", r"\[view\] pixel must be .*, got \[1, 1.*\.\.\.$"),
-    ("pixel = 0.5", f'pixel = "{"x" * 1000}"', r"\[view\] pixel must be .*, got 'x+\.\.\.$"),
-    ("mfp = 0.5", "mfp = 1e-300", r"\[material.blue\] mfp must be between"),
-    ("error = 0.01", 'error = 0.01\nmfp = "4"', r"\[tolerance\] mfp must be a number > 0, got '4'"),
-    ("error = 0.01", "error = 0.01\nmfp = true", r"\[tolerance\] mfp must be a number > 0, got True"),
-    ("error = 0.01", "error = 0.01\nmfp = 101", r"\[tolerance\] within.mfp must be .* \(0, 100\], got 101"),
-    (
-        "error = 0.01",
-        "error = 0.01\npixels = 1.5",
-        r"\[tolerance\] pixels must be a whole number in 1 ... 100, got 1.5",
-    ),
-    ("", "[budget]\ngpu = ['voodoo']", r"\[budget\] gpu must be one of switch, .* got \['voodoo'\]"),
     (
         "",
         f"[[layers]]\nn = {10**400}\nmu_a = 1\nmu_s = 1\ng = 0",
         r"a whole number of 401 digits, of 300 at most, of 'n' \(at line",
     ),
     ("", "[[layers]]\nn = 1\nmu_a = '1'\nmu_s = 1\ng = 0", r"\[layers 1\] mu_a must be .*, got '1'"),
-    ("[view]", 'unit = "\\u001b[31m"\n[view]', r"unit must be a text of 60 characters at most, got '\\x1b\[31m'"),
+    ("n = 1.0", "n = 1.0\nlayers = []", r"toml: layers must be tables \[\[layers\]\], got \[\]"),
+    ("[choose]", "[choose", "is not TOML: "),
+    (GPU, f"pixel = {10**400}", r"a whole number of 401 digits, of 300 at most, of 'pixel' \(at line"),
+    (GPU, f"pixel = 0x1{'0' * 5000}", r"\[choose\] pixel must be .*, got one of more than 4300 digits"),
+    (GPU, f"pixel = {'9' * 5000}", r"a whole number of 5000 digits, of 300 at most, of 'pixel' \(at line"),
+    (GPU, "pixel = 1e400", r"is not TOML: the number 1e400, beyond floating point, of 'pixel' \(at line"),
+    (GPU, "pixel = 1e300", BAD_PIXEL + r"1e\+300"),
+    (GPU, f"pixel = 1\n{'a.' * 100_000}b = 1", "is not TOML: tables or lists nested more than 32 deep"),
+    (GPU, f"pixel = {'[' * 100_000}", "is not TOML: tables or lists nested more than 32 deep"),
+    (GPU, f"pixel = {[1] * 1000}", r"\[choose\] pixel must be .*, got \[1, 1.*\.\.\.$"),
+    (GPU, f'pixel = "{"x" * 1000}"', r"\[choose\] pixel must be .*, got 'x+\.\.\.$"),
 ]
 
 
@@ -149,6 +201,15 @@ def test_mistakes_are_one_line(written, old, new, message):
         read(path)
     assert str(caught.value).startswith(str(path))
     assert "\n" not in str(caught.value)
+
+
+def test_a_colour_that_the_surface_does_not_let_out_is_refused(written):
+    """0.95 can be seen where nothing refracts, 0.92 at n = 1.4."""
+    path = written("reflectance = 0.6", "reflectance = 0.95")
+    assert read(path).reflectance[0] == (0.95, 0.95)
+    path.write_text(path.read_text(encoding="utf-8").replace("n = 1.0", "n = 1.4"), encoding="utf-8")
+    with pytest.raises(InputError, match=r"\[material.red\] reflectance must be .* and <= 0.923, or .*, got 0.95"):
+        read(path)
 
 
 def test_missing_file(tmp_path):

@@ -22,7 +22,8 @@ def test_a_mistake_is_one_line(tmp_path):
     path.write_text("[view]\npixel = -1\n", encoding="utf-8")
     found = run(path)
     assert isinstance(found.exception, InputError)
-    assert str(found.exception) == f"{path}: table [material] is missing"
+    older = 'keys are of an older format: write scene = "skin" and [choose] pixel for [view] pixel'
+    assert str(found.exception) == f"{path}: {older}"
 
 
 @pytest.mark.slow
@@ -44,7 +45,7 @@ def test_nothing_serves(tmp_path):
     """Exit status 1, and the nearest; refracting skin."""
     text = SKIN.read_text(encoding="utf-8").partition("# Skin as two layers")[0]
     path = tmp_path / "scene.toml"
-    path.write_text(text.replace("error = 0.02", "error = 0.002").replace("index = 1.0", "index = 1.4"), "utf-8")
+    path.write_text(text.replace("tolerance = 0.02 ", "tolerance = 0.002 "), "utf-8")
     found = run(path)
     assert found.exit_code == 1
     assert found.stdout.startswith("No option meets 0.20 % within 5 ms: the most accurate in the budget is ")

@@ -4,6 +4,7 @@ import io
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -11,15 +12,17 @@ import numpy as np
 import pytest
 from matplotlib import image
 
+from mcml_sim import Setting
 from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
+from profilefit.shader import opened
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
 NEEDED = {"skin": (), "layers": ("layers",), "heart": ("layers",), "sea": ("water",), "fur": ()}
 OWN = {
-    "skin": ("label", "material"),
+    "skin": ("label", "material", "setting"),
     "layers": ("kind", "pose", "single", "least", "most"),
     "heart": ("surface", "size_mm", "steepness", "roughness", "kind", "gaussians", "texel", "tolerance"),
     "sea": (
@@ -62,6 +65,27 @@ def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
         assert getattr(said, key) == getattr(taken, key), key
 
 
+def test_what_choose_reads_is_ignored():
+    """One file serves both commands: neither looks at the keys of the other."""
+    skin = import_module(SCENES["skin"][0])
+    content = {"scene": "skin", "choose": {"anything": 1}, "technique": {"tolerance": "any"}}
+    assert skin.read("", content).setting == skin.read("", {"scene": "skin"}).setting == Setting("diffuse", n=1.4)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [1.0, 1.4])
+def test_the_truth_is_of_the_index_that_the_law_is_of(opengl, n):
+    """A truth of another index is wrong by more than the noise of so many samples."""
+    skin = import_module(SCENES["skin"][0])
+    content = {"scene": "skin", "n": n, "camera": {"resolution": [48, 36]}, "technique": {"samples": 256}}
+    request = skin.read("", content)
+    other = replace(request, technique=skin.read("", {**content, "n": 2.4 - n}).technique)
+    with opened() as context:
+        right, wrong = (skin.draw(context, one).point.rmse for one in (request, other))
+    assert right < 0.02
+    assert wrong > 3.0 * right
+
+
 @pytest.mark.slow
 def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
     """All of its files, and an error that falls with samples: the truth is not made of what is judged by it."""
@@ -92,7 +116,11 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
     [
         ('"skin"', '"fog"', "scene must be one of skin, layers, heart, sea, fur, got 'fog'"),
         ('scene = "skin"', "", "scene must be one of skin, layers, heart, sea, fur, got nothing"),
-        ("samples", "sample", "[technique] keys must be of kind, law, constants, illumination, samples, chart, got"),
+        (
+            "samples",
+            "sample",
+            "[technique] keys must be of kind, law, constants, illumination, samples, chart, tolerance, got",
+        ),
         ("samples = 4", "samples = 300", "[technique] samples must be a whole number >= 1 and <= 256, got 300"),
         ("samples = 4", 'law = "fog"', "[technique] law must be one of liang, burley"),
         (
@@ -101,6 +129,13 @@ def test_a_scene_is_drawn_beside_its_truth(command, small, opengl):
             "[technique] law must have a closed form to become a shader",
         ),
         ("samples = 4", 'kind = "none"\nlaw = "liang"', "[technique] law must be left out where kind is none, got"),
+        (
+            "samples = 4",
+            'law = "burley"\nconstants = "published:diffuse"',
+            "[technique] the published:diffuse constants of burley belong to diffuse, n = 1, g = 0, got a request for "
+            "diffuse, n = 1.4, g = 0: write n = 1 at the top of the file, or name another law",
+        ),
+        ("[technique]", "[material.red]\nmfp = 1\n[technique]", "[material.red] reflectance must be a number > 0 and"),
         ("[64]", "[0]", "[technique] chart must be at most 8 numbers of samples in 1 ... 256, got [0]"),
         ("[32, 24]", "[1000, 1000]", "[camera] resolution must be 65536 pixels at most, which the truth sums over"),
         ("[32, 24]", "[32, 0]", "[camera] resolution must be two whole numbers of pixels in 1 ... 1024, got [32, 0]"),

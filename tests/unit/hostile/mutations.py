@@ -85,7 +85,7 @@ TOML_WORDS = (
     *("[1, 2]", "[2, 1]", "[1, 2, 3]", "[0.1, true]", '["a"]', "'''a", '"', "=", "[" * DEEP, "{a=" * DEEP, "[" * 500),
 )  # fmt: skip
 TOML_LINES = (
-    *("[view]", "[[layers]]", "[layers]", "layers = 3", "view = 3", "unknown = 1", "[", "]", "=", "a = ", '"" = 1'),
+    *("[choose]", "[[layers]]", "[layers]", "layers = 3", "choose = 3", "unknown = 1", "[", "]", "=", "a = ", '"" = 1'),
     *(
         f"{'a.' * DEEP}b = 1",
         f"[{'a.' * 3000}b]",

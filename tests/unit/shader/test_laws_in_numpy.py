@@ -213,6 +213,10 @@ def test_the_twin_is_the_map(label):
     law = MAPS[label]
     names, share = twin(emit.map_text(law, "python", "map")), np.linspace(0.0, 1.0, 101)
     np.testing.assert_allclose(names["map_alpha"](share), law.alpha(share), rtol=0, atol=1e-11)
+    assert names["map_MAX_REFLECTANCE"] == pytest.approx(law.reflectances.high, rel=1e-11)
+    beyond = names["map_MAX_REFLECTANCE"] + np.array([0.0, 0.01, 1.0, 1e6])
+    np.testing.assert_array_equal(names["map_alpha"](beyond), names["map_alpha"](beyond[0]))
+    assert names["map_alpha"](-1.0) == names["map_alpha"](0.0)
     reached = share[:-1] if isinstance(law, LiangAlbedo) else share  # alpha = 1 is beyond its fold
     np.testing.assert_allclose(names["map_map_reflectance"](reached), law.reflectance(reached), rtol=0, atol=1e-10)
     assert 0.0 < names["map_map_reflectance"](1.0) <= 1.0

@@ -9,7 +9,8 @@ import pytest
 import profilefit
 from profilefit.errors import ShaderError
 from profilefit.recipes import catalogue
-from profilefit.shader import emit
+from profilefit.recipes.inventory import find
+from profilefit.shader import emit, export
 from profilefit.shader.check.law_cost import costs
 from profilefit.shader.check.shader_law import ROWS, WIDTH, ShaderLaw, ShaderMap, in_half, no_half
 
@@ -33,6 +34,19 @@ def test_a_map_goes_both_ways(context):
     there, values = ShaderMap(context, RATIONAL), np.linspace(0.0, 1.0, 33)
     np.testing.assert_allclose(there.alpha(values), RATIONAL.alpha(values), atol=FLOAT32)
     np.testing.assert_allclose(there.reflectance(values[:-1]), RATIONAL.reflectance(values[:-1]), atol=FLOAT32)
+
+
+@pytest.mark.parametrize(("n", "most"), [(1.0, 1.0), (1.4, 0.923188)])
+def test_a_colour_that_no_surface_lets_out_is_the_brightest(context, n, most):
+    """The largest A is a constant of the source, stated in the head; on the GPU, too, a larger one has its albedo."""
+    named = find("hazard-diffuse", catalogue.fits_folder(), n=n)
+    text = export(named, catalogue.fits_folder())
+    assert f"\n// hazard_MAX_REFLECTANCE = {most:.3g}: no half space of this n reflects more\n" in text
+    assert float(re.search(r"const float hazard_MAX_REFLECTANCE = (\S+);", text)[1]) == pytest.approx(most, abs=1e-6)
+    colour = np.array([-1.0, 0.0, 0.3, 0.8, 0.9, most, 0.95, 1.0, 2.0])
+    there = ShaderMap(context, named.law.albedo).alpha(colour)
+    np.testing.assert_allclose(there, named.law.albedo.alpha(np.clip(colour, 0.0, most)), atol=FLOAT32)
+    assert np.all(there[colour >= most] == 1.0)
 
 
 def test_more_arguments_than_a_texture_holds(context):
