@@ -65,7 +65,6 @@ ROWS = (
         length=transport,
         formula="photon beam diffusion's A per light that entered, capped at 1; l. If g > 0, type sigma_a and sigma_s",
         source="mmp/pbrt-v4 5f7a6068 (2026-06-14) materials.h, bssrdf.cpp; mmp/pbrt-v3 2f208c19 kdsubsurface.cpp",
-        checked="source; its table recomputed, to 0.4 %",
         g=ISOTROPIC,
     ),
     Engine(
