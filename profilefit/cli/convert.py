@@ -92,7 +92,7 @@ def convert(
     Examples:
       profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm
       profilefit convert --alpha 0.95 --dmfp 3mm --json
-      profilefit convert --reflectance .8 --illumination diffuse --n 1.4 --g 0.8 --mfp 1mm
+      profilefit convert --alpha 0.95 --n 1.4 --g 0.8 --mfp 1mm --sources
     """
     with interruptible(__name__):
         from mcml_sim.cli.screen import print_json, put, screen

@@ -142,7 +142,7 @@ def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
     }
     caption = [
         "Colours are linear. A row holds for its version only; --sources names fields, formulas, sources and checks.",
-        "at: the world scale of the renderer's settings. (scene): the scene is modelled in this unit.",
+        "at: the world scale of the renderer's settings. scene: it is modelled in this unit.",
         "renders A: what Blender shows of this medium, seen from the normal. Light enters refracted, which the map of "
         "its colour to an albedo leaves out.",
     ]
@@ -156,7 +156,7 @@ def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
 
 
 def _where(engine: Engine, unit: str) -> str:
-    field = engine.unit or (f"{unit} (scene)" if unit else "scene unit")
+    field = engine.unit or (f"{unit} scene" if unit else "scene unit")
     scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
     return f"{'1/' if engine.power < 0 else ''}{field}{scale}"
 

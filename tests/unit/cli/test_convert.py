@@ -49,7 +49,7 @@ def test_tables_of_the_medium_and_of_what_to_type(command):
     assert row["Blender 3.0-5.3 Christensen-Burley"][3:6] == ["0.01457", "0.01221", "0.01450"]
     assert row["Unity HDRP to 17.2 rasteriser"][-3:] == ["mm", "at", "1"]
     assert row["Unreal 5.1-5.8 rasteriser"][3:] == [*3 * ["0.07200"], "cm", "at", "0.1"]
-    assert row["Arnold 5 to 7 standard_surface"] == ["–", *3 * ["1.200"], "mm", "(scene)"]
+    assert row["Arnold 5 to 7 standard_surface"] == ["–", *3 * ["1.200"], "mm", "scene"]
     assert {engine.title for engine in ENGINES} <= set(row)
     assert "none: without absorption (alpha = 1)" in out
     assert "index-matched  " not in out.replace("exact, index-matched", ""), "said once"
