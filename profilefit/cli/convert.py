@@ -24,6 +24,7 @@ UNITS = ("um", "µm", "μm", "mm", "cm", "m", "in")
 NUMBER = re.compile(r"([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*(\D*)")
 COLOURS = "--alpha, --reflectance with --illumination, or --mu-a with --mu-s"
 LENGTH = "Length"  # the panel of --help
+WIDTH = 120  # of the tables
 
 
 def convert(
@@ -31,6 +32,7 @@ def convert(
     reflectance: Annotated[str | None, typer.Option(help="Total reflectance A, the colour.")] = None,
     illumination: Annotated[str | None, typer.Option(help=f"Of --reflectance and --falloff: {LIGHTS_HELP}.")] = None,
     n: Annotated[float, typer.Option("--n", help="Refractive index of the surface that A is of.")] = 1.0,
+    g: Annotated[float, typer.Option("--g", help="Mean cosine of scattering; alpha and mu_s' stay reduced.")] = 0.0,
     mu_a: Annotated[
         str | None, typer.Option(help="Absorption coefficient, with --mu-s; colour and length in one.")
     ] = None,
@@ -49,36 +51,52 @@ def convert(
         str | None, typer.Option(help="Normalized diffusion's d = l / s(A).", rich_help_panel=LENGTH)
     ] = None,
     falloff_dmfp: Annotated[str | None, typer.Option(help="Its d = l_d / s(A).", rich_help_panel=LENGTH)] = None,
+    mfp_unreduced: Annotated[
+        str | None, typer.Option(help="Mean free path 1 / (mu_s + mu_a).", rich_help_panel=LENGTH)
+    ] = None,
     cycles_radius: Annotated[
-        str | None, typer.Option(help="Cycles' radius times scale.", rich_help_panel=LENGTH)
+        str | None, typer.Option(help="Blender 5.2+: radius x scale of Random Walk.", rich_help_panel=LENGTH)
+    ] = None,
+    cycles_legacy_radius: Annotated[
+        str | None,
+        typer.Option(help="Random Walk of 4.0 to 5.1, (Fixed Radius) of 3.x, (Legacy).", rich_help_panel=LENGTH),
+    ] = None,
+    cycles_burley_radius: Annotated[
+        str | None, typer.Option(help="Blender 3.0+: Christensen-Burley.", rich_help_panel=LENGTH)
     ] = None,
     cycles_skin_radius: Annotated[
-        str | None, typer.Option(help="The same for random walk (skin).", rich_help_panel=LENGTH)
+        str | None,
+        typer.Option(help="Blender 4.0+: Random Walk (Skin); 3.x: Random Walk.", rich_help_panel=LENGTH),
     ] = None,
     hdrp_distance: Annotated[
-        str | None, typer.Option(help="Unity HDRP's scattering distance.", rich_help_panel=LENGTH)
+        str | None, typer.Option(help="Unity HDRP: Scattering Color x Multiplier.", rich_help_panel=LENGTH)
     ] = None,
-    hdrp_radius: Annotated[str | None, typer.Option(help="Unity HDRP's filter radius.", rich_help_panel=LENGTH)] = None,
+    hdrp_radius: Annotated[str | None, typer.Option(help="Unity HDRP: Max Radius.", rich_help_panel=LENGTH)] = None,
     unreal_mfp: Annotated[
-        str | None, typer.Option(help="Unreal's mean free path color times distance.", rich_help_panel=LENGTH)
+        str | None,
+        typer.Option(help="Unreal 5.1+, rasteriser: mean free path color x distance.", rich_help_panel=LENGTH),
     ] = None,
     unreal_dmfp: Annotated[
         str | None, typer.Option(help="The same before 5.1, a diffuse one.", rich_help_panel=LENGTH)
     ] = None,
+    sources: Annotated[
+        bool, typer.Option("--sources", help="List fields, formulas, sources and checks of renderers, too.")
+    ] = False,
     as_json: AsJson = False,
 ) -> None:
     """Convert a colour and a length into every convention.
 
-    Channels are separated by commas; a length may have a unit. --json prints a list of channels for each name.
+    Prints the medium's own quantities, then the colour and the length to type into each renderer, by version. Channels
+    are separated by commas; a length may have a unit. --json prints a list of channels for each name.
 
     \b
     Examples:
       profilefit convert --reflectance .9,.7,.5 --illumination diffuse --mfp 1.2mm
       profilefit convert --alpha 0.95 --dmfp 3mm --json
-      profilefit convert --reflectance .8 --illumination diffuse --n 1.4 --mfp 1
+      profilefit convert --alpha 0.95 --n 1.4 --g 0.8 --mfp 1mm --sources
     """
     with interruptible(__name__):
-        from mcml_sim.cli.screen import print_json, screen
+        from mcml_sim.cli.screen import print_json, put, screen
         from profilefit.report.tables.convert_table import content, convert_table
 
     lengths = {
@@ -89,7 +107,10 @@ def convert(
         # The falloff depends on the illumination whose A it is paired with.
         f"falloff_{illumination or LIGHTS[0]}": falloff,
         "falloff_dmfp": falloff_dmfp,
+        "mfp_unreduced": mfp_unreduced,
         "cycles_radius": cycles_radius,
+        "cycles_legacy_radius": cycles_legacy_radius,
+        "cycles_burley_radius": cycles_burley_radius,
         "cycles_skin_radius": cycles_skin_radius,
         "hdrp_distance": hdrp_distance,
         "hdrp_radius": hdrp_radius,
@@ -104,16 +125,16 @@ def convert(
     if chosen not in (["--alpha"], ["--reflectance"], ["--mu-a", "--mu-s"]):
         raise InputError(f"colour must be one of {COLOURS}, got {' and '.join(chosen) or 'none'}")
     if mu_a is not None and mu_s is not None:
-        medium, unit = _of_coefficients(mu_a, mu_s, given)
+        medium, unit = _of_coefficients(mu_a, mu_s, given, g)
     else:
-        medium, unit = _of_length(_albedo(alpha, reflectance, illumination, n), given)
+        medium, unit = _of_length(_albedo(alpha, reflectance, illumination, n, g), given, g)
     if as_json:
         print_json(content(medium, unit, n))
     else:
-        screen().print(convert_table(medium, unit, n))
+        put(convert_table(medium, unit, n, sources), screen(WIDTH))
 
 
-def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None, n: float) -> Floats:
+def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None, n: float, g: float) -> Floats:
     if alpha is not None:
         return _shares("--alpha", alpha)
     if illumination is None:
@@ -121,7 +142,7 @@ def _albedo(alpha: str | None, reflectance: str | None, illumination: str | None
     with interruptible(__name__):
         from profilefit.convert import alpha_of
 
-    return alpha_of(_shares("--reflectance", reflectance or ""), illumination, n)
+    return alpha_of(_shares("--reflectance", reflectance or ""), illumination, n, g)
 
 
 def _shares(option: str, text: str) -> Floats:
@@ -132,7 +153,7 @@ def _shares(option: str, text: str) -> Floats:
     return _numbers(option, text)[0]
 
 
-def _of_length(alpha: Floats, given: dict[str, str]) -> tuple[Optical, str]:
+def _of_length(alpha: Floats, given: dict[str, str], g: float) -> tuple[Optical, str]:
     with interruptible(__name__):
         from profilefit.convert import Optical
 
@@ -140,10 +161,10 @@ def _of_length(alpha: Floats, given: dict[str, str]) -> tuple[Optical, str]:
         raise InputError(f"length must be one, such as --mfp 1.2mm, got {_options(given)}")
     ((name, text),) = given.items()
     value, unit = _numbers(_option(name), text, UNITS)
-    return Optical.from_length(name, value, alpha), unit
+    return Optical.from_length(name, value, alpha, g), unit
 
 
-def _of_coefficients(mu_a: str, mu_s: str, given: dict[str, str]) -> tuple[Optical, str]:
+def _of_coefficients(mu_a: str, mu_s: str, given: dict[str, str], g: float) -> tuple[Optical, str]:
     with interruptible(__name__):
         from profilefit.convert import Optical
 
@@ -154,7 +175,7 @@ def _of_coefficients(mu_a: str, mu_s: str, given: dict[str, str]) -> tuple[Optic
     scattering, other = _numbers("--mu-s", mu_s, per_length)
     if unit != other:
         raise InputError(f"--mu-a and --mu-s must have one unit, got {unit or 'none'} and {other or 'none'}")
-    return Optical.from_coefficients(absorption, scattering), unit.removeprefix("/")
+    return Optical.from_coefficients(absorption, scattering, g), unit.removeprefix("/")
 
 
 def _option(name: str) -> str:

@@ -29,8 +29,6 @@ OPTIONAL = frozenset({"dask", "distributed", "numba", "arviz_base"})
 
 Imports = dict[str, set[str]]
 SHORT, LONG = 60, 600  # lines: a shorter file needs a second importer, a longer one is two nouns
-# Files that are shorter, and why.
-EXCEPTIONS = {"profilefit.laws.van_de_hulst": "one of a shelf"}
 # One public name in either package: what `exact.solve` and `fitting.least_squares` return.
 SHARED_NAMES = {"Solution"}
 
@@ -174,7 +172,7 @@ def test_a_file_is_one_noun():
                 continue
             if lines > LONG or (lines < SHORT and len(known.get(module, set()) - {module}) < 2):
                 wrong.add(module)
-    assert wrong == set(EXCEPTIONS)
+    assert wrong == set()
 
 
 def class_homes(root: Path, packages: Sequence[str]) -> dict[str, list[str]]:

@@ -1,26 +1,29 @@
-"""One medium in the conventions of papers and engines, as a table or as numbers."""
+"""One medium in the conventions of papers and renderers, as tables or as numbers."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from rich.console import RenderableType
+from rich.console import Group, RenderableType
+from rich.text import Text
 
 from mcml_sim.media.setting import ILLUMINATIONS
-from profilefit.convert import LENGTHS, Optical
-from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant
+from profilefit.convert import ENGINES, LENGTHS, QUANTITIES, Engine, Optical
+from profilefit.report.tables.cells import ABSENT, SEARCHLIGHT, column_table, on_the_point, significant
 
 Floats = NDArray[np.float64]
-DIGITS = 5
+DIGITS, COLOUR_PLACES = 5, 4
 NONE = "none"
+MEMO = "Falloffs, s and eq. 5, 6 and 8: Christensen and Burley, Pixar Technical Memo 15-04"
 
 
 @dataclass(frozen=True)
 class ConventionRow:
-    """One convention: its name, what the table says of it, and a value a channel."""
+    """One quantity of the medium: its name, what the table says of it, and a value per channel."""
 
     name: str
     title: str
@@ -31,28 +34,86 @@ class ConventionRow:
 
 
 def _rows(medium: Optical, n: float) -> list[ConventionRow]:
-    what = "exact, index-matched" if n == 1 else f"exact, n = {n:g}"
-    colour = [
-        ConventionRow(f"reflectance_{light}", "reflectance A", light, 0, what, medium.reflectance(light, n))
-        for light in ILLUMINATIONS
-    ]
+    """Return all quantities; a table leaves out what says the same twice."""
     return [
         ConventionRow("alpha", "albedo alpha", "", 0, "mu_s' / (mu_s' + mu_a)", medium.alpha),
-        *colour,
+        ConventionRow("alpha_unreduced", "  unreduced", "", 0, "mu_s / (mu_s + mu_a)", medium.alpha_unreduced),
+        *(
+            ConventionRow(
+                f"reflectance_{light}", "reflectance A", light, 0, _surface(n, medium.g), medium.reflectance(light, n)
+            )
+            for light in ILLUMINATIONS
+        ),
+        *(
+            ConventionRow(
+                f"matched_{light}", "  index-matched", light, 0, _surface(1.0, medium.g), medium.reflectance(light)
+            )
+            for light in ILLUMINATIONS
+        ),
         ConventionRow("mu_a", "absorption mu_a", "", -1, "(1 - alpha) / l", medium.mu_a),
         ConventionRow("mu_s", "reduced scattering mu_s'", "", -1, "alpha / l", medium.mu_s),
-        *(ConventionRow(one.name, one.title, one.colour, 1, one.formula, medium.length(one.name)) for one in LENGTHS),
+        ConventionRow("mu_s_unreduced", "  unreduced mu_s", "", -1, "mu_s' / (1 - g)", medium.mu_s / (1.0 - medium.g)),
+        *(
+            ConventionRow(length.name, length.title, length.colour, 1, length.formula, medium.length(length.name))
+            for length in LENGTHS
+        ),
     ]
 
 
-def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, str | float | Floats | None]:
-    """The same by name, for --json; what a channel has not is not finite. n is the index that A is of."""
-    return {"unit": unit or None, "n": n} | {row.name: row.values for row in _rows(medium, n)}
+def _surface(n: float, g: float) -> str:
+    known = "exact, index-matched" if n == 1 else f"exact, n = {n:g}"
+    return known if g == 0.0 else f"{known}, g = {g:g}" if n != 1 else f"{known}, g = 0 by similarity"
 
 
-def convert_table(medium: Optical, unit: str, n: float = 1.0) -> RenderableType:
-    """A line a convention, a column a channel; unit is that of length, or "". n is the index that A is of."""
-    rows = _rows(medium, n)
+def content(medium: Optical, unit: str, n: float = 1.0) -> dict[str, Any]:
+    """Return every quantity and row by name, for --json; what a channel has not is not finite. n is that of A."""
+    named = {row.name: row.values for row in _rows(medium, n)}
+    typed = [_typed(engine, medium, unit, n) for engine in ENGINES]
+    return {"unit": unit or None, "n": n, "g": medium.g, **named, "typed": typed}
+
+
+def _typed(engine: Engine, medium: Optical, unit: str, n: float) -> dict[str, Any]:
+    inverse = "1/" if engine.power < 0 else ""
+    return {
+        "name": engine.name,
+        "product": engine.product,
+        "version": engine.version,
+        "method": engine.method,
+        "colour_field": engine.fields[0],
+        "colour": engine.typed_colour(medium.alpha, n, medium.g),
+        "length_field": engine.fields[1],
+        "length": engine.typed_length(medium.alpha, medium.mfp, medium.g, unit),
+        "unit": f"{inverse}{_unit(engine, unit)}" if _unit(engine, unit) else None,
+        "scale_field": engine.fields[2] or None,
+        "scale": engine.scale,
+        "renders": engine.rendered(medium.alpha, medium.g),
+        "formula": engine.formula,
+        "source": engine.source,
+        "checked": engine.checked,
+    }
+
+
+def _unit(engine: Engine, unit: str) -> str:
+    return (engine.unit if unit else "") or unit
+
+
+def convert_table(medium: Optical, unit: str, n: float = 1.0, sources: bool = False) -> RenderableType:
+    """Return the medium's own quantities, then what to type into renderers, and where that is from if asked for.
+
+    unit  that of length, or ""; n the index that A is of
+    """
+    parts: list[RenderableType] = [_quantities(medium, unit, n), Text(), _engines(medium, unit, n)]
+    if sources:
+        parts += [Text(), Text("\n".join(_described(engine) for engine in ENGINES))]
+    return Group(*parts)
+
+
+def _quantities(medium: Optical, unit: str, n: float) -> RenderableType:
+    shown = {length.name for length in LENGTHS if length not in QUANTITIES}
+    hidden = shown | (set() if n != 1 else {f"matched_{light}" for light in ILLUMINATIONS})
+    if medium.g == 0.0:
+        hidden |= {"alpha_unreduced", "mu_s_unreduced", "mfp_unreduced"}
+    rows = [row for row in _rows(medium, n) if row.name not in hidden]
     cells = np.array([[_cell(value) for value in row.values] for row in rows])
     columns = {"": [row.title for row in rows]}
     for i in range(cells.shape[1]):
@@ -64,14 +125,57 @@ def convert_table(medium: Optical, unit: str, n: float = 1.0) -> RenderableType:
         "A of": [row.light for row in rows],
         "is": [row.formula for row in rows],
     }
-    sources = dict.fromkeys(one.source for one in LENGTHS if one.source)
-    caption = [f"Sources: {'; '.join(sources)}.", f"{SEARCHLIGHT}."]
-    if n != 1:
-        caption += ["Lengths of engines are paired with A of the same albedo under an index-matched surface."]
+    caption = [f"{MEMO}. {SEARCHLIGHT}."]
     if NONE in cells:
         caption += [f"{NONE}: without absorption (alpha = 1) there is no diffuse mean free path."]
-    return column_table("One medium in every convention", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))
+    return column_table("The medium", columns, "\n".join(caption), ("", "unit", "A of"), ("is",))
 
 
-def _cell(value: float) -> str:
-    return significant(value, DIGITS) if math.isfinite(value) else NONE
+def _engines(medium: Optical, unit: str, n: float) -> RenderableType:
+    rows = [_typed(engine, medium, unit, n) for engine in ENGINES]
+    columns = {
+        "": [engine.title for engine in ENGINES],
+        "colour": [_colours(row["colour"]) for row in rows],
+        "length": [" ".join(_cell(value, DIGITS - 1) for value in row["length"]) for row in rows],
+        "in": [_where(engine, unit) for engine in ENGINES],
+        "renders A": [_colours(row["renders"], COLOUR_PLACES - 1, "") for row in rows],
+    }
+    caption = [
+        "Colours are linear. A row holds for its version only; --sources names fields, formulas, sources and checks.",
+        "at: the world scale of the renderer's settings. scene: it is modelled in this unit.",
+        "renders A: what Blender shows of this medium, seen from the normal. Light enters refracted, which the map of "
+        "its colour to an albedo leaves out.",
+    ]
+    if ABSENT in columns["colour"]:
+        caption += [f"{ABSENT}: no source says."]
+    if any(NONE in cell for cell in columns["length"]):
+        caption += [f"{NONE}: the renderer has no such g, or its row was not checked with g."]
+    if not unit:
+        caption += ["No unit was given: convert lengths from yours to the one of the row."]
+    return column_table("What to type", columns, "\n".join(caption), ("", "in"))
+
+
+def _where(engine: Engine, unit: str) -> str:
+    field = engine.unit or (f"{unit} scene" if unit else "scene unit")
+    scale = f" at {engine.scale:g}" if engine.unit and engine.scale else ""
+    return f"{'1/' if engine.power < 0 else ''}{field}{scale}"
+
+
+def _described(engine: Engine) -> str:
+    fields = [*engine.fields[:2], *([f"{engine.fields[2]} = {engine.scale:g}"] if engine.scale else [])]
+    return (
+        f"{engine.title}\n  fields: {'; '.join(fields)}\n  typed: {engine.formula}\n"
+        f"  source: {engine.source}\n  checked: {engine.checked}"
+    )
+
+
+def _colours(values: Floats | None, places: int = COLOUR_PLACES, absent: str = ABSENT) -> str:
+    return absent if values is None else " ".join(_share(value, places) for value in values)
+
+
+def _share(value: float, places: int) -> str:
+    return f"{value:.{places}f}" if math.isfinite(value) else NONE
+
+
+def _cell(value: float, digits: int = DIGITS) -> str:
+    return significant(value, digits) if math.isfinite(value) else NONE

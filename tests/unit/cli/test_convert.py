@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from profilefit.cli import main
-from profilefit.convert import BY_NAME, Optical, alpha_of
+from profilefit.convert import BY_NAME, ENGINES, Optical, alpha_of
 
 
 @pytest.fixture
@@ -36,52 +36,96 @@ def table(command):
     return run
 
 
-def test_a_table_of_every_convention(command):
+def test_tables_of_the_medium_and_of_what_to_type(command):
     words = ("--reflectance", "0.9,0.7,1", "--illumination", "diffuse", "--mfp", "1.2mm")
     status, out, err = command(*words)
     assert status == 0, err
     assert err == ""
     lines = out.splitlines()
-    assert max(map(len, lines)) <= 100
+    assert max(map(len, lines)) <= 120
     assert "…" not in out
-    row = {line[:26].strip(): line[26:].split() for line in lines}
-    assert row["Cycles radius x scale"][:5] == ["15.080", "15.080", "15.080", "mm", "diffuse"]
-    assert row["absorption mu_a"][3] == "1/mm"
-    assert row["diffuse mean free path"][2:4] == ["none", "mm"]
-    assert ["0.90000", "0.70000", "1.0000", "diffuse"] in [line[26:].split()[:4] for line in lines]
+    row = {line[:38].strip(): line[38:].split() for line in lines}
+    assert row["Blender 5.2-5.3 Random Walk"][:8] == ["0.9000", "0.6998", "1.0000", *3 * ["0.001200"], "m", "at"]
+    assert row["Blender 3.0-5.3 Christensen-Burley"][3:6] == ["0.01457", "0.01221", "0.01450"]
+    assert row["Unity HDRP to 17.2 rasteriser"][-3:] == ["mm", "at", "1"]
+    assert row["Unreal 5.1-5.8 rasteriser"][3:] == [*3 * ["0.07200"], "cm", "at", "0.1"]
+    assert row["Arnold 5 to 7 standard_surface"] == ["–", *3 * ["1.200"], "mm", "scene"]
+    assert {engine.title for engine in ENGINES} <= set(row)
     assert "none: without absorption (alpha = 1)" in out
+    assert "index-matched  " not in out.replace("exact, index-matched", ""), "said once"
+    assert "–: no source says" in out
+    assert "checked:" not in out
+
+
+def test_sources_of_every_row(command):
+    _, out, _ = command("--alpha", "0.5", "--mfp", "1", "--sources")
+    text = " ".join(out.split())
+    for engine in ENGINES:
+        assert f"typed: {engine.formula}" in text
+        assert f"source: {engine.source} checked: {engine.checked}" in text
+    assert "Mean Free Path Color x Mean Free Path Distance; World Unit Scale = 0.1" in text
 
 
 def test_what_every_channel_has_is_not_explained_away(command):
     _, out, _ = command("--alpha", "0.5", "--mfp", "1")
     assert "none" not in out
     assert "1/length" in out
+    assert "No unit was given" in out
 
 
 def test_json_has_every_convention_and_null_for_none(table):
-    found = table("--alpha", "0.5,1", "--mfp", "2cm")
-    colours = {"alpha", "n", "reflectance_searchlight", "reflectance_diffuse", "mu_a", "mu_s"}
-    assert set(BY_NAME) | {"unit"} | colours == set(found)
-    assert found["unit"] == "cm"
-    assert found["mfp"] == [2.0, 2.0]
-    assert found["mu_a"] == [0.25, 0.0]
-    assert found["dmfp"][1] is None
-    assert found["dmfp"][0] == pytest.approx(2.0)  # sqrt(1.5 / 1.5) l
+    printed = table("--alpha", "0.5,1", "--mfp", "2cm")
+    colours = {"alpha", "alpha_unreduced", "n", "g", "mu_a", "mu_s", "mu_s_unreduced"}
+    colours |= {f"{kind}_{light}" for kind in ("reflectance", "matched") for light in ("searchlight", "diffuse")}
+    assert set(BY_NAME) | {"unit", "typed"} | colours == set(printed)
+    assert printed["unit"] == "cm"
+    assert printed["mfp"] == [2.0, 2.0]
+    assert printed["mu_a"] == [0.25, 0.0]
+    assert printed["dmfp"][1] is None
+    assert printed["dmfp"][0] == pytest.approx(2.0)  # sqrt(1.5 / 1.5) l
     assert table("--alpha", "0.5", "--mfp", "2")["unit"] is None
+    typed = {row["name"]: row for row in printed["typed"]}
+    assert list(typed) == [engine.name for engine in ENGINES]
+    assert (typed["hdrp"]["unit"], typed["hdrp"]["scale_field"], typed["hdrp"]["scale"]) == ("mm", "World Scale", 1.0)
+    assert typed["hdrp"]["length"] == pytest.approx([10 * x for x in printed["hdrp_distance"]], rel=1e-12)
+    assert (typed["mitsuba"]["unit"], typed["mitsuba"]["length"]) == ("1/cm", [0.5, 0.5])
+    assert typed["arnold"]["colour"] is None
 
 
-def test_a_colour_of_a_surface_that_refracts(table, command):
+def test_a_colour_of_a_surface_that_refracts_and_the_matched_one(table, command):
     words = ("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
-    found = table(*words, "--n", "1.4")
-    assert found["alpha"] == pytest.approx(alpha_of([0.8], "diffuse", 1.4), rel=1e-12)
-    assert found["reflectance_diffuse"] == pytest.approx([0.8], rel=1e-10)
-    matched = table("--alpha", repr(found["alpha"][0]), "--mfp", "1.2mm")
-    same = set(BY_NAME) | {"unit", "mu_a", "mu_s"}  # of the medium, whatever lies on it
-    assert {key: found[key] for key in same} == {key: matched[key] for key in same}
-    assert found["alpha"][0] - table(*words)["alpha"][0] > 0.005  # the same colour is another medium
-    assert "exact, n = 1.4" in command(*words, "--n", "1.4")[1]
+    printed = table(*words, "--n", "1.4")
+    assert printed["alpha"] == pytest.approx(alpha_of([0.8], "diffuse", 1.4), rel=1e-12)
+    assert printed["reflectance_diffuse"] == pytest.approx([0.8], rel=1e-10)
+    matched = table("--alpha", repr(printed["alpha"][0]), "--mfp", "1.2mm")
+    same = set(BY_NAME) | {"unit", "mu_a", "mu_s", "matched_diffuse", "matched_searchlight"}  # whatever lies on it
+    assert {key: printed[key] for key in same} == {key: matched[key] for key in same}
+    assert printed["matched_diffuse"] == matched["reflectance_diffuse"]
+    typed = {row["name"]: row["colour"] for row in printed["typed"]}
+    assert typed["hdrp"] == printed["matched_diffuse"], "engines that blur assume a matched surface"
+    assert printed["alpha"][0] - table(*words)["alpha"][0] > 0.005  # the same colour is another medium
+    out = command(*words, "--n", "1.4")[1]
+    assert "exact, n = 1.4" in out
+    assert out.count("  index-matched") == 2
     for n, why in (("0.9", "n >= 1"), ("nan", "n must be a refractive index"), ("1.4", "must be in [0, 0.923")):
         status, out, err = command("--reflectance", "0.99", *words[2:], "--n", n)
+        assert (status, out, len(err.splitlines())) == (2, "", 1)
+        assert why in err
+
+
+def test_g_leaves_what_is_reduced_and_changes_the_rest(table, command):
+    words = ("--alpha", "0.9", "--mfp", "1mm")
+    isotropic, printed = table(*words), table(*words, "--g", "0.8")
+    for name in ("alpha", "mfp", "mu_a", "mu_s", "dmfp", "falloff_diffuse", "reflectance_diffuse", "hdrp_distance"):
+        assert printed[name] == isotropic[name]
+    assert printed["mu_s_unreduced"] == pytest.approx([4.5])
+    assert printed["alpha_unreduced"] == pytest.approx([4.5 / 4.6])
+    assert printed["mfp_unreduced"] == printed["cycles_radius"] == pytest.approx([1 / 4.6])
+    assert "g = 0 by similarity" in command(*words, "--g", "0.8")[1]
+    assert "exact, n = 1.4, g = 0.8" in command(*words, "--g", "0.8", "--n", "1.4")[1]
+    assert "no such g" in command(*words, "--g", "0.95")[1]
+    for g, n, why in (("1", "1", "--g must be a mean cosine in (-1, 1), got 1"), (".8", "2", "n from 1.33 to 1.45")):
+        status, out, err = command(*words, "--g", g, "--n", n)
         assert (status, out, len(err.splitlines())) == (2, "", 1)
         assert why in err
 
@@ -100,8 +144,8 @@ def test_every_length_is_an_option(table, name):
 def test_there_and_back_through_an_engine(table):
     first = table("--reflectance", "0.8", "--illumination", "diffuse", "--mfp", "1.2mm")
     again = table("--alpha", repr(first["alpha"][0]), "--unreal-mfp", f"{first['unreal_mfp'][0]!r}mm")
-    for name, value in first.items():
-        assert again[name] == (value if name == "unit" else pytest.approx(value, rel=1e-12))
+    for name in {*BY_NAME, "alpha", "mu_a", "mu_s"}:
+        assert again[name] == pytest.approx(first[name], rel=1e-12)
 
 
 def test_coefficients_are_a_colour_and_a_length(table):

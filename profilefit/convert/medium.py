@@ -1,0 +1,104 @@
+"""One medium, to and from every convention of albedo and length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from mcml_sim import Setting
+from mcml_sim.exact.light import unreduced
+from profilefit.convert import blender, real_time
+from profilefit.convert.colour import LARGEST, checked, reflectance_of
+from profilefit.convert.lengths import QUANTITIES, Length
+from profilefit.errors import InputError
+
+Floats = NDArray[np.float64]
+LENGTHS = (*QUANTITIES, *blender.LENGTHS, *real_time.LENGTHS)
+BY_NAME = {length.name: length for length in LENGTHS}
+
+
+@dataclass(frozen=True, eq=False)
+class Optical:
+    """A medium: alpha its reduced albedo [-] in [0, 1], mfp = 1 / (mu_s' + mu_a) [length] > 0, g its mean cosine [-].
+
+    alpha and mfp are arrays of one shape, an element per channel; numbers and lists broadcast. Raises InputError.
+    """
+
+    alpha: Floats
+    mfp: Floats
+    g: float = 0.0
+
+    def __post_init__(self) -> None:
+        Setting(g=self.g)  # refuses a mean cosine that is none
+        alpha, mfp = checked("alpha", self.alpha, 0.0, 1.0), _checked_length("mfp", self.mfp)
+        alpha, mfp = _broadcast({"alpha": alpha, "mfp": mfp})
+        object.__setattr__(self, "alpha", alpha)
+        object.__setattr__(self, "mfp", mfp)
+
+    @classmethod
+    def from_length(cls, name: str, value: ArrayLike, alpha: ArrayLike, g: float = 0.0) -> Optical:
+        """Return the medium of this reduced albedo whose length `name`, one of `BY_NAME`, has this value [length]."""
+        Setting(g=g)
+        length = _named(name)
+        albedo, lengths = checked("alpha", alpha, 0.0, 1.0), _checked_length(name, value)
+        albedo, lengths = _broadcast({"alpha": albedo, name: lengths})
+        factor = length.factor(albedo, g)
+        if not np.all(np.isfinite(factor)):
+            raise InputError(f"{name} must be another length at alpha = 1: it is infinite where nothing is absorbed")
+        return cls(albedo, lengths / factor, g)
+
+    @classmethod
+    def from_coefficients(cls, mu_a: ArrayLike, mu_s: ArrayLike, g: float = 0.0) -> Optical:
+        """Return the medium of these absorption and reduced scattering coefficients [1/length], >= 0 and not both 0."""
+        absorption, scattering = checked("mu_a", mu_a, 0.0, LARGEST), checked("mu_s", mu_s, 0.0, LARGEST)
+        absorption, scattering = _broadcast({"mu_a": absorption, "mu_s": scattering})
+        both = absorption + scattering
+        if not np.all(both > 0):
+            raise InputError("mu_a + mu_s must be > 0: there is no medium, got 0")
+        return cls(scattering / both, 1.0 / both, g)
+
+    @property
+    def mu_a(self) -> Floats:
+        """Absorption coefficient [1/length]."""
+        return (1.0 - self.alpha) / self.mfp
+
+    @property
+    def mu_s(self) -> Floats:
+        """Reduced scattering coefficient mu_s' = mu_s (1 - g) [1/length]."""
+        return self.alpha / self.mfp
+
+    @property
+    def alpha_unreduced(self) -> Floats:
+        """Albedo mu_s / (mu_s + mu_a) [-]."""
+        return np.asarray(unreduced(self.alpha, self.g))
+
+    def reflectance(self, illumination: str, n: float = 1.0) -> Floats:
+        """Return A [-] under "searchlight" or "diffuse" illumination, of index n >= 1; see `reflectance_of`."""
+        return reflectance_of(self.alpha, illumination, n, self.g)
+
+    def length(self, name: str) -> Floats:
+        """Return the length `name`, one of `BY_NAME` [length]; infinite where the medium has none."""
+        return self.mfp * _named(name).factor(self.alpha, self.g)
+
+
+def _named(name: str) -> Length:
+    if name not in BY_NAME:
+        raise InputError(f"length must be one of {', '.join(BY_NAME)}, got {name!r}")
+    return BY_NAME[name]
+
+
+def _checked_length(name: str, values: ArrayLike) -> Floats:
+    numbers = checked(name, values, 0.0, LARGEST)
+    if np.any(numbers == 0.0):
+        raise InputError(f"{name} must be > 0 and finite, got 0")
+    return numbers
+
+
+def _broadcast(named: dict[str, Floats]) -> list[Floats]:
+    try:
+        return [np.array(values) for values in np.broadcast_arrays(*named.values())]
+    except ValueError:
+        shapes = " and ".join(str(values.size) for values in named.values())
+        raise InputError(f"{' and '.join(named)} must have one value or equally many, got {shapes}") from None
