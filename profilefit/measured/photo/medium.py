@@ -48,6 +48,7 @@ UNEVEN = 0.01  # relative error in waves along ln r that neither sectors nor bra
 SHORTEST, LONGEST = 1 / 10, 1.0  # l where the search begins: over the core's sigma, and over the last ring's radius
 COARSE = 2  # steps of least squares in all but albedo and length, at each point of the coarse search
 MAX_STEPS = 80
+AGAIN = 1  # descents from where one stalled, whose damping has grown beyond use
 FARTHEST = 1.0  # step of what light is not straight in
 ENOUGH = 1e-3  # of chi-square, that another step must gain
 ROOM = 1.0  # of ln l from the end of its range, within which it has run there
@@ -402,7 +403,11 @@ def _descended(shot: Shot, start: Floats) -> Minimum:
     """End of damped least squares within bounds, from a start."""
     longest = np.full(start.size, np.inf)
     longest[:4], longest[start.size - len(shot.cards) :] = FARTHEST, FARTHEST
-    done = solve(shot.residuals, start, shot.bounds, rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
+    for _ in range(1 + AGAIN):
+        done = solve(shot.residuals, start, shot.bounds, rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
+        if done.converged:
+            break
+        start = done.parameters
     return Minimum(**vars(done))
 
 

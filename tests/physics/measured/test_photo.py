@@ -290,7 +290,7 @@ def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
         shot=SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",)), plate=SQUARE, notes=(),
         cards=(1,), fits={"red": fit},
     )  # fmt: skip
-    assert any(line.startswith("red: ANOTHER MEDIUM FITS AS WELL: mu_s' 0.9") for line in photo_lines(seen))
+    assert any(line.startswith("red: ANOTHER MEDIUM FITS AS WELL: mu_s' 0.855 1/mm") for line in photo_lines(seen))
 
 
 def test_the_lowest_chi_square_is_kept_though_its_descent_did_not_end():
