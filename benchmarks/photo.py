@@ -1,6 +1,7 @@
 """How well `profilefit photo` does on photographs whose truth is known, and what a mistake costs.
 
     python -m benchmarks.photo --jobs 2     # 200 photographs of four setups: an hour
+    python -m benchmarks.photo --setups     # 200 photographs of as many setups
     python -m benchmarks.photo --mistakes   # a minute
 
 Each is a bracket of five 12-bit exposures of a spot on a medium of n 1.4 and g 0.8, with every nuisance drawn anew from
@@ -8,26 +9,35 @@ what the fit believes: beam, surface, glare and its width, darkened corners, spe
 correlated error of 1 %; with cards, a white one and a grey one of reflectance .18 +- .004 likewise; once more
 with glare that falls as r^-2.4 to r^-5 in place of r^-3. Errors are over the Fisher bound
 of the same rings at the truth.
+
+With --setups each photograph has a camera and a beam of its own, and three media: pixels of .05 to .3 mm, a beam of 2
+to 12 pixels, 200 to 1600 pixels across, albedos of wax to ketchup (1 - alpha from .003 to .98, mu_s' + mu_a from .3 to
+4 per mm), no card, either, or both in turn. It prints the share of intervals of 95 % that hold the truth, and how many
+values are wrong by more than 5 intervals unsaid: without a misfit, a rival, "not identified", or a refusal.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from mcml_sim import Setting
 from mcml_sim.files.whole_file import write_whole
+from profilefit.errors import InputError
 from profilefit.measured import law_error
 from profilefit.measured.exact_light import exact_light
+from profilefit.measured.identifiability import LOOSE
+from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import u_of
 from profilefit.measured.photo import medium, simulated, workflow
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, of_sensor
@@ -52,6 +62,7 @@ STEPS = 5  # exposures, by a factor of four each
 FULL = 0.5  # of the sensor's range, that the shortest one reaches
 LATE = 0.03  # relative error of a stated time
 FARTHEST = 40.0  # mm
+UNSAID = 5.0  # intervals, that a value may be wrong by without a warning
 
 
 class Truth(NamedTuple):
@@ -62,6 +73,34 @@ class Truth(NamedTuple):
     optics: SpotOptics
     camera: SpotCamera
     grey: float
+
+
+class Setup(NamedTuple):
+    """What is photographed by a camera of its own: albedo and length [mm] of each channel's medium.
+
+    beam  1/e^2 radius as the fit is told it; white, grey whether there is such a card
+    """
+
+    media: dict[str, tuple[float, float]]
+    optics: SpotOptics
+    camera: SpotCamera
+    beam: Known
+    white: bool
+    grey: float | None
+
+
+class Verdict(NamedTuple):
+    """What a photograph's answer says of one colour; an answer that was refused holds no value.
+
+    refusal  why there is no answer; empty where there is one
+    warned   names of the values that a misfit, a rival or "not identified" warns of
+    off      ln of value over truth by name, in half widths of the 95 % interval
+    """
+
+    colour: str
+    refusal: str
+    warned: tuple[str, ...]
+    off: dict[str, float]
 
 
 class Outcome(NamedTuple):
@@ -75,31 +114,41 @@ class Outcome(NamedTuple):
 def drawn(rng: np.random.Generator) -> Truth:
     """From what a fit believes, of media such as skin, wax and milk."""
     mu_s, mu_a = np.exp(rng.uniform(np.log(0.6), np.log(2.0))), np.exp(rng.uniform(np.log(0.01), np.log(0.15)))
-    beam, core = BEAM.value * (1.0 + BEAM.error / BEAM.value * rng.standard_normal()), 0.03
-    glare = float(np.abs(0.02 + 0.02 * rng.standard_normal()))
-    optics = SpotOptics(
-        beam=float(2.0 * np.sqrt(max(0.25 * beam**2 - core**2, 1e-4))), core=core,
-        surface=float(np.abs(0.01 + 0.01 * rng.standard_normal())), glare=glare,
-        width=float(np.exp(rng.uniform(np.log(1.0), np.log(16.0)))),
-    )  # fmt: skip
-    camera = replace(
-        CAMERA, corner=float(np.clip(0.05 + 0.05 * rng.standard_normal(), 0.0, 0.3)),
-        centre=tuple(rng.uniform(-20.0, 20.0, 2).tolist()),
-    )  # fmt: skip
+    optics, camera = nuisances(rng, BEAM, CAMERA)
     length = 1.0 / (mu_s + mu_a)
     return Truth(float(mu_s * length), float(length), optics, camera, GREY.value + GREY.error * rng.standard_normal())
 
 
-def exposures(radii: Floats, light: Floats, camera: SpotCamera, rng: np.random.Generator) -> list[Exposure]:
-    """A bracket, its times off by LATE; its light off by a correlated 1 %."""
+def nuisances(rng: np.random.Generator, told: Known, camera: SpotCamera) -> tuple[SpotOptics, SpotCamera]:
+    """Beam, lens and surface as a fit believes them, and a lens that darkens the corners, the spot off the middle."""
+    beam, core = told.value * (1.0 + told.error / told.value * rng.standard_normal()), 0.06 * told.value
+    glare = float(np.abs(0.02 + 0.02 * rng.standard_normal()))
+    optics = SpotOptics(
+        beam=float(2.0 * np.sqrt(max(0.25 * beam**2 - core**2, 1e-3 * beam**2))), core=core,
+        surface=float(np.abs(0.01 + 0.01 * rng.standard_normal())), glare=glare,
+        width=float(np.exp(rng.uniform(np.log(1.0), np.log(16.0)))),
+    )  # fmt: skip
+    shown = replace(
+        camera, corner=float(np.clip(0.05 + 0.05 * rng.standard_normal(), 0.0, 0.3)),
+        centre=tuple(rng.uniform(-20.0, 20.0, 2).tolist()),
+    )  # fmt: skip
+    return optics, shown
+
+
+def exposures(
+    radii: Floats, light: Floats | Mapping[str, Floats], camera: SpotCamera, rng: np.random.Generator
+) -> list[Exposure]:
+    """A bracket, its times off by LATE; its light, of all channels or by channel, off by a correlated 1 %."""
+    by_channel = light if isinstance(light, Mapping) else {"": light}
     smooth = law_error.waves(np.maximum(radii, 0.1)) + 1e-9 * np.eye(radii.size)
-    wavy = light * (1.0 + medium.UNEVEN * np.linalg.cholesky(smooth) @ rng.standard_normal(radii.size))
-    first = FULL * camera.gain * (camera.white - camera.black) / float(light[0])
+    root = medium.UNEVEN * np.linalg.cholesky(smooth)
+    wavy = {name: (radii, one * (1.0 + root @ rng.standard_normal(radii.size))) for name, one in by_channel.items()}
+    brightest = max(float(one[0]) for one in by_channel.values())
+    first = FULL * camera.gain * (camera.white - camera.black) / brightest
     stated = [first * 4.0**step for step in range(STEPS)]
     times = {one: one * (1.0 + LATE * rng.standard_normal()) for one in stated}
-    taken = simulated.taken(
-        dict.fromkeys(simulated.CHANNELS, (radii, wavy)), camera, 1.0, times, int(rng.integers(2**31))
-    )
+    radial = {name: wavy[name if name in wavy else ""] for name in simulated.CHANNELS}
+    taken = simulated.taken(radial, camera, 1.0, times, int(rng.integers(2**31)))
     return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
 
 
@@ -126,7 +175,7 @@ def outcome(cards: bool, shaped: bool, at: int) -> Outcome:
         white = simulated.card(one.optics, radii)
         pairs = ((0.9 * white, None), (one.grey * white, GREY))
         shown = tuple(workflow.carded(seen(light), "green", size, known, spot) for light, known in pairs)
-    beliefs = Beliefs(beam=BEAM, border=0.5 * pitch * float(np.hypot(*one.camera.sides)))
+    beliefs = Beliefs(beam=BEAM).over(spot.sides, pitch, pitch * spot.spot.reach)
     shot = Shot(workflow.ringed(spot, "green", size), shown, exact_light(SETTING), beliefs)
     fit = medium.fitted(shot)
     truth = {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}
@@ -145,6 +194,89 @@ def _coordinates(one: Truth, shot: Shot, found: Floats) -> Floats:
     near = np.abs(np.log(np.array(shot.beliefs.halos) / one.optics.width))
     x[5 : 5 + near.size] = one.optics.glare * np.exp(-near) / np.exp(-near).sum()
     return x
+
+
+def setup(at: int) -> Setup:
+    """The setup of this number of the series."""
+    rng = np.random.default_rng([13, at])
+    while True:
+        pitch, pixels = float(rng.uniform(0.05, 0.3)), float(np.exp(rng.uniform(np.log(2.0), np.log(12.0))))
+        columns = 2 * int(np.exp(rng.uniform(np.log(100.0), np.log(800.0))))
+        camera = replace(CAMERA, sides=(columns, 2 * int(0.375 * columns)), pitch=pitch)
+        told = Known(pitch * pixels, 0.1 * pitch * pixels)
+        optics, camera = nuisances(rng, told, camera)
+        media = {}
+        for name in simulated.CHANNELS:
+            absorbed, rate = (np.exp(rng.uniform(*np.log(ends))) for ends in ((0.003, 0.98), (0.3, 4.0)))
+            media[name] = float(1.0 - absorbed), float(1.0 / rate)
+        try:
+            simulated.require_resolved(max(length for _, length in media.values()), optics, _farthest(camera))
+        except InputError:  # too fine a beam in too wide a picture to be simulated: another
+            continue
+        grey = float(GREY.value + GREY.error * rng.standard_normal())
+        return Setup(media, optics, camera, told, at % 2 == 1, grey if at % 4 >= 2 else None)
+
+
+def _farthest(camera: SpotCamera) -> float:
+    """[mm], beyond the corners."""
+    return 1.2 * camera.pitch * float(np.hypot(*camera.sides))
+
+
+def verdicts(at: int) -> list[Verdict]:
+    """The answer to one photograph of the series, colour by colour."""
+    one, rng = setup(at), np.random.default_rng([17, at])
+    radii = simulated.radii(_farthest(one.camera), one.optics)
+    size = PixelScale(np.diag([one.camera.pitch, one.camera.pitch, 1.0]), "known")
+
+    def seen(light: Floats | Mapping[str, Floats]) -> workflow.Bracket:
+        return workflow.bracketed(exposures(radii, light, one.camera, rng), size)
+
+    card = simulated.card(one.optics, radii)
+    try:
+        spot = seen({name: simulated.light(*of, SETTING, one.optics, radii) for name, of in one.media.items()})
+        shown = [(seen(0.9 * card), None)] if one.white else []
+        shown += [] if one.grey is None else [(seen(one.grey * card), GREY)]
+        found = workflow.measured(spot, shown, size, SETTING, Beliefs(beam=one.beam))
+    except InputError as error:
+        return [Verdict(colour, str(error), (), {}) for colour in simulated.CHANNELS]
+    return [
+        _verdict(colour, found.fits[colour], *one.media[colour]) if colour in found.fits
+        else Verdict(colour, "no spot is seen", (), {})
+        for colour in simulated.CHANNELS
+    ]  # fmt: skip
+
+
+def _verdict(colour: str, fit: medium.PhotoFit, alpha: float, length: float) -> Verdict:
+    total = float(np.asarray(fit.shot.light.total(alpha)))
+    truth = {"mu_s'": alpha / length, "mu_a": (1.0 - alpha) / length, "A": total}
+    half = {name: medium.WITHIN * fit.errors[name] / fit.values[name] for name in truth}
+    off = {name: float(np.log(fit.values[name] / truth[name])) / half[name] for name in truth}
+    loose = tuple(name for name in NAMES if not fit.errors[name] < LOOSE * fit.values[name])
+    warned = tuple(truth) if fit.chance < DETECTED or fit.rivals else (*loose, *(("A",) if loose else ()))
+    return Verdict(colour, "" if fit.converged else fit.result, warned, off)
+
+
+def setups(count: int, jobs: int) -> dict[str, Any]:
+    """Print, of each photograph and of all, what holds and what is wrong unsaid."""
+    each: list[Verdict] = []
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        for at, found in enumerate(pool.map(verdicts, range(count))):
+            each += found
+            for one in found:
+                off = ", ".join(f"{name} {value:+.1f}" for name, value in one.off.items())
+                print(f"{at} {one.colour}: {off}; {one.refusal or ', '.join(one.warned) or 'no warning'}", flush=True)
+    answered = [one for one in each if not one.refusal]
+    shares: dict[str, Any] = {"answers": len(answered), "refused": len(each) - len(answered)}
+    for colour in simulated.CHANNELS:
+        of = [one.off for one in answered if one.colour == colour]
+        for name in (*NAMES, "A"):
+            shares[f"{colour} {name}"] = float(np.mean([abs(off[name]) < 1.0 for off in of]))
+            print(f"{colour} {name}: 95 % hold {shares[f'{colour} {name}']:.1%} of {len(of)}")
+    wrong = [name in one.warned for one in answered for name, off in one.off.items() if abs(off) > UNSAID]
+    shares |= {"wrong": len(wrong), "unsaid": wrong.count(False)}
+    print(f"{count} photographs, {len(each)} colours, {shares['refused']} refused; wrong by more than {UNSAID:g} "
+          f"intervals: {len(wrong)} values, {shares['unsaid']} of them unsaid")  # fmt: skip
+    return shares
 
 
 @dataclass(frozen=True)
@@ -188,8 +320,9 @@ def mistaken(one: Mistake) -> medium.PhotoFit:
     shots = [replace(shot, planes=tuple(_bent(plane, one.bent) for plane in shot.planes)) for shot in shots]
     pitch = one.pixel * camera.pitch
     size = PixelScale(np.diag([pitch, pitch, 1.0]), "told")
-    beliefs = Beliefs(beam=BEAM, border=0.5 * pitch * float(np.hypot(*camera.sides)))
-    rings = workflow.ringed(workflow.bracketed(shots, size), "green", size)
+    spot = workflow.bracketed(shots, size)
+    beliefs = Beliefs(beam=BEAM).over(spot.sides, pitch, pitch * spot.spot.reach)
+    rings = workflow.ringed(spot, "green", size)
     return medium.fitted(Shot(rings, (), exact_light(one.setting), replace(beliefs, **one.beliefs)))
 
 
@@ -215,10 +348,16 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="photographs")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--json", type=Path, help="also write the numbers into this file")
+    parser.add_argument("--setups", action="store_true", help="of cameras, beams and media of their own")
     parser.add_argument("--mistakes", action="store_true", help="print what each costs instead")
     given = parser.parse_args()
     if given.mistakes:
         mistakes()
+        return
+    if given.setups:
+        shares = setups(given.count, given.jobs)
+        if given.json is not None:
+            write_whole(given.json, json.dumps(shares, indent=1) + "\n")
         return
     found: dict[str, dict[str, dict[str, float]]] = {}
     for setup, (cards, shaped) in SETUPS.items():

@@ -42,12 +42,16 @@ class Instrument:
 
         The radii (m,) are those of all rows, at least up to `farthest`, and the weights (n, m).
         """
-        d, mean = self._distances(inner, outer)
+        return self.gathered(*self._distances(inner, outer), farthest)
+
+    def gathered(self, d: Floats, mean: Floats, farthest: float = 0.0) -> Nodes:
+        """Like `nodes`, of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
             return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)
-        beams = (self.beam.nodes(one) for one in d)
-        rows = ((rho, share[:, None] * weight) for (rho, weight), share in zip(beams, mean, strict=True))
+        counts = [(one[share > 0], share[share > 0]) for one, share in zip(d, mean, strict=True)]
+        beams = (self.beam.nodes(one) for one, _ in counts)
+        rows = ((rho, share[:, None] * weight) for (rho, weight), (_, share) in zip(beams, counts, strict=True))
         return _shared(rows, farthest)
 
     def _distances(self, inner: Floats, outer: Floats) -> Nodes:

@@ -63,17 +63,27 @@ class Model:
         rows = np.append(np.arange(inner.size), -1)
         return np.asarray(values)[rows], np.asarray(slopes)[:, rows].T
 
-    def weighed(self, point: Floats, rho: Floats, weights: Floats) -> tuple[Floats, Floats]:
-        """Sums (n,) over radii (m,) of weights (n, m) times 2 pi rho R_d at one point (3,), and derivatives (n, 3)."""
-        values, slopes = _linearised(self.traced, point, rho, weights)
-        return np.asarray(values)[:-1], np.asarray(slopes)[:, :-1].T
+    def density(self, point: Floats, rho: Floats) -> tuple[Floats, Floats]:
+        """Compute 2 pi rho R_d at radii (m,) for one point (3,), A last (m + 1,), and derivatives (m + 1, 3).
+
+        Numbers of radii that are alike share one compiled function, whatever rows they are summed to.
+        """
+        values, slopes = _linearised(self.traced, point, rho, np.eye(rho.size))
+        return np.asarray(values), np.asarray(slopes).T
+
+    def densities(self, points: Floats, rho: Floats) -> Floats:
+        """Compute 2 pi rho R_d (k, m) at radii (m,) for points (k, 3)."""
+        return self._in_flocks(points, rho, np.eye(rho.size))[:, :-1]
 
     def predicted(self, points: Floats, inner: Floats, outer: Floats) -> Floats:
         """Predictions (m, n + 1) at points (m, 3), the last column being A."""
+        return self._in_flocks(points, *self._nodes(inner, outer))[:, np.append(np.arange(inner.size), -1)]
+
+    def _in_flocks(self, points: Floats, *nodes: Array | Floats) -> Floats:
+        """Sums over radii, and A, (m, n + 1) at points (m, 3)."""
         flocks = -(-len(points) // FLOCK)
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
-        nodes, rows = self._nodes(inner, outer), np.append(np.arange(inner.size), -1)
-        light = [np.asarray(_predicted(self.traced, flock, *nodes))[:, rows] for flock in np.split(filled, flocks)]
+        light = [np.asarray(_predicted(self.traced, flock, *nodes)) for flock in np.split(filled, flocks)]
         return np.concatenate(light)[: len(points)]
 
     def shares(self, point: Floats, r: Floats) -> Floats:

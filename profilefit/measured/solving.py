@@ -5,7 +5,7 @@ A failure is a result: `Minimum.result` is "converged" or says what happened and
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -107,12 +107,7 @@ class Problem:
         if SCALE in self.question.free:
             points[:, SCALE] = np.log(self._best_scales(points))
         places = np.array([[i, j] for i in range(len(u)) for j in range(len(ln_l))])
-        order = np.argsort(self.costs(points))
-        chosen: list[int] = []
-        for at in order:
-            if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
-                chosen.append(int(at))
-        return points[chosen[:STARTS]]
+        return points[best_apart(places, self.costs(points))]
 
     def _best_scales(self, points: Floats) -> Floats:
         """The scale that fits best at each point, by linear least squares (m,)."""
@@ -125,13 +120,13 @@ class Problem:
 
 @dataclass(frozen=True)
 class Minimum(solver.Solution):
-    """End of a descent in all three coordinates; `others` other minima that a search found, the lowest first."""
+    """End of a descent; `others` other minima that a search found, the lowest first."""
 
     others: tuple[Minimum, ...] = ()
 
     @property
     def point(self) -> Floats:
-        """Coordinates (3,)."""
+        """Coordinates (p,): those of `model`, and after them what else a problem leaves open."""
         return self.parameters
 
     @property
@@ -140,20 +135,38 @@ class Minimum(solver.Solution):
         return self.result in (AT_WHITE, AT_BLACK)
 
 
+def best_apart(places: Floats, costs: Floats) -> list[int]:
+    """Return the rows of a coarse search where descents start: the cheapest, no two of them neighbours.
+
+    Args:
+        places: (m, 2) whole numbers, where each row lies in the search's grid.
+        costs: (m,) chi-square of each.
+    """
+    chosen: list[int] = []
+    for at in np.argsort(costs):
+        if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
+            chosen.append(int(at))
+    return chosen[:STARTS]
+
+
 def minimised(problem: Problem) -> Minimum:
     """The lowest of the minima that several starts lead to, and the others."""
-    ends = (descended(problem, start, problem.question.free) for start in problem.starts)
-    lowest, *others = sorted(ends, key=lambda one: (not np.isfinite(one.cost), one.cost))
+    return lowest(descended(problem, start, problem.question.free) for start in problem.starts)
+
+
+def lowest(ends: Iterable[Minimum]) -> Minimum:
+    """Return the end of lowest chi-square, converged or not, with the other minima."""
+    first, *others = sorted(ends, key=lambda one: (not np.isfinite(one.cost), one.cost))
     apart: list[Minimum] = []
     for one in others:
-        if np.isfinite(one.cost) and all(are_apart(one, other) for other in (lowest, *apart)):
+        if np.isfinite(one.cost) and all(are_apart(one, other) for other in (first, *apart)):
             apart.append(one)
-    return replace(lowest, others=tuple(apart))
+    return replace(first, others=tuple(apart))
 
 
 def are_apart(one: Minimum, other: Minimum) -> bool:
     """Whether two ends of descents are two minima: their coordinates differ by more than a search leaves open."""
-    return bool(np.max(np.abs(one.point - other.point)) > APART)
+    return bool(np.max(np.abs(one.point - other.point)[: len(NAMES)]) > APART)
 
 
 def likelihood(rise: Floats, free: int, pooled: float) -> Floats:

@@ -99,7 +99,8 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
     if pairs < LEAST_PAIRS or not above > 0:
         raise InputError(
             f"{shorter.source}: expected a scene that {longer.source} shares with it, neither dark nor clipped, in "
-            f"{LEAST_PAIRS} pixels, got {pairs:.0f}; take exposures in steps of a factor of eight or less"
+            f"{LEAST_PAIRS} pixels, got {pairs if above > 0 else 0:.0f}; take exposures in steps of a factor of eight "
+            "or less"
         )
     ratio = above / below
     scatter = sum(float(np.sum((one - ratio * other) ** 2)) for one, other in chosen)

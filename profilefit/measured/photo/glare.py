@@ -24,7 +24,8 @@ from scipy.interpolate import CubicSpline
 from scipy.special import ellipe, ellipk
 
 from profilefit.measured.beam import Floats, Gaussian
-from profilefit.measured.instrument import RING, Instrument
+from profilefit.measured.instrument import Instrument
+from profilefit.measured.photo.rings import SpotRings, over_rings
 
 FARTHER = 5.0  # of the last ring, from where halos still bring light
 NEAR = 0.1  # of a, between halos whose difference is a derivative
@@ -43,17 +44,16 @@ class RingWeights(NamedTuple):
     widening: Floats
 
 
-def ring_weights(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> RingWeights:
+def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> RingWeights:
     """Of a core and halos; the core's weights lie on cubics between those of sigmas APART."""
-    rings = inner.tobytes(), outer.tobytes()
     place = float(np.log(sigma)) / APART
     first = int(np.floor(place)) - 1
     share = POLYNOMIALS @ (place - first) ** np.arange(4.0)
     slope = POLYNOMIALS[:, 1:] @ (np.arange(1.0, 4.0) * (place - first) ** np.arange(3.0)) / APART
-    cores = [_core(float(np.exp(APART * (first + at))), *rings) for at in range(4)]
+    cores = [_core(float(np.exp(APART * (first + at))), *map(_hashable, rings.gathered)) for at in range(4)]
     rho, near = cores[0][0], np.stack([one for _, one in cores])
     core, widening = np.tensordot([share, slope], near, axes=1)
-    sharp, bend = _halos(tuple(halos), *rings)
+    sharp, bend = _halos(tuple(halos), rho.tobytes(), rings.inner.tobytes(), rings.outer.tobytes())
     blurred = sharp - 0.5 * _blur(sigma, halos)[:, None, None] ** 2 * bend
     return RingWeights(rho, np.concatenate([core[None], blurred]), widening)
 
@@ -63,18 +63,25 @@ def _blur(sigma: float, halos: Sequence[float]) -> Floats:
     return np.minimum(sigma, 0.5 * np.array(halos))
 
 
+Hashable = tuple[bytes, tuple[int, ...]]
+
+
+def _hashable(numbers: Floats) -> Hashable:
+    return numbers.tobytes(), numbers.shape
+
+
 @lru_cache(maxsize=24)
-def _core(sigma: float, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
-    ends = np.frombuffer(inner), np.frombuffer(outer)
-    return Instrument(Gaussian(2.0 * sigma)).nodes(*ends, farthest=FARTHER * float(ends[1][-1]))
+def _core(sigma: float, distances: Hashable, shares: Hashable) -> tuple[Floats, Floats]:
+    d, share = (np.frombuffer(content).reshape(shape) for content, shape in (distances, shares))
+    return Instrument(Gaussian(2.0 * sigma)).gathered(d, share, FARTHER * float(d.max()))
 
 
 @lru_cache(maxsize=8)
-def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
-    """Weights (halos, n, m) of halos that no core blurs, and minus their Laplacians."""
-    rho, _ = _core(float(np.frombuffer(outer)[0]), inner, outer)  # radii are those of any core
+def _halos(halos: tuple[float, ...], radii: bytes, inner: bytes, outer: bytes) -> tuple[Floats, Floats]:
+    """Weights (halos, n, m) of halos that no core blurs, and minus their Laplacians; even over the rings' areas."""
+    rho = np.frombuffer(radii)
     steps = CubicSpline(np.arange(rho.size), rho)(np.arange(rho.size), 1)  # a sum is a trapezoidal integral
-    d, share = _over_rings(np.frombuffer(inner), np.frombuffer(outer))
+    d, share = over_rings(np.frombuffer(inner), np.frombuffer(outer))
 
     def weights(by: float) -> Floats:
         return np.stack([np.einsum("q,nqm->nm", share, halo(by * a, d[..., None], rho)) * steps for a in halos])
@@ -84,16 +91,16 @@ def _halos(halos: tuple[float, ...], inner: bytes, outer: bytes) -> tuple[Floats
     return own, (bend - 2.0 * slope) / np.array(halos)[:, None, None] ** 2
 
 
-def ring_means(sigma: float, halos: Sequence[float], inner: Floats, outer: Floats) -> Floats:
-    """Each spread's own mean over rings (1 + halos, n) [1/area]."""
+def ring_means(sigma: float, halos: Sequence[float], rings: SpotRings) -> tuple[Floats, Floats]:
+    """Each spread's own mean over rings (1 + halos, n) [1/area], and the core's derivative (n,) by ln sigma."""
+    (inner, outer), (d, share) = (rings.inner, rings.outer), rings.gathered
     areas = np.pi * (outer - inner) * (outer + inner)
-    core = (np.exp(-0.5 * (inner / sigma) ** 2) - np.exp(-0.5 * (outer / sigma) ** 2)) / areas
+    square = (d / sigma) ** 2
+    core = share * np.exp(-0.5 * square) / (2.0 * np.pi * sigma**2)
     # (1 + ka) e^{-ka} cos(k sigma), as much blurred to third order, is (1 - a d/da) of e^{-kz} at z = a + i sigma.
-    means = []
-    for a, z in zip(halos, np.array(halos) + 1j * _blur(sigma, halos), strict=True):
-        near, far = (z / np.sqrt(r**2 + z**2) - a * r**2 / (r**2 + z**2) ** 1.5 for r in (inner, outer))
-        means.append((near - far).real / areas)
-    return np.stack([core, *means])
+    a, z = np.array(halos)[:, None], (np.array(halos) + 1j * _blur(sigma, halos))[:, None]
+    near, far = (z / np.sqrt(r**2 + z**2) - a * r**2 / (r**2 + z**2) ** 1.5 for r in (inner, outer))
+    return np.concatenate([core.sum(axis=1)[None], (near - far).real / areas]), np.sum(core * (square - 2.0), axis=1)
 
 
 def halo(a: float, d: Floats, rho: Floats) -> Floats:
@@ -103,9 +110,3 @@ def halo(a: float, d: Floats, rho: Floats) -> Floats:
     e, k = ellipe(m), ellipk(m)
     found: Floats = 2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more))
     return found
-
-
-def _over_rings(inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
-    """Distances (n, q) and shares (q,) of a ring's area."""
-    t, share = 0.5 * (1.0 + RING[0]), 0.5 * RING[1]
-    return np.sqrt(inner[:, None] ** 2 + ((outer - inner) * (outer + inner))[:, None] * t), share

@@ -10,8 +10,9 @@ Errors are those of the normal approximation at the best fit; the same of a trut
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,24 +20,45 @@ from scipy import stats
 from scipy.linalg import block_diag, solve_triangular
 
 from mcml_sim.exact.light import ExactLight
-from profilefit.fitting.solver import covariance, solve
+from profilefit.fitting.solver import CONVERGED, covariance, solve
 from profilefit.measured import law_error, model
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import Model, u_of
 from profilefit.measured.photo.glare import ring_means, ring_weights
 from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.problem import Known
+from profilefit.measured.solving import (
+    ALBEDOS,
+    BLACK,
+    FARTHEST_LN,
+    FARTHEST_U,
+    LENGTHS,
+    WHITE,
+    Minimum,
+    best_apart,
+    lowest,
+)
 
 Floats = NDArray[np.float64]
+MEDIUM = ("mu_s'", "mu_a")
 HALO, ALIKE = 0.5, np.log(2.0)  # error of a halo's share over that of all glare; ln a within which shares are alike
+NARROWEST, WIDEST, RATIO = 1.0, 32.0, np.sqrt(2.0)  # widths of halos [mm], and of one over the next narrower
 DARK = 1e-5  # error of the dark level
 UNEVEN = 0.01  # relative error in waves along ln r that neither sectors nor brackets show
-STEP = 1e-4  # of ln sigma, for derivatives
-ALBEDOS = (0.5, 0.8, 0.95, 0.99)
-LENGTHS = (0.02, 0.05, 0.12, 0.3)  # of the last ring's radius
+SHORTEST, LONGEST = 1 / 10, 1.0  # l where the search begins: over the core's sigma, and over the last ring's radius
+COARSE = 2  # steps of least squares in all but albedo and length, at each point of the coarse search
 MAX_STEPS = 80
+AGAIN = 1  # descents from where one stalled, whose damping has grown beyond use
 FARTHEST = 1.0  # step of what light is not straight in
 ENOUGH = 1e-3  # of chi-square, that another step must gain
+ROOM = 1.0  # of ln l from the end of its range, within which it has run there
+WITHIN = float(stats.norm.ppf(0.975))  # standard errors from a value to an end of its interval of 95 %
+AT_BLACK = "alpha runs to 0: these rings show no multiple scattering; check scale, beam, n and g"
+AT_WHITE = "alpha runs to 1: these rings show no absorption; photograph a wider field, or a grey card"
+RAN_AWAY = "l runs to an end of its range: these rings show no scattering in the medium; check the scale and the beam"
+UNENDED = "the search did not end at a minimum: photograph cards, or expose longer"
+RIVALLED = "media that differ fit as well: photograph a grey card, or a spot of a narrower beam"
+LARGEST = 100.0  # of a logarithm, where an interval ends that tells nothing
 
 
 @dataclass(frozen=True)
@@ -55,7 +77,19 @@ class Beliefs:
     scale: Known | None = None
     corner: Known = field(default_factory=lambda: Known(0.05, 0.05))
     border: float = 20.0
-    halos: tuple[float, ...] = tuple(np.geomspace(1.0, 32.0, 11).tolist())
+    halos: tuple[float, ...] = tuple(np.geomspace(NARROWEST, WIDEST, 11).tolist())
+
+    def over(self, sides: tuple[int, int], pixel: float, reach: float) -> Beliefs:
+        """The same for a picture of so many columns and rows, of `pixel` [unit] each, with rings out to `reach` [unit].
+
+        Halos reach as far as the rings, since a wider one falls as a narrower one does there. None is narrower than the
+        core, from which rings would not tell it apart.
+        """
+        near = NARROWEST if self.beam is None else max(NARROWEST, 0.5 * self.beam.value)
+        far = max(WIDEST, reach, 2.0 * near)
+        count = 1 + round(float(np.log(far / near) / np.log(RATIO)))
+        halos = tuple(np.geomspace(near, far, count).tolist())
+        return replace(self, border=0.5 * pixel * float(np.hypot(*sides)), halos=halos)
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,6 +98,26 @@ class Card:
 
     rings: SpotRings
     reflectance: Known | None = None
+
+
+class Spread(NamedTuple):
+    """Light of the medium's rings as beam and lens spread it, by spread (c of them), for a scale of 1.
+
+    light      (c + 1, n) light of the medium, and last the core's derivative by ln sigma
+    by_medium  (c, n, 2) derivatives of the former by the first two coordinates
+    own        (c, n) light that the surface scatters, and `wider` (n,) the core's derivative by ln sigma
+    """
+
+    light: Floats
+    by_medium: Floats
+    own: Floats
+    wider: Floats
+
+    def widened(self, by: float) -> Spread:
+        """The same of a core wider by a change of ln sigma, to first order and not below nothing."""
+        light, own = self.light.copy(), self.own.copy()
+        light[0], own[0] = np.maximum(light[0] + by * light[-1], 0.0), np.maximum(own[0] + by * self.wider, 0.0)
+        return self._replace(light=light, own=own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,10 +143,14 @@ class Shot:
 
     def rows(self, x: Floats) -> tuple[Floats, Floats]:
         """Light of all rings (n,), and its derivatives (n, p)."""
+        return self._rows(x, self._spread(float(np.exp(x[3])), *self._profile(x)))
+
+    def _rows(self, x: Floats, spread: Spread) -> tuple[Floats, Floats]:
+        """Like `rows`, for the light of the medium as beam and lens spread it."""
         halos = len(self.beliefs.halos)
         sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
         scale, share, corner = np.exp(x[2]), np.append(1.0 - glare.sum(), glare), x[6 + halos]
-        light, by_medium, own, wider = self._spread(x, sigma)
+        light, by_medium, own, wider = spread
         seen = light[:-1] + surface * own
         value = scale * share @ seen + dark * self.size
         slopes = np.zeros((value.size, x.size))
@@ -106,7 +164,7 @@ class Shot:
         values, each = [of_medium[0]], [of_medium[1]]
         for at, card in enumerate(self.cards, start=7 + halos):
             rings, scale = card.rings, np.exp(x[at])
-            alone, wider = self._alone(rings, sigma)
+            alone, wider = ring_means(sigma, self.beliefs.halos, rings)
             bright, slopes = scale * share @ alone, np.zeros((rings.value.size, x.size))
             slopes[:, 3] = scale * share[0] * wider
             slopes[:, 5 : 5 + halos] = scale * (alone[1:] - alone[0]).T
@@ -123,22 +181,21 @@ class Shot:
         slopes[:, 6 + len(self.beliefs.halos)] = -value * outwards
         return value * (1.0 - corner * outwards), slopes
 
-    def _spread(self, x: Floats, sigma: float) -> tuple[Floats, Floats, Floats, Floats]:
-        """Of the medium: light (c + 1, n) by spread and, last, the core's derivative by ln sigma; slopes (c, n, 2).
+    @cached_property
+    def radii(self) -> Floats:
+        """Radii (m,) at which the medium's profile is needed, whatever the core."""
+        return ring_weights(float(self.medium.outer[0]), self.beliefs.halos, self.medium).rho
 
-        Of what the surface scatters: means (c, n) by spread, and the core's derivative (n,).
-        """
-        rings, shape = self.medium, (len(self.beliefs.halos) + 2, self.medium.value.size)
-        rho, weights, widening = ring_weights(sigma, self.beliefs.halos, rings.inner, rings.outer)
-        rows = np.concatenate([weights, widening[None]]).reshape(-1, rho.size)
-        light, slopes = Model(self.light).weighed(np.array([x[0], x[1], 0.0]), rho, rows)
-        return light.reshape(shape), slopes[:, :2].reshape(*shape, 2)[:-1], *self._alone(rings, sigma)
+    def _profile(self, x: Floats) -> tuple[Floats, Floats]:
+        """2 pi rho R_d of the medium (m,), and its derivatives (m, 2) by the first two coordinates."""
+        density, slopes = Model(self.light).density(np.array([x[0], x[1], 0.0]), self.radii)
+        return density[:-1], slopes[:-1, :2]
 
-    def _alone(self, rings: SpotRings, sigma: float) -> tuple[Floats, Floats]:
-        """Means (c, n) of each spread over rings, and the core's derivative (n,) by ln sigma."""
-        means, wider = (ring_means(one, self.beliefs.halos, rings.inner, rings.outer)
-                        for one in (sigma, sigma * np.exp(STEP)))  # fmt: skip
-        return means, (wider[0] - means[0]) / STEP
+    def _spread(self, sigma: float, density: Floats, slopes: Floats) -> Spread:
+        """Light of the medium's rings from its profile (m,) at `radii` and the profile's derivatives (m, 2)."""
+        _, weights, widening = ring_weights(sigma, self.beliefs.halos, self.medium)
+        light = np.concatenate([weights @ density, (widening @ density)[None]])
+        return Spread(light, weights @ slopes, *ring_means(sigma, self.beliefs.halos, self.medium))
 
     @property
     def middle(self) -> Floats:
@@ -176,9 +233,10 @@ class Shot:
 
     @cached_property
     def whitening(self) -> Floats:
-        """Lower root of the rows' covariance."""
+        """Matrix that turns errors of the rows into independent ones of size 1: the inverse of their lower root."""
         blocks = [self._covariance(one) for one in (self.medium, *(card.rings for card in self.cards))]
-        found: Floats = np.linalg.cholesky(block_diag(*blocks))
+        root = np.linalg.cholesky(block_diag(*blocks))
+        found: Floats = solve_triangular(root, np.eye(len(root)), lower=True)
         return found
 
     def _covariance(self, one: SpotRings) -> Floats:
@@ -188,48 +246,110 @@ class Shot:
 
     def residuals(self, x: Floats) -> tuple[Floats, Floats]:
         """In standard errors (m,), those of what is known beforehand last, and their derivatives (m, p)."""
-        value, slopes = self.rows(x)
+        return self._residuals(x, *self.rows(x))
+
+    def _residuals(self, x: Floats, value: Floats, slopes: Floats) -> tuple[Floats, Floats]:
+        """Like `residuals`, for the light of all rings (n,) and its derivatives (n, p)."""
         data = np.concatenate([self.medium.value, *(card.rings.value for card in self.cards)])
         ways, thought = self.knowledge
-        rows = solve_triangular(self.whitening, np.column_stack([value - data, slopes]), lower=True)
+        rows = self.whitening @ np.column_stack([value - data, slopes])
         return np.append(rows[:, 0], ways @ x - thought), np.vstack([rows[:, 1:], ways])
 
-    def starts(self) -> list[Floats]:
-        """The best of a coarse search in length, for each of some albedos, the best first."""
+    @property
+    def bounds(self) -> tuple[Floats, Floats]:
+        """Lowest and highest coordinates (p,) of a descent."""
         halos = len(self.beliefs.halos)
+        low, high = np.full((2, len(self.names)), np.inf) * [[-1.0], [1.0]]
+        low[4 : 5 + halos] = 0.0
+        low[:2] = -FARTHEST_U, self.lengths[0] - FARTHEST_LN
+        high[:2] = FARTHEST_U, self.lengths[1] + FARTHEST_LN
+        return low, high
+
+    @property
+    def lengths(self) -> Floats:
+        """Range (2,) of ln l where the search begins: from well within the core to beyond the last ring."""
+        return np.log([SHORTEST * np.exp(self._first[3]), LONGEST * self.medium.outer[-1]])
+
+    @cached_property
+    def _first(self) -> Floats:
+        """Coordinates (p,) of the search but for the medium and the scales; sigma from the beam or half the light."""
         x = self.middle
         if self.beliefs.beam is None:
             near = self.cards[0].rings if self.cards else self.medium
             half = near.r[int(np.argmax(near.value < 0.5 * near.value[0]))]
             x[3] = np.log(half / 1.18)
+        first, sigma = self.medium.value.size, float(np.exp(x[3]))
         for at, card in enumerate(self.cards, start=x.size - len(self.cards)):
-            first = ring_means(float(np.exp(x[3])), (), card.rings.inner[:1], card.rings.outer[:1])
-            x[at] = np.log(card.rings.value[0] / first[0, 0])
-        best = []
-        last = float(self.medium.outer[-1])
-        for alpha in ALBEDOS:
-            found = []
-            for share in LENGTHS:
-                x[:2] = u_of(alpha), np.log(share * last)
-                if self.beliefs.scale is None:
-                    x[2] = 0.0
-                    light = self.rows(x)[0][: self.medium.value.size] - x[5 + halos] * self.size
-                    x[2] = float(np.median(np.log(np.maximum(self.medium.value, 1e-12 * self.size) / light)))
-                found.append((float(np.sum(self.residuals(x)[0] ** 2)), x.copy()))
-            best.append(min(found, key=lambda one: one[0]))
-        return [x for _, x in sorted(best, key=lambda one: one[0])]
+            x[at] = self._scale(x, first, card.rings, ring_means(sigma, self.beliefs.halos, card.rings)[0])
+            first += card.rings.value.size
+        return x
+
+    def _scale(self, x: Floats, first: int, rings: SpotRings, light: Floats) -> float:
+        """Logarithm of the scale that fits rings best, by linear least squares.
+
+        Args:
+            x: (p,) coordinates; those of glare count.
+            first: place of the first of the rings among all rows.
+            rings: those of the medium, or of a card.
+            light: (c, n) theirs by spread, of scale 1.
+        """
+        glare, rows = x[5 : 5 + len(self.beliefs.halos)], slice(first, first + rings.value.size)
+        both = np.column_stack([np.append(1.0 - glare.sum(), glare) @ light, rings.value])
+        seen, value = (self.whitening[rows, rows] @ both).T
+        norm = max(float(seen @ seen), np.finfo(float).tiny)
+        return float(np.log(max(seen @ value / norm, 1e-3 * np.linalg.norm(value) / np.sqrt(norm))))
+
+    @cached_property
+    def starts(self) -> list[Floats]:
+        """The best points of a coarse search over albedos and lengths, no two neighbours, the best first.
+
+        At each of them scale, beam, surface, glare and cards are those of a few steps of least squares.
+        """
+        places = np.array([[i, j] for i in range(len(ALBEDOS)) for j in range(LENGTHS)])
+        u, ln_l = np.array([u_of(one) for one in ALBEDOS]), np.linspace(*self.lengths, LENGTHS)
+        points = np.column_stack([u[places[:, 0]], ln_l[places[:, 1]], np.zeros(len(places))])
+        sigma, densities = float(np.exp(self._first[3])), Model(self.light).densities(points, self.radii)
+        _, weights, widening = ring_weights(sigma, self.beliefs.halos, self.medium)
+        light = np.concatenate([weights, widening[None]]) @ densities.T
+        own = ring_means(sigma, self.beliefs.halos, self.medium)
+        none = np.zeros((*weights.shape[:2], 2))
+        each = [self._settled(point, Spread(light[..., at], none, *own)) for at, point in enumerate(points)]
+        return [each[at][1] for at in best_apart(places, np.array([cost for cost, _ in each]))]
+
+    def _settled(self, point: Floats, spread: Spread) -> tuple[float, Floats]:
+        """Chi-square and coordinates (p,) at an albedo and a length, after COARSE steps in all others."""
+        x, (low, high) = self._first.copy(), self.bounds
+        x[:2] = point[:2]
+        if self.beliefs.scale is None:
+            x[2] = self._scale(x, 0, self.medium, spread.light[:-1] + x[4] * spread.own)
+        ends = []
+        for _ in range(COARSE + 1):
+            rows, slopes = self._residuals(x, *self._rows(x, spread.widened(x[3] - self._first[3])))
+            ends.append((float(rows @ rows), x))
+            step = np.zeros(x.size)
+            step[2:] = np.linalg.lstsq(slopes[:, 2:], -rows)[0]
+            x = np.clip(x + np.clip(step, -FARTHEST, FARTHEST), low, high)
+        return min(ends, key=lambda one: one[0])
 
 
 @dataclass(frozen=True, eq=False)
 class PhotoFit:
-    """Where it ended: coordinates (p,) and their covariance (p, p); chi-square, and its degrees of freedom."""
+    """End of a fit: coordinates (p,) and their covariance (p, p); chi-square, its degrees of freedom, and the verdict.
+
+    rivals  minima beyond the intervals of 95 %, of a chi-square no higher than where these end
+    """
 
     shot: Shot
     x: Floats
     covariance: Floats
     chi2: float
     freedom: int
-    converged: bool
+    result: str
+    rivals: tuple[PhotoFit, ...] = ()
+
+    @property
+    def converged(self) -> bool:
+        return self.result == CONVERGED
 
     @property
     def chance(self) -> float:
@@ -242,38 +362,71 @@ class PhotoFit:
         return float(np.sqrt(self.chi2 / self.freedom)) if self.chance < DETECTED else 1.0
 
     @cached_property
+    def total(self) -> tuple[float, Floats]:
+        """Total reflectance A of the medium, and its derivatives (3,)."""
+        density, slopes = Model(self.shot.light).density(np.array([*self.x[:2], 0.0]), self.shot.radii)
+        return float(density[-1]), slopes[-1]
+
+    @cached_property
     def values(self) -> dict[str, float]:
-        """alpha, l, mu_s', mu_a, scale."""
-        found = model.quantities(self.x[None, :3], np.full(1, np.nan))
-        return {name: float(value[0]) for name, value in found.items() if name != "A"}
+        """A, alpha, l, mu_s', mu_a, scale."""
+        found = model.quantities(self.x[None, :3], np.array([self.total[0]]))
+        return {name: float(value[0]) for name, value in found.items()}
 
     @cached_property
     def errors(self) -> dict[str, float]:
         """Standard errors of the values."""
-        gradients = model.slopes(self.x[:3], np.zeros(3))
-        found = model.errors(gradients, self.widening**2 * self.covariance[:3, :3])
-        return {name: found[name] for name in self.values}
+        return model.errors(model.slopes(self.x[:3], self.total[1]), self.widening**2 * self.covariance[:3, :3])
+
+    def interval(self, name: str) -> tuple[float, float]:
+        """Interval of 95 % of a value: symmetric in its logarithm; no albedo is above 1."""
+        value = self.values[name]
+        half = min(WITHIN * self.errors[name] / value, LARGEST)
+        low, high = value * np.exp(-half), value * np.exp(half)
+        return low, min(high, 1.0) if name in ("A", "alpha") else high
+
+    def holds(self, values: Mapping[str, float]) -> bool:
+        """Whether the intervals of mu_s' and mu_a hold these values."""
+        return all(low <= values[name] <= high for name in MEDIUM for low, high in [self.interval(name)])
 
 
 def fitted(shot: Shot) -> PhotoFit:
-    """The least squares fit of a shot: the best of those from every start."""
-    ends = [_descended(shot, start) for start in shot.starts()]
-    return min(ends, key=lambda one: (not one.converged, one.chi2))
+    """Fit a shot by least squares: the lowest minimum that a search finds, and its rivals."""
+    found = lowest(_descended(shot, start) for start in shot.starts)
+    first, *others = (_ended(shot, one) for one in (found, *found.others))
+    within = (WITHIN * first.widening) ** 2
+    rivals = tuple(one for one in others if one.chi2 - first.chi2 < within and not first.holds(one.values))
+    return replace(first, rivals=rivals, result=RIVALLED if rivals and first.converged else first.result)
 
 
-def _descended(shot: Shot, start: Floats) -> PhotoFit:
+def _descended(shot: Shot, start: Floats) -> Minimum:
     """End of damped least squares within bounds, from a start."""
-    halos = len(shot.beliefs.halos)
-    low, high, longest = np.full((3, start.size), np.inf) * [[-1.0], [1.0], [1.0]]
-    low[0], low[4 : 5 + halos], high[0] = -12.0, 0.0, 12.0
-    longest[:4], longest[7 + halos :] = FARTHEST, FARTHEST
-    start = np.clip(start, low, high)
-    done = solve(shot.residuals, start, (low, high), rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
-    freedom = done.residuals.size - start.size
-    return PhotoFit(shot, done.parameters, done.covariance, done.cost, freedom, done.converged)
+    longest = np.full(start.size, np.inf)
+    longest[:4], longest[start.size - len(shot.cards) :] = FARTHEST, FARTHEST
+    for _ in range(1 + AGAIN):
+        done = solve(shot.residuals, start, shot.bounds, rescaled=True, gain=ENOUGH, longest=longest, most=MAX_STEPS)
+        if done.converged:
+            break
+        start = done.parameters
+    return Minimum(**vars(done))
+
+
+def _ended(shot: Shot, done: Minimum) -> PhotoFit:
+    """A descent's end as a fit, whose verdict says where there is no medium."""
+    (u, ln_l), (low, high) = done.point[:2], (one[1] for one in shot.bounds)
+    result = done.result
+    if u > BLACK:
+        result = AT_BLACK
+    elif u < WHITE:
+        result = AT_WHITE
+    elif not low + ROOM < ln_l < high - ROOM:
+        result = RAN_AWAY
+    elif not done.converged:
+        result = UNENDED
+    return PhotoFit(shot, done.point, done.covariance, done.cost, done.residuals.size - done.point.size, result)
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:
     """Relative errors of mu_s' and mu_a that no unbiased estimate from such rings undercuts."""
-    one = PhotoFit(truth, x, covariance(truth.residuals(x)[1]), 0.0, 1, True)
-    return {name: one.errors[name] / one.values[name] for name in ("mu_s'", "mu_a")}
+    one = PhotoFit(truth, x, covariance(truth.residuals(x)[1]), 0.0, 1, CONVERGED)
+    return {name: one.errors[name] / one.values[name] for name in MEDIUM}

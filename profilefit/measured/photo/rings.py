@@ -1,13 +1,13 @@
 """Means over rings about the spot, and their covariance by sectors: noise, speckle and unevenness alike.
 
-A ring has few pixels near the centre, and where these lie in it is chance: its mean is that of the polynomial in the
-square of the radius that fits its pixels, which is even over its area.
+A ring has few pixels near the centre, and where these lie in it is chance. Its mean is that of its pixels, and it keeps
+the distances at which these lie, over which the fit averages its light.
 
-Each ring is divided into sectors. The scatter of what they differ from that by gives the covariance of the rings, which
-are correlated where something is uneven over many of them; with fewer sectors than rings it is shrunk towards its
-diagonal by as much as its correlations are noise (Schaefer and Strimmer, Stat. Appl. Genet. Mol. Biol. 4, 2005). Near
-the centre a grain of speckle is wider than a sector, and sectors that share it do not scatter: there a ring's relative
-variance is at least that of the next ones, by area.
+Each ring is divided into sectors, whose deviations from a polynomial in the square of the radius give the covariance of
+the rings. Rings are correlated where something is uneven over many of them; with fewer sectors than rings the
+covariance is shrunk towards its diagonal by as much as its correlations are noise (Schaefer and Strimmer, Stat. Appl.
+Genet. Mol. Biol. 4, 2005). Near the centre a grain of speckle is wider than a sector, and sectors that share it do not
+scatter, or a sector has no pixel. There a ring's variance is at least that of as many pixels, as bright, of next rings.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from profilefit.measured.instrument import RING
 from profilefit.measured.photo.bracket import Picture
 from profilefit.measured.photo.pixel_scale import PixelScale
 from profilefit.measured.photo.spot import places
@@ -30,17 +31,29 @@ GRAIN, NEXT = 8.0, 5  # pixels, of a sector that no grain fills; rings with such
 SEEN = 5.0  # standard errors of noise in the middle, from which there is a spot
 DEGREE = 4  # in the square of the radius, of the light within a ring
 POWERS = np.arange(DEGREE + 1)
-EVEN = np.where(POWERS % 2 == 0, 1.0 / (POWERS + 1.0), 0.0)  # means of the powers over -1 ... 1
+PARTS = 32  # of a ring, of equal area, that each count at one distance
 
 
 @dataclass(frozen=True, eq=False)
 class SpotRings:
-    """Of inner and outer radii (n,) [unit], the light of each, and its covariance (n, n)."""
+    """Rings of inner and outer radii (n,) [unit], the light of each, and its covariance (n, n).
+
+    pixels  distances (n, m) of a ring's pixels from the centre, and the share of the pixels at each; None: even by area
+    """
 
     inner: Floats
     outer: Floats
     value: Floats
     covariance: Floats
+    pixels: tuple[Floats, Floats] | None = None
+
+    @property
+    def gathered(self) -> tuple[Floats, Floats]:
+        """Distances (n, m) whose light each ring averages, and how much each counts."""
+        if self.pixels is not None:
+            return self.pixels
+        d, share = over_rings(self.inner, self.outer)
+        return d, np.broadcast_to(share, d.shape)
 
     @property
     def r(self) -> Floats:
@@ -55,11 +68,6 @@ class SpotRings:
         noise = np.median((np.diag(self.covariance) * areas)[far])
         return bool(self.value[0] - np.median(self.value[far]) > SEEN * np.sqrt(noise / areas[0]))
 
-    def within(self, low: float, high: float) -> SpotRings:
-        """Those that lie wholly between two radii."""
-        keep = (self.inner >= low) & (self.outer <= high)
-        return SpotRings(self.inner[keep], self.outer[keep], self.value[keep], self.covariance[np.ix_(keep, keep)])
-
 
 def edges_of(reach: float, pixel: float) -> Floats:
     """Radii from the centre to `reach`, at least FINEST pixels apart [unit]."""
@@ -72,16 +80,22 @@ def edges_of(reach: float, pixel: float) -> Floats:
 def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Floats, plate: PixelScale) -> SpotRings:
     """Of the planes of one colour, between edges [unit]."""
     count = edges.size - 1
-    cells = count * SECTORS
+    cells, parts = count * SECTORS, count * PARTS
     kept = []
     powers, products = np.zeros((2 * DEGREE + 1, count)), np.zeros((DEGREE + 1, count))
+    places_of, light_of = np.zeros((2, parts)), np.zeros((2, count))
     squares = edges**2
     for one in pictures:
         x, y, light = places(one, plate, centre)
-        ring = np.digitize(np.hypot(x, y), edges) - 1
+        square = x * x + y * y
+        ring = np.digitize(np.sqrt(square), edges) - 1
         good = (ring >= 0) & (ring < count) & np.isfinite(light)
-        x, y, light, ring = x[good], y[good], light[good], ring[good]
-        across = 2.0 * (x * x + y * y - squares[ring]) / np.diff(squares)[ring] - 1.0
+        x, y, square, light, ring = x[good], y[good], square[good], light[good], ring[good]
+        share = (square - squares[ring]) / np.diff(squares)[ring]
+        across = 2.0 * share - 1.0
+        part = ring * PARTS + np.clip(PARTS * share, 0, PARTS - 1).astype(int)
+        places_of += np.bincount(part, minlength=parts), np.bincount(part, square, parts)
+        light_of += np.bincount(ring, light, count), np.bincount(ring, light.astype(float) ** 2, count)
         sector = ((np.arctan2(y, x) + np.pi) * (SECTORS / (2.0 * np.pi))).astype(int) % SECTORS
         kept.append((ring, across, ring * SECTORS + sector, light))
         for power in range(2 * DEGREE + 1):
@@ -94,24 +108,40 @@ def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Float
         off = light - np.sum(polynomials[:, ring] * across ** POWERS[:, None], axis=0)
         sums += np.bincount(cell, minlength=cells), np.bincount(cell, off, cells)
     many, total = sums.reshape(2, count, SECTORS)
-    whole = np.all(many > 0, axis=1)
-    off = total[whole] / many[whole]
-    value = (EVEN @ polynomials)[whole]
-    inner, outer = edges[:-1][whole], edges[1:][whole]
-    covariance = shrunk(off - off.mean(axis=1)[:, None])
-    widening = _of_grains(np.diag(covariance), value, inner, outer, GRAIN * plate.pixel(centre))
-    return SpotRings(inner, outer, value, covariance * np.outer(widening, widening))
+    pixels, whole = many.sum(axis=1), np.all(many > 0, axis=1)
+    covariance, off = np.zeros((count, count)), total[whole] / many[whole]
+    covariance[np.ix_(whole, whole)] = shrunk(off - off.mean(axis=1)[:, None])
+    narrow = ~whole | (np.pi * (edges[1:] + edges[:-1]) < SECTORS * GRAIN * plate.pixel(centre))
+    covariance = _of_grains(covariance, pixels, light_of, narrow)
+    number, square = places_of.reshape(2, count, PARTS)
+    distance = np.sqrt(np.where(number > 0, square / np.maximum(number, 1.0), squares[1:, None]))
+    seen = (pixels > 0) & (np.diag(covariance) > 0)
+    each = np.maximum(pixels, 1.0)
+    return SpotRings(
+        edges[:-1][seen], edges[1:][seen], (light_of[0] / each)[seen], covariance[np.ix_(seen, seen)],
+        (distance[seen], (number / each[:, None])[seen]),
+    )  # fmt: skip
 
 
-def _of_grains(variance: Floats, value: Floats, inner: Floats, outer: Floats, grain: float) -> Floats:
-    """Factor (n,) on the errors of rings whose sectors are narrower than `grain`, from their variances (n,)."""
-    areas, narrow = np.pi * (outer - inner) * (outer + inner), np.pi * (inner + outer) < SECTORS * grain
-    tells = ~narrow & (value > 0)
+def _of_grains(covariance: Floats, pixels: Floats, light: Floats, narrow: NDArray[np.bool_]) -> Floats:
+    """Covariance (n, n) of rings, no smaller where sectors are `narrow` (n,) than that of other rings lets expect.
+
+    Args:
+        covariance: (n, n) that of sectors; zero where a sector has no pixel.
+        pixels: (n,) number of each ring's pixels.
+        light: (2, n) sums of their light, and of its square.
+    """
+    variance = np.diag(covariance)
+    # Relative variance of a pixel, grains included: a mean over pixels of light y has that times (sum y^2) / n^2.
+    spread = light[1] / np.maximum(pixels, 1.0) ** 2
+    tells = ~narrow & (light[0] > 0)
     if not np.any(tells):
-        return np.ones(areas.size)
-    by_area = float(np.median((variance[tells] * areas[tells] / value[tells] ** 2)[:NEXT]))
-    least = by_area * value**2 / areas
-    return np.where(narrow & (least > variance), np.sqrt(least / np.maximum(variance, np.finfo(float).tiny)), 1.0)
+        tells = (variance > 0) & (light[0] > 0)
+    least = np.median((variance[tells] / spread[tells])[:NEXT]) * spread if np.any(tells) else np.zeros(pixels.size)
+    missing = np.where(narrow & (variance == 0), least, 0.0)
+    wider = np.sqrt(np.maximum(least / np.where(variance > 0, variance, np.inf), 1.0))
+    widening = np.where(narrow, wider, 1.0)
+    return covariance * np.outer(widening, widening) + np.diag(missing)
 
 
 def _polynomials(powers: Floats, products: Floats) -> Floats:
@@ -135,3 +165,9 @@ def shrunk(off: Floats) -> Floats:
     size = np.sqrt(variance / sectors)
     found: Floats = kept * np.outer(size, size)
     return found
+
+
+def over_rings(inner: Floats, outer: Floats) -> tuple[Floats, Floats]:
+    """Distances (n, q) and shares (q,) of a ring's area."""
+    t, share = 0.5 * (1.0 + RING[0]), 0.5 * RING[1]
+    return np.sqrt(inner[:, None] ** 2 + ((outer - inner) * (outer + inner))[:, None] * t), share

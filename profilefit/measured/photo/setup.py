@@ -246,9 +246,7 @@ def _told(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None])
     pixel, core = setup.camera.pitch, setup.optics.sigma
     edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))
-    beliefs = Beliefs(
-        beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core), border=0.5 * pixel * float(np.hypot(*setup.camera.sides))
-    )
+    beliefs = Beliefs(beam=Known(2.0 * core, BEAM_ERROR * 2.0 * core)).over(setup.camera.sides, pixel, float(edges[-1]))
     shot = Shot(blank, tuple(Card(blank, known) for known in cards), exact_light(setup.setting), beliefs)
     x = shot.middle
     x[:4] = u_of(mu_s / (mu_s + mu_a)), -np.log(mu_s + mu_a), 0.0, np.log(core)

@@ -102,9 +102,22 @@ def photo(
             own = [_darkened(one, level) for one in _read(paths, exposures[0])]
             coded += [one.source for one in own if not one.linear]
             shown.append((bracketed(own, size), known))
+    found = measured(seen, shown, size, where, beliefs or Beliefs())
+    notes = tuple(f"{one}: eight bits, taken for sRGB: not a measurement" for one in coded[:1])
+    return replace(found, notes=(*notes, *found.notes))
+
+
+def measured(
+    seen: Bracket,
+    shown: Sequence[tuple[Bracket, Known | None]],
+    size: PixelScale,
+    where: Setting,
+    beliefs: Beliefs,
+) -> Photo:
+    """Fit the medium of each colour of a merged bracket; `shown` are those of cards, with their reflectance."""
     pixel = size.pixel(seen.spot.centre)
-    believed = replace(beliefs or Beliefs(), border=0.5 * pixel * float(np.hypot(*seen.sides)))
-    fits, bounds, notes = {}, {}, [f"{one}: eight bits, taken for sRGB: not a measurement" for one in coded[:1]]
+    believed = beliefs.over(seen.sides, pixel, pixel * seen.spot.reach)
+    fits, bounds, notes = {}, {}, []
     for colour in seen.colours:
         of_spot = ringed(seen, colour, size)
         if not of_spot.shows_spot:
@@ -121,7 +134,9 @@ def photo(
         fits[colour] = medium.fitted(shot)
         bounds[colour] = dict(medium.fisher(shot, fits[colour].x))
     if not fits:
-        raise InputError(f"{shots[0]}: expected a spot brighter than the scatter of its pixels, got none in any colour")
+        raise InputError(
+            f"{seen.sources[0]}: expected a spot brighter than the scatter of its pixels, got none in any colour"
+        )
     if any(known and not (seen.seconds and one.seconds) for one, known in shown):
         notes.append("no exposure time is stated, so the grey card tells beam and glare, and no scale")
     return Photo(seen, tuple(one for one, _ in shown), size, where, fits, bounds, tuple(notes))

@@ -15,9 +15,9 @@ from profilefit.recipes import record
 from profilefit.report.tables.cells import column_table, interval, significant, to_error
 from profilefit.report.tables.fit_tables import p_value
 
-NAMES = ("mu_s'", "mu_a", "alpha", "l")
-UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm"}
-FARTHEST = 100.0  # of a logarithm, where an interval ends that says nothing
+NAMES = ("mu_s'", "mu_a", "alpha", "l", "A")
+UNITS = {"mu_s'": "1/mm", "mu_a": "1/mm", "alpha": "", "l": "mm", "A": ""}
+RIVALLED = ("mu_s'", "mu_a", "A")  # of another medium
 REMEDY = "photograph cards, or expose longer"
 CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
 
@@ -28,12 +28,10 @@ def photo_tables(found: Photo) -> list[RenderableType]:
     for colour, fit in found.fits.items():
         for name in NAMES:
             value, error = fit.values[name], fit.errors[name]
-            ends = value * np.exp(min(1.96 * error / value, FARTHEST) * np.array([-1.0, 1.0]))
-            ends = np.minimum(ends, 1.0) if name == "alpha" else ends
             best = found.bounds[colour].get(name)
             cells = (
                 colour if name == NAMES[0] else "", name, to_error(value, error), significant(error),
-                interval((float(ends[0]), float(ends[1]))), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
+                interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
             )  # fmt: skip
             for column, cell in zip(columns.values(), cells, strict=True):
                 column.append(cell)
@@ -66,7 +64,10 @@ def photo_lines(found: Photo) -> Iterator[str]:
             f"for {fit.freedom} degrees of freedom, p-value {p_value(fit.chance)}: {verdict}"
         )
         if not fit.converged:
-            yield f"{colour}: THE SEARCH DID NOT END at a minimum: these values are no answer"
+            yield f"{colour}: NO ANSWER: {fit.result}"
+        for one in fit.rivals:
+            told = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
+            yield f"{colour}: ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.chi2 - fit.chi2:+.1f}"
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
@@ -74,8 +75,8 @@ def photo_lines(found: Photo) -> Iterator[str]:
         first, *_ = found.fits.values()
         halos = first.shot.beliefs.halos
         yield (
-            f"no card was photographed, so the shape of glare is not known: it is a mixture of halos {halos[0]:g} to "
-            f"{halos[-1]:g} mm wide; {CARDS}"
+            f"no card was photographed, so the shape of glare is not known: it is a mixture of halos {halos[0]:.3g} to "
+            f"{halos[-1]:.3g} mm wide; {CARDS}"
         )
 
 
@@ -100,6 +101,8 @@ def photo_content(found: Photo) -> dict[str, Any]:
                     "freedom": fit.freedom,
                     "chance": fit.chance,
                     "converged": fit.converged,
+                    "result": fit.result,
+                    "rivals": [one.values | {"chi2": one.chi2} for one in fit.rivals],
                     "inner": fit.shot.medium.inner,
                     "outer": fit.shot.medium.outer,
                     "value": fit.shot.medium.value,
