@@ -309,6 +309,18 @@ def waved(
     return whole.chosen(light > 1e-9 * light[0]), one, seen
 
 
+SMOOTH = Medium(Setting(n=1.4, g=0.8), 0.98, 1.0, 0.001)  # mu_a .02, mu_s' .98 per mm
+
+
+def wavy(size: float = 0.004, wavelength: float = 2.5, phase: float = 0.5) -> Measured:
+    """Draw light of `SMOOTH` at 30 radii with a relative error of one wave along ln r and noise of .1 %."""
+    r = np.geomspace(0.1, 10.0, 30)
+    light = Model(exact_light(SMOOTH.setting)).predicted(_point(SMOOTH)[None], r, r)[0, :-1]
+    wave = size * np.sin(2.0 * np.pi * np.log(r) / wavelength + phase)
+    value = light * (1.0 + wave + SMOOTH.error * np.random.default_rng(1).standard_normal(r.size))
+    return Measured("wavy", "", r, r, value, SMOOTH.error * light, np.full(r.size, np.inf), "as given", "mm")
+
+
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm
 NOISE = (0.5, 1.0, 2.0, 5.0)  # %
 NEAREST, FARTHEST = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0), (2.0, 4.0, 7.0, 10.0, 15.0)

@@ -2,9 +2,9 @@
 
 Whether the data know of a beam that has a width, and what width would matter: the fit is repeated under Gaussian beams
 of widths from a five-hundredth of the last radius to half of it. If chi-square falls by more than a pencil beam's noise
-explains at 5 %, one-sided since a width is not negative, the data know of the width. Where a pencil beam leaves a lack of
-fit, the noise has the lack of fit that the best width leaves: none if the width explains all of it. How far the answer
-moves under the narrowest beam that moves it, as w^2, says which width would move it by a standard error.
+explains at 5 %, one-sided since a width is not negative, the data know of the width. Where a pencil beam leaves a lack
+of fit, the noise has the lack of fit that the best width leaves: none if the width explains all of it. How far the
+answer moves under the narrowest beam that moves it, as w^2, says which width would move it by a standard error.
 
 What n and g of soft tissue would make of the same data: the fit is repeated once.
 """

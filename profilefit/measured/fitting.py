@@ -32,7 +32,7 @@ SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
 LEAST_EXPECTED = 0.01
 LEVEL = 0.95  # of every interval
-# Correlation lengths in ln r of a lack of fit, whose wavelengths are some six times as long; 0 is one of each row alone.
+# Correlation lengths [ln r] of a lack of fit, whose waves are some six times as long; 0 is one of each row alone.
 LACK_WAVES = (0.0, 0.1, 0.2, 0.4, 0.8)
 LACK_ROUNDS, BETTER = 3, 0.9  # of its estimate; share of chi-square below which a minimum is another, better one
 
@@ -44,8 +44,8 @@ class MediumFit:
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
     rivals      other minima whose chi-square is no more above it than where the 95 % interval ends
     open        what the data leave open of ranges; the fit is that at their means
-    plain       the fit by the errors of the data and of the law alone, where this one allows for a lack of fit, which the
-                residuals of that one show; else None
+    plain       the fit by the errors of data and law alone, whose residuals suggest the lack of fit that this one
+                allows for; None where none is allowed for
     """
 
     problem: Problem

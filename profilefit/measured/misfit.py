@@ -31,8 +31,8 @@ DETECTED = 1e-3  # p-value below which a misfit counts as one
 DRAWS = 10_000
 TINY = float(np.finfo(float).tiny)
 LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
-# Relative errors d of a lack of fit that are tried, over that of a row: how many, the least, and the largest, or as many
-# times the root mean square of the residuals.
+# Relative errors d of a lack of fit that are tried, over that of a row: how many, the least, and the largest, or as
+# many times the root mean square of the residuals.
 SIZES, LEAST, MOST, TIMES = 20, 0.05, 20.0, 4.0
 
 
@@ -113,10 +113,10 @@ def lack_of_fit(
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     root = np.linalg.cholesky(np.eye(free.shape[1]) + free.T @ law @ free)
     z = np.linalg.solve(root, free.T @ residuals)
-    if not z.size:
+    own = np.diag(shapes[0])
+    if not (z.size and np.any(own > 0) and np.isfinite(z @ z)):
         return None
-    row = 1.0 / np.sqrt(np.median(np.diag(shapes[0])[np.diag(shapes[0]) > 0]))
-    d = row * np.geomspace(LEAST, max(MOST, TIMES * float(np.sqrt(z @ z / z.size))), SIZES)
+    d = np.median(own[own > 0]) ** -0.5 * np.geomspace(LEAST, max(MOST, TIMES * float(np.sqrt(z @ z / z.size))), SIZES)
     gain = np.zeros((len(shapes), SIZES))
     for at, shape in enumerate(shapes):
         inner = np.linalg.solve(root, np.linalg.solve(root, free.T @ shape @ free).T)

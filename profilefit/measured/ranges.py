@@ -96,7 +96,7 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
 
 
 def slopes_by_ranges(problem: Problem, values: Mapping[str, float], point: Floats) -> Floats:
-    """Derivatives (m, k) of the residuals at a point (3,) by the k ranges of the question, where these have `values`."""
+    """Derivatives (m, k) of the residuals at a point (3,) by the question's k ranges, where these have `values`."""
     low, high = np.array(list(problem.question.ranges.values())).T
     at = np.array([values[name] for name in problem.question.ranges])
     theta = point[list(problem.question.free)]

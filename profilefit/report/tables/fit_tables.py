@@ -81,7 +81,9 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         _ends(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
         for name in names
     ]
-    caption += "; 95 %: interval by " + ("all of these errors together" if whole else "the statistical error alone")
+    caption += "; 95 %: interval by " + (
+        "all of these errors together" if whole or found.plain is not None else "the statistical error alone"
+    )
     if any(any(result.ends(name)) for name in result.moving):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
     if found.question.law.setting.illumination == Setting().illumination:
@@ -214,8 +216,8 @@ def _goodness(result: Answer) -> Iterator[str]:
         added = _added(result)
         loud = max(added.values(), default=one.relative) >= LOUD
         yield (
-            f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data under "
-            f"this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
+            f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data "
+            f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
         )
     elif result.found.plain is not None:
         yield (
@@ -233,7 +235,7 @@ def _goodness(result: Answer) -> Iterator[str]:
 
 
 def _added(result: Answer) -> dict[str, float]:
-    """Relative errors of mu_a and mu_s' by lack of fit; none where it is not allowed for or they have no such errors."""
+    """Relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for or has no such errors."""
     found = result.found
     if found.plain is None:
         return {}
