@@ -1,4 +1,8 @@
-"""MCML's output files: written as MCML 1.2.2 does, and read back as far as a reflectance profile needs."""
+"""MCML's output files: written as MCML 1.2.2 does, and read back as far as a reflectance profile needs.
+
+Files of MCML 2 (Wang and Jacques) are read, too: the version mcmloA2.0, then the input file with one run (`mci`), RAT
+(specular reflectance first), and a section for each quantity that was scored. Lengths in cm.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +19,13 @@ from mcml_sim.errors import InputError
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
 from mcml_sim.media.grid import Grid
-from mcml_sim.results import mco2
-from mcml_sim.results.mci import DECIMAL, Lines, Run, read_run
+from mcml_sim.results.mci import DECIMAL, OUTPUT, VERSION_2, Lines, Run, read_media, read_run, read_run_2, shown
 from mcml_sim.results.tally import Tally
 
 Floats = NDArray[np.float64]
 Name = str | os.PathLike[str]
 
+OUTPUT_2 = "mcmloA2.0"  # version of MCML 2's output files
 ENDLESS = 1e8  # the thickness that V1's users write for infinite [cm]
 EVEN = 1e-9  # relative error of edges that are even but for rounding
 NUMBERS_A_LINE = 5
@@ -239,8 +243,8 @@ def parse_mco(content: bytes, name: str) -> Output:
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
     lines = Lines(name, content.replace(b"\x00", b"\xff"))
-    if _beginning(lines) == mco2.VERSION:
-        return Output(*mco2.parse(lines))
+    if _beginning(lines) == OUTPUT_2:
+        return _parse_2(lines)
     run = read_run(lines, set())
     _keyword(lines, "RAT")
     specular, diffuse, _, _ = _read_column(lines, "RAT", 4)
@@ -249,6 +253,27 @@ def parse_mco(content: bytes, name: str) -> Output:
         _read_column(lines, key, size)
     _keyword(lines, "Rd_r")
     return Output(run, specular, diffuse, np.array(_read_column(lines, "Rd_r", run.nr)))
+
+
+def _parse_2(lines: Lines) -> Output:
+    """Read what follows the version of a file of MCML 2; InputError names the line if it has no Rd_r."""
+    (word,) = lines.take(1, "the input's version, mcmli2.0")
+    if not word.startswith(VERSION_2):
+        raise lines.error("the input's version, mcmli2.0", shown(word))
+    media = read_media(lines)
+    output, *form = lines.take(1, OUTPUT, optional=1)
+    run = read_run_2(lines, media, output, form[0] if form else "A", scored=("Rd_r",))
+    lines.find("RAT")
+    specular, _, diffuse, *_ = (_first(lines, f"number {at} of 6 of RAT") for at in range(1, 7))
+    lines.find("Rd_r")
+    column = [_first(lines, f"number {at} of {run.nr} of Rd_r") for at in range(1, run.nr + 1)]
+    return Output(run, specular, diffuse, np.array(column))
+
+
+def _first(lines: Lines, what: str) -> float:
+    """Return the first number of a line, whatever follows."""
+    word, *_ = lines.take(1, what, optional=9)
+    return lines.decimal(what, word, (0.0, LARGEST))
 
 
 def begins_mco(path: str | os.PathLike[str]) -> bool:
@@ -262,8 +287,8 @@ def begins_mco(path: str | os.PathLike[str]) -> bool:
 def _beginning(lines: Lines) -> str:
     """The version."""
     (version,) = lines.take(1, "the file version, A1")
-    if version not in ("A1", mco2.VERSION):
-        raise lines.error(f"the file version, A1 or {mco2.VERSION}", repr(version[:10]))
+    if version not in ("A1", OUTPUT_2):
+        raise lines.error(f"the file version, A1 or {OUTPUT_2}", repr(version[:10]))
     if version == "A1":
         _keyword(lines, "InParm")
     return version

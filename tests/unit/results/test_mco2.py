@@ -106,7 +106,7 @@ def test_it_is_read(written):
             r":25: expected light that starts at the surface, 0, got '0.1'",
         ),
         ("Rd_r 	A_rz", "A_rz", r":30: expected Rd_r among what was scored, got 'A_rz Rd_t'"),
-        ("1000000", "1e6", r":31: expected the number of photons, a whole number from 1"),
+        ("1000000", "1.5", r":31: expected the number of photons, a whole number from 1"),
         ("1.4	1	100	0.9", "1.4	1	100	1", r":13: expected g of 'skin' between -1 and 1"),
         ("  2.5000E-01\n", "", r":57: expected number 4 of 4 of Rd_r, a number from 0 to 1e\+30, got 'Rd_t'"),
         (
