@@ -59,7 +59,7 @@ from tests.unit.hostile import mutations, processes
 
 # A record alone in its folder is normalised with the shipped map, and the command says so.
 NAMED = (InputError, OutputError, ShaderError, StoreError)  # what a command says in one line
-QUICK, ALL = 200, 10_000
+QUICK, ALL = 60, 10_000
 LONGEST = 1.0  # [s] of this process
 LARGEST = 500e6  # [bytes] by which reading one file may grow it
 ROOM = 2_000_000_000  # [bytes] beyond which reading is stopped
