@@ -65,8 +65,8 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
         return None
     start, ranges = _box(problem, *first)
     for one in others:  # which leads elsewhere where the first ended in a local minimum
-        if np.isfinite(_cost(one[0])) and (there := _box(problem, *one))[0].cost < start.cost - LOWER:
-            start, ranges = there
+        if np.isfinite(_cost(one[0])) and (best := _box(problem, *one))[0].cost < start.cost - LOWER:
+            start, ranges = best
     nodes = [_scaled(leggauss(NODES[name])[0], ends) for name, ends in ranges.items()]
     within = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
     rise = np.array([_cost(one) - _cost(start) for one in within])
