@@ -118,7 +118,7 @@ ROWS = (
         length=walk,
         formula="van de Hulst's map at alpha; 1 / (mu_s + mu_a)",
         source=f"{FILES}: {TODAY}; commit e5f41641 (2026-06-02) took 1 / (4 pi) away",
-        checked=MEASURED,
+        checked="source; measured in Blender 5.2 and 5.3",
         g=(-0.99, 0.99),
         renders=rough_entry,
     ),
