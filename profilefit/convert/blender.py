@@ -7,7 +7,7 @@ that, has no caller. The walk has it as Random Walk (Fixed Radius) of 3.x, Rando
 
 Since 4.0 walks enter along the refracted ray, while colours are mapped as if light entered diffusely, and leave
 unrefracted: they show less than the A of their medium. Seen from the normal through roughness 1 this is exact
-(`Engine.renders`), and agrees with renders of Blender 5.3 within 0.5 %.
+(`Engine.renders`), and agrees with renders of Blender 5.0 to 5.3 within 0.5 %.
 """
 
 from __future__ import annotations
@@ -118,7 +118,7 @@ ROWS = (
         length=walk,
         formula="van de Hulst's map at alpha; 1 / (mu_s + mu_a)",
         source=f"{FILES}: {TODAY}; commit e5f41641 (2026-06-02) took 1 / (4 pi) away",
-        checked=MEASURED,
+        checked="source; measured in Blender 5.2 and 5.3",
         g=(-0.99, 0.99),
         renders=rough_entry,
     ),
@@ -165,6 +165,7 @@ ROWS = (
         length=walk_legacy,
         formula="as Random Walk (Legacy) of 5.2",
         source=f"{FILES}: {FROM_4} to v5.1.0 (2026-03)",
+        checked="source; measured in Blender 5.0",
         g=(0.0, 0.9),
         renders=rough_entry,
     ),
