@@ -100,7 +100,7 @@ class Card:
     reflectance: Known | None = None
 
 
-class Spread(NamedTuple):
+class SpotLight(NamedTuple):
     """Light of the medium's rings as beam and lens spread it, by spread (c of them), for a scale of 1.
 
     light      (c + 1, n) light of the medium, and last the core's derivative by ln sigma
@@ -113,7 +113,7 @@ class Spread(NamedTuple):
     own: Floats
     wider: Floats
 
-    def widened(self, by: float) -> Spread:
+    def widened(self, by: float) -> SpotLight:
         """The same of a core wider by a change of ln sigma, to first order and not below nothing."""
         light, own = self.light.copy(), self.own.copy()
         light[0], own[0] = np.maximum(light[0] + by * light[-1], 0.0), np.maximum(own[0] + by * self.wider, 0.0)
@@ -145,7 +145,7 @@ class Shot:
         """Light of all rings (n,), and its derivatives (n, p)."""
         return self._rows(x, self._spread(float(np.exp(x[3])), *self._profile(x)))
 
-    def _rows(self, x: Floats, spread: Spread) -> tuple[Floats, Floats]:
+    def _rows(self, x: Floats, spread: SpotLight) -> tuple[Floats, Floats]:
         """Like `rows`, for the light of the medium as beam and lens spread it."""
         halos = len(self.beliefs.halos)
         sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
@@ -191,11 +191,11 @@ class Shot:
         density, slopes = Model(self.light).density(np.array([x[0], x[1], 0.0]), self.radii)
         return density[:-1], slopes[:-1, :2]
 
-    def _spread(self, sigma: float, density: Floats, slopes: Floats) -> Spread:
+    def _spread(self, sigma: float, density: Floats, slopes: Floats) -> SpotLight:
         """Light of the medium's rings from its profile (m,) at `radii` and the profile's derivatives (m, 2)."""
         _, weights, widening = ring_weights(sigma, self.beliefs.halos, self.medium)
         light = np.concatenate([weights @ density, (widening @ density)[None]])
-        return Spread(light, weights @ slopes, *ring_means(sigma, self.beliefs.halos, self.medium))
+        return SpotLight(light, weights @ slopes, *ring_means(sigma, self.beliefs.halos, self.medium))
 
     @property
     def middle(self) -> Floats:
@@ -266,9 +266,9 @@ class Shot:
         return low, high
 
     @property
-    def lengths(self) -> Floats:
-        """Range (2,) of ln l where the search begins: from well within the core to beyond the last ring."""
-        return np.log([SHORTEST * np.exp(self._first[3]), LONGEST * self.medium.outer[-1]])
+    def lengths(self) -> tuple[float, float]:
+        """Range of ln l where the search begins: from well within the core to beyond the last ring."""
+        return float(np.log(SHORTEST) + self._first[3]), float(np.log(LONGEST * self.medium.outer[-1]))
 
     @cached_property
     def _first(self) -> Floats:
@@ -313,10 +313,10 @@ class Shot:
         light = np.concatenate([weights, widening[None]]) @ densities.T
         own = ring_means(sigma, self.beliefs.halos, self.medium)
         none = np.zeros((*weights.shape[:2], 2))
-        each = [self._settled(point, Spread(light[..., at], none, *own)) for at, point in enumerate(points)]
+        each = [self._settled(point, SpotLight(light[..., at], none, *own)) for at, point in enumerate(points)]
         return [each[at][1] for at in best_apart(places, np.array([cost for cost, _ in each]))]
 
-    def _settled(self, point: Floats, spread: Spread) -> tuple[float, Floats]:
+    def _settled(self, point: Floats, spread: SpotLight) -> tuple[float, Floats]:
         """Chi-square and coordinates (p,) at an albedo and a length, after COARSE steps in all others."""
         x, (low, high) = self._first.copy(), self.bounds
         x[:2] = point[:2]
