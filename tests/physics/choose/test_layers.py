@@ -52,14 +52,14 @@ def test_two_halves_are_one_layer():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("illumination", ["searchlight", "diffuse"])
-def test_exact_light_and_traced_light_say_the_same(illumination):
-    """Skin in red light, whose lower layer is clear."""
+@pytest.mark.parametrize(("illumination", "off"), [("searchlight", 0.02), ("diffuse", 0.03)])
+def test_exact_light_and_traced_light_say_the_same(illumination, off):
+    """Skin in red light, whose lower layer is clear; its mean free path moves by 1 % from seed to seed."""
     stack = Medium((Layer(1.4, 0.21, 4.8, 0.0, 0.25), Layer(1.4, 0.0085, 0.45, 0.0)))
     found, traced = (one_layer(stack, 0.02, WITHIN, photons, illumination=illumination) for photons in (None, 2**20))
     assert found.error > 0.01
     assert traced.error == pytest.approx(found.error, abs=4.0 * traced.standard_error)
-    assert traced.mfp == pytest.approx(found.mfp, rel=0.03)  # 1 % from seed to seed: the misfit is flat there
+    assert traced.mfp == pytest.approx(found.mfp, rel=off)
     assert found.single == traced.single
 
 
