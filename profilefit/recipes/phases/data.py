@@ -123,7 +123,7 @@ def _header(path: Path, at: int, line: str) -> tuple[str, ...]:
             raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {_shown(cell)}")
         unit = (match["unit"] or "").strip()
         if unit not in COLUMNS[name]:
-            raise InputError(f"{path}:{at}: expected {name} in {COLUMNS[name][1]}, got [{unit}]")
+            raise InputError(f"{path}:{at}: expected {name} in {COLUMNS[name][1]}, got [{unit[:LONGEST_SHOWN]}]")
         names.append(name)
     if "angle" not in names or "value" not in names:
         raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {_shown(line)}")
