@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
 from profilefit.measured.lengths import length
 from profilefit.measured.photo.exposure import Exposure, Plane, library
 
 Floats = NDArray[np.float64]
+FARTHEST = 1e6  # pixels, between two points of a ruler
 PER_PIXEL = re.compile(r"(?P<length>.+?)\s*/\s*(?:px|pixel)")
 NUMBER = r"[0-9]+(?:\.[0-9]+)?"
 RULER = re.compile(rf"(?P<a>{NUMBER}),(?P<b>{NUMBER}):(?P<c>{NUMBER}),(?P<d>{NUMBER})\s*=\s*(?P<length>.+)")
@@ -61,13 +63,13 @@ def pixel_scale(option: str, text: str, shots: Sequence[Exposure], unit: str = "
         return PixelScale(np.diag([size, size, 1.0]), f"{size:g} {unit} a pixel, as told")
     if match := RULER.fullmatch(text):
         apart = float(np.hypot(float(match["c"]) - float(match["a"]), float(match["d"]) - float(match["b"])))
-        if not apart > 1.0:
-            raise InputError(f"{option} must have two points that are apart, got {text!r}")
+        if not 1.0 < apart < FARTHEST:
+            raise InputError(f"{option} must have two points that are apart, on a photograph, got {shown(text)}")
         size = length(option, match["length"], unit) / apart
         return PixelScale(np.diag([size, size, 1.0]), f"{size:.4g} {unit} a pixel, by two points of a ruler")
     if text.startswith(MARKER):
         return _by_marker(option, length(option, text.removeprefix(MARKER), unit), shots, unit)
-    raise InputError(f"{option} must be {ACCEPTED}, got {text!r}")
+    raise InputError(f"{option} must be {ACCEPTED}, got {shown(text)}")
 
 
 def _by_marker(option: str, side: float, shots: Sequence[Exposure], unit: str) -> PixelScale:

@@ -16,7 +16,7 @@ from profilefit.measured.photo import bracket, medium, rings
 from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
 from profilefit.measured.photo.exposure import COLOURS, GREY, Exposure, read
 from profilefit.measured.photo.medium import Beliefs, Card, PhotoFit, Shot
-from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
+from profilefit.measured.photo.pixel_scale import MARKER, PixelScale, pixel_scale
 from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.photo.spot import Spot, spot
 from profilefit.measured.problem import Known
@@ -91,6 +91,8 @@ def photo(
     scale   pixels as lengths (`pixel_scale`); reflectance of the grey card; dark frames, whose mean is taken off
     """
     where = setting or Setting(n=1.4, g=0.8)
+    if not scale.startswith(MARKER):  # what is wrong with it is reported before photographs are read
+        pixel_scale("scale", scale, (), UNIT)
     exposures = _read(shots)
     level = _level(dark, exposures[0])
     exposures = [_darkened(one, level) for one in exposures]

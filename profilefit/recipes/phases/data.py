@@ -196,7 +196,7 @@ def _header(path: Path, at: int, line: str) -> dict[str, str]:
         units[name] = " ".join((match["unit"] or "").split())
         if units[name] not in COLUMNS[name]:
             accepted = ", ".join(filter(None, COLUMNS[name]))
-            raise InputError(f"{path}:{at}: expected {name} in {accepted} or without a unit, got [{units[name]}]")
+            raise InputError(f"{path}:{at}: expected {name} in {accepted} or without a unit, got {_shown(units[name])}")
     if "angle" not in units or "value" not in units:
         raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {_shown(line)}")
     if units.get("sigma") and units["sigma"] != units["value"]:

@@ -239,6 +239,12 @@ def test_a_setup_that_makes_no_photograph_is_named(command, tmp_path, change, sa
         (("cut.jpg", *SCALE), "cut.jpg: cannot be read as a picture: image file is truncated"),
         (("none.jpg", *SCALE), "none.jpg: cannot be read as a picture: cannot identify image file"),
         (("SPOT", "other.tif", *SCALE), "expected 400 x 300 pixels"),
+        (("none.jpg", "--scale", "wide"), "scale must be 0.05mm/px"),
+        (
+            ("none.jpg", "--scale", f"{'9' * 5000}mm/px"),
+            f"scale must lie between 1e-40 and 1e+40 mm, got '{'9' * 59}...",
+        ),
+        (("none.jpg", "--scale", f"1,1:{'9' * 5000},1=10mm"), "scale must have two points that are apart, on a photo"),
         (("SPOT", *SCALE, "--beam", "0.5mm"), "--beam must be a value with its error"),
         (("SPOT", *SCALE, "--glare", "much"), "--glare must be a value with its error"),
         (
