@@ -2,6 +2,7 @@
 
     python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
     python -m benchmarks.own_data --beams                  # under beams of .25 to 1 mm, given or not: the same
+    python -m benchmarks.own_data --distorted --count 400  # light that no medium gives exactly: an hour on two cores
     python -m benchmarks.own_data --chart own-data.png     # a minute: error by r_min, r_max, noise, beam, n and g
 
 Media are drawn from what a fit takes for possible: n from 1.33 to 1.45, g from 0 to .95, alpha' flat in sqrt(1 -
@@ -238,6 +239,90 @@ def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
     return tuple(inside)
 
 
+ALLOWED: dict[str, dict[str, tuple[float, float]]] = {
+    "n and g given": {},
+    "n and g open": {"n": FORWARD_N, "g": (0.7, FORWARD_G)},
+    "n, g and beam open": {"n": FORWARD_N, "g": (0.7, FORWARD_G), "beam": (0.1, 1.0)},
+}
+
+
+class Distortions(NamedTuple):
+    """Shares of media whose light has a smooth relative error."""
+
+    held: dict[str, float]
+    """Of the intervals by all errors, those that hold the truth, by quantity."""
+    answered: float
+    """Media that have such intervals."""
+    accused: float | None
+    """Media under a pencil beam where a width is noticed; None where the beam is open."""
+
+
+def distortions(known: str, count: int, jobs: int) -> Distortions:
+    """Count over so many media; n, g and beam as in `ALLOWED`."""
+    with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
+        each = list(pool.map(partial(distorted, known), range(count)))
+    held = np.mean([one for one, _ in each if one is not None], axis=0)
+    accused = [one for _, one in each if one is not None]
+    return Distortions(
+        dict(zip((*NAMES, "A"), held.tolist(), strict=True)),
+        float(np.mean([one is not None for one, _ in each])),
+        float(np.mean(accused)) if accused else None,
+    )
+
+
+def distorted(known: str, at: int, noise: tuple[float, float] = (0.003, 0.01), **waves) -> tuple:
+    """Whether the intervals of one medium of the series hold mu_s', mu_a and A, and whether a width is noticed."""
+    data, one, seen = waved(np.random.default_rng([3, at]), "beam" in ALLOWED[known], noise, **waves)
+    ranges = ALLOWED[known]
+    middles = {name: float(np.mean(ends)) for name, ends in ranges.items()}
+    setting = Setting(n=middles.get("n", one.setting.n), g=middles.get("g", one.setting.g))
+    instrument = Instrument(Gaussian(middles["beam"])) if "beam" in ranges else seen
+    answer = judged(fitted(data, Question(exact_light(setting), SCALE, instrument=instrument, ranges=ranges)))
+    width = answer.width
+    light = Model(exact_light(one.setting)).predicted(_point(one)[None], EDGES[:1], EDGES[1:2])
+    truth = {**_truth(one), "A": float(light[0, -1])}
+    noticed, held = None if width is None else width.noticed, []
+    for name, true in truth.items():
+        low, high = answer.whole_interval(name) or (None, None)
+        if low is None or high is None:
+            return None, noticed
+        held.append(low < true < high)
+    return tuple(held), noticed
+
+
+def waved(
+    rng: np.random.Generator,
+    beamed: bool,
+    noise: tuple[float, float],
+    sizes: tuple[float, float] = (0.001, 0.01),
+    wavelengths: tuple[float, float] = (0.5, 3.0),
+) -> tuple[Measured, Medium, Instrument]:
+    """Draw a medium and its light at 20 to 40 radii over 1.5 to 2 decades, with noise and a wave along ln r."""
+    n, g = rng.uniform(*FORWARD_N), rng.uniform(0.7, FORWARD_G)
+    r = 0.1 * np.geomspace(1.0, 10.0 ** rng.uniform(1.5, 2.0), int(rng.integers(20, 41)))
+    albedo = 1.0 - np.exp(rng.uniform(np.log(0.001), np.log(0.5)))
+    length, error = (np.exp(rng.uniform(*np.log(ends))) for ends in ((r[0], r[-1]), noise))
+    one = Medium(Setting(n=float(n), g=float(g)), float(albedo), float(length), float(error))
+    seen = Instrument(Gaussian(float(rng.uniform(0.1, 1.0)))) if beamed else PENCIL
+    light = Model(exact_light(one.setting), seen).predicted(_point(one)[None], r, r)[0, :-1]
+    wave = np.sin(2.0 * np.pi * np.log(r) / rng.uniform(*wavelengths) + rng.uniform(0.0, 2.0 * np.pi))
+    value = light * (1.0 + rng.uniform(*sizes) * wave + error * rng.standard_normal(r.size))
+    whole = Measured("drawn", "", r, r, value, error * light, np.full(r.size, np.inf), "as given", "mm")
+    return whole.chosen(light > 1e-9 * light[0]), one, seen
+
+
+SMOOTH = Medium(Setting(n=1.4, g=0.8), 0.98, 1.0, 0.001)  # mu_a .02, mu_s' .98 per mm
+
+
+def wavy(size: float = 0.004, wavelength: float = 2.5, phase: float = 0.5) -> Measured:
+    """Draw light of `SMOOTH` at 30 radii with a relative error of one wave along ln r and noise of .1 %."""
+    r = np.geomspace(0.1, 10.0, 30)
+    light = Model(exact_light(SMOOTH.setting)).predicted(_point(SMOOTH)[None], r, r)[0, :-1]
+    wave = size * np.sin(2.0 * np.pi * np.log(r) / wavelength + phase)
+    value = light * (1.0 + wave + SMOOTH.error * np.random.default_rng(1).standard_normal(r.size))
+    return Measured("wavy", "", r, r, value, SMOOTH.error * light, np.full(r.size, np.inf), "as given", "mm")
+
+
 TISSUE = Medium(Setting(n=1.4, g=0.9), 10.0 / 10.2, 1.0 / 1.02, 0.02)  # mu_a .02, mu_s' 1 per mm
 NOISE = (0.5, 1.0, 2.0, 5.0)  # %
 NEAREST, FARTHEST = (0.1, 0.2, 0.5, 1.0, 2.0, 4.0), (2.0, 4.0, 7.0, 10.0, 15.0)
@@ -291,6 +376,7 @@ def main() -> None:
     parser.add_argument("--count", type=int, default=200, help="media")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     parser.add_argument("--beams", action="store_true", help="of media under beams of a width instead")
+    parser.add_argument("--distorted", action="store_true", help="of light with smooth relative errors instead")
     parser.add_argument("--chart", type=Path, help="draw the chart there instead")
     given = parser.parse_args()
     if given.chart is not None:
@@ -301,6 +387,13 @@ def main() -> None:
         print(f"beams of .25 to 1 mm, given: held {one.held}, answered {one.answered:.1%}")
         print(f"not given: wrong {one.wrong:.1%}, of these warned {one.warned:.1%}, width or misfit {one.noticed:.1%}")
         print(f"pencil beams accused: {one.accused:.1%}")
+        return
+    if given.distorted:
+        for known in ALLOWED:
+            shared = distortions(known, given.count, given.jobs)
+            held = ", ".join(f"{name} {share:.1%}" for name, share in shared.held.items())
+            print(f"{known}, {given.count} media: held {held}, answered {shared.answered:.1%}", end="")
+            print(f", pencil beams accused {shared.accused:.1%}" if shared.accused is not None else "", flush=True)
         return
     for opened in (False, True):
         print(f"n and g {'open' if opened else 'given'}, {given.count} media")

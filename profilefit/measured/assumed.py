@@ -2,8 +2,9 @@
 
 Whether the data know of a beam that has a width, and what width would matter: the fit is repeated under Gaussian beams
 of widths from a five-hundredth of the last radius to half of it. If chi-square falls by more than a pencil beam's noise
-explains at 5 %, one-sided since a width is not negative, the data know of the width. How far the answer moves under the
-narrowest beam that moves it, as w^2, says which width would move it by a standard error.
+explains at 5 %, one-sided since a width is not negative, the data know of the width. Where a pencil beam leaves a lack
+of fit, the noise has the lack of fit that the best width leaves: none if the width explains all of it. How far the
+answer moves under the narrowest beam that moves it, as w^2, says which width would move it by a standard error.
 
 What n and g of soft tissue would make of the same data: the fit is repeated once.
 """
@@ -13,6 +14,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import stats
 
 from mcml_sim.exact.light import ExactLight
@@ -24,6 +26,7 @@ from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import MediumFit
 from profilefit.measured.solving import Minimum, Problem, descended, descended_from
 
+Floats = NDArray[np.float64]
 HALVINGS = 9  # of the widths that are tried, from half the last radius
 FINER = 3  # further trials between the best and its neighbours
 NOTICED = 0.05  # chance below which a width is said to be seen
@@ -34,8 +37,8 @@ TISSUE = {"n": 1.4, "g": 0.9}
 class BeamWidth:
     """What a Gaussian beam would do to a fit that assumes a pencil beam.
 
-    w        the 1/e^2 radius that explains the data best [unit of r]; fall how much chi-square falls there; chance how
-             often noise lets it fall as much
+    w        the 1/e^2 radius that explains the data best [unit of r]; fall how much chi-square falls there, by errors
+             with the lack of fit that is left; chance how often noise lets it fall as much
     telling  the 1/e^2 radius that moves `moved`, a quantity, by one of its standard errors [unit of r]; None if no
              width does
     """
@@ -55,24 +58,50 @@ def beam_width(found: MediumFit) -> BeamWidth | None:
     """None where a beam is given, or where the fit has no errors to compare with."""
     if found.question.instrument.beam is not None or not found.minimum.converged:
         return None
-    widths = list(0.5 * found.data.r[-1] * 0.5 ** np.arange(HALVINGS - 1.0, -1.0, -1.0))
-    fits = {0.0: found.minimum}
-    start = found.minimum
-    for w in widths:
-        start = _under(found.problem, w, start)
+    plain = found.plain or found
+    fits = _under_widths(plain.problem, plain.minimum)
+    best = _best(fits)
+    if found.plain is not None and best > 0 and (lack := _lack(found.plain, best, fits[best])) is not None:
+        problem = replace(plain.problem, noise=replace(plain.problem.noise, lack=lack))
+        fits = _under_widths(problem, descended(problem, plain.point, plain.question.free))
+        best = _best(fits)
+    fall = max(_cost(fits[0.0]) - _cost(fits[best]), 0.0)
+    chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
+    if found.plain is not None:
+        fits = _under_widths(found.problem, found.minimum)
+    return BeamWidth(best, fall, chance, *_telling(found, {w: fits[w] for w in _widths(found.problem)}))
+
+
+def _widths(problem: Problem) -> list[float]:
+    return list(0.5 * problem.data.r[-1] * 0.5 ** np.arange(HALVINGS - 1.0, -1.0, -1.0))
+
+
+def _under_widths(problem: Problem, pencil: Minimum) -> dict[float, Minimum]:
+    """Fits under Gaussian beams by 1/e^2 radius: of the widths that are tried, the pencil beam's, and near the best."""
+    fits, start = {0.0: pencil}, pencil
+    for w in _widths(problem):
+        start = _under(problem, w, start)
         fits[w] = start
     for _ in range(FINER):
-        best = min(fits, key=lambda w: _cost(fits[w]))
-        tried = sorted(fits)
+        best, tried = _best(fits), sorted(fits)
         at = tried.index(best)
         for low, high in ((best, tried[min(at + 1, len(tried) - 1)]), (tried[max(at - 1, 0)], best)):
             between = float(np.sqrt(low * high))
             if between > 0 and between not in fits:
-                fits[between] = _under(found.problem, between, fits[best])
-    best = min(fits, key=lambda w: _cost(fits[w]))
-    fall = max(found.minimum.cost - _cost(fits[best]), 0.0)
-    chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
-    return BeamWidth(best, fall, chance, *_telling(found, {w: fits[w] for w in widths}))
+                fits[between] = _under(problem, between, fits[best])
+    return fits
+
+
+def _best(fits: dict[float, Minimum]) -> float:
+    return min(fits, key=lambda w: _cost(fits[w]))
+
+
+def _lack(plain: MediumFit, w: float, there: Minimum) -> Floats | None:
+    """Covariance of the lack of fit that the best width leaves; None if it leaves none."""
+    known = {} if plain.open is None else plain.open.mean
+    question = replace(plain.question, ranges={**plain.question.ranges, "beam": (0.0, 0.5 * float(plain.data.r[-1]))})
+    problem = replace(plain.problem, question=question).under({"beam": w})
+    return replace(plain, problem=problem, minimum=there).lack_of_fit({**known, "beam": w})
 
 
 @dataclass(frozen=True)
@@ -93,13 +122,14 @@ def as_tissue(found: MediumFit) -> Tissue | None:
     there = Setting.of(question.law.setting.as_table() | {name: TISSUE[name] for name in question.assumed})
     if not (question.assumed and there.is_solved and isinstance(question.law, ExactLight) and found.minimum.converged):
         return None
-    problem = replace(found.problem, question=replace(question, law=exact_light(there)))
+    plain = found.plain or found
+    problem = replace(plain.problem, question=replace(question, law=exact_light(there)))
     try:
-        end = descended_from(problem, found.point)
+        end = descended_from(problem, plain.point)
     except InputError:  # a total reflectance is held that such a medium has not
         return None
     values = model.quantities(end.point[None], np.zeros(1))
-    return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - found.minimum.cost)
+    return Tissue(there, {name: float(value[0]) for name, value in values.items()}, end.cost - plain.minimum.cost)
 
 
 def _under(problem: Problem, w: float, start: Minimum) -> Minimum:

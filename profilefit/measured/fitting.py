@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -14,11 +15,11 @@ from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import law_error, model
 from profilefit.measured.data import Measured, require_workable
-from profilefit.measured.misfit import Misfit, alone, gaussianised, misfit
+from profilefit.measured.misfit import Misfit, alone, gaussianised, lack_of_fit, misfit
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.problem import Question
-from profilefit.measured.ranges import Opened, opened
+from profilefit.measured.ranges import Opened, opened, slopes_by_ranges
 from profilefit.measured.replicates import widening
 from profilefit.measured.solving import Minimum, Problem, are_apart, descended, descended_from, minimised
 
@@ -31,6 +32,9 @@ SEARCHED = (0.3, 0.9, 0.99)  # albedos whose largest error of the law the search
 # A ring counts as if at least this share of its light were expected, lest its error be none where the law has none.
 LEAST_EXPECTED = 0.01
 LEVEL = 0.95  # of every interval
+# Correlation lengths [ln r] of a lack of fit, whose waves are some six times as long; 0 is one of each row alone.
+LACK_WAVES = (0.0, 0.1, 0.2, 0.4, 0.8)
+LACK_ROUNDS, BETTER = 3, 0.9  # of its estimate; share of chi-square below which a minimum is another, better one
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class MediumFit:
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
     rivals      other minima whose chi-square is no more above it than where the 95 % interval ends
     open        what the data leave open of ranges; the fit is that at their means
+    plain       the fit by the errors of data and law alone, whose residuals suggest the lack of fit that this one
+                allows for; None where none is allowed for
     """
 
     problem: Problem
@@ -49,6 +55,7 @@ class MediumFit:
     widening: float = 1.0
     rivals: tuple[Minimum, ...] = ()
     open: Opened | None = None
+    plain: MediumFit | None = None
 
     @property
     def data(self) -> Measured:
@@ -102,12 +109,13 @@ class MediumFit:
     @property
     def statistical(self) -> Floats:
         """Covariance (3, 3) of the coordinates from the data's own errors."""
-        rows = np.eye(self.minimum.residuals.size) - self.law_rows  # of all errors, the rows' covariance is 1
+        # Of all errors the rows' covariance is 1.
+        rows = np.eye(self.minimum.residuals.size) - self.law_rows - self.lack_rows
         return self.gain @ rows @ self.gain.T
 
     @property
     def likely(self) -> Floats:
-        """Covariance (3, 3) of the coordinates: the data's own errors, the law's, and what is open of ranges."""
+        """Covariance (3, 3) of the coordinates: errors of the data, of the law and by lack of fit, and open ranges."""
         return self.conditional + self.of_ranges
 
     @property
@@ -125,9 +133,13 @@ class MediumFit:
         """Covariance (m, m) of the rows, in standard errors, from the law's own error; zero if that is unknown."""
         return self._law_rows(self.problem.noise)
 
+    @cached_property
+    def lack_rows(self) -> Floats:
+        """Covariance (m, m) of the rows, in standard errors, from the lack of fit; zero where none is allowed for."""
+        return self._rows_of(self.problem.noise.lack, self.problem.noise)
+
     def _law_rows(self, noise: Noise) -> Floats:
-        model = self.problem.noise.model
-        return self._rows_of(np.zeros((self.rows,) * 2) if model is None else model, np.ones(self.rows), noise)
+        return self._rows_of(self.problem.noise.model, noise)
 
     @property
     def law_size(self) -> Floats:
@@ -142,13 +154,10 @@ class MediumFit:
             return np.zeros(self.rows, bool)
         return self.problem.model.shares(self.point, self.data.inner) > law_error.WITHIN
 
-    @cached_property
-    def wave_rows(self) -> Floats:
-        """The same of a relative error 1 in waves."""
-        return self._rows_of(law_error.waves(self.data.r), self.light, self.problem.noise)
-
-    def _rows_of(self, shape: Floats, size: Floats, noise: Noise) -> Floats:
-        return law_error.whitened(shape, size, noise, self.minimum.residuals.size)
+    def _rows_of(self, error: Floats | None, noise: Noise) -> Floats:
+        """Covariance (m, m), in standard errors, of an error of covariance (n, n); zero if that is None."""
+        shape = np.zeros((self.rows,) * 2) if error is None else error
+        return law_error.whitened(shape, np.ones(self.rows), noise, self.minimum.residuals.size)
 
     @property
     def of_law(self) -> Floats:
@@ -157,23 +166,51 @@ class MediumFit:
 
     @property
     def of_misfit(self) -> Floats:
-        """Covariance (3, 3) of the coordinates from the misfit that is left, taken for an error in waves."""
-        return self.misfit.relative**2 * self.gain @ self.wave_rows @ self.gain.T
+        """Covariance (3, 3) of the coordinates from the lack of fit; zero where none is allowed for."""
+        return self.gain @ self.lack_rows @ self.gain.T
 
     @cached_property
     def misfit(self) -> Misfit:
-        """Judged by the errors of the data as they are: what widens those of the coordinates is no noise in a row."""
+        """Goodness of fit by the errors of the data and of the law, without any lack of fit that is allowed for."""
+        if self.plain is not None:
+            return self.plain.misfit
+        rows, jacobian, law, (waves, uneven) = self._in_data_errors((law_error.WAVE, 0.0))
+        return misfit(rows, jacobian, law, waves, self.rows, uneven, self.data.pooled)
+
+    def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
+        """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
+
+        values  those of the question's ranges, which may take up residuals as the free coordinates do
+        """
+        rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
+        variances = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
+        if variances is None:
+            return None
+        each = zip(variances, LACK_WAVES, strict=True)
+        joint = sum(variance * law_error.rough_waves(self.data.r, length) for variance, length in each)
+        return np.asarray(joint * np.outer(self.light, self.light), float)
+
+    def _in_data_errors(
+        self, lengths: Sequence[float], values: Mapping[str, float] | None = None
+    ) -> tuple[Floats, Floats, Floats, Floats]:
+        """Residuals (m,), their derivatives, and covariances of the law's error and of relative errors 1 in waves.
+
+        All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
+        Derivatives are by the free coordinates and, where `values` of them are given, by the question's ranges.
+        """
         times = np.ones(self.minimum.residuals.size)
         times[: self.rows] = np.sqrt(self.widening)
         own = self.problem.noise.alone
-        rows, slopes = replace(self.problem, noise=own).residuals(self.point)
+        problem = replace(self.problem, noise=own)
+        rows, slopes = problem.residuals(self.point)
         rows, both = times * rows, np.outer(times, times)
         rows[: self.rows] = gaussianised(rows[: self.rows], alone(self.data.freedom, self.data.pooled))
-        waves, uneven = (
-            both * self._rows_of(shape, self.light, own) for shape in (law_error.waves(self.data.r), np.eye(self.rows))
-        )
-        jacobian = times[:, None] * slopes[:, list(self.question.free)]
-        return misfit(rows, jacobian, both * self._law_rows(own), waves, self.rows, uneven, self.data.pooled)
+        size = np.outer(self.light, self.light)
+        shapes = [both * self._rows_of(size * law_error.waves(self.data.r, length), own) for length in lengths]
+        slopes = slopes[:, list(self.question.free)]
+        if values:
+            slopes = np.column_stack([slopes, slopes_by_ranges(problem, values, self.point)])
+        return rows, times[:, None] * slopes, both * self._law_rows(own), np.array(shapes)
 
     @property
     def sigma(self) -> Floats:
@@ -207,13 +244,49 @@ def fitted(data: Measured, question: Question, source: law_error.Origin | None =
     problem = Problem(data, question, noise(data, widening=wider, model=model))
     minimum = first = minimised(problem)
     found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
-    reweighted = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
-    for _ in range(reweighted):
-        found = _reweighted(found)
-    if question.ranges and (left := opened(found.problem, found.minimum)) is not None:
-        found = replace(found, problem=found.problem.under(left.mean), minimum=left.there, open=left)
-        found = _reweighted(found) if reweighted else found
+    rounds = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
+    found = _allowing_for_lack(_settled(found, rounds), rounds)
     return replace(found, rivals=_rivals(found, first.others))
+
+
+def _settled(found: MediumFit, rounds: int) -> MediumFit:
+    """Fit again with the errors that the fit's own light has, so many times, then with what is open of ranges."""
+    for _ in range(rounds):
+        found = _reweighted(found)
+    if found.question.ranges:
+        left = opened(found.problem, found.minimum, None if found.open is None else found.open.mean)
+        found = replace(found, open=left)
+        if left is not None:
+            found = replace(found, problem=found.problem.under(left.mean), minimum=left.there)
+            found = _reweighted(found) if rounds else found
+    return found
+
+
+def _allowing_for_lack(found: MediumFit, rounds: int) -> MediumFit:
+    """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none.
+
+    Wider errors let the search out of a local minimum; where this leads to a better fit, all begins again from there.
+    """
+    wider = found
+    for _ in range(LACK_ROUNDS):
+        values = {} if found.open is None else found.open.mean
+        lack = found.lack_of_fit(values) if _ended(found) else None
+        if lack is None:
+            return found
+        problem = replace(found.problem, noise=replace(found.problem.noise, lack=lack))
+        wider = _settled(replace(found, problem=problem, plain=found), 1)
+        if not _ended(wider):
+            return found
+        back = replace(wider.problem, noise=found.problem.noise)
+        there = descended_from(back, wider.point)
+        if not there.cost < BETTER * found.minimum.cost:
+            break
+        found = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)
+    return wider
+
+
+def _ended(found: MediumFit) -> bool:
+    return found.minimum.converged or found.minimum.at_edge
 
 
 def _reweighted(found: MediumFit) -> MediumFit:
@@ -223,7 +296,8 @@ def _reweighted(found: MediumFit) -> MediumFit:
         return found
     expected = np.maximum(light, LEAST_EXPECTED * data.value)
     model = law_error.covariance(data, found.rel, found.beyond)
-    problem = replace(found.problem, noise=noise(data, expected, found.widening, model))
+    weights = noise(data, expected, found.widening, model, found.problem.noise.lack)
+    problem = replace(found.problem, noise=weights)
     minimum = descended(problem, found.point, found.question.free)
     return replace(found, problem=problem, minimum=minimum, rel=_rel(found.question, minimum, found.source))
 

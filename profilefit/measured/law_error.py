@@ -84,16 +84,26 @@ def covariance(data: Measured, rel: float | None, beyond: NDArray[np.bool_]) -> 
     if not rel:
         return None
     size = RMS * rel * np.where(beyond, BEYOND, 1.0) * np.abs(data.value)
-    distance = np.abs(np.subtract.outer(np.log(data.r), np.log(data.r))) / WAVE
-    # A smoother one, such as `waves`, would have neighbouring rows trusted for what they say beside it.
-    found: Floats = np.exp(-distance) * np.outer(size, size)
-    return found
+    return rough_waves(data.r) * np.outer(size, size)
 
 
-def waves(r: Floats) -> Floats:
-    """Correlations (n, n) along ln r of an error that comes in waves."""
-    distance = np.subtract.outer(np.log(r), np.log(r)) / WAVE
-    return np.exp(-0.5 * distance**2)
+def waves(r: Floats, length: float = WAVE) -> Floats:
+    """Correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0 makes rows independent."""
+    return np.asarray(np.exp(-0.5 * _apart(r, length) ** 2), float)
+
+
+def rough_waves(r: Floats, length: float = WAVE) -> Floats:
+    """Correlations (n, n) of an error of this length along ln r with which rows are weighed; 0 makes rows independent.
+
+    With those of `waves`, which are smooth, neighbouring rows would be trusted for what they say beside the error.
+    """
+    return np.asarray(np.exp(-_apart(r, length)), float)
+
+
+def _apart(r: Floats, length: float) -> Floats:
+    """Distances (n, n) of rows in ln r over a length; infinite for any two rows where that is 0."""
+    distance = np.abs(np.subtract.outer(np.log(r), np.log(r)))
+    return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
 
 
 def whitened(shape: Floats, size: Floats, noise: Noise, rows: int) -> Floats:

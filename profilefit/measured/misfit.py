@@ -10,6 +10,9 @@ waves    the score z^T S^-1 D S^-1 z of a relative error that is correlated alon
 Errors made from replicates share the error of their trend: with `pooled` degrees of freedom behind it chi-square is an
 F, and the waves' draws are divided likewise. Both p-values are combined by Sidak's rule. The misfit is the relative
 error, row by row, that brings chi-square to n - p.
+
+`lack_of_fit` estimates which error of the model would leave such residuals: a Gaussian process of relative standard
+deviation d and of some correlation along ln r, by the likelihood of z under S + d^2 D (restricted likelihood, REML).
 """
 
 from __future__ import annotations
@@ -21,11 +24,16 @@ from numpy.typing import NDArray
 from scipy import special, stats
 from scipy.optimize import brentq
 
+from profilefit.measured.solving import likelihood
+
 Floats = NDArray[np.float64]
 DETECTED = 1e-3  # p-value below which a misfit counts as one
 DRAWS = 10_000
 TINY = float(np.finfo(float).tiny)
 LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
+# Relative errors d of a lack of fit that are tried, over that of a row: how many, the least, and the largest, or as
+# many times the root mean square of the residuals.
+SIZES, LEAST, MOST, TIMES = 20, 0.05, 20.0, 4.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +100,35 @@ def misfit(
         (1 + int(np.sum(signs[1:] != signs[:-1])), 1 + (rows - 1) / 2),
         amplitude(z, own, free.T @ (np.diag(np.diag(shape)) if uneven is None else uneven) @ free),
     )
+
+
+def lack_of_fit(
+    residuals: Floats, jacobian: Floats, law: Floats, shapes: Floats, pooled: float = np.inf
+) -> Floats | None:
+    """Estimate the relative variances (k,) of errors of these shapes (k, m, m), of which the residuals show the sum.
+
+    The prior is flat in ln d and among the shapes; a variance is the posterior's mean of d^2 times the shape's share.
+    Arguments are those of `misfit`. None if z is at most as likely with such errors, over the prior, as without any.
+    """
+    free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
+    root = np.linalg.cholesky(np.eye(free.shape[1]) + free.T @ law @ free)
+    z = np.linalg.solve(root, free.T @ residuals)
+    own = np.diag(shapes[0])
+    if not (z.size and np.any(own > 0) and np.isfinite(z @ z)):
+        return None
+    d = np.median(own[own > 0]) ** -0.5 * np.geomspace(LEAST, max(MOST, TIMES * float(np.sqrt(z @ z / z.size))), SIZES)
+    gain = np.zeros((len(shapes), SIZES))
+    for at, shape in enumerate(shapes):
+        inner = np.linalg.solve(root, np.linalg.solve(root, free.T @ shape @ free).T)
+        values, vectors = np.linalg.eigh(0.5 * (inner + inner.T))
+        growth = 1.0 + np.outer(d**2, np.maximum(values, 0.0))
+        gain[at] = likelihood(np.sum((z @ vectors) ** 2 / growth, axis=1), z.size, pooled)
+        gain[at] -= 0.5 * np.sum(np.log(growth), axis=1) + likelihood(z @ z, z.size, pooled)
+    top = float(gain.max())
+    share = np.exp(gain - top)
+    if top + np.log(share.mean()) <= 0.0:
+        return None
+    return np.asarray(share / share.sum() @ d**2, float)
 
 
 def scatter_chance(square: float, freedom: int, pooled: float) -> float:

@@ -8,7 +8,7 @@ b = S^-1 v / sqrt(N - 1) this is S (1 - b b^T) S, whose inverse root is (Sherman
     C^-1/2 = (1 + c b b^T) S^-1,   c = (1 / sqrt(1 - b^T b) - 1) / b^T b.
 
 Without photons to share b is zero, and this divides by sigma. Where a law stands for the light its own error is a
-covariance of the rows, too; both together are whitened by the root of their sum.
+covariance of the rows, too, and so is a lack of fit; all together are whitened by the root of their sum.
 """
 
 from __future__ import annotations
@@ -31,12 +31,14 @@ LARGEST_SHARE = 1.0 - 1e-6
 class Noise:
     """The covariance of n rows: root (n,) is the diagonal S [of the values], common (n,) the vector b [-].
 
-    model (n, n) is that of the error of what the rows are held against, None where it has none.
+    model (n, n) is that of the error of what the rows are held against, None where it has none; lack (n, n) that of a
+    lack of fit, None where none is allowed for.
     """
 
     root: Floats
     common: Floats
     model: Floats | None = None
+    lack: Floats | None = None
 
     @property
     def share(self) -> float:
@@ -45,7 +47,7 @@ class Noise:
     @property
     def alone(self) -> Noise:
         """The errors of the data only."""
-        return replace(self, model=None)
+        return replace(self, model=None, lack=None)
 
     @property
     def data(self) -> Floats:
@@ -55,9 +57,9 @@ class Noise:
 
     @cached_property
     def _whole(self) -> Floats:
-        """Root of the data's covariance and the model's, lower triangle, over the data's errors."""
-        model = np.zeros((self.root.size,) * 2) if self.model is None else self.model
-        return np.asarray(np.linalg.cholesky((self.data + model) / np.outer(self.root, self.root)), float)
+        """Root of the covariances of data, model and lack of fit, lower triangle, over the data's errors."""
+        whole = sum((one for one in (self.model, self.lack) if one is not None), self.data)
+        return np.asarray(np.linalg.cholesky(whole / np.outer(self.root, self.root)), float)
 
     @property
     def sigma(self) -> Floats:
@@ -67,7 +69,7 @@ class Noise:
     def whitened(self, rows: Floats) -> Floats:
         """Rows (n,) or (n, k) in standard errors, independent of each other."""
         alone = (rows.T / self.root).T
-        if self.model is not None:
+        if self.model is not None or self.lack is not None:
             whitened: Floats = solve_triangular(self._whole, alone, lower=True, check_finite=False)
             return whitened
         if self.share == 0.0:
@@ -76,10 +78,16 @@ class Noise:
         return alone + growth * np.multiply.outer(self.common, self.common @ alone)
 
 
-def noise(data: Measured, light: Floats | None = None, widening: float = 1.0, model: Floats | None = None) -> Noise:
+def noise(
+    data: Measured,
+    light: Floats | None = None,
+    widening: float = 1.0,
+    model: Floats | None = None,
+    lack: Floats | None = None,
+) -> Noise:
     """The errors of the data; of counts those of `light` (n,), where a fit predicts it better than the counts.
 
-    widening    factor on every variance; model (n, n) covariance of the error of what the rows are held against
+    widening    factor on every variance; model and lack (n, n) as in `Noise`
     """
     expected = data.value if light is None or not data.counted else light
     others = data.photons - 1.0
@@ -87,4 +95,4 @@ def noise(data: Measured, light: Floats | None = None, widening: float = 1.0, mo
     root = np.sqrt(widening * variance)
     common = expected / (np.sqrt(others) * root)
     share = float(common @ common)
-    return Noise(root, common * np.sqrt(min(1.0, LARGEST_SHARE / share)) if share > 0 else common, model)
+    return Noise(root, common * np.sqrt(min(1.0, LARGEST_SHARE / share)) if share > 0 else common, model, lack)

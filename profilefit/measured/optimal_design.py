@@ -93,9 +93,9 @@ def _others(found: MediumFit) -> list[Candidate]:
 
 
 def _repeated(found: MediumFit) -> Floats:
-    """Covariance of the coordinates where the data's errors are those of REPEATS profiles, and the law's stay."""
-    law = found.law_rows
-    rows = law + (np.eye(len(law)) - law) / REPEATS
+    """Covariance of the coordinates where the data's errors are those of REPEATS profiles, and the others stay."""
+    stay = found.law_rows + found.lack_rows
+    rows = stay + (np.eye(len(stay)) - stay) / REPEATS
     return _covariance(found, np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
 
 

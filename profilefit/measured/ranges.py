@@ -24,6 +24,7 @@ Floats = NDArray[np.float64]
 NODES = {"n": 3, "g": 6, "beam": 5}
 PLACES = {"n": 15, "g": 121, "beam": 61}  # between the nodes, where the polynomials are evaluated
 COARSE = 3  # nodes of each range from which the search begins
+STARTS, LOWER = 4, 1.0  # the best of these that are followed; chi-square by which one must be lower than the one before
 REACH = 5.0  # standard errors of a range's value to either side of the best, beyond which it is not looked for
 STEP = 1e-3  # of a range, for derivatives
 ENOUGH, MAX_STEPS = 1e-5, 60  # of chi-square, that another step of the search must gain; of the search
@@ -51,20 +52,27 @@ class Opened:
         return found
 
 
-def opened(problem: Problem, start: Minimum) -> Opened | None:
-    """Of the ranges of a problem; None where the fit has no errors anywhere in them."""
+def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None = None) -> Opened | None:
+    """Of the ranges of a problem; None where the fit has no errors anywhere in them.
+
+    known  values of the ranges where `start` is a fit, which may be the best
+    """
     whole = dict(problem.question.ranges)
     rough = [_scaled(leggauss(COARSE)[0], ends) for ends in whole.values()]
-    start, values = min(_fits(problem, tuple(whole), rough, start), key=lambda one: _cost(one[0]))
-    if not np.isfinite(_cost(start)):
+    fits = _fits(problem, tuple(whole), rough, start) + ([] if known is None else [(start, dict(known))])
+    first, *others = sorted(fits, key=lambda one: _cost(one[0]))[:STARTS]
+    if not np.isfinite(_cost(first[0])):
         return None
-    start, ranges = _box(problem, start, values)
+    start, ranges = _box(problem, *first)
+    for one in others:  # which leads elsewhere where the first ended in a local minimum
+        if np.isfinite(_cost(one[0])) and (best := _box(problem, *one))[0].cost < start.cost - LOWER:
+            start, ranges = best
     nodes = [_scaled(leggauss(NODES[name])[0], ends) for name, ends in ranges.items()]
-    fits = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
-    rise = np.array([_cost(one) - _cost(start) for one in fits])
+    within = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
+    rise = np.array([_cost(one) - _cost(start) for one in within])
     if not np.all(np.isfinite(rise)):
         return None
-    theta, log = np.array([one.point for one in fits]), _log_volumes(problem, fits)
+    theta, log = np.array([one.point for one in within]), _log_volumes(problem, within)
     if not np.any(np.isfinite(log)):
         return None
     if np.all(np.isfinite(log)):  # errors at every node
@@ -85,6 +93,23 @@ def opened(problem: Problem, start: Minimum) -> Opened | None:
     drawn = theta[np.random.default_rng(SEED).choice(share.size, DRAWS, p=share)]
     there = fitted_under(problem, means, start)
     return Opened(means, errors, there, drawn - there.point)
+
+
+def slopes_by_ranges(problem: Problem, values: Mapping[str, float], point: Floats) -> Floats:
+    """Derivatives (m, k) of the residuals at a point (3,) by the question's k ranges, where these have `values`."""
+    low, high = np.array(list(problem.question.ranges.values())).T
+    at = np.array([values[name] for name in problem.question.ranges])
+    theta = point[list(problem.question.free)]
+    return differences(lambda moved: _residuals(problem, theta, moved)[0], STEP * (high - low), high)(at)[1]
+
+
+def _residuals(problem: Problem, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
+    """Residuals (m,) where the free coordinates (p,) and the ranges (k,) have these values; derivatives (m, p)."""
+    there = problem.under(dict(zip(problem.question.ranges, map(float, values), strict=True)))
+    point, free = there.question.base, list(problem.question.free)
+    point[free] = theta
+    rows, slopes = there.residuals(point)
+    return rows, slopes[:, free]
 
 
 def fitted_under(problem: Problem, values: Mapping[str, float], start: Minimum) -> Minimum:
@@ -110,17 +135,11 @@ def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Mi
     free, ranges = list(problem.question.free), problem.question.ranges
     low, high = np.array(list(ranges.values())).T
 
-    def residuals(theta: Floats, values: Floats) -> tuple[Floats, Floats]:
-        there = problem.under(dict(zip(ranges, map(float, values), strict=True)))
-        point = there.question.base
-        point[free] = theta
-        rows, slopes = there.residuals(point)
-        return rows, slopes[:, free]
-
     def at(x: Floats) -> tuple[Floats, Floats]:
         theta, values = np.split(x, [len(free)])
-        by_range = differences(lambda moved: residuals(theta, moved)[0], STEP * (high - low), high)(values)[1]
-        rows, slopes = residuals(theta, values)
+        step = STEP * (high - low)
+        by_range = differences(lambda moved: _residuals(problem, theta, moved)[0], step, high)(values)[1]
+        rows, slopes = _residuals(problem, theta, values)
         return rows, np.column_stack([slopes, by_range])
 
     first, last = (end[free] for end in problem.bounds(start.point))

@@ -52,28 +52,31 @@ class Answer:
 
     @cached_property
     def draws(self) -> dict[str, Floats]:
-        """Posterior draws (k,) of every quantity; empty without a chain."""
+        """Posterior draws (k,) of every quantity by the errors of data and law; empty without a chain.
+
+        Draws by all errors are drawn towards the fit, in the coordinates, as far as the lack of fit widens their
+        covariance. At an end, where derivatives give no errors, they stay as they are.
+        """
         if self.walk is None:
             return {}
-        return self._quantities(self._sampled)
+        if self.found.plain is None or not self.identified:
+            return self._quantities(self._sampled)
+        found, free = self.found, list(self.found.question.free)
+        whole, data = (one[np.ix_(free, free)] for one in (found.likely, found.likely - found.of_misfit))
+        nearer = np.linalg.cholesky(data) @ np.linalg.inv(np.linalg.cholesky(whole))
+        moved = self._sampled.copy()
+        moved[:, free] = found.point[free] + (moved[:, free] - found.point[free]) @ nearer.T
+        return self._quantities(moved)
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
-        """The same, each moved by a lack-of-fit error where a misfit is detected.
+        """Posterior draws (k,) of every quantity by all errors, with the lack of fit that is allowed for.
 
-        Empty at an end, where derivatives, which propagate it, give no errors.
+        Empty at an end, and where neither the law's error nor a lack of fit is known.
         """
-        found = self.found
-        if self.walk is None or not self.identified or not (found.misfit.detected or found.rel is not None):
+        if self.walk is None or not self.identified or (self.found.plain is None and self.found.rel is None):
             return {}
-        if not found.misfit.detected:
-            return self.draws
-        free = list(found.question.free)
-        moved = self._sampled.copy()
-        generator = np.random.default_rng(len(moved))
-        zero, joint = np.zeros(len(free)), found.of_misfit[np.ix_(free, free)]
-        moved[:, free] += generator.multivariate_normal(zero, joint, len(moved), method="eigh")
-        return self._quantities(moved)
+        return self.draws if self.found.plain is None else self._quantities(self._sampled)
 
     @cached_property
     def _sampled(self) -> Floats:
@@ -129,7 +132,7 @@ class Answer:
     def interval(self, name: str) -> Ends | None:
         """95 % by the data's errors and the law's: of the posterior draws; without a chain, of the profile likelihood.
 
-        Both ends, or one and None: a one-sided limit.
+        Both ends, or one and None: a one-sided limit. That limit, and the profile likelihood, are by all errors.
         """
         if name in self.draws and name in self.moving:
             return self._middle(name, self.draws[name])
@@ -137,7 +140,7 @@ class Answer:
         return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
 
     def whole_interval(self, name: str) -> Ends | None:
-        """95 % by all errors: statistical, model, and lack of fit where detected; None where these are unknown."""
+        """95 % by all errors: statistical, model, and lack of fit if allowed for; None where these are unknown."""
         held = name not in self.whole_draws or name not in self.moving
         return None if held else self._middle(name, self.whole_draws[name])
 
@@ -261,6 +264,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
             **vars(found.misfit),
             "detected": found.misfit.detected,
             "within_law": found.misfit.within_law,
+            "allowed_for": found.plain is not None,
         }
         body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
         body["advice"] = result.advice

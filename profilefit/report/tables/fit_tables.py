@@ -10,6 +10,7 @@ from rich.text import Text
 
 from mcml_sim.media.setting import Setting
 from profilefit.measured.fitting import MediumFit
+from profilefit.measured.identifiability import relative_errors
 from profilefit.measured.misfit import DETECTED
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.oblique import NEAR
@@ -32,6 +33,7 @@ HELD_IN = "checked on simulated replicates, such intervals cover the truth in 93
 RIVALLED = ("mu_s'", "mu_a", "scale")
 ODD = (0.5, 2.0)  # scales between these are a calibration's
 UNLIKELY = 3.0  # standard errors
+LOUD = 0.05  # relative error of mu_a or mu_s' by lack of fit, from which the answer says MISFIT in capitals
 REACHED = 0.1  # of the first radius
 TINIEST = 1e-16  # p-value that is worth printing
 ANYTHING, WIDE = "anything", 1e4  # of an interval, and from which ratio of its ends
@@ -70,7 +72,7 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
     if found.rel != 0 or found.question.ranges:  # exact light has no error of its own
         columns["± model"] = [significant(law[name]) if name in law and name in moving else ABSENT for name in names]
         caption += OF_RANGES if found.question.ranges else OF_LAW
-    if result.identifiability is not None and found.misfit.detected:
+    if found.plain is not None:
         misfit = found.errors(found.of_misfit) if moving else {}
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
@@ -79,7 +81,9 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         _ends(result.whole_interval(name) if whole else result.interval(name), 1.0 if name in SHARES else None)
         for name in names
     ]
-    caption += "; 95 %: interval by " + ("all of these errors together" if whole else "the statistical error alone")
+    caption += "; 95 %: interval by " + (
+        "all of these errors together" if whole or found.plain is not None else "the statistical error alone"
+    )
     if any(any(result.ends(name)) for name in result.moving):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
     if found.question.law.setting.illumination == Setting().illumination:
@@ -209,9 +213,16 @@ def _goodness(result: Answer) -> Iterator[str]:
         f"lag-1 autocorrelation {one.along_r:+.2f}, {one.runs[0]} sign runs ({one.runs[1]:.0f} expected)"
     )
     if one.detected:
+        added = _added(result)
+        loud = max(added.values(), default=one.relative) >= LOUD
         yield (
-            f"MISFIT (p-value {p_value(one.joined)}): one layer does not explain the data under this light, "
-            f"scattering and surface; {_unexplained(one.relative)}"
+            f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data "
+            f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
+        )
+    elif result.found.plain is not None:
+        yield (
+            f"a misfit is not detected (p-value {p_value(one.joined)}) but more likely than none; "
+            f"{_effect(result, _added(result))}"
         )
     elif one.within_law and result.found.question.ranges:
         yield "the misfit is within what is known as a range only"
@@ -221,6 +232,28 @@ def _goodness(result: Answer) -> Iterator[str]:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
         yield "no misfit is detected: one layer explains the data"
+
+
+def _added(result: Answer) -> dict[str, float]:
+    """Relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for or has no such errors."""
+    found = result.found
+    if found.plain is None:
+        return {}
+    errors = relative_errors(found, found.of_misfit)
+    return {name: errors[name] for name in ("mu_a", "mu_s'") if name in result.identified}
+
+
+def _effect(result: Answer, added: dict[str, float]) -> str:
+    """How much a lack of fit adds to the errors, and how large the other errors are."""
+    found = result.found
+    if found.plain is None:
+        return "no error below allows for it"
+    if not added:
+        return "the limits allow for it"
+    others = relative_errors(found, found.likely - found.of_misfit)
+    by_lack = " and ".join(f"± {significant(100 * error)} % to {name}" for name, error in added.items())
+    rest = " and ".join(f"± {significant(100 * others[name])} %" for name in added)
+    return f"it adds {by_lack}, where all other errors are {rest}; 95 % includes it"
 
 
 def _unexplained(relative: float) -> str:

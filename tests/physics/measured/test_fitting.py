@@ -160,7 +160,7 @@ def test_two_layers_are_no_half_space():
     assert found.misfit.detected
     assert found.misfit.along_r > 0.5
     assert 0.1 < found.misfit.relative < 0.25
-    statistical, inflated = found.errors(found.statistical), found.errors(found.of_misfit)
+    statistical, inflated = found.plain.errors(found.plain.statistical), found.errors(found.of_misfit)
     assert inflated["mu_a"] > 20 * statistical["mu_a"]
     assert relative_errors(found, found.of_misfit)["mu_a"] > 0.1
 

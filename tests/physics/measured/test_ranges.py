@@ -98,6 +98,28 @@ def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     np.testing.assert_allclose(light, right, rtol=3e-4)
 
 
+@pytest.mark.parametrize(
+    ("size", "wavelength", "phase", "opened"),
+    [(0.004, 2.5, 0.5, False), (0.003, 1.0, 0.0, True)],
+    ids=["given", "open"],
+)
+def test_intervals_hold_under_a_misfit(size, wavelength, phase, opened):
+    """Light of tissue with a smooth relative error, n and g given or open: intervals hold, the data's alone do not."""
+    ranges = {"n": (1.33, 1.45), "g": (0.7, 0.95)} if opened else {}
+    setting = Setting(n=1.39, g=0.825) if opened else own_data.SMOOTH.setting
+    data = own_data.wavy(size, wavelength, phase)
+    found = fitted(data, Question(exact_light(setting), own_data.SCALE, ranges=ranges))
+    assert found.misfit.detected
+    for one, holds in ((found, True), (found.plain, False)):
+        errors = one.errors(one.likely)
+        for name, truth in {"mu_s'": 0.98, "mu_a": 0.02}.items():
+            assert (abs(one.values[name] - truth) < one.quantile * errors[name]) == holds, name
+    if opened:
+        assert abs(found.open.mean["n"] - 1.4) < 2 * found.open.error["n"]
+        assert abs(found.open.mean["g"] - 0.8) < 2 * found.open.error["g"]
+        assert found.open.error["n"] > 5 * found.plain.open.error["n"]
+
+
 @pytest.mark.slow
 def test_ranges_of_data_without_absorption_leave_the_limit():
     """Light brighter than any medium's: the albedo runs to 1 at every g, and the middle of the range is fitted."""
