@@ -281,11 +281,13 @@ def distorted(known: str, at: int, noise: tuple[float, float] = (0.003, 0.01), *
     width = answer.width
     light = Model(exact_light(one.setting)).predicted(_point(one)[None], EDGES[:1], EDGES[1:2])
     truth = {**_truth(one), "A": float(light[0, -1])}
-    ends = [answer.whole_interval(name) or (None, None) for name in truth]
-    if any(low is None or high is None for low, high in ends):
-        return None, None if width is None else width.noticed
-    held = tuple(low < true < high for (low, high), true in zip(ends, truth.values(), strict=True))
-    return held, None if width is None else width.noticed
+    noticed, held = None if width is None else width.noticed, []
+    for name, true in truth.items():
+        low, high = answer.whole_interval(name) or (None, None)
+        if low is None or high is None:
+            return None, noticed
+        held.append(low < true < high)
+    return tuple(held), noticed
 
 
 def waved(
@@ -388,10 +390,17 @@ def main() -> None:
         return
     if given.distorted:
         for known in ALLOWED:
+<<<<<<< HEAD
             one = distortions(known, given.count, given.jobs)
             held = ", ".join(f"{name} {share:.1%}" for name, share in one.held.items())
             print(f"{known}, {given.count} media: held {held}, answered {one.answered:.1%}", end="")
             print(f", pencil beams accused {one.accused:.1%}" if one.accused is not None else "", flush=True)
+=======
+            shared = distortions(known, given.count, given.jobs)
+            held = ", ".join(f"{name} {share:.1%}" for name, share in shared.held.items())
+            print(f"{known}, {given.count} media: held {held}, answered {shared.answered:.1%}", end="")
+            print(f", pencil beams accused {shared.accused:.1%}" if shared.accused is not None else "", flush=True)
+>>>>>>> 2ca0a777a587b432ac4a150e96e83583118507a5
         return
     for opened in (False, True):
         print(f"n and g {'open' if opened else 'given'}, {given.count} media")
