@@ -266,9 +266,9 @@ class Shot:
         return low, high
 
     @property
-    def lengths(self) -> Floats:
-        """Range (2,) of ln l where the search begins: from well within the core to beyond the last ring."""
-        return np.log([SHORTEST * np.exp(self._first[3]), LONGEST * self.medium.outer[-1]])
+    def lengths(self) -> tuple[float, float]:
+        """Range of ln l where the search begins: from well within the core to beyond the last ring."""
+        return float(np.log(SHORTEST) + self._first[3]), float(np.log(LONGEST * self.medium.outer[-1]))
 
     @cached_property
     def _first(self) -> Floats:
