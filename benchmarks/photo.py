@@ -234,7 +234,7 @@ def verdicts(at: int) -> list[Verdict]:
     card = simulated.card(one.optics, radii)
     try:
         spot = seen({name: simulated.light(*of, SETTING, one.optics, radii) for name, of in one.media.items()})
-        shown = [(seen(0.9 * card), None)] if one.white else []
+        shown: list[tuple[workflow.Bracket, Known | None]] = [(seen(0.9 * card), None)] if one.white else []
         shown += [] if one.grey is None else [(seen(one.grey * card), GREY)]
         found = workflow.measured(spot, shown, size, SETTING, Beliefs(beam=one.beam))
     except InputError as error:
