@@ -390,17 +390,10 @@ def main() -> None:
         return
     if given.distorted:
         for known in ALLOWED:
-<<<<<<< HEAD
-            one = distortions(known, given.count, given.jobs)
-            held = ", ".join(f"{name} {share:.1%}" for name, share in one.held.items())
-            print(f"{known}, {given.count} media: held {held}, answered {one.answered:.1%}", end="")
-            print(f", pencil beams accused {one.accused:.1%}" if one.accused is not None else "", flush=True)
-=======
             shared = distortions(known, given.count, given.jobs)
             held = ", ".join(f"{name} {share:.1%}" for name, share in shared.held.items())
             print(f"{known}, {given.count} media: held {held}, answered {shared.answered:.1%}", end="")
             print(f", pencil beams accused {shared.accused:.1%}" if shared.accused is not None else "", flush=True)
->>>>>>> 2ca0a777a587b432ac4a150e96e83583118507a5
         return
     for opened in (False, True):
         print(f"n and g {'open' if opened else 'given'}, {given.count} media")
