@@ -43,6 +43,8 @@ from mcml_sim import Setting
 from mcml_sim.files.text_file import as_json
 from mcml_sim.files.whole_file import write_whole
 from profilefit import convert
+from profilefit.convert.blender import skin_alpha
+from profilefit.convert.maps import wrenninge_alpha
 from profilefit.scenes.stage.step_edge import step_response
 
 Floats = NDArray[np.float64]
@@ -104,14 +106,6 @@ class Row:
     printed: float
 
 
-def wrenninge(colour: float) -> float:
-    """Return the albedo of Wrenninge, Villemin and Hery (Pixar Technical Memo 17-07, 2017) at g = 0 [-]."""
-    blend = colour**0.25
-    low = 1.8260523782 * np.arctan(5.112467903288 * colour) ** 1.09686102424
-    high = 0.496310210422 * np.arctan(4.2350090365 * colour) ** 2.40602999408
-    return float((1.0 - blend) * low + blend * high)
-
-
 def published(name: str) -> Callable[[float], float]:
     """Return a map from the colour to the albedo by its printed constants."""
     law = profilefit.albedo_law(name, "published", Setting("diffuse"))
@@ -120,17 +114,9 @@ def published(name: str) -> Callable[[float], float]:
 
 MAPS: dict[str, Callable[[float], float]] = {
     "van de Hulst": published("van_de_hulst"),
-    "Wrenninge": wrenninge,
+    "Wrenninge": wrenninge_alpha,
     "Chiang": published("chiang"),
 }
-
-
-def printed_length(method: str, colour: float) -> float:
-    """Return l, or d of BURLEY, over the radius that `profilefit convert` prints for a medium of this colour."""
-    medium = convert.Optical(convert.alpha_of(colour, "diffuse"), 1.0)
-    name = "cycles_skin_radius" if method == "RANDOM_WALK_SKIN" else "cycles_radius"
-    length = medium.length("falloff_diffuse") if method == "BURLEY" else medium.mfp
-    return float(length / medium.length(name))
 
 
 DISTANCES = np.geomspace(entering.NEAREST, entering.FARTHEST, 100)
@@ -227,13 +213,24 @@ class Blender:
     def length(self, method: str, colour: float) -> float:
         """Return the length over the typed radius that the source has: l of a walk, d of BURLEY."""
         if method == "RANDOM_WALK_SKIN":
-            return float(np.sqrt(3.0 * (1.0 - convert.cycles_skin_alpha(colour, self.surface.ior))))
+            return float(np.sqrt(3.0 * (1.0 - skin_alpha(colour, self.surface.ior))))
         return 1.0 if method == "RANDOM_WALK" and self.release >= UNSCALED else SHRINK
 
     def alpha(self, method: str, colour: float) -> float:
         """Return the albedo that the source has for a walk [-]."""
         newest = method == "RANDOM_WALK" and self.release >= UNSCALED
         return MAPS["van de Hulst" if newest else "Wrenninge"](colour)
+
+    def printed(self, method: str, colour: float) -> float:
+        """Return l, or d of BURLEY, over the radius that `profilefit convert` prints beside this colour."""
+        if method == "BURLEY":
+            medium = convert.Optical(convert.alpha_of(colour, "diffuse"), 1.0)
+            return float(medium.length("falloff_diffuse") / medium.length("cycles_burley_radius"))
+        newest = method == "RANDOM_WALK" and self.release >= UNSCALED
+        name = "cycles_radius" if newest else "cycles_legacy_radius"
+        if method == "RANDOM_WALK_SKIN":
+            name = "cycles_skin_radius"
+        return float(1.0 / convert.Optical(self.alpha(method, colour), 1.0).length(name))
 
     def reflectance(self, method: str, colour: float) -> float:
         """Return A by the source [-]."""
@@ -295,7 +292,7 @@ def row(blender: Blender, method: str, colour: float, edges: Floats, white: Floa
         scale,
         *other,
         (float(np.sqrt(np.mean(residuals**2))), noise),
-        printed_length(method, colour),
+        blender.printed(method, colour),
     )
 
 
