@@ -169,7 +169,9 @@ def find(name: str) -> PhaseRecord:
         return load(Path(name))
     known = {path.stem: path for one in (fits_folder(), LOCAL) for path in record.available(one / PHASES).values()}
     if name not in known:
-        raise InputError(f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}")
+        raise InputError(
+            f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}"
+        )
     return load(known[name])
 
 
