@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mcml_sim import Setting
+from mcml_sim.media.checks import shown
 from mcml_sim.media.phase import Phase
 from profilefit.errors import InputError, RecordError
 from profilefit.laws.phases import FORMS, regression
@@ -212,7 +213,9 @@ def find(name: str) -> PhaseRecord:
         return load(Path(name))
     known = {path.stem: path for one in (fits_folder(), LOCAL) for path in record.available(one / PHASES).values()}
     if name not in known:
-        raise InputError(f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {name!r}")
+        raise InputError(
+            f"the record of a phase function must be one of {', '.join(known)}, or a .json, got {shown(name)}"
+        )
     return load(known[name])
 
 

@@ -157,7 +157,10 @@ def random_sea(
     vectors = _lattice(_length("tile", tile), checked_whole("harmonics", harmonics, 1, 64))
     k = np.linalg.norm(vectors, axis=1)
     along = vectors @ blow / (k * speed)
-    root = np.exp(-0.5 / (k * speed**2 / GRAVITY) ** 2) / k**2 * np.abs(along)
+    with np.errstate(divide="ignore", over="ignore"):
+        root = np.exp(-0.5 / (k * speed**2 / GRAVITY) ** 2) / k**2 * np.abs(along)
+    if not np.any(root > 1e-100):  # whose squares are floats
+        raise InputError(f"wind must be strong enough for waves on a tile of {tile:g} m, got {shown(wind)}")
     return _drawn(root, vectors, rms_slope, tile, seed, count)
 
 
