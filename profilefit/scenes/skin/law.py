@@ -23,6 +23,7 @@ from scipy.optimize import brentq
 from scipy.special import erf
 
 from mcml_sim import Setting, exact
+from mcml_sim.exact.single_scattering import entered
 from profilefit.errors import InputError
 from profilefit.scenes.stage.exact_law import DIFFUSE, require_isotropic
 from profilefit.scenes.stage.world import Rgb
@@ -137,7 +138,7 @@ class Separable:
 def albedo_of(reflectance: float, setting: Setting) -> float:
     """alpha of the exact half space of reflectance A [-]."""
     share = max(reflectance, 0.0)
-    if share >= exact.reflectance(1.0, setting):  # a surface that refracts lets no more in
+    if share >= entered(setting):  # a surface that refracts lets no more in
         return 1.0
     return float(brentq(lambda alpha: float(exact.reflectance(alpha, setting)) - share, 0.0, 1.0))
 

@@ -7,7 +7,8 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from mcml_sim import Setting, exact
+from mcml_sim import Setting
+from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media.fresnel import normal_reflectance
 from mcml_sim.media.setting import ILLUMINATIONS
 from profilefit.errors import InputError, SettingError
@@ -57,7 +58,7 @@ def head_scene(
     if detail < 1:
         raise InputError(f"detail must be a whole number >= 1, got {detail!r}")
     what = material.middle(setting) if isinstance(material, Painted) else translucent(material, setting)
-    most = float(exact.reflectance(1.0, setting))  # a colour that the surface lets out
+    most = float(entered(setting))  # a colour that the surface lets out
     face = np.minimum(skin(what.reflectance, columns), np.float32(most))
     even = plain(what.reflectance)
     pale = plain(np.minimum(np.multiply(what.reflectance, (1.2, 1.5, 1.8)), min(0.9, most)))
@@ -138,7 +139,7 @@ def draw(context: moderngl.Context, of: SceneRequest) -> Drawn:
 def _material(tables: Tables, content: Table, setting: Setting) -> str | Painted:
     if not isinstance(content.get("material"), dict):
         return tables.text("", "material", content, "skin1", tuple(BY_NAME))
-    found, most = [], float(exact.reflectance(1.0, setting))
+    found, most = [], float(entered(setting))
     for channel in CHANNELS:
         where = f"material.{channel}"
         one = tables.table(tables.table(content, "material"), channel, within="material")

@@ -349,5 +349,5 @@ def test_shipped_records_are_written_over_only_where_they_are_named(command, mon
     assert (status, "the folder is next" in err) == (2, True)
 
 
-def _reached(folder):
+def _reached(*_, **__):
     raise InputError("the folder is next")

@@ -40,7 +40,7 @@ def image(tmp_path):
 KEYS = "keys must be of "
 REFUSED = [
     ("colour", 1, f"{KEYS}title, .*, got 'colour'"),
-    ("technique.colour", 1, rf"\[technique\] {KEYS}kind, samples, chart, single, got 'colour'"),
+    ("technique.colour", 1, rf"\[technique\] {KEYS}kind, samples, chart, tolerance, single, got 'colour'"),
     ("camera.zoom", 1, rf"\[camera\] {KEYS}resolution, distance, direction, height, target, got 'zoom'"),
     ("light.colour", 1, rf"\[light\] {KEYS}direction, irradiance, ambient, got 'colour'"),
     ("layers.2.colour", 1, rf"\[layers 2\] {KEYS}name, .*, got 'colour'"),
