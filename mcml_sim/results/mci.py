@@ -237,7 +237,7 @@ def _bins(lines: Lines, words: dict[str, str], decimal: bool = False) -> tuple[i
 
 
 class Optics(NamedTuple):
-    """Of a medium of MCML 2 [-, 1/cm]."""
+    """Optical properties of a medium of MCML 2 [-, 1/cm]."""
 
     n: float
     mu_a: float

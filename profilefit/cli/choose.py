@@ -21,7 +21,7 @@ UNSERVED = 1  # exit status
 
 
 class SceneNeed(NamedTuple):
-    """What a scene needs: as data, as printed, and whether anything is within its limits."""
+    """Answer for a scene, as data and as printed, and whether any option is within the scene's limits."""
 
     content: dict[str, Any]
     printed: Sequence[RenderableType]

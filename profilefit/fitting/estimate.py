@@ -241,7 +241,7 @@ def followed(hessian: Floats, mixed: Floats) -> Floats:
 def _second_derivatives(
     problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings
 ) -> tuple[Floats, Floats]:
-    """The same as `Fit.second_derivatives`, by one compiled program."""
+    """Compute `Fit.second_derivatives` by one compiled program."""
     with jax.enable_x64(True):
         law = jax.tree.map(jnp.asarray, law)  # traced, so that other constants compile nothing
         here = jnp.asarray(solution.parameters)

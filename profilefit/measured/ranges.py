@@ -53,7 +53,7 @@ class Opened:
 
 
 def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None = None) -> Opened | None:
-    """Of the ranges of a problem; None where the fit has no errors anywhere in them.
+    """Find what the data leave open of a problem's ranges; None where the fit has no errors anywhere in them.
 
     known  values of the ranges where `start` is a fit, which may be the best
     """

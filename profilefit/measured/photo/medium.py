@@ -80,7 +80,7 @@ class Beliefs:
     halos: tuple[float, ...] = tuple(np.geomspace(NARROWEST, WIDEST, 11).tolist())
 
     def over(self, sides: tuple[int, int], pixel: float, reach: float) -> Beliefs:
-        """The same for a picture of so many columns and rows, of `pixel` [unit] each, with rings out to `reach` [unit].
+        """Return beliefs for a picture of so many columns and rows, of `pixel` [unit] each, with rings to `reach` [unit].
 
         Halos reach as far as the rings, since a wider one falls as a narrower one does there. None is narrower than the
         core, from which rings would not tell it apart.
@@ -114,7 +114,7 @@ class SpotLight(NamedTuple):
     wider: Floats
 
     def widened(self, by: float) -> SpotLight:
-        """The same of a core wider by a change of ln sigma, to first order and not below nothing."""
+        """Return the light under a core wider by a change of ln sigma, to first order and not below 0."""
         light, own = self.light.copy(), self.own.copy()
         light[0], own[0] = np.maximum(light[0] + by * light[-1], 0.0), np.maximum(own[0] + by * self.wider, 0.0)
         return self._replace(light=light, own=own)

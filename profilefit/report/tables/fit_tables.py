@@ -242,7 +242,7 @@ def _added(result: Answer) -> dict[str, float]:
 
 
 def _effect(result: Answer, added: dict[str, float]) -> str:
-    """How much a lack of fit adds to the errors, and how large the other errors are."""
+    """Return how much a lack of fit adds to the errors, and how large the other errors are, in words."""
     found = result.found
     if found.plain is None:
         return "no error below allows for it"

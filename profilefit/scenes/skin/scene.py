@@ -85,7 +85,7 @@ SKIN = 1.4  # refractive index
 
 @dataclass(frozen=True)
 class SceneRequest(ViewRequest):
-    """What a file requests.
+    """Scene of skin that a file requests.
 
     material  by its name, or painted;  setting  of its A and of the reference: diffuse illumination, n of the file
     illumination  of the law
