@@ -19,6 +19,8 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.special import sici
 
+from profilefit.convert.colour import reflectance_by_cosine
+
 Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 STEP = 0.2  # of the logarithm of x
@@ -78,14 +80,8 @@ def reflectance(alpha: float, entry: Entry, most: int | None = None) -> float:
 
 
 def _total(alpha: Complexes, entry: Entry) -> Complexes:
-    """1 - H(mu) sqrt(1 - alpha), averaged over the directions (Chandrasekhar 1950, ch. V)."""
-    total = np.zeros(alpha.shape, complex)
-    x = np.exp(LN_X)
-    logarithm = np.log(1.0 - alpha[:, None] * np.arctan(x) / x)
-    for cosine, share in zip(entry.cosine, entry.share, strict=True):
-        h = np.exp(-(cosine / np.pi) * STEP * np.sum(logarithm * x / (1.0 + (cosine * x) ** 2), axis=1))
-        total += share * (1.0 - h * np.sqrt(1.0 - alpha))
-    return total
+    """A at albedos (n,) of any argument [-], averaged over the directions."""
+    return np.asarray(reflectance_by_cosine(alpha, entry.cosine) @ entry.share)
 
 
 def dark_edge(alpha: float, entry: Entry) -> CubicSpline:

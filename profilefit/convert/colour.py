@@ -67,12 +67,13 @@ def reflectance_by_cosine(alpha: ArrayLike, cosine: ArrayLike) -> Floats:
     """Return A [-] for a beam that travels at this cosine to the normal inside an index-matched isotropic medium.
 
     1 - H(mu) sqrt(1 - alpha), with ln H = -mu/pi int_0^(pi/2) ln(1 - alpha t cot t) / (cos^2 t + mu^2 sin^2 t) dt
-    (Chandrasekhar, Radiative Transfer, 1950, sec. 39). The last axis of `cosine` is kept behind those of alpha.
+    (Chandrasekhar, Radiative Transfer, 1950, sec. 39). The last axis of `cosine` is kept behind those of alpha, which
+    may be complex: orders of scattering are the coefficients of A in powers of alpha.
     """
     nodes, weights = _unit_rule()
     t = 0.5 * np.pi * nodes**3  # the logarithm is steep at 0
     dt = 1.5 * np.pi * nodes**2 * weights
-    albedo, mu = np.asarray(alpha, float)[..., None, None], np.asarray(cosine, float)[..., None]
+    albedo, mu = np.asarray(alpha)[..., None, None], np.asarray(cosine, float)[..., None]
     defect = np.where(t < SMALL, t * t / 3.0, 1.0 - t / np.tan(t))  # 1 - t cot t
     logarithm = np.log((1.0 - albedo) + albedo * defect)
     exponent = -mu / np.pi * np.sum(dt * logarithm / (np.cos(t) ** 2 + (mu * np.sin(t)) ** 2), axis=-1, keepdims=True)

@@ -80,7 +80,7 @@ class Beliefs:
     halos: tuple[float, ...] = tuple(np.geomspace(NARROWEST, WIDEST, 11).tolist())
 
     def over(self, sides: tuple[int, int], pixel: float, reach: float) -> Beliefs:
-        """Return beliefs for a picture of so many columns and rows, of `pixel` [unit] each, with rings to `reach` [unit].
+        """Return beliefs for a picture of so many columns and rows, of `pixel` each, with rings out to `reach` [unit].
 
         Halos reach as far as the rings, since a wider one falls as a narrower one does there. None is narrower than the
         core, from which rings would not tell it apart.
