@@ -33,6 +33,7 @@ STARTS = 4  # the best of them, no two neighbours, that are followed to their mi
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
 EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has run there
 WHITE, BLACK = -9.0, 6.0  # u beyond which no data distinguish alpha from 1 or 0
+UNSEEN = 1e-3  # standard errors by which residuals move on the way from alpha to 1, where they do not show it
 AT_WHITE = "alpha runs to 1: these data show no absorption; measure farther out, or hold it with `held` alpha=..."
 NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
 RAN_AWAY = "a coordinate diverges: the data do not constrain it; check unit and scale, or hold one with `held`"
@@ -210,13 +211,18 @@ def _usable(rows: Floats, slopes: Floats) -> bool:
         return bool(np.isfinite(np.sum(rows**2) + np.sum(slopes**2)))
 
 
+def _is_white(done: solver.Solution) -> bool:
+    """Whether data cannot tell alpha from 1: residuals are linear in s = e^u there, and move by `UNSEEN` at most."""
+    return bool(done.parameters[U] < 0 and np.linalg.norm(done.jacobian[:, U]) < UNSEEN)
+
+
 def _explained(done: solver.Solution, free: tuple[int, ...], ran: list[int]) -> str:
     """Verdict on a descent; `ran` the coordinates at the end of their range."""
     if done.result == solver.NOT_FINITE:
         return NOT_FINITE
     if LENGTH in ran:
         return RAN_AWAY
-    if U in free and done.parameters[U] < WHITE:
+    if U in free and (done.parameters[U] < WHITE or _is_white(done)):
         return AT_WHITE
     if U in free and done.parameters[U] > BLACK:  # there a lower albedo and a larger scale are equivalent
         return AT_BLACK
