@@ -237,12 +237,15 @@ def test_simulated_tissue_and_what_similarity_costs(tmp_path):
     assert not straight.misfit.detected
     whole, far = found[0.9, None], found[0.9, 0.2]
     assert whole.misfit.detected
-    assert whole.values["mu_a"] == pytest.approx(0.187, rel=0.03)
-    assert whole.values["mu_s'"] == pytest.approx(9.55, rel=0.03)
+    allowed = whole.errors(whole.likely)
+    assert abs(whole.values["mu_a"] - 0.2) < 2 * allowed["mu_a"], "by errors with the lack of fit"
+    assert abs(whole.values["mu_s'"] - 10.0) < 2 * allowed["mu_s'"]
+    assert whole.plain.values["mu_a"] == pytest.approx(0.187, rel=0.03)
+    assert whole.plain.values["mu_s'"] == pytest.approx(9.55, rel=0.03)
     assert far.misfit.detected
     assert far.misfit.relative < 0.02, "which a law of larger error would not see"
-    assert far.values["mu_a"] == pytest.approx(0.134, rel=0.05)
-    assert far.values["mu_s'"] == pytest.approx(12.9, rel=0.05)
+    assert far.plain.values["mu_a"] == pytest.approx(0.134, rel=0.05)
+    assert far.plain.values["mu_s'"] == pytest.approx(12.9, rel=0.05)
 
 
 def test_a_white_medium_has_an_upper_limit_of_absorption():
