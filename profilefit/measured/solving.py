@@ -212,7 +212,7 @@ def _usable(rows: Floats, slopes: Floats) -> bool:
 
 
 def _is_white(done: solver.Solution) -> bool:
-    """Whether data cannot tell alpha from 1: residuals are linear in s = e^u there, and move by `UNSEEN` at most."""
+    """Whether alpha and 1 fit alike: residuals are linear in s = e^u there, and move by `UNSEEN` at most on the way."""
     return bool(done.parameters[U] < 0 and np.linalg.norm(done.jacobian[:, U]) < UNSEEN)
 
 
