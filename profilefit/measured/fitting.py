@@ -183,8 +183,10 @@ class MediumFit:
         values  those of the question's ranges, which may take up residuals as the free coordinates do
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
-        variances = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
-        if variances is None:
+        variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
+        if values:
+            variances = variances * likelier / (1.0 + likelier)
+        elif likelier <= 1.0:
             return None
         each = zip(variances, LACK_WAVES, strict=True)
         joint = sum(variance * law_error.rough_waves(self.data.r, length) for variance, length in each)

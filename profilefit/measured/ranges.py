@@ -15,16 +15,18 @@ from itertools import product
 import numpy as np
 from numpy.polynomial.legendre import leggauss, legvander
 from numpy.typing import NDArray
+from scipy import special
 
 from profilefit.fitting.solver import differences, solve
 from profilefit.measured.model import U
-from profilefit.measured.solving import Minimum, Problem, descended_from, likelihood, log_prior
+from profilefit.measured.solving import AT_WHITE, WHITE, Minimum, Problem, descended_from, likelihood, log_prior
 
 Floats = NDArray[np.float64]
 NODES = {"n": 3, "g": 6, "beam": 5}
 PLACES = {"n": 15, "g": 121, "beam": 61}  # between the nodes, where the polynomials are evaluated
 COARSE = 3  # nodes of each range from which the search begins
-STARTS, LOWER = 4, 1.0  # the best of these that are followed; chi-square by which one must be lower than the one before
+STARTS, AGAIN = 4, 2  # how many of the best of these are followed, the first time and where a fit is known
+LOWER = 1.0  # chi-square by which one of these must be lower than the one before
 REACH = 5.0  # standard errors of a range's value to either side of the best, beyond which it is not looked for
 STEP = 1e-3  # of a range, for derivatives
 ENOUGH, MAX_STEPS = 1e-5, 60  # of chi-square, that another step of the search must gain; of the search
@@ -60,7 +62,7 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
     whole = dict(problem.question.ranges)
     rough = [_scaled(leggauss(COARSE)[0], ends) for ends in whole.values()]
     fits = _fits(problem, tuple(whole), rough, start) + ([] if known is None else [(start, dict(known))])
-    first, *others = sorted(fits, key=lambda one: _cost(one[0]))[:STARTS]
+    first, *others = sorted(fits, key=lambda one: _cost(one[0]))[: STARTS if known is None else AGAIN]
     if not np.isfinite(_cost(first[0])):
         return None
     start, ranges = _box(problem, *first)
@@ -77,7 +79,9 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
         return None
     if np.all(np.isfinite(log)):  # errors at every node
         between = _product([_polynomials(NODES[name], PLACES[name]) for name in ranges])
+        theta[:, U] = np.exp(theta[:, U])  # sqrt(1 - alpha), near enough: it ends at 0 where the data allow no other
         theta, log = between @ theta, between @ log
+        theta[:, U] = np.log(np.maximum(theta[:, U], np.exp(WHITE)))
         log += likelihood(between @ rise, len(problem.question.free), problem.data.pooled)
         places = [_scaled(_middles(PLACES[name]), ends) for name, ends in ranges.items()]
     else:
@@ -157,15 +161,28 @@ def _cost(one: Minimum) -> float:
 
 
 def _log_volumes(problem: Problem, fits: Sequence[Minimum]) -> Floats:
-    """ln of the prior's share within the errors of each fit, up to a constant; -inf where it has none."""
+    """ln of the prior's share within the errors of each fit, up to a constant; -inf where it has none.
+
+    Residuals are linear in s = e^u, in which the prior is flat and ends at s = 0 (alpha = 1), near which it is
+    sqrt(1 - alpha): what lies beyond that end is cut off.
+    """
     free = list(problem.question.free)
     found = np.full(len(fits), -np.inf)
     for at, one in enumerate(fits):
-        sign, log = np.linalg.slogdet(one.jacobian[:, free].T @ one.jacobian[:, free])
-        if one.converged and sign > 0:
-            flat = float(log_prior(one.point[U])) if U in free else 0.0
-            found[at] = flat - 0.5 * log
+        slopes = one.jacobian[:, free]
+        sign, log = np.linalg.slogdet(slopes.T @ slopes)
+        if sign > 0 and (one.converged or one.result == AT_WHITE):
+            found[at] = -0.5 * log + (_log_inside(one, free) if U in free else 0.0)
     return found
+
+
+def _log_inside(one: Minimum, free: Sequence[int]) -> float:
+    """ln of the prior's density at a fit, times the share of its errors with alpha < 1."""
+    others = one.jacobian[:, [at for at in free if at != U]]
+    along = one.jacobian[:, U] - others @ np.linalg.lstsq(others, one.jacobian[:, U])[0]
+    size = float(np.linalg.norm(along))  # s over its error
+    pull = float(along @ one.residuals) / size  # 0 at a minimum, positive at an end
+    return float(log_prior(one.point[U])) + 0.5 * pull**2 + float(special.log_ndtr(size - pull))
 
 
 def _scaled(t: Floats, ends: tuple[float, float]) -> Floats:

@@ -33,7 +33,7 @@ STARTS = 4  # the best of them, no two neighbours, that are followed to their mi
 FARTHEST_U, FARTHEST_LN = 12.0, 7.0
 EDGE = 1e-3  # of such a range: nearer to its end than this, a coordinate has run there
 WHITE, BLACK = -9.0, 6.0  # u beyond which no data distinguish alpha from 1 or 0
-UNSEEN = 1e-3  # standard errors by which residuals move on the way from alpha to 1, where they do not show it
+UNSEEN = 0.01  # standard errors by which residuals move on the way from alpha to 1, where they do not show it
 AT_WHITE = "alpha runs to 1: these data show no absorption; measure farther out, or hold it with `held` alpha=..."
 NOT_FINITE = "the law is not finite there: check the unit and what is held, or leave out the outermost rows"
 RAN_AWAY = "a coordinate diverges: the data do not constrain it; check unit and scale, or hold one with `held`"

@@ -218,12 +218,9 @@ def _goodness(result: Answer) -> Iterator[str]:
             f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
         )
     elif result.found.plain is not None:
-        yield (
-            f"a misfit is not detected (p-value {p_value(one.joined)}) but more likely than none; "
-            f"{_effect(result, _added(result))}"
-        )
-    elif one.within_law and result.found.question.ranges:
-        yield "the misfit is within what is known as a range only"
+        ranges = result.found.question.ranges
+        why = f"though {' and '.join(ranges)}, known as ranges, may hide one" if ranges else "but more likely than none"
+        yield f"a misfit is not detected (p-value {p_value(one.joined)}) {why}; {_effect(result, _added(result))}"
     elif one.within_law:
         yield "the misfit is within the law's own error: what is missing is a better law, not another medium"
     elif not result.found.data.bounded and 1.0 - one.chance < DETECTED:

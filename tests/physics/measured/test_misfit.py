@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from profilefit.measured.law_error import waves
-from profilefit.measured.misfit import DETECTED, misfit
+from profilefit.measured.misfit import DETECTED, lack_of_fit, misfit
 
 ROWS, SETS = 24, 120
 R = np.geomspace(0.1, 10.0, ROWS)
@@ -69,3 +69,18 @@ def test_what_the_law_itself_may_leave_is_no_misfit(noise):
     assert np.mean([one.chance < DETECTED for one in found]) > 0.5
     assert not any(one.detected for one in found)
     assert any(one.within_law for one in found)
+
+
+def test_a_lack_of_fit_is_likelier_than_none_where_there_is_one(noise):
+    """Of noise alone the ratio of likelihoods exceeds k in 1 / k of the sets at most, as its mean there is 1."""
+
+    def estimates(rows):
+        residuals = rows - rows @ np.linalg.pinv(JACOBIAN).T @ JACOBIAN.T
+        return [lack_of_fit(one, JACOBIAN, NONE, SHAPE[None]) for one in residuals]
+
+    ratios = np.array([likelier for _, likelier in estimates(noise)])
+    assert np.mean(ratios > 10.0) < 0.1 + 3.0 * np.sqrt(0.1 * 0.9 / SETS)
+    assert np.median(ratios) < 1.0
+    waved = estimates(noise[:40] + 3.0 * np.sin(2.0 * np.log(R)))
+    assert np.median([likelier for _, likelier in waved]) > 1e6
+    assert np.sqrt(np.median([variances[0] for variances, _ in waved])) == pytest.approx(0.042, rel=0.5)
