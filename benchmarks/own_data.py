@@ -111,7 +111,7 @@ def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
 
 def _ends(answer: Answer, name: str) -> tuple[float, float] | None:
     """Of the interval that has two."""
-    low, high = answer.interval(name) or (None, None)
+    low, high = answer.whole_interval(name) or answer.interval(name) or (None, None)
     return None if low is None or high is None else (low, high)
 
 

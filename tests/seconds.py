@@ -10,7 +10,7 @@ from itertools import chain
 import pytest
 
 SHOWN = 12
-LONGEST = "test_mutations.py"  # half an hour in `make test-all`
+LONGEST = "test_mutations.py"
 _last = 0.0  # when this process last reported
 
 

@@ -79,11 +79,17 @@ def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
 
 def pieces(rest: Floats) -> Floats:
     """f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
+    found: Floats = np.tensordot(rest, _cubics(), 1)
+    return found
+
+
+@lru_cache(maxsize=1)
+def _cubics() -> Floats:
+    """The cubics of every B-spline, (splines, intervals, 4)."""
     t = np.arange(4) * STEP / 3.0
     starts = KNOTS[3:-4]
     basis = BSpline.design_matrix((starts[:, None] + t * (1 - 1e-12)).ravel(), KNOTS, 3).toarray()
-    values = (rest @ basis.T).reshape(rest.shape[0], starts.size, 4)
-    found: Floats = values @ np.linalg.inv(np.vander(t, 4)).T
+    found: Floats = basis.T.reshape(-1, starts.size, 4) @ np.linalg.inv(np.vander(t, 4)).T
     return found
 
 
