@@ -72,8 +72,10 @@ def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
 
 
 def _filled(light: ExactLight) -> ExactLight:
-    """The same with as many intervals as where g = 0, which are never reached: both share compiled code."""
+    """The same with as many intervals as where g = 0, so both share compiled code; what is added is f at its end."""
     intervals = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
     with jax.enable_x64(True):
-        more = ((0, 0), (0, intervals - light.rest.shape[1]), (0, 0))
-        return replace(light, rest=jnp.pad(light.rest, more, mode="edge"))
+        end = light.rest[:, -1] @ jnp.power(light.step, jnp.arange(3.0, -1.0, -1.0))
+        shape = end.size, intervals - light.rest.shape[1], 4
+        more = jnp.zeros(shape).at[..., 3].set(end[:, None])
+        return replace(light, rest=jnp.concatenate([light.rest, more], 1))

@@ -28,6 +28,7 @@ COARSE = 3  # nodes of each range from which the search begins
 STARTS, AGAIN = 4, 2  # how many of the best of these are followed, the first time and where a fit is known
 LOWER = 1.0  # chi-square by which one of these must be lower than the one before
 REACH = 5.0  # standard errors of a range's value to either side of the best, beyond which it is not looked for
+NARROWED = 5  # times at most, until the box has no end where nothing is
 STEP = 1e-3  # of a range, for derivatives
 ENOUGH, MAX_STEPS = 1e-5, 60  # of chi-square, that another step of the search must gain; of the search
 DRAWS, SEED = 4000, 0
@@ -69,9 +70,14 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
     for one in others:  # which leads elsewhere where the first ended in a local minimum
         if np.isfinite(_cost(one[0])) and (best := _box(problem, *one))[0].cost < start.cost - LOWER:
             start, ranges = best
-    nodes = [_scaled(leggauss(NODES[name])[0], ends) for name, ends in ranges.items()]
-    within = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
-    rise = np.array([_cost(one) - _cost(start) for one in within])
+    for _ in range(NARROWED):
+        nodes = [_scaled(leggauss(NODES[name])[0], ends) for name, ends in ranges.items()]
+        within = [one for one, _ in _fits(problem, tuple(ranges), nodes, start)]
+        rise = np.array([_cost(one) - _cost(start) for one in within])
+        narrower = _narrowed(ranges, nodes, rise)
+        if narrower == ranges:
+            break
+        ranges = narrower
     if not np.all(np.isfinite(rise)):
         return None
     theta, log = np.array([one.point for one in within]), _log_volumes(problem, within)
@@ -124,14 +130,18 @@ def fitted_under(problem: Problem, values: Mapping[str, float], start: Minimum) 
 def _fits(
     problem: Problem, names: Sequence[str], nodes: Sequence[Floats], start: Minimum
 ) -> list[tuple[Minimum, dict[str, float]]]:
-    """At all combinations of the nodes, each from where the one before it ended, the first from `start`."""
-    fits: list[tuple[Minimum, dict[str, float]]] = []
-    for each in product(*nodes):
-        values = dict(zip(names, map(float, each), strict=True))
-        one = fitted_under(problem, values, start)
-        fits.append((one, values))
-        start = one if one.converged else start
-    return fits
+    """At all combinations of the nodes, from the middle ones outward, each begun at the nearest that converged.
+
+    start  a fit somewhere in the middle
+    """
+    places = np.array(list(product(*(np.linspace(-1.0, 1.0, one.size) for one in nodes))))
+    values = [dict(zip(names, map(float, each), strict=True)) for each in product(*nodes)]
+    fits: dict[int, Minimum] = {}
+    for at in map(int, np.argsort(np.sum(places**2, axis=1), kind="stable")):
+        ended = [other for other, one in fits.items() if one.converged]
+        nearest = min(ended, key=lambda other: float(np.sum((places[at] - places[other]) ** 2)), default=None)
+        fits[at] = fitted_under(problem, values[at], start if nearest is None else fits[nearest])
+    return [(fits[at], values[at]) for at in range(len(values))]
 
 
 def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Minimum, dict[str, tuple[float, float]]]:
@@ -154,6 +164,21 @@ def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Mi
     ends = zip(np.maximum(best - REACH * errors, low), np.minimum(best + REACH * errors, high), strict=True)
     box = dict(zip(ranges, ((float(a), float(b)) for a, b in ends), strict=True))
     return fitted_under(problem, dict(zip(ranges, map(float, best), strict=True)), start), box
+
+
+def _narrowed(
+    ranges: Mapping[str, tuple[float, float]], nodes: Sequence[Floats], rise: Floats
+) -> dict[str, tuple[float, float]]:
+    """The box up to the first nodes where chi-square has risen beyond REACH, whatever the other ranges are."""
+    each = rise.reshape([one.size for one in nodes])
+    found = {}
+    for axis, (name, (low, high)) in enumerate(ranges.items()):
+        least = np.min(each, axis=tuple(at for at in range(each.ndim) if at != axis))
+        near = np.flatnonzero(least < REACH**2)
+        first, last = (near[0], near[-1]) if near.size else (0, least.size - 1)
+        at = nodes[axis]
+        found[name] = float(at[first - 1]) if first > 0 else low, float(at[last + 1]) if last + 1 < at.size else high
+    return found
 
 
 def _cost(one: Minimum) -> float:

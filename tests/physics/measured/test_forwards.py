@@ -1,12 +1,15 @@
 """Fits of media that scatter forwards: g given, known as a range, or not thought of."""
 
+import jax
 import numpy as np
 import pytest
 
 from benchmarks import half_spaces, own_data
 from mcml_sim import Layer, Medium, Setting
+from mcml_sim.exact.anisotropic import table
 from profilefit.measured import fit
 from profilefit.measured.data import Measured
+from profilefit.measured.exact_light import exact_light
 from profilefit.measured.premises import Premises
 from profilefit.report.tables.fit_tables import fit_lines
 from tests.fixtures import slow
@@ -62,6 +65,18 @@ def test_what_is_open_widens_the_errors(ranges):
     assert abs(found.found.values["mu_a"] - 0.02) < 3 * errors["mu_a"]
     lines = [line.plain for line in fit_lines(found)]
     assert any(line.startswith("known as ranges: ") for line in lines) == bool(ranges)
+
+
+@pytest.mark.parametrize("alpha", [0.5, 0.99])
+def test_light_goes_on_beyond_the_table(alpha):
+    """Beyond its farthest radius light of a fit is the table's, which decays on without a step."""
+    setting = Setting(n=1.4, g=0.8)
+    light, whole = exact_light(setting), table.light(setting)
+    x = float(whole.farthest) * np.array([1.0 - 1e-9, 1.0 + 1e-9, 1.5])
+    with jax.enable_x64(True):
+        found, right = (np.asarray(one.ring_density(x, np.array(alpha))) for one in (light, whole))
+    np.testing.assert_allclose(found, right, rtol=1e-12)
+    assert found[1] == pytest.approx(found[0], rel=1e-6)
 
 
 def test_what_nobody_said_is_said_to_be_assumed():
