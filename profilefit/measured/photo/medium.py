@@ -57,7 +57,8 @@ AT_BLACK = "alpha runs to 0: these rings show no multiple scattering; check scal
 AT_WHITE = "alpha runs to 1: these rings show no absorption; photograph a wider field, or a grey card"
 RAN_AWAY = "l runs to an end of its range: these rings show no scattering in the medium; check the scale and the beam"
 UNENDED = "the search did not end at a minimum: photograph cards, or expose longer"
-RIVALLED = "media that differ fit as well: photograph a grey card, or a spot of a narrower beam"
+RIVALLED = "media that differ fit the rings, too: photograph a grey card, or a spot of a narrower beam"
+RIVAL = float(stats.chi2.isf(DETECTED, 1))  # of chi-square above the best, up to which another minimum is a rival
 LARGEST = 100.0  # of a logarithm, where an interval ends that tells nothing
 
 
@@ -336,7 +337,7 @@ class Shot:
 class PhotoFit:
     """End of a fit: coordinates (p,) and their covariance (p, p); chi-square, its degrees of freedom, and the verdict.
 
-    rivals  minima beyond the intervals of 95 %, of a chi-square no higher than where these end
+    rivals  minima beyond the intervals of 95 %, of a chi-square that is higher by RIVAL at most
     """
 
     shot: Shot
@@ -394,7 +395,7 @@ def fitted(shot: Shot) -> PhotoFit:
     """Fit a shot by least squares: the lowest minimum that a search finds, and its rivals."""
     found = lowest(_descended(shot, start) for start in shot.starts)
     first, *others = (_ended(shot, one) for one in (found, *found.others))
-    within = (WITHIN * first.widening) ** 2
+    within = RIVAL * first.widening**2
     rivals = tuple(one for one in others if one.chi2 - first.chi2 < within and not first.holds(one.values))
     return replace(first, rivals=rivals, result=RIVALLED if rivals and first.converged else first.result)
 

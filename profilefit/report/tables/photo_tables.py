@@ -67,7 +67,7 @@ def photo_lines(found: Photo) -> Iterator[str]:
             yield f"{colour}: NO ANSWER: {fit.result}"
         for one in fit.rivals:
             told = ", ".join(f"{name} {one.values[name]:.3g} {UNITS[name]}".rstrip() for name in RIVALLED)
-            yield f"{colour}: ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.chi2 - fit.chi2:+.1f}"
+            yield f"{colour}: ANOTHER MEDIUM FITS, TOO: {told}; chi-square {one.chi2 - fit.chi2:+.1f}"
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"

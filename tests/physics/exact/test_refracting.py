@@ -92,6 +92,7 @@ def test_more_nodes_change_nothing_under_other_surfaces(light, n):
     assert np.max(exact.error_estimate(RADII, ALPHAS, setting=Setting(light, n=n))) < 1e-7
 
 
+@pytest.mark.slow
 @each_light
 def test_a_surface_that_hardly_refracts_is_none(light):
     """The cone shares no code with the H functions of n = 1."""

@@ -63,6 +63,7 @@ def test_reflectance_goes_from_one_end_to_the_other():
     assert law.profile(0.3) == law.profile(0.3, 0.1)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("n", "thickness"), [(1.0, 0.1), *slow((1.4, 0.02), (1.4, 0.0), (1.4, 2.0), (1.4, np.inf))])
 def test_sampler_has_its_own_density_and_finds_all_the_light(n, thickness):
     law = stack(n)

@@ -286,11 +286,14 @@ def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
     monkeypatch.setattr(medium, "_descended", lambda shot, at: ends[at])
     fit = medium.fitted(replace(shot))
     assert (fit.x[0], fit.result, len(fit.rivals)) == (x[0], medium.RIVALLED, 1)
+    assert fit.rivals[0].chi2 - fit.chi2 < medium.RIVAL
+    ends[0] = Minimum(ends[0].parameters, np.append(rows, np.sqrt(medium.RIVAL)), slopes, 1, CONVERGED)
+    assert medium.fitted(replace(shot)).rivals == (), "negative control: a chance of 1 in 1000"
     seen = SimpleNamespace(
         shot=SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",)), plate=SQUARE, notes=(),
         cards=(1,), fits={"red": fit},
     )  # fmt: skip
-    assert any(line.startswith("red: ANOTHER MEDIUM FITS AS WELL: mu_s' 0.855 1/mm") for line in photo_lines(seen))
+    assert any(line.startswith("red: ANOTHER MEDIUM FITS, TOO: mu_s' 0.855 1/mm") for line in photo_lines(seen))
 
 
 def test_the_lowest_chi_square_is_kept_though_its_descent_did_not_end():

@@ -48,6 +48,7 @@ def test_all_that_fails_at_the_ends_of_albedos_has_a_cause():
     assert told >= {*((cause, MODEL) for cause in causes), ("less than its terms", TEXT32)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("albedos", "is_negative"), [((0.3, 0.9), False), ((0.9, 0.0), True)])
 def test_laws_in_python(albedos, is_negative):
     """One that `stack_law` fits is right everywhere; one that it does not is negative somewhere, for a cause."""

@@ -62,7 +62,8 @@ def test_giovanelli_at_n_1_5():
     assert not agrees(simulate(half_space(0.9, n=1.5), GRID, 2**18, progress=False).diffuse_reflectance, 0.2161120812)
 
 
-@pytest.mark.parametrize("n", [1.0, pytest.param(1.4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [1.0, 1.4])
 def test_orders_agree(n):
     tally, where = shone(half_space(0.8, n=n), 2**19), Setting("diffuse", n=n)
     orders = simulate_orders(GRID, 2**19, seed=4, setting=where, progress=False).energy(0.8)

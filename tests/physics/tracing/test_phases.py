@@ -42,6 +42,7 @@ def tally(phase, g=0.0, seed=1, photons=50_000, **given):
     return simulate(Medium(layers), GRID, photons, seed, **given)
 
 
+@pytest.mark.slow
 @PHOTONS
 def test_an_empty_term_changes_no_bit(photons):
     mixed = Mixture((1, 0), (ONE, HenyeyGreenstein(0.1)))

@@ -14,6 +14,7 @@ def errors(panel):
     return {(one.method, int(one.label)): one.error.value for one in panel.points}
 
 
+@pytest.mark.slow
 def test_shafts_over_samples():
     panel = sea.shafts(SMALL)
     found = errors(panel)

@@ -45,6 +45,7 @@ def test_scalar_rings_are_unions_of_even_ones():
     assert energy[0, -1] == pytest.approx(sum(range(first, last)))
 
 
+@pytest.mark.slow
 def test_order_resolved_error_is_what_it_states(sidak):
     """Each ring within its own error; with the error stated ten times too small some are not."""
     answer = truth.by_orders(MATCHED, 20_000)(1)

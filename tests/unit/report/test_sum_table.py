@@ -107,6 +107,7 @@ def test_the_caption_has_the_numbers_of_the_records():
     assert f"{100 * most:.3g} %" not in heart
 
 
+@pytest.mark.slow
 def test_the_figure_is_whole(tmp_path):
     files = sum_figure(Source(fits_folder()), tmp_path)
     assert [file.name for file in files] == ["gaussians-of-stacks.png", "gaussians-of-stacks.svg"]

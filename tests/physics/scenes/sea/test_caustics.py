@@ -11,7 +11,6 @@ from profilefit.scenes.sea.hits import first_hit
 from profilefit.scenes.sea.reference import adaptive_filter, caustic_photons, misfit, photons, sigma
 from profilefit.scenes.sea.truth import caustic_boxes
 from profilefit.scenes.sea.waves import SUN, Waves, random_floor, random_sea, refracted
-from tests.fixtures import slow
 
 TILE, DEPTH, N = 10.0, 5.0, 1.34
 STEP = 2.0 * np.pi / TILE
@@ -125,7 +124,8 @@ def test_errors_against_fragments(context):
     assert table[BEYOND, Splat.DERIVATIVES, 256][0].rms > 5.0
 
 
-@pytest.mark.parametrize("seed", [2, *slow(3, 4)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [2, 3, 4])
 def test_the_way_that_is_chosen_on_other_seas(context, seed):
     for f, vertices, most, rms in ((BEFORE, 256, 7e4, 0.008), (BEYOND, 192, 3e5, 0.025), (2.0, 160, 3e5, 0.1)):
         drawn = caustic_map(context, sea(f, seed), splat_for(f), vertices, SIDE, DEPTH)

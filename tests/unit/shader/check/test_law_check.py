@@ -87,6 +87,7 @@ def test_a_law_of_two_parts_passes_with_room(context, refracting):
     assert found.measured["rel"] == pytest.approx(found.model.values["rel"], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("old", "new", "broken"),
     [
