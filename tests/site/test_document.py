@@ -218,13 +218,9 @@ def test_damage_is_one_line_and_leaves_the_old_page(page, records, tmp_path):
         write_page(tmp_path / "file" / "report.html", records, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("scheme", "width"),
-    [
-        ("dark", 400),
-        *(pytest.param(*one, marks=pytest.mark.slow) for one in [("dark", 1400), ("light", 400), ("light", 1400)]),
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("width", [400, 1400])
+@pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_it_opens_without_a_complaint_and_nothing_is_clipped(open_page, page, width, scheme):
     window = open_page(page, width, color_scheme=scheme)
     window.evaluate("document.querySelectorAll('details').forEach((one) => { one.open = true; })")

@@ -85,6 +85,7 @@ def test_light_scattered_once(phase, illumination, photons):
     assert abs(seen.sum() - total) < 4 * np.sqrt(total * found.entered / found.photons)
 
 
+@pytest.mark.slow
 @BY_PHASE
 @PHOTONS
 def test_layers_and_orders_agree(phase, photons):

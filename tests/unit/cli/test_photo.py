@@ -150,6 +150,7 @@ def test_white_of_sixteen_bits_is_where_pixels_pile_up(tmp_path):
         assert read(tmp_path / f"{name}.tif").planes[0].range == white
 
 
+@pytest.mark.slow
 def test_a_colour_without_a_spot_is_left_out_and_each_has_its_dark_level(command, folder, tmp_path):
     """RGB of sixteen bits, blue dark; red and green of the same light on levels of their own."""
     levels = np.array([300, 600, 900], np.float32)

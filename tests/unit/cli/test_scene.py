@@ -17,6 +17,7 @@ from mcml_sim.files.text_file import read_toml
 from profilefit.errors import InputError
 from profilefit.scenes import SCENES
 from profilefit.shader import opened
+from tests.fixtures import slow
 
 EXAMPLES = Path(__file__).resolve().parents[3] / "examples"
 # What a file of each scene must have: all else may be left out.
@@ -51,7 +52,7 @@ def small(tmp_path):
     return path
 
 
-@pytest.mark.parametrize("name", SCENES)
+@pytest.mark.parametrize("name", [*slow("heart"), *(one for one in SCENES if one != "heart")])
 def test_the_example_says_what_is_taken_without_it(command, tmp_path, name):
     status, out, err = command("scene", name, "--example")
     assert (status, err) == (0, "")

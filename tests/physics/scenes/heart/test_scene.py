@@ -53,6 +53,7 @@ def test_a_mistake_is_one_line(place, value, message):
     assert text.isprintable()
 
 
+@pytest.mark.slow
 def test_what_is_left_out_is_as_the_example_has_it():
     found = scene.read("heart.toml", content())
     least = scene.read("heart.toml", {"scene": "heart", "layers": EXAMPLE["layers"]})
