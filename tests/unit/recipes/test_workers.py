@@ -84,7 +84,20 @@ def test_cores_are_those_that_this_process_may_use():
     assert 1 <= cores() <= os.cpu_count()
 
 
-@pytest.mark.skipif(not hasattr(os, "sched_getaffinity") or cores() < 2, reason="shares of two cores or more")
+@pytest.fixture
+def two_cores():
+    """Two cores or more, though a worker of the tests has one of its own."""
+    if not hasattr(os, "sched_setaffinity"):
+        pytest.skip("this system has no shares of cores")
+    own = os.sched_getaffinity(0)
+    os.sched_setaffinity(0, range(os.cpu_count()))
+    if cores() < 2:
+        pytest.skip("shares of two cores or more")
+    yield
+    os.sched_setaffinity(0, own)
+
+
+@pytest.mark.usefixtures("two_cores")
 def test_each_process_has_cores_of_its_own():
     with Workers(2) as workers:
         first, second = (found for _, found in workers.each(os.sched_getaffinity, [0, 0]))
