@@ -70,6 +70,7 @@ BRACKETED = re.compile(r"\[(?P<square>[^\[\]]*)\]|\((?P<round>[^()]*)\)")
 LONGEST_NAME = 6  # words; more are a sentence
 MOST_SHOWN = 5  # statements that a note names
 ACCEPTED = "r (or r_in and r_out) with value and sigma, or with value1, value2, value3, ..."
+ANGLES = ("angle", "theta", "scattering angle")  # columns of a phase function
 SMALLEST, LARGEST = 1e-100, 1e100  # of a number, whose squares and units are floats then
 LONGEST_SHOWN = 40  # characters of a cell in a message
 
@@ -241,7 +242,8 @@ def _header(path: Path, at: int, cells: tuple[str, ...], delimiter: str) -> _Hea
         if names.count(name) > 1:
             raise InputError(f"{path}:{at}: expected each column once, got {_shown(name)} {names.count(name)} times")
         if name not in NAMES and not REPLICATE.fullmatch(name):
-            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got the column {_shown(word)}")
+            hint = "; a phase function is fitted with `--kind phase`" if word in ANGLES else ""
+            raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got the column {_shown(word)}{hint}")
     missing = next(_missing(header), None)
     if missing:
         raise InputError(f"{path}:{at}: expected a header of {ACCEPTED}, got {missing}")

@@ -198,6 +198,7 @@ BAD = {
     "r,value1,value2\n": r":1: .*, got 2 replicates",
     "r,value,value1,value2,value3\n": r":1: .*, got replicates beside value or sigma",
     "1,2,3\n4,5,6\n": r":1: expected a header of r .*, got the column '1'",
+    "angle [deg],value\n1,2\n": r"got the column 'angle'; a phase function is fitted with `--kind phase`",
     "r,value,sigma\n1,2,.1\n2,1,.1\n": r": expected at least 3 rows under the header, got 2",
     GOOD + "4,0.05\n": r":5: expected 3 cells between commas, as the header has, got 2",
     GOOD.replace("0.2", "zero"): r":3: column value: expected a finite number, got 'zero'",
