@@ -180,7 +180,8 @@ class MediumFit:
     def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
         """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
 
-        values  those of the question's ranges, which may take up residuals as the free coordinates do
+        values  those of the question's ranges. These take up residuals as the free coordinates do, and hide a lack of
+                fit: its variance is then multiplied by the probability that there is one, of even odds before the data
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
         variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
