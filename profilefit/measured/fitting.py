@@ -180,14 +180,12 @@ class MediumFit:
     def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
         """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
 
-        values  those of the question's ranges. These take up residuals as the free coordinates do, and hide a lack of
-                fit: its variance is then multiplied by the probability that there is one, of even odds before the data
+        values  those of the question's ranges. These take up residuals as the free coordinates do, and so hide a lack
+                of fit: one that the residuals allow is then presumed
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
         variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
-        if values:
-            variances = variances * likelier / (1.0 + likelier)
-        elif likelier <= 1.0:
+        if not values and likelier <= 1.0:
             return None
         each = zip(variances, LACK_WAVES, strict=True)
         joint = sum(variance * law_error.rough_waves(self.data.r, length) for variance, length in each)
