@@ -72,7 +72,10 @@ def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
 
 
 def _filled(light: ExactLight) -> ExactLight:
-    """The same with as many intervals as where g = 0, so both share compiled code; what is added is f at its end."""
+    """Return the light with as many intervals as where g = 0, so that both share compiled code.
+
+    Those that are added hold f at its end.
+    """
     intervals = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
     with jax.enable_x64(True):
         end = light.rest[:, -1] @ jnp.power(light.step, jnp.arange(3.0, -1.0, -1.0))

@@ -185,7 +185,7 @@ class MediumFit:
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
         variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
-        if not values and likelier <= 1.0:
+        if likelier <= (-np.inf if values else 0.0):
             return None
         each = zip(variances, LACK_WAVES, strict=True)
         joint = sum(variance * law_error.rough_waves(self.data.r, length) for variance, length in each)

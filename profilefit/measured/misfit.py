@@ -34,7 +34,6 @@ LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
 # Relative errors d of a lack of fit that are tried, over that of a row: how many, the least, and the largest, or as
 # many times the root mean square of the residuals.
 SIZES, LEAST, MOST, TIMES = 20, 0.05, 20.0, 4.0
-MOST_LIKELIER = 100.0  # ln of a ratio of likelihoods, beyond which its size is of no interest
 
 
 @dataclass(frozen=True)
@@ -109,15 +108,15 @@ def lack_of_fit(
     """Estimate the relative variances (k,) of errors of these shapes (k, m, m), of which the residuals show the sum.
 
     The prior is flat in ln d and among the shapes; a variance is the posterior's mean of d^2 times the shape's share.
-    Arguments are those of `misfit`. The second value is how many times likelier z is with such errors, over the prior,
-    than without any; zeros where there is nothing to estimate.
+    Arguments are those of `misfit`. The second value is ln of how many times likelier z is with such errors, over the
+    prior, than without any; -inf where there is nothing to estimate.
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     root = np.linalg.cholesky(np.eye(free.shape[1]) + free.T @ law @ free)
     z = np.linalg.solve(root, free.T @ residuals)
     own = np.diag(shapes[0])
     if not (z.size and np.any(own > 0) and np.isfinite(z @ z)):
-        return np.zeros(len(shapes)), 0.0
+        return np.zeros(len(shapes)), -np.inf
     d = np.median(own[own > 0]) ** -0.5 * np.geomspace(LEAST, max(MOST, TIMES * float(np.sqrt(z @ z / z.size))), SIZES)
     gain = np.zeros((len(shapes), SIZES))
     for at, shape in enumerate(shapes):
@@ -128,8 +127,7 @@ def lack_of_fit(
         gain[at] -= 0.5 * np.sum(np.log(growth), axis=1) + likelihood(z @ z, z.size, pooled)
     top = float(gain.max())
     share = np.exp(gain - top)
-    variances = np.asarray(share / share.sum() @ d**2, float)
-    return variances, float(np.exp(min(top, MOST_LIKELIER)) * share.mean())
+    return np.asarray(share / share.sum() @ d**2, float), top + float(np.log(share.mean()))
 
 
 def scatter_chance(square: float, freedom: int, pooled: float) -> float:

@@ -78,9 +78,9 @@ def test_a_lack_of_fit_is_likelier_than_none_where_there_is_one(noise):
         residuals = rows - rows @ np.linalg.pinv(JACOBIAN).T @ JACOBIAN.T
         return [lack_of_fit(one, JACOBIAN, NONE, SHAPE[None]) for one in residuals]
 
-    ratios = np.array([likelier for _, likelier in estimates(noise)])
+    ratios = np.exp([likelier for _, likelier in estimates(noise)])
     assert np.mean(ratios > 10.0) < 0.1 + 3.0 * np.sqrt(0.1 * 0.9 / SETS)
     assert np.median(ratios) < 1.0
     waved = estimates(noise[:40] + 3.0 * np.sin(2.0 * np.log(R)))
-    assert np.median([likelier for _, likelier in waved]) > 1e6
+    assert np.median([likelier for _, likelier in waved]) > np.log(1e6)
     assert np.sqrt(np.median([variances[0] for variances, _ in waved])) == pytest.approx(0.042, rel=0.5)

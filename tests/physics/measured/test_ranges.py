@@ -136,7 +136,7 @@ def test_open_ranges_hold_media_that_a_misfit_hides_in(at):
 
 @pytest.mark.slow
 def test_ranges_of_data_without_absorption_leave_the_limit():
-    """Light brighter than any medium's: the albedo runs to 1 at every g, and the darkest light of the range is best."""
+    """Light brighter than any medium's: the albedo runs to 1 at every g."""
     white = own_data.Medium(Setting(n=1.4, g=0.8), 1.0 - 1e-9, 1.0, 0.005)
     data = own_data.rows(white, np.random.default_rng(4))
     data = replace(data, value=1.15 * data.value * (data.r / data.r[0]) ** 0.1)

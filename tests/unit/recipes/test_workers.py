@@ -91,10 +91,12 @@ def two_cores():
         pytest.skip("this system has no shares of cores")
     own = os.sched_getaffinity(0)
     os.sched_setaffinity(0, range(os.cpu_count()))
-    if cores() < 2:
-        pytest.skip("shares of two cores or more")
-    yield
-    os.sched_setaffinity(0, own)
+    try:
+        if cores() < 2:
+            pytest.skip("shares of two cores or more")
+        yield
+    finally:
+        os.sched_setaffinity(0, own)
 
 
 @pytest.mark.usefixtures("two_cores")
