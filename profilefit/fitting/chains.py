@@ -43,7 +43,7 @@ KEPT = 1000
 Moves = Sequence[tuple[emcee.moves.Move, float]]
 
 
-# Differential evolution with snooker steps: a third of the evaluations of stretches (`benchmarks.moves`).
+# Differential evolution with snooker steps: a third of the evaluations of stretches.
 EVOLUTION: Moves = ((emcee.moves.DEMove(), 0.8), (emcee.moves.DESnookerMove(), 0.2))
 # Degrees of freedom of Student's t: tails beyond a normal's, so that no walker stays for ever where few proposals fall,
 # and so few that forty constants still accept every other draw.

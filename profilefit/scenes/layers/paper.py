@@ -53,11 +53,6 @@ class Corrections:
         """Their names."""
         return tuple(field.name for field in fields(cls))
 
-    @classmethod
-    def of_sum(cls) -> tuple[str, ...]:
-        """Those of single scattering, all but the dipole's."""
-        return tuple(name for name in cls.switches() if name != "dipole_sign")
-
 
 CORRECTED = Corrections()
 PRINTED = Corrections(*(False for _ in fields(Corrections)))

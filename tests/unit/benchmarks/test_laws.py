@@ -1,12 +1,17 @@
-"""The tables of costs and errors."""
+"""The tables of costs and errors, and the command that prints them."""
+
+import json
 
 import numpy as np
+import pytest
 
 import profilefit
 from benchmarks import laws
 from profilefit.studies.tradeoff import contenders
-from profilefit.studies.tradeoff.laws import PARTS, ContenderResult, counts
+from profilefit.studies.tradeoff.laws import PARTS, ContenderResult, LawSizes, counts
 from profilefit.studies.tradeoff.stopwatch import Ratio
+
+SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 
 
 def test_many_functions_are_summed():
@@ -15,3 +20,26 @@ def test_many_functions_are_summed():
     row = ContenderResult(dipole, counts(dipole), {}, ratios, None, np.array([0.1]), np.array([0.2]))
     assert laws.as_cells(row)[1:4] == ("0", "2 exp, 2 sqrt", "162 in all")
     assert laws.as_errors(row) == ("dipole", "0.1", "0.1", "0.2", "0.2")
+
+
+@pytest.mark.slow
+def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
+    wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
+    absent = contenders.Wanted("absent", "gaussians", "no-such-set")
+    monkeypatch.setattr(contenders, "WANTED", (*(w for w in contenders.WANTED if w[0] in wanted), absent))
+    monkeypatch.setattr(laws, "QUICK", SMALL)
+    numbers = tmp_path / "numbers.json"
+    laws.main(["--quick", "--json", str(numbers)])
+
+    printed = capsys.readouterr().out
+    assert "11 + 7" in printed
+    assert "left out: absent: constants must be" in printed
+    content = json.loads(numbers.read_text())
+    assert set(content) == wanted | {f"{contenders.YARDSTICK}, Xie's sampler", "hazard, two steps"}
+    assert content[contenders.YARDSTICK]["time_ratio"]["both"] == [1.0, 1.0, 1.0]
+    hazard = content["hazard"]
+    assert hazard["constants"] == 14
+    assert hazard["functions"]["both"] == {"exp": 1, "log": 4}
+    assert hazard["setup_nanoseconds"] > 0
+    assert hazard["rel"]["worst"] < 0.01 < 0.05 < content["Liang, corrected"]["rel"]["worst"]
+    assert "profile" not in content["hazard, two steps"]["time_ratio"]
