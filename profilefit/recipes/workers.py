@@ -3,7 +3,7 @@
 They are spawned, since the threads of JAX do not survive a fork, and nothing here imports JAX, so that all of them
 start at once. Each has its own share of the cores, where the system allows that: XLA and BLAS start a thread for each
 core that they see, and more threads than cores take a tenth more time. What XLA compiles for one process serves all.
-What a job warns of is warned of where it was asked for.
+Warnings of a job are issued again in the process that asked for it.
 """
 
 from __future__ import annotations
@@ -12,15 +12,17 @@ import os
 import signal
 import tempfile
 import threading
-import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
-from functools import partial
-from multiprocessing import get_context, parent_process
-from multiprocessing.connection import Connection, wait
+from itertools import islice
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.queues import SimpleQueue
 from types import TracebackType
-from typing import Any, Self, TypeVar, cast
+from typing import Any, Self, TypeVar
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"  # read by JAX when a process starts
 SHARED = {  # programs worth keeping: of any size, that took some time
@@ -32,66 +34,63 @@ Done = TypeVar("Done")
 
 
 def cores() -> int:
-    """How many cores this process may use."""
+    """Return how many cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def _shares(processes: int) -> list[list[int]]:
-    """Numbers of the cores that each process may use. Lists are empty where cores are too few or cannot be chosen."""
-    known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
-    return [known[number::processes] if len(known) >= processes else [] for number in range(processes)]
-
-
 class Workers:
-    """So many processes; jobs are done here if that is one.
+    """Pool of processes; with fewer than two, jobs are done in this process.
 
-    Leaving ends them at once, whatever they are at; what they write must be whole or absent whenever that is.
+    Leaving ends the processes at once, whatever they do: what they write must be whole or absent at any moment.
     """
 
     def __init__(self, processes: int) -> None:
         self._processes = processes if processes > 1 else 0
 
     def __enter__(self) -> Self:
-        context, self._left = get_context("spawn"), ExitStack()
+        self._left = ExitStack()
         if self._processes:
+            context = get_context("spawn")
+            watched, held = context.Pipe(duplex=False)
+            shares = context.SimpleQueue()
+            known = sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else []
+            for number in range(self._processes):
+                shares.put(known[number :: self._processes] if len(known) >= self._processes else [])
             self._left.enter_context(_sharing_programs())
-        pairs = [context.Pipe() for _ in range(self._processes)]
-        self._pipes = [ours for ours, _ in pairs]
-        self._started = [
-            context.Process(target=_work, args=(theirs, share), daemon=True)
-            for (_, theirs), share in zip(pairs, _shares(self._processes), strict=True)
-        ]
-        for process, (_, theirs) in zip(self._started, pairs, strict=True):
-            process.start()
-            theirs.close()  # or the end of a process would not be seen
+            self._pool = ProcessPoolExecutor(self._processes, context, _begin, (watched, shares))
+            self._left.callback(self._pool.shutdown, cancel_futures=True)
+            self._left.callback(held.close)  # first of all: by this the processes end
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
-        for process, pipe in zip(self._started, self._pipes, strict=True):
-            process.kill()
-            process.join()
-            pipe.close()
         self._left.close()
 
     def each(self, task: Callable[[Job], Done], jobs: Sequence[Job]) -> Iterator[tuple[int, Done]]:
-        """The number of each job and what `task` makes of it, as they come; jobs begin in their order.
+        """Yield the number of each job and what `task` makes of it, as they come; jobs begin in their order.
 
-        An error of a job rises here; ChildProcessError if a process was ended from outside.
+        An error of a job is raised here; ChildProcessError if a process was ended from outside.
         """
-        if not self._pipes:
+        if not self._processes:
             yield from ((number, task(job)) for number, job in enumerate(jobs))
             return
-        left, idle, at_work = list(enumerate(jobs)), list(self._pipes), dict[Any, int]()
-        while left or at_work:
-            while left and idle:
-                number, job = left.pop(0)
-                at_work[pipe := idle.pop(0)] = number
-                with suppress(BrokenPipeError):  # it has ended, as the next lines will see
-                    pipe.send(partial(task, job))
-            for ready in wait(list(at_work)):
-                number, pipe = at_work.pop(ready), cast("Connection", ready)
-                idle.append(pipe)
-                yield number, _received(pipe)
+        waiting, running = enumerate(jobs), dict[Future[tuple[Done, list[Warning | str]]], int]()
+        try:
+            while True:
+                # No more at once than processes: a job that is being written into a pipe which nobody reads any more
+                # would hold up the end, before Python 3.11.5.
+                for number, job in islice(waiting, self._processes - len(running)):
+                    running[self._pool.submit(_done, task, job)] = number
+                if not running:
+                    return
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    number = running.pop(future)
+                    result, warned = future.result()
+                    for warning in warned:
+                        warnings.warn(warning, stacklevel=2)
+                    yield number, result
+        except BrokenProcessPool:
+            reason = "a process that fitted was ended from outside, for want of memory, say"
+            raise ChildProcessError(reason) from None
 
 
 @contextmanager
@@ -110,44 +109,24 @@ def _sharing_programs() -> Iterator[None]:
                 os.environ.pop(name, None) if value is None else os.environ.update({name: value})
 
 
-def _received(pipe: Connection) -> Any:
-    try:
-        result, error, warned = pipe.recv()
-    except (EOFError, ConnectionResetError):
-        raise ChildProcessError("a process that fitted was ended from outside, for want of memory, say") from None
-    for one in warned:
-        warnings.warn(one, stacklevel=3)
-    if error is not None:
-        raise error
-    return result
-
-
-def _work(pipe: Connection, own: list[int]) -> None:
-    """Do jobs until nobody asks for one any more."""
-    if own:
+def _begin(watched: Connection, shares: SimpleQueue[list[int]]) -> None:
+    """Take one share of the cores, ignore Ctrl-C, which is for the process that started this, and end with that."""
+    if share := shares.get():
         with suppress(OSError):  # a sandbox may forbid it; then all share all cores
-            os.sched_setaffinity(0, own)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is for the one that started this
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    with suppress(EOFError, BrokenPipeError):
-        while True:
-            pipe.send(_done(pipe.recv()))
+            os.sched_setaffinity(0, share)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with, args=(watched,), daemon=True).start()
 
 
-def _done(job: Callable[[], Any]) -> tuple[Any, Exception | None, list[Warning | str]]:
-    """What a job gives, what went wrong, and what it warned of."""
-    with warnings.catch_warnings(record=True) as found:
+def _end_with(watched: Connection) -> None:
+    """End this process when the other end of the pipe is closed, as it also is where its holder was killed."""
+    with suppress(EOFError, OSError):
+        watched.recv()
+    os._exit(1)
+
+
+def _done(task: Callable[[Any], Any], job: Any) -> tuple[Any, list[Warning | str]]:
+    """Return what a task makes of a job, and its warnings."""
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        try:
-            result, error = job(), None
-        except Exception as raised:
-            raised.add_note(traceback.format_exc())  # the traceback itself stays here
-            result, error = None, raised
-    return result, error, [one.message for one in found]
-
-
-def _end_with_parent() -> None:
-    """Whoever started this may have been killed, and could not say so."""
-    if (parent := parent_process()) is not None:
-        parent.join()
-        os._exit(1)
+        return task(job), [warning.message for warning in caught]

@@ -1,6 +1,7 @@
 """Processes side by side: what they give, what they say, and that none is left behind."""
 
 import math
+import multiprocessing
 import operator
 import os
 import signal
@@ -14,16 +15,22 @@ import pytest
 from profilefit.recipes.workers import Workers, cores
 from tests.fixtures import slow
 
-# Starts two processes that would sleep for a minute, says who they are, and waits for them.
+# Starts two processes that would sleep for a minute, prints their numbers, and waits for them.
 SLEEPERS = """
-import signal, time
+import multiprocessing, signal, time
 from profilefit.recipes.workers import Workers
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.default_int_handler)  # which a shell's & has ignored
     with Workers(2) as workers:
-        print(*(process.pid for process in workers._started), flush=True)
-        list(workers.each(time.sleep, [0.01, 0.01, 60, 60]))
+        begun = workers.each(time.sleep, [0.01, 0.01, 60, 60])
+        next(begun)
+        print(*(process.pid for process in multiprocessing.active_children()), flush=True)
+        list(begun)
 """
+
+
+# Sleeps, so that no process does two of two jobs, and gives the number of its process.
+NUMBER = "__import__('time').sleep(0.2) or __import__('os').getpid()"
 
 
 @pytest.mark.parametrize("processes", [0, 1, 2, 3])
@@ -32,8 +39,11 @@ def test_every_job_is_done_once_whatever_the_processes(processes):
         assert dict(workers.each(math.factorial, range(8))) == dict(enumerate(map(math.factorial, range(8))))
         assert list(workers.each(operator.neg, [5])) == [(0, -5)]
         assert list(workers.each(operator.neg, [])) == []
-        assert len(workers._started) == (processes if processes > 1 else 0)
-    assert not any(process.is_alive() for process in workers._started)
+        numbers = {number for _, number in workers.each(eval, [NUMBER] * 2 * processes)}
+        assert len(numbers) == processes
+        assert (os.getpid() in numbers) == (processes == 1)
+    assert not any(map(_is_alive, numbers - {os.getpid()}))
+    assert not multiprocessing.active_children()
 
 
 @pytest.mark.parametrize("processes", [1, 2])
@@ -43,7 +53,7 @@ def test_errors_and_warnings_come_here(processes):
             list(workers.each(warnings.warn, ["from a job"]))
         with pytest.raises(OverflowError, match="math range error"):
             list(workers.each(math.exp, [1.0, 1e9, 2.0]))
-    assert not any(process.is_alive() for process in workers._started)
+    assert not multiprocessing.active_children()
 
 
 def test_a_process_that_is_ended_from_outside_is_missed():
