@@ -5,17 +5,12 @@ The first screen says what a command is for, how it is used, its subcommands by 
 
 from __future__ import annotations
 
-import _thread
-import contextlib
 import inspect
 import os
-import signal
 import sys
-import threading
-import time
 import traceback
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
@@ -94,7 +89,6 @@ def add_version(app: typer.Typer, package: str) -> None:
 ANSWERS = (0, 1)
 BAD_INPUT = 2
 FAULT = 70  # exit status, EX_SOFTWARE of sysexits.h: of what should not have happened
-AGAIN = 0.05  # [s] until a Ctrl-C that was lost comes again
 LONGEST, KEPT_END = 2000, 500  # characters of a message, and of them those at its end, where the advice stands
 NOBODY_READS = 141  # exit status, as a shell reports any program that SIGPIPE ended: 128 + 13
 
@@ -143,9 +137,7 @@ class Program:
             warnings.filterwarnings("error", category=RuntimeWarning)  # of arithmetic: such numbers make no answer
             warnings.simplefilter("always", Notice)
             warnings.showwarning = lambda message, *_: found.append(message)
-            with _lost_interrupts() as lost:
-                status = self._status()
-            status = INTERRUPTED if lost else status
+            status = self._status()
             if status == INTERRUPTED:
                 self.say(self.stopped())
             # Warnings of libraries are not shown; and an error is one line.
@@ -195,39 +187,6 @@ class Program:
             )
             return FAULT
         return BAD_INPUT
-
-
-@contextlib.contextmanager
-def _lost_interrupts() -> Iterator[list[bool]]:
-    """An item for each Ctrl-C that Python dropped, which comes again.
-
-    That is one that falls into a callback of the garbage collector, as jax has one, or into __del__: nothing can be
-    raised from there.
-    """
-    lost: list[bool] = []
-    at_work, here = True, threading.get_ident()
-    before = sys.unraisablehook
-
-    def again() -> None:
-        time.sleep(AGAIN)
-        if at_work and hasattr(signal, "pthread_kill"):
-            signal.pthread_kill(here, signal.SIGINT)  # ends a wait, too
-        elif at_work:
-            _thread.interrupt_main()
-
-    def hook(raised: sys.UnraisableHookArgs) -> None:
-        if not issubclass(raised.exc_type, KeyboardInterrupt):
-            before(raised)
-            return
-        lost.append(True)
-        _thread.start_new_thread(again, ())  # threading's locks may be held by what the collector interrupted
-
-    sys.unraisablehook = hook
-    try:
-        yield lost
-    finally:
-        at_work = False
-        sys.unraisablehook = before
 
 
 def _let_go_of_stdout() -> None:

@@ -13,14 +13,12 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.exact import table, tables, transform
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS, Setting, is_traced
-
-Floats = NDArray[np.float64]
 
 Kernel = Callable[[Transform, jax.Array, jax.Array], jax.Array]
 """(transform, alpha, x) -> the quantity wanted, at radii or shares x of any shape, of one albedo."""

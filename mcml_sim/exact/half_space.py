@@ -8,17 +8,17 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError, SettingError
 from mcml_sim.exact import dispersion, hankel
 from mcml_sim.exact.anisotropic import functions as forwards
 from mcml_sim.exact.by_albedo import Surface, by_alpha, elementwise, surface, total
 from mcml_sim.exact.transform import STANDARD, Transform
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, require_one_shape, require_own_process
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting, is_traced
 
-Floats = NDArray[np.float64]
 Numbers = ArrayLike | jax.Array
 
 SEARCHLIGHT = Setting()

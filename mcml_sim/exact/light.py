@@ -21,13 +21,12 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array
-from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
 from mcml_sim.exact import single_scattering
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 
-Floats = NDArray[np.float64]
 STEP = 0.06  # of ln x, of D_1
 SINGLE_NEAREST, SINGLE_FARTHEST = 1e-7, 1e5  # mfp
 LEAST = 1e-3  # albedo below which f no longer changes

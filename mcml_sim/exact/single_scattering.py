@@ -27,14 +27,14 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim.media import fresnel
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.phase import Phase
 from mcml_sim.media.setting import Setting
 
-Floats = NDArray[np.float64]
 SEARCHLIGHT = Setting()
 
 # f(k) is analytic in ln(k - k_c) within an angle of pi/2 of the real axis, so the step leaves an error of

@@ -20,10 +20,9 @@ from functools import lru_cache, partial
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import digamma, gammaln, k0e, k1e
 
-Floats = NDArray[np.float64]
+from mcml_sim.media.arrays import Floats
 
 # Where the series, which cancels ever more, and the partial fractions, which need ever fewer terms, are both good to
 # 5e-14.

@@ -28,9 +28,9 @@ from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[Any]
 
 KAPPAS = np.array([1.0, 0.88, 0.72, 0.55, 0.4, 0.28, 0.19, 0.12, 0.06, 0.0])  # decay rates between the groups

@@ -13,11 +13,11 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.exact.table import Complexes, Table, made, shapes
 from mcml_sim.exact.transform import Rule
 from mcml_sim.files.kept import kept
+from mcml_sim.media.arrays import Floats
 
 LEAST = 1.0 + 1e-9  # n of the least surface that refracts
 VERSION = 2  # of what `table.made` puts into a table
@@ -57,6 +57,6 @@ def _called(n: jax.Array, rule: Rule, slope: bool) -> Table:
     return jax.tree.map(jnp.asarray, found(n))
 
 
-def _reals(part: Complexes) -> NDArray[np.float64]:
+def _reals(part: Complexes) -> Floats:
     """Real and imaginary parts along one more axis."""
     return np.ascontiguousarray(part, dtype=complex)[..., None].view(float)

@@ -30,12 +30,10 @@ from typing import NamedTuple
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.exact.dispersion import dispersion, squared_decay_rate
 from mcml_sim.exact.special_functions import inverse_sinh, logarithm, sinh_and_cosh, square_root
-
-Floats = NDArray[np.float64]
+from mcml_sim.media.arrays import Floats
 
 # Closer to the source than this the profile is its own limit, alpha / (4 pi r), to 1e-5 [mfp].
 NEAREST_RADIUS = 1e-6

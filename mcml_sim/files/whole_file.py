@@ -21,7 +21,7 @@ import shutil
 import stat
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 
 from mcml_sim.errors import InputError, OutputError
@@ -31,17 +31,22 @@ NAME_KEPT = 30  # characters of its name in that name: file systems hold 255 byt
 LONGEST_CHAIN = 40  # links, as in Linux
 ROOM = 2**22  # bytes that a disk must have free before work begins: a command's numbers and figures are smaller
 MEGABYTE = 1e6
+REFUSED = {
+    stat.S_ISDIR: "it is a folder",
+    stat.S_ISBLK: "it is a disk, not a file",
+    stat.S_ISSOCK: "it is a socket, not a file",
+}
 
 
 def checked_path(path: object) -> Path:
-    """The path of that name; InputError on what is none."""
+    """Return the path of that name; InputError on what is none."""
     if isinstance(path, (str, os.PathLike)):
         return Path(path)
     raise InputError(f"path must be the name of a file, got {reprlib.repr(path)}")
 
 
 def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
-    """A file's bytes, and no more than `most` + 1 of them: one that is longer is not read to its end.
+    """Return the bytes of a file, at most `most` + 1 of them: a longer file is not read to its end.
 
     InputError names the file and why it cannot be read.
     """
@@ -54,16 +59,18 @@ def read_whole(path: str | os.PathLike[str], most: int) -> bytes:
 
 
 def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = True) -> None:
-    """Raise OutputError unless files can be made in `folder`: better now than after an hour of photons.
+    """Raise OutputError unless files can be made in a folder: better now than after an hour of photons.
 
-    files  names in the folder that must be free, or of what can be replaced
-    room   bytes that its disk must have free
-    make   whether to make the folder; else the nearest folder above that exists is looked at
+    Args:
+        folder: where they would be made.
+        files: names in the folder that must be free, or of what can be replaced.
+        room: bytes that its disk must have free.
+        make: whether to make the folder; else the nearest folder above that exists is looked at.
     """
     try:
         if make:
             folder.mkdir(parents=True, exist_ok=True)
-        place = next(one for one in (folder, *folder.absolute().parents) if os.path.lexists(one))
+        place = next(path for path in (folder, *folder.absolute().parents) if os.path.lexists(path))
         with tempfile.TemporaryFile(dir=place):
             pass
         disk = shutil.disk_usage(place)
@@ -71,19 +78,19 @@ def require_folder(folder: Path, *files: str, room: float = ROOM, make: bool = T
             got = f"{disk.free / MEGABYTE:.1f} MB are free, {room / MEGABYTE:.0f} MB may be needed"
             raise OSError(errno.ENOSPC, f"{os.strerror(errno.ENOSPC)}: {got}")
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot write into {folder}: {_reason(error)}") from None
+        raise OutputError(f"cannot write into {folder}: {reason_of(error)}") from None
     for name in files:
         require_target(folder / name)
 
 
 def require_target(path: Path) -> None:
-    """OutputError if what has that name already cannot be replaced or written into; makes nothing."""
+    """Raise OutputError if what has that name already cannot be replaced or written into; make nothing."""
     with _named(path):
         _target(path)
 
 
 def require_writable(path: Path, room: float = ROOM) -> None:
-    """OutputError unless `write_whole(path)` can work, as far as can be known before. Makes its folder."""
+    """Make the folder of a file; OutputError unless `write_whole(path)` can work, as far as can be known before."""
     with _named(path):
         target = _target(path)
     if target is not None:
@@ -132,7 +139,7 @@ def write_together(contents: Mapping[Path, bytes | str]) -> None:
 
 
 def _target(path: Path) -> Path | None:
-    """The file to be replaced, where links lead; None for what is written into. OSError if it can be neither."""
+    """Return the file to be replaced, where links lead; None for what is written into. OSError if it can be neither."""
     if _stream(path) is not None:
         return None
     target = Path(os.path.realpath(path))
@@ -140,12 +147,8 @@ def _target(path: Path) -> Path | None:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
         return target
-    for is_it, refused in (
-        (stat.S_ISDIR, "it is a folder"),
-        (stat.S_ISBLK, "it is a disk, not a file"),
-        (stat.S_ISSOCK, "it is a socket, not a file"),
-    ):
-        if is_it(mode):
+    for is_kind, refused in REFUSED.items():
+        if is_kind(mode):
             raise OSError(errno.EEXIST, refused)
     if not os.access(path, os.W_OK):
         raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
@@ -153,7 +156,7 @@ def _target(path: Path) -> Path | None:
 
 
 def _stream(path: Path) -> int | None:
-    """The open file descriptor that a path such as /dev/stdout or /dev/fd/3 stands for.
+    """Return the open file descriptor that a path such as /dev/stdout or /dev/fd/3 stands for.
 
     What it is open on may be a file. To replace that would part it from whoever writes to the same stream.
     """
@@ -168,60 +171,45 @@ def _stream(path: Path) -> int | None:
 
 
 def _pour(path: Path, data: bytes) -> None:
-    """Write into what is no regular file."""
+    """Write into an open stream, a device, or a pipe that somebody reads from; no reader is waited for."""
     if (stream := _stream(path)) is not None:
         if sys.stdout:
             sys.stdout.flush()  # what was printed before stands before
         handle = os.dup(stream)
     else:
-        handle = _opened(path)
+        try:
+            handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
+        except OSError as error:
+            if error.errno == errno.ENXIO:
+                raise OSError(errno.ENXIO, "it is a pipe that nobody reads from") from None
+            raise
+        if sys.platform != "win32":
+            os.set_blocking(handle, True)
     with open(handle, "wb") as file:
         file.write(data)
 
 
-def _opened(path: Path) -> int:
-    """A device, or a pipe that somebody reads from; neither is waited for."""
-    try:
-        handle = os.open(path, os.O_WRONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0))
-    except OSError as error:
-        if error.errno == errno.ENXIO:
-            raise OSError(errno.ENXIO, "it is a pipe that nobody reads from") from None
-        raise
-    if stat.S_ISREG(os.fstat(handle).st_mode):
-        os.close(handle)
-        raise OSError(errno.EEXIST, "somebody put a file in its place just now")
-    if sys.platform != "win32":
-        os.set_blocking(handle, True)
-    return handle
-
-
 def _beside(target: Path) -> Path:
-    """A name that no file has, in the same folder."""
+    """Return a name that no file has, in the same folder."""
     return target.with_name(f".{target.name[:NAME_KEPT]}.{secrets.token_hex(4)}{UNFINISHED}")
 
 
 def _fill(part: Path, data: bytes, target: Path) -> None:
-    """Make the file that is to replace `target`, with the mode and the owner that it keeps, and see it on the disk."""
+    """Make the file that is to replace `target`, with its mode and its owner, and see it on the disk."""
     with part.open("xb") as file:  # x: never through a link that somebody put there
         with contextlib.suppress(FileNotFoundError):
             before = target.stat()
-            _own(part, before)
+            for owner in (before.st_uid, -1) if sys.platform != "win32" else ():
+                with contextlib.suppress(OSError):  # the group at least, where the system allows it
+                    os.chown(part, owner, before.st_gid)
+                    break
             part.chmod(stat.S_IMODE(before.st_mode) & 0o777)
         file.write(data)
         file.flush()
         os.fsync(file.fileno())
 
 
-def _own(part: Path, before: os.stat_result) -> None:
-    """Keep owner and group, or at least the group, where the system allows it."""
-    if sys.platform != "win32":
-        for owner in (before.st_uid, -1):
-            with contextlib.suppress(OSError):
-                os.chown(part, owner, before.st_gid)
-                return
-
-
-def _exchange(files: Mapping[Path, tuple[Path, Path]], leftovers: list[Path]) -> None:
+def _exchange(files: dict[Path, tuple[Path, Path]], leftovers: list[Path]) -> None:
     """Give files the names of their targets: all or none. What had these names before is added to `leftovers`.
 
     One file is replaced at once. Of several the old ones are first moved aside, the last one before all others.
@@ -229,42 +217,39 @@ def _exchange(files: Mapping[Path, tuple[Path, Path]], leftovers: list[Path]) ->
     aside: dict[Path, Path] = {}
     placed: list[Path] = []
     try:
-        if len(files) > 1:
-            for target, (path, _) in reversed(list(files.items())):
-                if target.exists():
-                    aside[target] = _beside(target)
-                    with _named(path):
-                        target.rename(aside[target])
+        for target, (path, _) in reversed(files.items()) if len(files) > 1 else ():
+            if target.exists():
+                aside[target] = _beside(target)
+                with _named(path):
+                    target.rename(aside[target])
         for target, (path, part) in files.items():
             placed.append(target)
             with _named(path):
                 os.replace(part, target)
         leftovers.extend(aside.values())
     except BaseException:
-        if len(files) > 1:
-            for target in reversed(placed):
-                with contextlib.suppress(OSError):
-                    target.unlink()
-        for target, before in reversed(list(aside.items())):
+        _remove(placed[::-1] if len(files) > 1 else [])
+        for target, before in reversed(aside.items()):
             with contextlib.suppress(OSError):
                 before.replace(target)
         raise
 
 
-def _remove(leftovers: list[Path]) -> None:
-    for one in leftovers:
+def _remove(paths: Iterable[Path]) -> None:
+    for path in paths:
         with contextlib.suppress(OSError):  # renamed, or the folder is gone: then the error on its way up says so
-            one.unlink()
+            path.unlink()
 
 
 @contextlib.contextmanager
 def _named(path: Path) -> Iterator[None]:
-    """What the system says of a file, as an OutputError in one line."""
+    """Turn what the system reports of a file into an OutputError in one line."""
     try:
         yield
     except (OSError, ValueError) as error:
-        raise OutputError(f"cannot write {path}: {_reason(error)}") from None
+        raise OutputError(f"cannot write {path}: {reason_of(error)}") from None
 
 
-def _reason(error: Exception) -> str:
+def reason_of(error: Exception) -> str:
+    """Return what went wrong with a file, in one line."""
     return (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]

@@ -10,9 +10,9 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.errors import ForkError, InputError
+from mcml_sim.media.arrays import Floats
 
 MAX_PHOTONS = 10**13  # weeks on the largest machines; more is a slip of the pen
 MAX_WORKERS = 4096
@@ -38,7 +38,7 @@ def is_number(value: object) -> TypeGuard[float]:
     return isinstance(value, (float, np.integer, np.floating)) and not math.isnan(value)
 
 
-def checked_numbers(name: str, value: object, accepted: str) -> NDArray[np.float64]:
+def checked_numbers(name: str, value: object, accepted: str) -> Floats:
     """Real numbers as float64, of any shape; `accepted` says what they are.
 
     InputError on text, complex numbers, other objects, ragged lists and what is masked: none is silently made a number.

@@ -7,9 +7,10 @@ import operator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError
+from mcml_sim.media.arrays import Floats
 
 MAX_BINS = 65_536  # along one axis
 # Float32 places are 1.2e-7 of themselves apart; this much of its photons (1 %) a bin may gain or lose by that.
@@ -29,11 +30,11 @@ class Grid:
     A bin holds lower edge <= x < upper edge. Grids with equal edges are equal. InputError on anything else.
     """
 
-    r_edges: NDArray[np.float64]
+    r_edges: Floats
     """Edges of the rings [length], float64 (rings + 1,), read-only."""
-    z_edges: NDArray[np.float64] | None
+    z_edges: Floats | None
     """Edges of the depths [length], float64 (depths + 1,), read-only; None if depth is not resolved."""
-    a_edges: NDArray[np.float64] | None
+    a_edges: Floats | None
     """Edges of the exit angles to the surface's normal [rad], float64 (na + 1,), 0 ... pi/2; None if not resolved."""
 
     def __init__(
@@ -68,20 +69,20 @@ class Grid:
         return 0 if self.a_edges is None else len(self.a_edges) - 1
 
     @property
-    def r_areas(self) -> NDArray[np.float64]:
+    def r_areas(self) -> Floats:
         """Areas of the rings [length^2], float64 (rings,)."""
         lower, upper = self.r_edges[:-1], self.r_edges[1:]
         return np.pi * (upper - lower) * (upper + lower)
 
     @property
-    def z_widths(self) -> NDArray[np.float64]:
+    def z_widths(self) -> Floats:
         """Widths of the depth bins [length], float64 (depths,)."""
         if self.z_edges is None:
             raise InputError("this grid resolves no depths, give it dz and nz")
         return np.diff(self.z_edges)
 
     @property
-    def solid_angles(self) -> NDArray[np.float64]:
+    def solid_angles(self) -> Floats:
         """Solid angles of the angle bins, 2 pi (cos lower - cos upper) [sr], float64 (angles,)."""
         if self.a_edges is None:
             raise InputError("this grid resolves no angles, give it na")
@@ -110,9 +111,9 @@ class Grid:
 
     def _set_edges(
         self,
-        r_edges: NDArray[np.float64],
-        z_edges: NDArray[np.float64] | None,
-        a_edges: NDArray[np.float64] | None,
+        r_edges: Floats,
+        z_edges: Floats | None,
+        a_edges: Floats | None,
     ) -> None:
         for name, edges in (("r_edges", r_edges), ("z_edges", z_edges), ("a_edges", a_edges)):
             if edges is not None:
@@ -120,7 +121,7 @@ class Grid:
             object.__setattr__(self, name, edges)
 
 
-def _even_edges(axis: str, width: float, number: int) -> NDArray[np.float64]:
+def _even_edges(axis: str, width: float, number: int) -> Floats:
     if not (
         isinstance(width, (int, float, np.number)) and not isinstance(width, bool) and np.isfinite(width) and width > 0
     ):
@@ -128,7 +129,7 @@ def _even_edges(axis: str, width: float, number: int) -> NDArray[np.float64]:
     return width * np.arange(_checked_number(f"n{axis}", number) + 1, dtype=np.float64)
 
 
-def _angle_edges(na: int | None) -> NDArray[np.float64] | None:
+def _angle_edges(na: int | None) -> Floats | None:
     return None if na is None else np.linspace(0.0, np.pi / 2, _checked_number("na", na) + 1)
 
 
@@ -142,7 +143,7 @@ def _checked_number(name: str, value: int) -> int:
     return number
 
 
-def _checked_edges(axis: str, values: ArrayLike) -> NDArray[np.float64]:
+def _checked_edges(axis: str, values: ArrayLike) -> Floats:
     try:
         edges = np.array(values, dtype=np.float64)
     except (TypeError, ValueError):

@@ -6,10 +6,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.media import phase as phases
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import is_number, shown
 
 MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of the pen
@@ -122,7 +122,7 @@ class Medium:
         return replace(self, layers=(replace(first, thickness=thickness), *others))
 
     @property
-    def z_edges(self) -> NDArray[np.float64]:
+    def z_edges(self) -> Floats:
         """Depths of the interfaces [length], (layers + 1,); the last may be infinite."""
         return np.concatenate([[0.0], np.cumsum([layer.thickness for layer in self.layers])])
 

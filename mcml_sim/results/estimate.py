@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from mcml_sim.media.arrays import Floats
 
 # At 100 effective samples the standard error of an estimate is itself known to about 10 %, and its distribution is
 # near enough to a normal one for tests and weights to trust it.

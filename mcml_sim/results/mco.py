@@ -13,16 +13,15 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.files.version import __version__
 from mcml_sim.files.whole_file import checked_path, read_whole, write_whole
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.results.mci import DECIMAL, OUTPUT, VERSION_2, Lines, Run, read_media, read_run, read_run_2, shown
 from mcml_sim.results.tally import Tally
 
-Floats = NDArray[np.float64]
 Name = str | os.PathLike[str]
 
 OUTPUT_2 = "mcmloA2.0"  # version of MCML 2's output files

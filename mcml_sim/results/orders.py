@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact import single_scattering
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import (
     checked_numbers,
     checked_whole,
@@ -21,8 +22,6 @@ from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing import order_bins
 from mcml_sim.tracing.counts import Counts, Ledger
 from mcml_sim.tracing.order_bins import OrderBins
-
-Floats = NDArray[np.float64]
 
 SEARCHLIGHT = Setting()
 

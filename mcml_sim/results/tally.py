@@ -7,18 +7,16 @@ from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.errors import InputError
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.media import fresnel
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.results.estimate import Estimate
 from mcml_sim.tracing.deposits import Deposits
-
-Floats = NDArray[np.float64]
 
 SCALARS = (
     "specular_reflectance",

@@ -5,9 +5,6 @@ from __future__ import annotations
 from functools import partial
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
-
 from mcml_sim.errors import InputError
 from mcml_sim.media.checks import (
     MAX_PHOTONS,
@@ -23,8 +20,6 @@ from mcml_sim.runs.batches import run_batches
 from mcml_sim.runs.store import Store
 from mcml_sim.tracing import order_bins, orders_batch
 from mcml_sim.tracing.counts import Counts
-
-Floats = NDArray[np.float64]
 
 SEARCHLIGHT = Setting()
 

@@ -30,7 +30,7 @@ from mcml_sim.errors import ELSEWHERE, RESUMES, Notice, OutputError, StoreError
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.text_file import parse_json
 from mcml_sim.files.version import __version__
-from mcml_sim.files.whole_file import UNFINISHED, write_whole
+from mcml_sim.files.whole_file import UNFINISHED, reason_of, write_whole
 
 MANIFEST = "run.json"
 # What a killed run leaves half-written; writing a batch takes far less than this, so nobody is at work on it [s].
@@ -97,7 +97,7 @@ class Store(Generic[R]):
         except FileNotFoundError:
             return None
         except (OSError, ValueError) as error:
-            text = f"{path} is damaged ({_reason(error)}); just that batch is traced again"
+            text = f"{path} is damaged ({reason_of(error)}); just that batch is traced again"
             warnings.warn(text, DamagedBatch, stacklevel=2)
             return None
 
@@ -114,7 +114,7 @@ class Store(Generic[R]):
             self.folder.mkdir(parents=True, exist_ok=True)
             self._sweep()
         except OSError as error:
-            raise StoreError(f"cannot use {self.folder} as a store: {_reason(error)}") from error
+            raise StoreError(f"cannot use {self.folder} as a store: {reason_of(error)}") from error
         require_ours(self.folder, self._made_by)
         path, contents = self.folder / MANIFEST, json.dumps(self._made_by, indent=1).encode()
         if not _holds(path, contents):
@@ -221,10 +221,14 @@ def manifest(folder: Path) -> dict[str, object] | None:
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
-        raise StoreError(f"{path} is damaged ({_reason(error)}); delete it, the batches beside it stay valid") from None
+        raise _damaged(path, reason_of(error)) from None
     if not isinstance(found, dict):
-        raise StoreError(f"{path} is damaged (not an object); delete it, the batches beside it stay valid")
+        raise _damaged(path, "not an object")
     return found
+
+
+def _damaged(path: Path, reason: str) -> StoreError:
+    return StoreError(f"{path} is damaged ({reason}); delete it, the batches beside it stay valid")
 
 
 def maker() -> dict[str, object]:
@@ -249,10 +253,6 @@ def cpu_class() -> str:
 
 def _digest(made_by: dict[str, object]) -> str:
     return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()
-
-
-def _reason(error: Exception) -> str:
-    return (getattr(error, "strerror", None) or str(error) or type(error).__name__).splitlines()[0]
 
 
 def _apart(one: object, other: object) -> tuple[str, str]:

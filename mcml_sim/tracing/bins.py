@@ -11,9 +11,8 @@ import numpy as np
 from jax import Array
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
-
-Floats = NDArray[np.float64]
 
 FEWEST_GROUPS = 8
 FEWEST_IN_GROUP = 64  # photons: groups differ by one, which must not show in their spread

@@ -16,8 +16,8 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 from jax import Array, lax
-from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
@@ -33,8 +33,6 @@ from mcml_sim.tracing.layered_event import (
     LayeredLanes,
     Stack,
 )
-
-Floats = NDArray[np.float64]
 
 BATCH_PHOTONS = 2**18
 IDLE_SHARE = 0.25  # of the lanes that end before their places are filled again; from 0.15 to 0.3 it is the same

@@ -23,6 +23,7 @@ import numpy as np
 from jax import Array, lax
 from numpy.typing import NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.grid import Grid
 from mcml_sim.media.medium import Medium
 from mcml_sim.tracing import isotropic_event, orders_batch, pool, rng
@@ -30,8 +31,6 @@ from mcml_sim.tracing.bins import Axis, axis, groups
 from mcml_sim.tracing.deposits import Deposits
 from mcml_sim.tracing.isotropic_event import IsotropicLanes
 from mcml_sim.tracing.orders_batch import Ends
-
-Floats = NDArray[np.float64]
 
 # Where nothing is absorbed, 0.6 % of the light is still inside after this many scatterings; `cut` says so.
 MAX_ORDER = 65_536

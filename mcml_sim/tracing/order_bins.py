@@ -19,9 +19,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
-
-Floats = NDArray[np.float64]
 
 LAST_EXACT = 256
 BINS_PER_OCTAVE = 64

@@ -25,9 +25,9 @@ from mcml_sim.exact.anisotropic import system as systems
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.exact.single_scattering import entered
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import Setting
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 
 KAPPAS = (1.01, 0.5, 0.22, 0.09, 0.035, 0.0)  # between groups

@@ -30,8 +30,8 @@ from numpy.typing import NDArray
 
 from mcml_sim.exact.anisotropic import harmonics
 from mcml_sim.media import fresnel
+from mcml_sim.media.arrays import Floats
 
-Floats = NDArray[np.float64]
 Complexes = NDArray[np.complex128]
 FADES = 0.5  # of the degree: where moments begin to fade
 # x runs on a ray, away from K = 0, about which the frame along K turns for ever. Light of order n grows by

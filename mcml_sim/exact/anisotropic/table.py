@@ -18,7 +18,6 @@ from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import BSpline
 
 from mcml_sim.errors import InputError
@@ -26,9 +25,8 @@ from mcml_sim.exact.anisotropic import high_orders
 from mcml_sim.exact.light import LEAST, ExactLight, coefficients, nodes, tabulated
 from mcml_sim.files.npz import read_npz
 from mcml_sim.files.whole_file import read_whole
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N, ILLUMINATIONS, Setting
-
-Floats = NDArray[np.float64]
 
 COSINES = 0.5 * FORWARD_G * (1.0 - np.cos(np.pi * np.arange(8) / 7.0))
 INDICES = np.linspace(*FORWARD_N, 3)

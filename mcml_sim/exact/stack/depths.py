@@ -11,14 +11,12 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from mcml_sim.exact.half_space import decay_rate
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_whole
 from mcml_sim.media.medium import Layer, Medium
-
-Floats = NDArray[np.float64]
 
 FIRST_PANEL = 1.5  # mean free paths, of the panels at interfaces
 WAVES = 4.0  # 1/k, of the panels at surfaces

@@ -28,8 +28,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import exp1, expn, j0
 
-from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss, near_end, near_node, slowest
+from mcml_sim.exact.stack.depths import DARK, Depths, Nodes, gauss, near_end, near_node, slowest
 from mcml_sim.exact.stack.slants import Complexes, Slants, cones, deepest, directions, reflectance, steepest
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS
 
 CLOSE = 0.5  # of the length of a panel: from nearer than this K is integrated by the double-exponential rule

@@ -19,14 +19,12 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from mcml_sim.exact.stack import depths, fluence
 from mcml_sim.exact.stack.depths import Depths, Nodes
 from mcml_sim.exact.stack.slants import critical_slope, reflectance
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.medium import Layer, Medium
-
-Floats = NDArray[np.float64]
 
 SURFACES = Nodes(depth=4, slope=4, azimuth=4)  # of a stack whose depths nobody asks for
 LEAST = 1e-13  # of light to and fro

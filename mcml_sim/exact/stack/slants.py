@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim.exact.stack.depths import DARK, Depths, Floats, Nodes, gauss
+from mcml_sim.exact.stack.depths import DARK, Depths, Nodes, gauss
+from mcml_sim.media.arrays import Floats
 
 Complexes = NDArray[Any]  # complex128, which numpy's own types lose
 

@@ -24,7 +24,7 @@ from typing import Any
 import jax
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.special import erfc, j0, j1
 from threadpoolctl import threadpool_limits
 
@@ -35,11 +35,10 @@ from mcml_sim.exact.stack import depths, fluence, known
 from mcml_sim.exact.stack.depths import Depths, Nodes
 from mcml_sim.exact.stack.fluence import Field
 from mcml_sim.media import fresnel
+from mcml_sim.media.arrays import Floats
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting, require_illumination
-
-Floats = NDArray[np.float64]
 
 MAX_LAYERS = 20
 STANDARD = Nodes(depth=20, slope=24, azimuth=24)

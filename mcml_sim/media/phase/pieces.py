@@ -6,11 +6,8 @@ from typing import Any, NamedTuple
 
 import jax.numpy as jnp
 import numpy as np
-from numpy.typing import NDArray
 
-from mcml_sim.media.arrays import namespace
-
-Floats = NDArray[np.float64]
+from mcml_sim.media.arrays import Floats, namespace
 
 FLAT = 1e-4  # exponents of a share below which its power is a logarithm
 NODES = 24  # of Gauss and Legendre's rule in a piece, besides those that a polynomial needs

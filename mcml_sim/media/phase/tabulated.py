@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from mcml_sim.errors import InputError
-from mcml_sim.media.arrays import namespace
+from mcml_sim.media.arrays import Floats, namespace
 from mcml_sim.media.checks import checked_numbers, shown
 from mcml_sim.media.phase.base import Phase
-from mcml_sim.media.phase.pieces import Floats, Pieces
+from mcml_sim.media.phase.pieces import Pieces
 
 MOST_ROWS = 2**16
 TOLERANCE = 0.02  # by which an integral may miss 1: a table's own interpolation does
