@@ -1,4 +1,4 @@
-"""What light does in layered media: photons traced in JAX, and exact solutions to hold them against."""
+"""Light in layered media: photons traced in JAX, and exact solutions to hold them against."""
 
 from mcml_sim.cli.lazy import attributes
 from mcml_sim.errors import ClusterError, ForkError, InputError, OutputError, SettingError, StoreError
@@ -74,5 +74,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return the names that an interactive shell completes, unused ones included."""
     return [*globals(), *__all__]

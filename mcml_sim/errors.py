@@ -1,4 +1,4 @@
-"""What can go wrong, by name. Every message says what was wrong, what was got and what is accepted."""
+"""Errors by name. Every message says what was wrong, what was got and what is accepted."""
 
 # Remedies that errors name; a command line has other words for them.
 ELSEWHERE = "use another folder"
@@ -7,11 +7,11 @@ RESUMES = "the same run with its store resumes"
 
 
 class Notice(UserWarning):
-    """Something to know besides the answer; a command line says it on stderr, beside what it prints."""
+    """Warning to the user beside the answer; a command line prints it on stderr."""
 
 
 class InputError(ValueError):
-    """An argument that no physics or file format allows."""
+    """Argument that no physics or file format allows."""
 
 
 class SettingError(InputError):
@@ -19,15 +19,15 @@ class SettingError(InputError):
 
 
 class StoreError(RuntimeError):
-    """A folder of photon batches that is damaged, foreign, or cannot be written."""
+    """Folder of photon batches that is damaged, foreign, or cannot be written."""
 
 
 class ClusterError(RuntimeError):
-    """A Dask cluster that does not answer, or whose workers would not give the bits of this machine."""
+    """Dask cluster that does not answer, or whose workers would not give the bits of this machine."""
 
 
 class OutputError(RuntimeError):
-    """A file of results that cannot be written."""
+    """File of results that cannot be written."""
 
 
 class ForkError(RuntimeError):

@@ -13,6 +13,8 @@ from sphinx.application import Sphinx
 
 # `dr, nr   text`: what is named, two blanks or more, what it is.
 ENTRY = re.compile(r"([\w(][\w, .:*=()/-]*?)\s{2,}(\S.*)")
+# `name: text`, an entry of a section.
+ARGUMENT = re.compile(r"(\w+): (\S.*)")
 # Wide gaps inside a line, or a line that is moved in, are set by hand: a formula or a table.
 BY_HAND = re.compile(r"\S {3,}\S|^ ")
 EQUATION = re.compile(r"[^`]* = [^`.;]*[\^/][^`.;]*")
@@ -28,7 +30,17 @@ def paragraphs(lines: list[str]) -> Iterator[list[str]]:
 
 def restructured(lines: list[str]) -> list[str]:
     """The same as reStructuredText."""
-    return [line for paragraph in paragraphs(lines) for part in blocks(paragraph) for line in (*part, "")]
+    return [line for one in paragraphs(lines) for part in blocks(in_columns(one)) for line in (*part, "")]
+
+
+def in_columns(paragraph: list[str]) -> list[str]:
+    """Return a section as entries of two columns: each argument and its text, or `Returns` and what."""
+    title, lines = paragraph[0], [line.removeprefix("    ") for line in paragraph[1:]]
+    if title == "Args:":
+        return [ARGUMENT.sub(r"\1  \2", line, count=1) if line[0] != " " else line for line in lines]
+    if title in ("Returns:", "Raises:"):
+        return [f"{title[:-1]}  {lines[0]}", *(f"    {line}" for line in lines[1:])]
+    return paragraph
 
 
 def blocks(paragraph: list[str]) -> Iterator[list[str]]:

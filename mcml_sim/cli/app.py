@@ -1,4 +1,4 @@
-"""mcml-sim on the command line: its first screen, its one subcommand, and its errors in words of the shell."""
+"""Command mcml-sim: its first screen, its one subcommand, and its errors in words of the shell."""
 
 from __future__ import annotations
 
@@ -38,14 +38,14 @@ def _stopped() -> str:
 
 
 def _remedied(text: str) -> str:
-    """What a library error says, with remedies of the command line."""
+    """Return the text of a library error, with remedies of the command line."""
     for theirs, ours in REMEDIES.items():
         text = text.replace(theirs, ours)
     return text
 
 
 def _hint() -> str:
-    """How to put right a command that was not understood."""
+    """Return advice for a command that was not understood."""
     first = next(iter(sys.argv[1:]), "")
     return f"mcml-sim run {first} does its runs" if first.endswith(".mci") else accepted()
 

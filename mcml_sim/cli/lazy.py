@@ -1,4 +1,4 @@
-"""What is imported only on first use: names of a package (PEP 562), a command, and what a subcommand needs.
+"""Imports on first use: names of a package (PEP 562), a command, and what a subcommand needs.
 
 JAX and SciPy take seconds to import, which a command that only shows its help, or completes a word, has no use for.
 """
@@ -19,7 +19,7 @@ INTERRUPTED = 130  # exit status, as of any command that Ctrl-C ended
 
 
 def attributes(package: str, homes: Mapping[str, str]) -> Callable[[str], Any]:
-    """The `__getattr__` of a package: `homes` says in which of its modules each name is.
+    """Return the `__getattr__` of a package: `homes` names the module of each name.
 
     A module itself has the room it is in, with a dot: "media." makes `phase` of `media.phase`, "" stays in the root.
     """
@@ -48,7 +48,7 @@ def command(module: str) -> None:
 
 @contextlib.contextmanager
 def interruptible(module: str) -> Iterator[None]:
-    """For the imports of a command in `module`: Ctrl-C ends the process at once, in one line and with its status.
+    """Have Ctrl-C end the process at once, in one line and with its status, during imports of a command in `module`.
 
     An exception that falls into imports may be dropped, or turned into another.
     """
@@ -63,7 +63,7 @@ def interruptible(module: str) -> Iterator[None]:
 
 
 def _on_interrupt(handler: Any) -> bool:
-    """Set the handler of Ctrl-C, where this thread may."""
+    """Set the handler of Ctrl-C; return whether this thread may."""
     try:
         signal.signal(signal.SIGINT, handler)
     except ValueError:  # only the main thread may

@@ -1,4 +1,4 @@
-"""The lines that mcml-sim prints of a run: its totals with errors, its speed, and what its precision needs."""
+"""Lines that mcml-sim prints of a run: its totals with errors, its speed, and what its precision needs."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ SHORT = 0.05  # compiling that is not worth a word [s]
 
 
 def totals(kept: Results) -> Iterator[str]:
-    """A line for each share of the light, and one for their sum."""
+    """Yield a line for each share of the light, and one for their sum."""
     for name, title in TOTALS.items():
         yield _line(title, with_error(kept.estimates[name]))
     if kept.cut > 0:
@@ -41,7 +41,7 @@ def _line(title: str, text: str) -> str:
 
 
 def with_error(estimate: Estimate) -> str:
-    """A value and its standard error with two digits, such as 0.23783 ± 0.00042."""
+    """Return a value and its standard error with two digits, such as 0.23783 ± 0.00042."""
     value, error = float(estimate.value), float(estimate.standard_error)
     if not math.isfinite(error):
         return f"{value:.6g} ± unknown"
@@ -56,7 +56,7 @@ def with_error(estimate: Estimate) -> str:
 
 
 def speed(photons: int, seconds: float, compiling: float) -> str:
-    """Photons a second of the time that was not spent in compiling [s]."""
+    """Return the seconds of a run, and photons per second of the time that was not spent in compiling [s]."""
     tracing = max(seconds - compiling, 1e-3)
     rate = photons / tracing
     return f"{times(seconds, compiling)}, " + (
@@ -65,14 +65,14 @@ def speed(photons: int, seconds: float, compiling: float) -> str:
 
 
 def times(seconds: float, compiling: float) -> str:
-    """How long a run took, and of that how long it took to compile."""
+    """Return the seconds of a run, those of compiling apart."""
     if compiling < SHORT:
         return f"{seconds:.1f} s"
     return f"{max(seconds - compiling, 0):.1f} s and {compiling:.1f} s to compile"
 
 
 def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
-    """Whether the precision was reached, and if not, what would reach it."""
+    """Return whether the precision was reached, and if not, what would reach it."""
     if goal.is_reached(estimate):
         return f"{goal.quantity}: relative standard error {goal.relative_error:g} reached"
     value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
@@ -90,7 +90,7 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
 
 
 def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
-    """The report of a run that is done."""
+    """Yield the report of a run that is done."""
     kept = done.results
     yield f"{kept.photons} photons, seed {job.seed}, {pace(done, options.scheduler is not None)}"
     yield from totals(kept)
@@ -101,7 +101,7 @@ def lines(job: Job, done: Done, options: RunOptions) -> Iterator[str]:
 
 
 def pace(done: Done, on_workers: bool) -> str:
-    """How fast a run went."""
+    """Return how fast a run went."""
     if done.seconds is None:
         return "finished before"
     if done.resumed:  # the batches that were there cost nothing: a rate would be too good
@@ -111,7 +111,7 @@ def pace(done: Done, on_workers: bool) -> str:
 
 
 def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
-    """A run that is done, for JSON: files, and each share of the light with its standard error."""
+    """Return a run that is done for JSON: files, and each share of the light with its standard error."""
     shares = {name: kept.estimates[name] for name in (*TOTALS, "energy")}
     summary = {
         "mco": job.mco,

@@ -1,4 +1,4 @@
-"""Around any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status.
+"""Frame of any subcommand: one line for what the user can mend, a quiet end where nobody reads on, an exit status.
 
 The first screen says what a command is for, how it is used, its subcommands by group, all in 24 lines of 80.
 """
@@ -29,10 +29,10 @@ NOT_SHOWN = ("--show-completion",)  # --install-completion does what most want
 
 
 class FirstScreen(TyperGroup):
-    """typer's own --help has a box a group, which for nine subcommands is more than a screen."""
+    """First screen in place of typer's --help, whose boxes per group take more than a screen for nine subcommands."""
 
     def format_help(self, ctx: typer.Context, formatter: object) -> None:  # type: ignore[override]
-        """Print it to stdout, in colour on a terminal."""
+        """Print the screen to stdout, in colour on a terminal."""
         console = Console(highlight=False, soft_wrap=True, width=None if sys.stdout.isatty() else 80)
         console.print(Text.assemble("Usage: ", (f"{ctx.command_path} COMMAND [OPTIONS] ...", "bold")))
         console.print(Text(f"\n{(self.help or '').strip()}\n"))
@@ -47,7 +47,7 @@ class FirstScreen(TyperGroup):
         console.print(Text(f"More, with examples: {ctx.command_path} COMMAND --help", style="dim"))
 
     def _commands(self, ctx: typer.Context) -> list[tuple[str, str, str]]:
-        """Group, name, what it does."""
+        """Return group, name and short help of each subcommand."""
         found = [self.commands[name] for name in self.list_commands(ctx)]
         return [
             (getattr(one, "rich_help_panel", None) or "Commands", one.name or "", one.get_short_help_str(200))
@@ -69,7 +69,7 @@ def add(
 
 
 def add_version(app: typer.Typer, package: str) -> None:
-    """Add --version, which is that of both packages."""
+    """Add --version, which prints the version of both packages."""
 
     def show(wanted: bool) -> None:
         if wanted:
@@ -94,17 +94,17 @@ NOBODY_READS = 141  # exit status, as a shell reports any program that SIGPIPE e
 
 
 def accepted() -> str:
-    """How to put right a command that was not understood."""
+    """Return advice for a command that was not understood."""
     return "--help shows what is accepted"
 
 
 def unchanged(text: str) -> str:
-    """What a library error says, as it says it."""
+    """Return the text of a library error as it is."""
     return text
 
 
 def one_line(text: str) -> str:
-    """A text as one line that a terminal only prints.
+    """Return a text as one line that a terminal only prints.
 
     Names of files and words in them may hold line breaks, escape sequences or marks that turn the direction of
     writing: everything that is not to be seen is spelled as Python spells it. Of a long text the middle is left out.
@@ -116,7 +116,7 @@ def one_line(text: str) -> str:
 
 @dataclass(frozen=True)
 class Program:
-    """A command with its subcommands.
+    """Command with its subcommands.
 
     mendable  the errors that are the user's to mend; remedied what they say, in words of the command line
     stopped   what to do after Ctrl-C; hint after a command that was not understood
@@ -147,13 +147,13 @@ class Program:
         sys.exit(status)
 
     def say(self, text: object) -> None:
-        """A line on stderr: one, whatever the text holds."""
+        """Print one line on stderr, whatever the text holds."""
         Console(stderr=True, highlight=False, soft_wrap=True, emoji=False).print(
             f"{self.name}: {one_line(str(text))}", markup=False
         )
 
     def _status(self) -> int:
-        """Do the subcommand, and say what went wrong."""
+        """Run the subcommand, and print what went wrong; return the exit status."""
         try:
             # Standalone, typer would end the process itself on Ctrl-C, and print usage errors in a box of many lines.
             status = int(self.app(prog_name=self.name, standalone_mode=False) or 0)
@@ -190,5 +190,5 @@ class Program:
 
 
 def _let_go_of_stdout() -> None:
-    """Have Python not try once more as it ends."""
+    """Have Python not flush once more as it ends."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

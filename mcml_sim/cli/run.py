@@ -1,4 +1,4 @@
-"""mcml-sim run: every run of an MCML input file, its results written and printed."""
+"""Command `mcml-sim run`: every run of an MCML input file, its results written and printed."""
 
 from __future__ import annotations
 
@@ -140,7 +140,7 @@ def run(
 
 
 def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:
-    """A whole number as people write them, 1e6 included."""
+    """Return a whole number as people write them, 1e6 included."""
     with interruptible(__name__):
         from mcml_sim.media.checks import checked_whole
 

@@ -1,4 +1,4 @@
-"""Where a command writes: results to stdout and nothing else there; notes and progress to stderr."""
+"""Output of a command: results to stdout and nothing else there; notes and progress to stderr."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ WIDTH = 100  # columns of what goes into a file or a pipe, which have no width o
 
 
 def screen(width: int = WIDTH) -> Console:
-    """stdout, as wide as the terminal, or as COLUMNS says, or `width` [characters]; rich heeds NO_COLOR."""
+    """Open stdout, as wide as the terminal, or as COLUMNS says, or `width` [characters]; rich heeds NO_COLOR."""
     return Console(highlight=False, width=None if sys.stdout.isatty() or "COLUMNS" in os.environ else width)
 
 
 def notes(quiet: bool) -> Console:
-    """stderr, for what is said besides the result."""
+    """Open stderr, for what is printed besides the result."""
     return Console(stderr=True, quiet=quiet, highlight=False, soft_wrap=True)
 
 
@@ -43,14 +43,14 @@ def put(part: RenderableType, console: Console) -> None:
 
 
 def print_json(value: Any) -> None:
-    """The one way in which --json prints: nothing but JSON, NaN and infinities as null."""
+    """Print JSON, and nothing else, with NaN and infinities as null: the only writer of --json."""
     text = as_json(value)
     encoding = (sys.stdout.encoding or "").lower().replace("-", "")
     sys.stdout.write(text if encoding == "utf8" else as_json(value, ascii_only=True))
 
 
 def typed() -> str:
-    """The command as it was typed; `python -m` goes by the name of the package."""
+    """Return the command as it was typed; `python -m` goes by the name of the package."""
     program = Path(sys.argv[0])
     name = program.parent.name if program.name == "__main__.py" else program.name
     return shlex.join([name, *sys.argv[1:]])

@@ -1,4 +1,4 @@
-"""What the shell and the user at it do to a command: streams that are closed, Ctrl-C."""
+"""Shell and user around a command: streams that are closed, letters that a terminal lacks, Ctrl-C."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ UNKNOWN = "?"
 
 
 def spelled(error: UnicodeError) -> tuple[str, int]:
-    """The characters that could not be encoded, each as another, and where to go on."""
+    """Return the characters that could not be encoded, each as another, and where to go on."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lost = error.object[error.start : error.end]
@@ -52,7 +52,7 @@ def mend_streams() -> None:
 
 @contextlib.contextmanager
 def two_interrupts() -> Iterator[None]:
-    """The first Ctrl-C says what it waits for and raises KeyboardInterrupt, the second ends the process.
+    """Let the first Ctrl-C print what it waits for and raise KeyboardInterrupt, and the second end the process.
 
     Compiling cannot be interrupted and takes seconds, and batches may take long: someone who insists need not wait.
     """

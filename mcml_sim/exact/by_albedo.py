@@ -34,7 +34,7 @@ Surface = table.Table | None
 
 
 def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = STANDARD) -> Any:
-    """The kernel on x broadcast against alpha, float64 arrays; a jax array if one of them or the setting's n is."""
+    """Return the kernel on x broadcast against alpha, float64 arrays; a jax array if one of them or n is."""
     if any(isinstance(one, jax.Array) for one in (x, alpha, setting.n)):
         return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), surface(setting, rule), setting.illumination, rule)
     x, alpha = np.broadcast_arrays(x, alpha)
@@ -52,7 +52,7 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = 
 
 
 def elementwise(function: Each, alpha: Any, of: Surface = None) -> Any:
-    """`function` of each albedo by itself, a float64 array."""
+    """Return `function` of each albedo by itself, a float64 array."""
     if any(isinstance(one, jax.Array) for one in (alpha, *jax.tree.leaves(of))):
         return _traced_each(function, jnp.asarray(alpha), of)
     with jax.enable_x64(True), jax.core.eval_context():
@@ -61,26 +61,26 @@ def elementwise(function: Each, alpha: Any, of: Surface = None) -> Any:
 
 
 def forget() -> None:
-    """Let go of all transforms that were kept."""
+    """Forget all transforms that were kept."""
     _transform.cache_clear()
 
 
 def surface(setting: Setting, rule: Rule = STANDARD) -> Surface:
-    """For `solve`; makes a table where there is none."""
+    """Return the surface for `solve`; makes a table where there is none."""
     if is_traced(setting.n):
         return tables.traced_table(jnp.asarray(setting.n), rule)
     return None if setting.n == 1.0 else tables.table(float(setting.n), rule)
 
 
 def solve(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> Transform:
-    """The transform of one albedo, a float64 scalar in [0, 1]."""
+    """Return the transform of one albedo, a float64 scalar in [0, 1]."""
     if of is None:
         return transform.solve(alpha, illumination, rule)
     return table.transform(of, alpha, ILLUMINATIONS.index(illumination), rule)
 
 
 def total(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> jax.Array:
-    """A / alpha of one albedo."""
+    """Return A / alpha of one albedo."""
     if of is None:
         return transform.reflectance_over_alpha(alpha, illumination, rule)
     return table.total(of, alpha, ILLUMINATIONS.index(illumination))
@@ -105,7 +105,7 @@ def _each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
 
 
 def blocks(x: Floats, size: int = BLOCK) -> list[Floats]:
-    """Pieces of x (n,) of one length, the last one filled up with its last number."""
+    """Return pieces of x (n,) of one length, the last one filled up with its last number."""
     full = np.pad(x, (0, -x.size % size), mode="edge") if x.size else x
     return list(full.reshape(-1, size))
 
@@ -131,7 +131,7 @@ def _traced_each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
 
 
 def _map(function: Callable, arguments: Any, at_once: int) -> Any:
-    """vmap of at most so many at a time; what fills the last ones up is cut off."""
+    """Map a function over at most so many at a time (vmap); what fills the last ones up is cut off."""
     size = jax.tree.leaves(arguments)[0].size
     if size <= at_once:
         return jax.vmap(function)(arguments)

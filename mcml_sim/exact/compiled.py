@@ -1,4 +1,4 @@
-"""`jit` and `filter_jit`, as jax and equinox have them, with XLA's options for all but the tracing of photons."""
+"""Functions `jit` and `filter_jit` of jax and equinox, with XLA's options for all but the tracing of photons."""
 
 from collections.abc import Callable
 from functools import wraps
@@ -13,18 +13,18 @@ OPTIONS = {"xla_cpu_use_fusion_emitters": False} if jax.__version_info__ < (0, 1
 
 
 def jit(function: Callable, **named: Any) -> Callable:
-    """`jax.jit` with these options."""
+    """Return `jax.jit` of a function with these options."""
     return _outermost(function, jax.jit(function, compiler_options=OPTIONS, **named), jax.jit(function, **named))
 
 
 def filter_jit(function: Callable) -> Callable:
-    """`equinox.filter_jit` with these options."""
+    """Return `equinox.filter_jit` of a function with these options."""
     compiled: Any = eqx.filter_jit
     return _outermost(function, compiled(function, compiler_options=OPTIONS), compiled(function))
 
 
 def _outermost(function: Callable, own: Callable, within: Callable) -> Callable:
-    """Options are of a whole program: where others are compiled with it, or differentiated, theirs hold."""
+    """Call `own` with its options, or `within` a program that is compiled or differentiated, whose options hold."""
 
     @wraps(function)
     def call(*arguments: Any, **named: Any) -> Any:

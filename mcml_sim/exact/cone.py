@@ -1,4 +1,4 @@
-"""The half space under a surface that refracts, n > 1, scattering isotropically: mirror and escape cone.
+"""Half space under a surface that refracts, n > 1, scattering isotropically: mirror and escape cone.
 
 A surface that reflected everything would make the half space, with its mirror image, an infinite medium, which a
 Fourier transform in depth solves. The real surface is that mirror less the light that leaves through the cone of angles
@@ -47,14 +47,14 @@ BISECTIONS = 50
 
 
 class System(NamedTuple):
-    """The half space at one wave number, on nodes x."""
+    """Equations of the half space at one wave number, on nodes x."""
 
     matrix: jax.Array
-    """M, complex128 (x, x)."""
+    """Matrix M, complex128 (x, x)."""
     leaving: jax.Array
-    """sqrt(w) q, complex128 (x,)."""
+    """Vector sqrt(w) q, complex128 (x,)."""
     source: jax.Array
-    """sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)."""
+    """Vectors sqrt(w) s under a searchlight and under diffuse light, complex128 (2, x)."""
 
 
 class _Cone(NamedTuple):
@@ -66,7 +66,7 @@ class _Cone(NamedTuple):
 
 
 def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -> jax.Array:
-    """m_j, where R^(k) / alpha = sum alpha^j m_j over the orders of scattering less one: (2, orders)."""
+    """Return m_j, where R^(k) / alpha = sum alpha^j m_j over the orders of scattering less one: (2, orders)."""
     matrix, leaving, source = system(n, k, x_nodes, angles)
     _, powers = jax.lax.scan(lambda v, _: (matrix @ v, v), leaving, None, length=orders)
     return source @ powers.T / np.pi
@@ -74,7 +74,7 @@ def series(n: jax.Array, k: jax.Array, orders: int, x_nodes: int, angles: int) -
 
 @partial(jit, static_argnames=("x_nodes", "angles"))
 def orders(n: float, alpha: float, k: jax.Array, x_nodes: int = 240, angles: int = 72) -> tuple[jax.Array, jax.Array]:
-    """R^(k) of one albedo at real k > 0 of shape (k,), and what of it was scattered once: float64 (2, k) each."""
+    """Return R^(k) of one albedo at real k > 0 (k,), and the part scattered once: float64 (2, k) each."""
 
     def at(k: jax.Array) -> tuple[jax.Array, jax.Array]:
         matrix, leaving, source = system(jnp.asarray(n), k + 0j, x_nodes, angles)
@@ -86,7 +86,7 @@ def orders(n: float, alpha: float, k: jax.Array, x_nodes: int = 240, angles: int
 
 
 def system(n: jax.Array, k: jax.Array, x_nodes: int, angles: int) -> System:
-    """At k = rho e^{i pi/4} or i b + rho e^{i pi/4}, or real, complex128 (), not 0; n > 1 may be traced."""
+    """Return the system at k = rho e^{i pi/4} or i b + rho e^{i pi/4}, or real, complex128 (), not 0; n > 1."""
     turn = jnp.where(k.imag == 0.0, 1.0, np.exp(0.25j * np.pi))
     y, dy = _y_nodes(jax.lax.stop_gradient(n), jnp.abs(k), x_nodes)
     x, root = turn * y, jnp.sqrt(dy) * square_root(turn)
@@ -109,7 +109,7 @@ def system(n: jax.Array, k: jax.Array, x_nodes: int, angles: int) -> System:
 def _mean_over_azimuth(
     n: jax.Array, k: jax.Array, turn: jax.Array, y: jax.Array, angles: int
 ) -> tuple[jax.Array, jax.Array, jax.Array, jax.Array]:
-    """f(x) and f(-x) by nodes of the cone, their derivatives by x and -x, mu and the weights: each (2, x, angles)."""
+    """Return f(x) and f(-x) by nodes of the cone, their derivatives, mu and the weights: each (2, x, angles)."""
     both = jnp.stack([y, -y])
     cone = _cone(n, jnp.abs(k), angles)
     middle = _between_singularities(*jax.lax.stop_gradient((n, k, turn * both)))
@@ -123,7 +123,7 @@ def _mean_over_azimuth(
 
 
 def _between_singularities(n: jax.Array, k: jax.Array, x: jax.Array) -> jax.Array:
-    """Im tau halfway between the singularities of the integrand on either side of the real axis, (2, x).
+    """Return Im tau halfway between the integrand's singularities on either side of the real axis, (2, x).
 
     They are Fresnel's, at pi/2, and zeros of (1 + i x mu)^2 + k^2 (1 - mu^2), where mu is that of the cone's sheet.
     """
@@ -141,7 +141,7 @@ def _between_singularities(n: jax.Array, k: jax.Array, x: jax.Array) -> jax.Arra
 
 
 def _cone(n: jax.Array, k: jax.Array, angles: int) -> _Cone:
-    """For k = |k|. The weights have Fresnel's transmittance and dmu in them."""
+    """Return nodes for k = |k|. The weights have Fresnel's transmittance and dmu in them."""
     first = FIRST_TAU - jnp.log1p(k)
     cosine = jnp.sqrt((n - 1.0) * (n + 1.0)) / n  # of the critical angle
     last = LAST_TAU - jnp.log(jax.lax.stop_gradient(cosine))
@@ -160,7 +160,7 @@ def _cone(n: jax.Array, k: jax.Array, angles: int) -> _Cone:
 
 
 def _y_nodes(n: jax.Array, k: jax.Array, count: int) -> tuple[jax.Array, jax.Array]:
-    """y and dy of x = y e^{i pi/4}, for k = |k|: midpoints of a variable that is odd in y."""
+    """Return y and dy of x = y e^{i pi/4}, for k = |k|: midpoints of a variable that is odd in y."""
     cosine = jnp.sqrt((n - 1.0) * (n + 1.0)) / n
     edge, width = k / (n * cosine), 1.0 / cosine
     scale = jnp.minimum(1.0, k)

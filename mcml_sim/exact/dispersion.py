@@ -1,4 +1,4 @@
-"""The dispersion function of isotropic scattering, 1 - alpha arctan(K)/K, and its root, over jax.numpy."""
+"""Dispersion function of isotropic scattering, 1 - alpha arctan(K)/K, and its root, over jax.numpy."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ SERIES_TERMS = 13  # which ends below rounding
 
 
 def dispersion(alpha: jax.Array, square: jax.Array) -> jax.Array:
-    """1 - alpha arctan(K)/K by the square K^2 of complex K, not real below -1."""
+    """Return 1 - alpha arctan(K)/K by the square K^2 of complex K, not real below -1."""
     return (1.0 - alpha) + alpha * _arctan_defect(square)
 
 
 def _arctan_defect(square: jax.Array) -> jax.Array:
-    """1 - arctan(K)/K = K^2/3 - K^4/5 + ..."""
+    """Return 1 - arctan(K)/K = K^2/3 - K^4/5 + ..."""
     small = jnp.abs(square) < SMALL_SQUARE
     t = jnp.where(small, square, 0.0)
     series = jnp.zeros_like(t)
@@ -32,7 +32,7 @@ def _arctan_defect(square: jax.Array) -> jax.Array:
 
 @jax.custom_jvp
 def squared_decay_rate(alpha: jax.Array) -> jax.Array:
-    """kappa^2, where alpha artanh(kappa)/kappa = 1; smooth in alpha on [0, 1], unlike kappa.
+    """Return kappa^2, where alpha artanh(kappa)/kappa = 1; smooth in alpha on [0, 1], unlike kappa.
 
     With kappa = tanh(t) it is t coth(t) = 1/alpha, which Newton's method solves for t^2.
     """
@@ -49,7 +49,7 @@ def squared_decay_rate(alpha: jax.Array) -> jax.Array:
 
 
 def _coth_excess(square: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """t coth(t) - 1 and its derivative by the square of t, with the series where they would cancel."""
+    """Return t coth(t) - 1 and its derivative by the square of t, with the series where they would cancel."""
     small = square < SMALL_SQUARE
     x = jnp.where(small, square, 0.0)
     # B_2n 2^2n / (2n)!, n = 1, 2, ... (Abramowitz & Stegun 1964, 4.5.67)
@@ -65,7 +65,7 @@ def _coth_excess(square: jax.Array) -> tuple[jax.Array, jax.Array]:
 
 @squared_decay_rate.defjvp
 def _squared_decay_rate_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
-    """From T(kappa^2) = artanh(kappa)/kappa = 1/alpha, T' = (1/(1 - q) - T) / (2 q) with q = kappa^2."""
+    """Return the derivative from T(q) = artanh(kappa)/kappa = 1/alpha, T' = (1/(1 - q) - T) / (2 q), q = kappa^2."""
     (alpha,), (d_alpha,) = primals, tangents
     square = squared_decay_rate(alpha)
     safe = jnp.maximum(alpha, LEAST_ALBEDO)
@@ -81,5 +81,5 @@ def _squared_decay_rate_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array,
 
 
 def decay_rate(alpha: jax.Array) -> jax.Array:
-    """kappa, 1 at alpha = 0 and 0 at alpha = 1."""
+    """Return kappa, 1 at alpha = 0 and 0 at alpha = 1."""
     return jnp.sqrt(squared_decay_rate(alpha))

@@ -1,4 +1,4 @@
-"""The functions of `mcml_sim.exact`, which says what they take and how far they hold."""
+"""Functions of `mcml_sim.exact`, whose docstring says what they take and how far they hold."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ ARGUMENTS = {
 
 
 def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
+    """Return the total diffuse reflectance A of the half space [-]; `alpha` the single-scattering albedo in [0, 1].
 
     R^(0), which where n = 1 equals 1 - H(1) sqrt(1 - alpha) under a searchlight and 1 - 2 sqrt(1 - alpha) int_0^1 H(mu)
     mu dmu under diffuse light (Chandrasekhar 1950, ch. V) without their cancellation. Relative error below 1e-12, where
@@ -52,7 +52,7 @@ def reflectance(alpha: Numbers, setting: Setting = SEARCHLIGHT) -> float | Float
 
 
 def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A.
+    """Return the reflectance profile R_d(r) [1/length^2]: 2 pi r R_d integrates to A.
 
     2 pi r R_d tends to alpha/2 at r = 0 where n = 1, else to alpha times `single_scattering.source_strength`.
     """
@@ -66,7 +66,7 @@ def profile(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = S
 
 
 def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
+    """Return the share of the reflected energy that leaves within radius r [-]: 0 at r = 0, 1 at infinity."""
     require_solved(setting)
     radius, albedo, length = _all_checked(r=r, alpha=alpha, mfp=mfp)
     if not setting.is_isotropic:
@@ -75,7 +75,7 @@ def cdf(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARC
 
 
 def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Radius within which the share `xi` in [0, 1] of the reflected energy leaves [length]; cdf(quantile(xi)) = xi.
+    """Return the radius within which the share `xi` in [0, 1] of the reflected energy leaves [length].
 
     The derivative at xi = 1, infinite, is given as 0.
     """
@@ -93,12 +93,12 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
 
 
 def decay_rate(alpha: Numbers) -> float | Floats:
-    """kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls off as e^{-kappa r / mfp} r^-2 [-]."""
+    """Return kappa(alpha), the root of alpha artanh(kappa)/kappa = 1: R_d falls as e^{-kappa r / mfp} r^-2 [-]."""
     return _scalar_or_array(elementwise(_decay_rate, *_all_checked(alpha=alpha)))
 
 
 def error_estimate(r: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting = SEARCHLIGHT) -> float | Floats:
-    """Relative change of `profile` with half as many nodes again in each quadrature, none in common [-].
+    """Return the relative change of `profile` with half as many nodes again in each quadrature, none in common [-].
 
     Their errors fall exponentially with the number of nodes, so nearly all of the change is the error of `profile`:
     that of quadrature, and of rounding, which differs too. It knows nothing of what both take for granted: the
@@ -141,7 +141,7 @@ def _radius(transform: Transform, alpha: jax.Array, xi: jax.Array) -> jax.Array:
 def _radius_within(
     xi: jax.Array, alpha: jax.Array, n: jax.Array | None, known: float | None, illumination: str
 ) -> jax.Array:
-    """Under an index `n` by which it can be differentiated, or a `known` one."""
+    """Return the radius under an index `n` by which it can be differentiated, or a `known` one."""
     return by_alpha(_radius, xi, alpha, _setting(illumination, n, known))
 
 
@@ -149,7 +149,7 @@ def _radius_within(
 def _radius_within_jvp(
     known: float | None, illumination: str, primals: tuple, tangents: tuple
 ) -> tuple[jax.Array, jax.Array]:
-    """Of the implicit function: cdf(x, alpha, n) = xi."""
+    """Differentiate the implicit function cdf(x, alpha, n) = xi."""
     (xi, *where), (d_xi, *d_where) = primals, tangents
     radius = _radius_within(xi, *where, known, illumination)
     x = jnp.where(xi == 1.0, 1.0, radius)
@@ -166,7 +166,7 @@ def _setting(illumination: str, n: Any, known: Any) -> Setting:
 
 
 def require_solved(setting: Setting) -> None:
-    """SettingError of a half space that is not solved."""
+    """Raise SettingError for a half space that is not solved."""
     if not (isinstance(setting, Setting) and setting.is_solved):
         if isinstance(setting, Setting) and is_traced(setting.n) and setting.g != 0:
             raise SettingError(f"exact light has derivatives by n where g = 0 only, got g = {setting.g:g}")
@@ -174,7 +174,7 @@ def require_solved(setting: Setting) -> None:
 
 
 def _all_checked(**given: Any) -> list[Any]:
-    """Each as `_checked`; InputError if their shapes do not broadcast."""
+    """Return each argument as `_checked`; InputError if their shapes do not broadcast."""
     require_own_process()
     values = {name: _checked(name, value) for name, value in given.items()}
     require_one_shape(**values)
@@ -182,7 +182,7 @@ def _all_checked(**given: Any) -> list[Any]:
 
 
 def _checked(name: str, value: Any) -> Any:
-    """A float64 array: of numpy, with InputError for what is out of range, or as it was of jax, with nan for it."""
+    """Return a float64 array: of numpy, with InputError for what is out of range, or of jax, with nan for it."""
     what, low, high = ARGUMENTS[name]
     if isinstance(value, jax.Array):
         _require_double(name, value)
@@ -202,7 +202,7 @@ def _require_double(name: str, value: jax.Array) -> None:
 
 
 def _scalar_or_array(values: Any) -> Any:
-    """As jax gave it, or else a float for scalars."""
+    """Return a result as jax gave it, or else a float for scalars."""
     if isinstance(values, jax.Array):
         return values
     return float(values) if np.ndim(values) == 0 else np.asarray(values)

@@ -1,4 +1,4 @@
-"""The reflectance profile from its transform: the inverse Hankel transform, over jax.numpy.
+"""Reflectance profile from its transform: the inverse Hankel transform, over jax.numpy.
 
     R_d(r) = (1/2 pi) int_0^inf k R^(k) J0(k r) dk
     int_0^r 2 pi r' R_d(r') dr' = r int_0^inf R^(k) J1(k r) dk
@@ -23,21 +23,21 @@ SETTLED = 4e-15  # of the logarithm of a share: its rounding
 
 
 def profile(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
-    """R_d [1/mfp^2] at radii x >= 0 of any shape; infinite at the source, 0 at infinity."""
+    """Return R_d [1/mfp^2] at radii x >= 0 of any shape; infinite at the source, 0 at infinity."""
     somewhere = jnp.where((x == 0.0) | (x == jnp.inf), 1.0, x)
     value = alpha * (ring_density(transform, somewhere) / (2.0 * np.pi * somewhere))
     return jnp.where(x == jnp.inf, 0.0, jnp.where((x == 0.0) & (alpha > 0.0), jnp.inf, jnp.where(x == 0.0, 0.0, value)))
 
 
 def cdf(transform: Transform, x: jax.Array) -> jax.Array:
-    """Share of the reflected energy that leaves within x, >= 0 and of any shape."""
+    """Return the share of the reflected energy that leaves within x, >= 0 and of any shape."""
     somewhere = jnp.where(x == jnp.inf, 1.0, x)
     within = 1.0 - _energy_beyond(transform, somewhere)
     return jnp.where(x == jnp.inf, 1.0, within * jnp.minimum(x / NEAREST_RADIUS, 1.0))
 
 
 def ring_density(transform: Transform, x: jax.Array) -> jax.Array:
-    """2 pi x R_d(x) / alpha [1/mfp] at finite radii x >= 0 of any shape; 1/2 at the source."""
+    """Return 2 pi x R_d(x) / alpha [1/mfp] at finite radii x >= 0 of any shape; 1/2 at the source."""
     inside = _solved(transform, x)
     # Nothing of A is left in the sum, nor of its derivative in alpha, which is infinite at alpha = 1.
     total = jax.lax.stop_gradient(transform.reflectance)
@@ -48,7 +48,7 @@ def ring_density(transform: Transform, x: jax.Array) -> jax.Array:
 
 
 def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
-    """Radius within which the share xi in [0, 1], of any shape, leaves.
+    """Return the radius within which the share xi in [0, 1], of any shape, leaves.
 
     Newton's method for the logarithm of the share beyond. Where the surface does not refract, its slope falls from 1/2A
     at the source to kappa far away, so that from a point on the near side, such as the first, every step ends on that
@@ -83,7 +83,7 @@ def radius_within(transform: Transform, xi: jax.Array) -> jax.Array:
 
 
 def _energy_beyond(transform: Transform, x: jax.Array) -> jax.Array:
-    """Share of the reflected energy that leaves beyond x, or beyond NEAREST_RADIUS if that is farther."""
+    """Return the share of the reflected energy beyond x, or beyond NEAREST_RADIUS if that is farther."""
     inside = _solved(transform, x)
     # Next to the derivative in alpha of A, infinite at alpha = 1, no other counts.
     conservative = transform.farthest < NO_LIGHT
@@ -98,7 +98,7 @@ def _energy_beyond(transform: Transform, x: jax.Array) -> jax.Array:
 
 
 def _concentrated(x: jax.Array) -> jax.Array:
-    """Share of the energy that, for the sake of the sums, is taken away at the source, where it adds nothing to R_d(x).
+    """Return the share of the energy that the sums take away at the source, where it adds nothing to R_d(x).
 
     Far away only what R^ has beside R^(0) counts, which the sum would else be left with as a small difference; near
     the source R^(0) would be the large part.
@@ -107,5 +107,5 @@ def _concentrated(x: jax.Array) -> jax.Array:
 
 
 def _solved(transform: Transform, x: jax.Array) -> jax.Array:
-    """The nearest radius that the contour reaches; at alpha = 1 light ends in R_d ~ x^-3."""
+    """Return the nearest radius that the contour reaches; at alpha = 1 light ends in R_d ~ x^-3."""
     return jnp.clip(x, NEAREST_RADIUS, transform.farthest)

@@ -37,58 +37,58 @@ SEARCHLIGHT = Setting()
 
 
 class Reduced(NamedTuple):
-    """What a medium has in common with one whose scattering has no direction."""
+    """Scale that a medium shares with one whose scattering has no direction."""
 
     alpha: Any
-    """mu_s (1 - g) l*."""
+    """Reduced albedo mu_s (1 - g) l* [-]."""
     length: Any
-    """l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
+    """Length l* = 1 / (mu_a + mu_s (1 - g)) in mean free paths."""
 
 
 def reduced(alpha: Any, g: Any) -> Reduced:
-    """Of an albedo mu_s / (mu_s + mu_a)."""
+    """Return the reduced scale of an albedo mu_s / (mu_s + mu_a)."""
     length = 1.0 / (1.0 - alpha * g)
     return Reduced(alpha * (1.0 - g) * length, length)
 
 
 def unreduced(alpha: Any, g: float) -> Any:
-    """mu_s / (mu_s + mu_a) of a reduced albedo."""
+    """Return mu_s / (mu_s + mu_a) of a reduced albedo."""
     return alpha / (alpha + (1.0 - g) * (1.0 - alpha))
 
 
 class ExactLight(eqx.Module):
-    """The profile of a half space with `setting`; albedos and lengths are reduced ones."""
+    """Profile of a half space with `setting`; albedos and lengths are reduced ones."""
 
     setting: Setting = eqx.field(static=True)
     g: Array
     critical: Array
-    """k_c of light scattered once [1/mfp]."""
+    """Rate k_c of light scattered once [1/mfp]."""
     nearest: Array
-    """x of f's first knot; nearer, light scattered more than once is taken for x (1 - ln x) of itself."""
+    """Radius x of f's first knot; nearer, light scattered more than once is taken for x (1 - ln x) of itself."""
     farthest: Array
-    """x of the last one; farther, light goes on as its decay over x^2."""
+    """Radius x of the last knot; farther, light goes on as its decay over x^2."""
     step: Array
-    """Of ln x, from knot to knot."""
+    """Step of ln x, from knot to knot."""
     rest: Array
-    """f's spline in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling."""
+    """Spline of f in Chebyshev polynomials of s, (degrees, intervals, 4), powers falling."""
     once: Array
-    """Of ln D_1 + k_c x, x in mean free paths, (intervals, 4)."""
+    """Spline of ln D_1 + k_c x, x in mean free paths, (intervals, 4)."""
     kappa: Array
-    """Of kappa in the same polynomials as f, (degrees,)."""
+    """Decay rate kappa in the same polynomials as f, (degrees,)."""
     share: Array
-    """A / alpha in Chebyshev polynomials of s, (degrees,)."""
+    """Ratio A / alpha in Chebyshev polynomials of s, (degrees,)."""
 
     @property
     def unlabelled(self) -> ExactLight:
-        """The same without its setting: what is compiled for one serves all."""
+        """This light without its setting: what is compiled for one serves all."""
         return replace(self, setting=SEARCHLIGHT)
 
     def total(self, alpha) -> Array:
-        """Total reflectance A [-]."""
+        """Return the total reflectance A [-]."""
         return alpha * (_chebyshev(self.share.size, jnp.sqrt(1.0 - alpha), 1.0) @ self.share)
 
     def ring_density(self, x: Array, alpha: Array) -> Array:
-        """2 pi x R_d [1/l*] at x > 0 of any shape, of one albedo."""
+        """Return 2 pi x R_d [1/l*] at x > 0 of any shape, of one albedo."""
         paths = x * (1.0 + alpha * self.g / (1.0 - self.g))
         log = (jnp.log(paths) - np.log(SINGLE_NEAREST)) / STEP
         once = jnp.exp(_spline(self.once, log, STEP) - self.critical * paths) / (1.0 - self.g)
@@ -103,27 +103,27 @@ class ExactLight(eqx.Module):
         return alpha * once + alpha**2 * light
 
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
-        """R_d [1/l*^2]."""
+        """Return R_d [1/l*^2]."""
         return self.ring_density(x, alpha) / (2.0 * jnp.pi * x)
 
     def scaled_cdf(self, x: Array, alpha: Array) -> Array:
-        """Share of the reflected energy within x [-], to 1e-6 where g = 0, else as well as profile and A agree."""
+        """Return the share of the reflected energy within x [-], to 1e-6 where g = 0, else as profile and A agree."""
         return jnp.clip(self.energy(x, alpha) / self.total(alpha), 0.0, 1.0)
 
     def reach(self, alpha: Array) -> Array:
-        """Where what is left of the light is its e^-40 [l*]; infinite at alpha = 1."""
+        """Return the radius beyond which e^-40 of the light is left [l*]; infinite at alpha = 1."""
         kappa = _chebyshev(self.kappa.size, jnp.sqrt(1.0 - alpha), np.sqrt(1.0 - LEAST)) @ self.kappa
         return GONE / jnp.maximum(kappa, ROUNDING)
 
     def energy(self, x: Array, alpha: Array) -> Array:
-        """Integral of the profile over the disc of radius x [-]."""
+        """Return the integral of the profile over the disc of radius x [-]."""
         t, weight = 0.5 * (1.0 + ENERGY[0]), 0.5 * ENERGY[1]
         parts = self.ring_density(jnp.maximum(x, 1e-30)[..., None] * t**3, alpha) * (3.0 * t**2 * weight)
         return x * jnp.sum(parts, axis=-1)
 
 
 def tabulated(setting: Setting, nearest: float, step: float, rest: Floats, kappa: Floats, share: Floats) -> ExactLight:
-    """From numpy arrays, as in `ExactLight`."""
+    """Make the light from numpy arrays, as in `ExactLight`."""
     critical, farthest = single_scattering.critical_rate(setting), nearest * np.exp(step * rest.shape[1])
     parts = setting.g, critical, nearest, farthest, step, rest, once(setting), kappa, share
     with jax.enable_x64(True), jax.core.eval_context():
@@ -131,7 +131,7 @@ def tabulated(setting: Setting, nearest: float, step: float, rest: Floats, kappa
 
 
 def once(setting: Setting) -> Floats:
-    """ln D_1 + k_c x as cubics in ln x from SINGLE_NEAREST on, (intervals, 4)."""
+    """Return ln D_1 + k_c x as cubics in ln x from SINGLE_NEAREST on, (intervals, 4)."""
     log = np.arange(np.log(SINGLE_NEAREST), np.log(SINGLE_FARTHEST) + STEP, STEP)
     far = single_scattering.critical_rate(setting) * np.exp(log)
     found: Floats = CubicSpline(log, log_once(np.exp(log), setting) + far).c.T
@@ -139,7 +139,7 @@ def once(setting: Setting) -> Floats:
 
 
 def log_once(x: Floats, setting: Setting) -> Floats:
-    """ln of D_1 = 2 pi x R_1 / alpha, light scattered once [1/mfp], also where D_1 has long underflowed."""
+    """Return ln of D_1 = 2 pi x R_1 / alpha, light scattered once [1/mfp], also where D_1 has long underflowed."""
     k, weight = single_scattering.transform_density(setting)
     critical = single_scattering.critical_rate(setting)
     decayed = np.exp(-np.multiply.outer(x, k - critical)) @ (k * weight)
@@ -147,12 +147,12 @@ def log_once(x: Floats, setting: Setting) -> Floats:
 
 
 def nodes(degrees: int) -> Floats:
-    """Chebyshev's, from 1 to -1."""
+    """Return Chebyshev's nodes, from 1 to -1."""
     return np.cos(np.pi * (np.arange(degrees) + 0.5) / degrees)
 
 
 def coefficients(values: Floats) -> Floats:
-    """Of Chebyshev polynomials, from values at `nodes`, (degrees, ...)."""
+    """Return coefficients of Chebyshev polynomials, from values at `nodes`, (degrees, ...)."""
     degrees = values.shape[0]
     matrix = 2.0 / degrees * np.cos(np.outer(np.arange(degrees), np.pi * (np.arange(degrees) + 0.5) / degrees))
     matrix[0] *= 0.5
@@ -161,14 +161,14 @@ def coefficients(values: Floats) -> Floats:
 
 
 def _chebyshev(degrees: int, s, most: float) -> Array:
-    """All polynomials at s in [0, most]; above it those at `most`."""
+    """Return all polynomials at s in [0, most]; above it those at `most`."""
     # Next to either end the angle has no derivative.
     z = jnp.clip(s / most * 2.0 - 1.0, ROUNDING - 1.0, 1.0 - ROUNDING)
     return jnp.cos(jnp.arange(degrees) * jnp.arccos(z))
 
 
 def _spline(coefficients: Array, at: Array, step) -> Array:
-    """At places in intervals of one step, (intervals, 4) and (...)."""
+    """Return a spline at places in intervals of one step, (intervals, 4) and (...)."""
     interval = jnp.clip(jnp.floor(at), 0, coefficients.shape[0] - 1).astype(int)
     t = (at - interval) * step
     a, b, c, d = jnp.moveaxis(coefficients[interval], -1, 0)

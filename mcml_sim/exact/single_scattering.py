@@ -45,12 +45,15 @@ T_STEP, T_LAST = 0.13, 3.9  # of the tanh-sinh rule on (0, 1): 1e-12 for square 
 
 
 def ring_shares(r_edges: ArrayLike, setting: Setting = SEARCHLIGHT) -> Floats:
-    """Share of photons that leave a conservative half space after exactly one scattering, by ring [-].
+    """Return the share of photons that leave a conservative half space after exactly one scattering, by ring [-].
 
-    r_edges  edges of the rings [mfp], rising from 0, float64 (rings + 1,); `setting` may be any. A mean free path is
-             that of light itself, 1 / mu_s, not the reduced one
-    returns  (rings + 1,), the last beyond the last edge, per photon that entered; times `entered(setting)` per
-             photon that arrived. At albedo alpha it is alpha times as much.
+    Args:
+        r_edges: edges of the rings [mfp], rising from 0, (rings + 1,). A mean free path is 1 / mu_s, not reduced.
+        setting: any half space.
+
+    Returns:
+        Shares (rings + 1,), the last beyond the last edge, per photon that entered; times `entered(setting)` per
+        photon that arrived. At albedo alpha they are alpha times as much.
 
     Relative error of every share, also of narrow and far rings, below 1e-9 for radii of 1e-6 to 50 mfp, |g| <= 0.9 and
     n from 0.5 to 3; shares below 1e-290 may be 0.
@@ -63,7 +66,7 @@ def ring_shares(r_edges: ArrayLike, setting: Setting = SEARCHLIGHT) -> Floats:
 
 
 def entered(setting: Setting = SEARCHLIGHT) -> float:
-    """Share of the light that arrives at the surface and enters [-]."""
+    """Return the share of the light that arrives at the surface and enters [-]."""
     if setting.illumination == "searchlight":
         return 4 * setting.n / (setting.n + 1) ** 2
     return setting.n**2 * mean_transmittance(setting.n)
@@ -71,7 +74,7 @@ def entered(setting: Setting = SEARCHLIGHT) -> float:
 
 @lru_cache(maxsize=64)
 def source_strength(setting: Setting = SEARCHLIGHT) -> float:
-    """Limit of 2 pi r R_d at r = 0, over alpha, per photon that arrived [1/mfp]: int k f(k) dk times `entered`.
+    """Return the limit of 2 pi r R_d at r = 0, over alpha, per photon [1/mfp]: int k f(k) dk times `entered`.
 
     1/2 where n = 1 and g = 0, under either light. Light scattered more than once adds nothing there.
     """
@@ -81,13 +84,13 @@ def source_strength(setting: Setting = SEARCHLIGHT) -> float:
 
 @lru_cache(maxsize=64)
 def reflected(setting: Setting = SEARCHLIGHT) -> float:
-    """Share of the light that arrives which leaves after exactly one scattering, over alpha [-]."""
+    """Return the share of the light that arrives and leaves after exactly one scattering, over alpha [-]."""
     _, weighted = transform_density(setting)
     return float(entered(setting) * weighted.sum())
 
 
 def critical_rate(setting: Setting = SEARCHLIGHT) -> float:
-    """k_c [1/mfp], the least k at which light scattered once leaves: far away its R_d falls off as e^{-k_c r}.
+    """Return k_c [1/mfp], the least k at which light scattered once leaves: far away R_d falls as e^{-k_c r}.
 
     Searchlight: cot(theta / 2) at the critical angle theta; diffuse: n. 1 where n <= 1.
     """
@@ -97,7 +100,7 @@ def critical_rate(setting: Setting = SEARCHLIGHT) -> float:
 
 @lru_cache(maxsize=64)
 def transform_density(setting: Setting) -> tuple[Floats, Floats]:
-    """Nodes k, and f(k) dk on them."""
+    """Return nodes k, and f(k) dk on them."""
     n, phase = setting.n, setting.scattering
     critical = critical_rate(setting)
     if setting.illumination == "searchlight":
@@ -116,7 +119,7 @@ def _searchlight(critical: float, n: float, phase: Phase) -> Floats:
 
 
 def _diffuse_matched(phase: Phase) -> Floats:
-    """f where T = 1: the integral over psi is pi / 2."""
+    """Return f where T = 1: the integral over psi is pi / 2."""
     k = 1 + BEYOND_CRITICAL[:, None]
     eta, rest, weights = _unit_nodes()
     above, flat = BEYOND_CRITICAL[:, None] * (k + 1), rest * (1 + eta)  # k^2 - 1, 1 - eta^2
@@ -130,7 +133,7 @@ def _diffuse(critical: float, n: float, phase: Phase) -> Floats:
 
 
 def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float:
-    """f at k = critical + beyond, from the quarter with eta > 0 and psi < pi / 2, where mu_1 < mu_2."""
+    """Return f at k = critical + beyond, from the quarter with eta > 0 and psi < pi / 2, where mu_1 < mu_2."""
     k = critical + beyond
     x, rest, weights = _unit_nodes()
     above = (beyond + (critical - 1)) * (k + 1)  # k^2 - 1
@@ -153,12 +156,12 @@ def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float
 
 
 def _passes(mu: Floats, n: float) -> Floats:
-    """Share of light that the surface lets out [-], at a cosine `mu` to the normal inside."""
+    """Return the share of light that the surface lets out [-], at a cosine `mu` to the normal inside."""
     return 1 - fresnel.fresnel(n, 1.0, mu)[0]
 
 
 def _unit_nodes() -> tuple[Floats, Floats, Floats]:
-    """Nodes x in (0, 1), 1 - x without cancellation, and weights, of the tanh-sinh rule."""
+    """Return nodes x in (0, 1), 1 - x without cancellation, and weights, of the tanh-sinh rule."""
     t = np.arange(-T_LAST, T_LAST + T_STEP / 2, T_STEP)
     x, rest = 1 / (1 + np.exp(-np.pi * np.sinh(t))), 1 / (1 + np.exp(np.pi * np.sinh(t)))
     return x, rest, T_STEP * np.pi * np.cosh(t) * x * rest
@@ -166,7 +169,7 @@ def _unit_nodes() -> tuple[Floats, Floats, Floats]:
 
 @lru_cache(maxsize=64)
 def mean_transmittance(n: float) -> float:
-    """Fresnel's transmittance from inside, averaged over cosine-weighted directions [-]."""
+    """Return Fresnel's transmittance from inside, averaged over cosine-weighted directions [-]."""
     x, _, weights = _unit_nodes()
     cosine = np.sqrt(max(1 - 1 / n**2, 0.0))
     mu = cosine + (1 - cosine) * x

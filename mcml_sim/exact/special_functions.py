@@ -1,4 +1,4 @@
-"""Special functions over jax.numpy: functions of finite complex numbers, and the modified Bessel functions K0 and K1.
+"""Special functions over jax.numpy: functions of finite complex numbers, and modified Bessel functions K0 and K1.
 
 jax.numpy has the former for every infinity and signed zero, which takes XLA seconds to compile and several times as
 long to run; and its sinh of small complex numbers has no digit right.
@@ -33,7 +33,7 @@ FRACTIONS = 16
 
 @partial(jax.custom_jvp, nondiff_argnums=(0,))
 def bessel_k(order: int, z: jax.Array) -> jax.Array:
-    """K_order(z) for `order` 0 or 1 and complex128 `z` != 0 with |arg z| <= pi/4; relative error below 1e-13."""
+    """Return K_order(z) for `order` 0 or 1, complex128 `z` != 0, |arg z| <= pi/4; relative error below 1e-13."""
     near = jnp.abs(z) < SERIES_RADIUS
     series = _series(order, jnp.where(near, z, SERIES_RADIUS))
     return jnp.where(near, series, _fractions(order, jnp.where(near, SERIES_RADIUS, z)))
@@ -41,7 +41,7 @@ def bessel_k(order: int, z: jax.Array) -> jax.Array:
 
 @bessel_k.defjvp
 def _bessel_k_jvp(order: int, primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
-    """K0' = -K1 and K1' = -K0 - K1 / z."""
+    """Differentiate: K0' = -K1 and K1' = -K0 - K1 / z."""
     (z,), (dz,) = primals, tangents
     value = bessel_k(order, z)
     slope = -bessel_k(1, z) if order == 0 else -bessel_k(0, z) - value / z
@@ -84,7 +84,7 @@ def _fractions(order: int, z: jax.Array) -> jax.Array:
 
 @lru_cache(maxsize=2)
 def _gauss_rule(order: int) -> tuple[Floats, Floats]:
-    """Nodes and weights of Gauss's rule for mu_order(t) dt (Golub & Welsch, Math. Comp. 23, 1969).
+    """Return nodes and weights of Gauss's rule for mu_order(t) dt (Golub & Welsch, Math. Comp. 23, 1969).
 
     The measure is first put on many nodes, a trapezoid in ln t, whose three-term recurrence Lanczos then finds.
     """
@@ -108,7 +108,7 @@ def _gauss_rule(order: int) -> tuple[Floats, Floats]:
 
 @jax.custom_jvp
 def square_root(z: jax.Array) -> jax.Array:
-    """Principal root of z != 0."""
+    """Return the principal root of z != 0."""
     larger = jnp.sqrt(0.5 * (jnp.sqrt(z.real**2 + z.imag**2) + jnp.abs(z.real)))
     smaller = 0.5 * z.imag / larger
     right = z.real >= 0.0
@@ -124,7 +124,7 @@ def _square_root_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Ar
 
 @jax.custom_jvp
 def logarithm(z: jax.Array) -> jax.Array:
-    """Principal logarithm."""
+    """Return the principal logarithm."""
     return jax.lax.complex(0.5 * jnp.log(z.real**2 + z.imag**2), jnp.arctan2(z.imag, z.real))
 
 
@@ -134,21 +134,21 @@ def _logarithm_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Arra
 
 
 def arctangent(z: jax.Array) -> jax.Array:
-    """Principal arctan, of z with Re z >= 0 and not near i or beyond it."""
+    """Return the principal arctan of z with Re z >= 0 and not near i or beyond it."""
     real, imag = z.real, z.imag
     angle = 0.5 * jnp.arctan2(2.0 * real, 1.0 - real**2 - imag**2)
     return jax.lax.complex(angle, 0.25 * jnp.log1p(4.0 * imag / (real**2 + (1.0 - imag) ** 2)))
 
 
 def inverse_sinh(z: jax.Array, root: jax.Array) -> jax.Array:
-    """asinh, of z with Re z >= 0 and not near i, and sqrt(1 + z^2); right to all digits where z is small, too."""
+    """Return asinh of z with Re z >= 0 and not near i, and sqrt(1 + z^2); accurate where z is small, too."""
     less_one = z + z * z / (1.0 + root)  # e^asinh(z) - 1
     real, imag = less_one.real, less_one.imag
     return jax.lax.complex(0.5 * jnp.log1p(2.0 * real + real**2 + imag**2), jnp.arctan2(imag, 1.0 + real))
 
 
 def sinh_and_cosh(z: jax.Array) -> tuple[jax.Array, jax.Array]:
-    """sinh and cosh, right to all digits where z is small, too."""
+    """Return sinh and cosh, accurate where z is small, too."""
     less_one = jnp.expm1(z.real)
     inverse = 1.0 / (1.0 + less_one)
     # Held, or XLA works them out and compiles them anew wherever they are used.

@@ -1,4 +1,4 @@
-"""The transform of the half space under a refracting surface, n > 1, for every albedo.
+"""Transform of the half space under a refracting surface, n > 1, for every albedo.
 
 `cone` has it at one wave number k, from one matrix for all albedos. On the way back to r a contour must start below
 i kappa, the closer the farther r is, and kappa is the albedo's own. So albedos go by groups of kappa, each with a line
@@ -50,12 +50,12 @@ CHUNK = 16  # wave numbers at once
 
 
 class Table(NamedTuple):
-    """What albedos share under one surface."""
+    """Arrays that albedos share under one surface."""
 
     lines: Complexes
-    """R^(k) / alpha on the groups' lines, and at k = 0, in Chebyshev polynomials: (2 lights, groups, k, degree)."""
+    """Chebyshev coefficients of R^(k) / alpha on the groups' lines, and at k = 0: (2 lights, groups, k, degree)."""
     ray: Complexes
-    """Of each order of scattering, on the ray: (2 lights, k, orders)."""
+    """Transform of each order of scattering, on the ray: (2 lights, k, orders)."""
 
 
 class _Contour(NamedTuple):
@@ -64,7 +64,7 @@ class _Contour(NamedTuple):
 
 
 def transform(table: Table, alpha: jax.Array, light: int, rule: Rule) -> Transform:
-    """Of one albedo, a float64 scalar in [0, 1]; `light` is 0 for a searchlight, 1 for diffuse light."""
+    """Return the transform of one albedo, a float64 scalar in [0, 1]; `light`: 0 searchlight, 1 diffuse."""
     group = _group(alpha)
     k, dk = _whole_contour(group, rule)
     own = jnp.asarray(table.lines)[light, group]
@@ -76,7 +76,7 @@ def transform(table: Table, alpha: jax.Array, light: int, rule: Rule) -> Transfo
 
 
 def total(table: Table, alpha: jax.Array, light: int) -> jax.Array:
-    """A / alpha of one albedo."""
+    """Return A / alpha of one albedo."""
     group = _group(alpha)
     return _total(alpha, jnp.asarray(table.lines)[light, group, -1], group)
 
@@ -92,7 +92,7 @@ def _whole_contour(group: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
 
 
 def _variable(alpha: jax.Array, group: jax.Array | int, k: jax.Array) -> jax.Array:
-    """z, from w, between 1 and -1 at the ends of the group."""
+    """Return z, from w, between 1 and -1 at the ends of the group."""
     first, last = (_root(jnp.asarray(ALPHAS)[group + end], k) for end in (0, 1))
     return (2.0 * _root(alpha, k) - first - last) / (first - last)
 
@@ -102,7 +102,7 @@ def _root(alpha: jax.Array, k: Any) -> jax.Array:
 
 
 def _sum(coefficients: jax.Array, z: jax.Array) -> jax.Array:
-    """Of Chebyshev polynomials, by Clenshaw's recurrence: (..., degree) and (...)."""
+    """Sum Chebyshev polynomials by Clenshaw's recurrence: (..., degree) and (...)."""
     one, two = jnp.zeros_like(z), jnp.zeros_like(z)
     for index in range(coefficients.shape[-1] - 1, 0, -1):
         one, two = 2.0 * z * one - two + coefficients[..., index], one
@@ -111,13 +111,13 @@ def _sum(coefficients: jax.Array, z: jax.Array) -> jax.Array:
 
 @jax.custom_jvp
 def _total(alpha: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Array:
-    """A / alpha, at k = 0."""
+    """Return A / alpha, at k = 0."""
     return _total_of(jnp.sqrt(1.0 - alpha), coefficients, group)
 
 
 @_total.defjvp
 def _total_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
-    """Infinite at alpha = 1."""
+    """Differentiate A / alpha: infinite at alpha = 1."""
     alpha, coefficients, group = primals
     w = jnp.sqrt(1.0 - alpha)
     value, slope = jax.jvp(lambda one: _total_of(one, coefficients, group), (w,), (jnp.ones_like(w),))
@@ -130,7 +130,7 @@ def _total_of(w: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Ar
 
 
 def made(n: float, rule: Rule, slope: bool = False) -> Table:
-    """The table of one n > 1, or its derivative by n, in seconds."""
+    """Return the table of one n > 1, or its derivative by n, in seconds."""
     with jax.enable_x64(True), jax.core.eval_context():
         lines = np.stack([_line(n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
         lines = np.concatenate([lines, _totals(n, rule, slope)[:, :, None]], axis=2)
@@ -149,7 +149,7 @@ def made(n: float, rule: Rule, slope: bool = False) -> Table:
 
 
 def shapes(rule: Rule) -> Table:
-    """Of a table's arrays, as jax.ShapeDtypeStruct."""
+    """Return the shapes of a table's arrays, as jax.ShapeDtypeStruct."""
     lines, ray = _lines(rule.line), _ray(rule.line)
     shape = (2, len(lines), lines[0].k.size + 1, rule.degree), (2, ray.k.size, ORDERS)
     made_of: Any = [jax.ShapeDtypeStruct(one, np.complex128) for one in shape]
@@ -157,7 +157,7 @@ def shapes(rule: Rule) -> Table:
 
 
 def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Complexes:
-    """The polynomials of a group: (2, k, degree)."""
+    """Return the polynomials of a group: (2, k, degree)."""
     z, own = _nodes(rule.degree), line.k[line.dk != 0]
 
     def values(part: Complexes) -> Complexes:
@@ -171,7 +171,7 @@ def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Comp
 
 
 def _totals(n: float, rule: Rule, slope: bool) -> Complexes:
-    """The same at k = 0, of all groups: (2, groups, degree)."""
+    """Return the polynomials at k = 0, of all groups: (2, groups, degree)."""
     first, last = np.sqrt(1.0 - ALPHAS[:-1, None]), np.sqrt(1.0 - ALPHAS[1:, None])
     alpha = 1.0 - (0.5 * (first + last) + 0.5 * (first - last) * _nodes(rule.degree)) ** 2
     origins = np.full(alpha.shape[0], ORIGIN)
@@ -183,7 +183,7 @@ def _nodes(degree: int) -> Floats:
 
 
 def _polynomials(values: Complexes) -> Complexes:
-    """Coefficients of Chebyshev polynomials from values on their nodes, the last axis of both."""
+    """Return coefficients of Chebyshev polynomials from values on their nodes, the last axis of both."""
     degree = values.shape[-1]
     found: Complexes = 2.0 / degree * values @ np.cos(np.outer(np.arccos(_nodes(degree)), np.arange(degree)))
     found[..., 0] *= 0.5
@@ -191,7 +191,7 @@ def _polynomials(values: Complexes) -> Complexes:
 
 
 def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: int, slope: bool) -> Complexes:
-    """R^(k) / alpha for albedos (k, m), which the nodes in w make complex, or its derivative by n: (2, k, m)."""
+    """Return R^(k) / alpha for albedos (k, m), complex by the nodes in w, or its derivative by n: (2, k, m)."""
     here, change = ([np.asarray(part) for part in system] for system in _systems(n, k, x_nodes, angles, slope))
     found = []
     for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=True):
@@ -212,7 +212,7 @@ def _orders(n: float, k: Complexes, sizes: tuple[int, int], slope: bool) -> Comp
 
 
 def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Complexes:
-    """Of all k: (2, k, ...), on every core."""
+    """Compute at all k, on every core: (2, k, ...)."""
     parts = np.array_split(np.pad(k, (0, -k.size % CHUNK), mode="edge"), -(-k.size // CHUNK))
 
     def in_double(part: Complexes) -> Complexes:
@@ -227,7 +227,7 @@ def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Comp
 def _systems(
     n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool
 ) -> tuple[cone.System, cone.System | tuple[()]]:
-    """And their derivatives by n, if wanted."""
+    """Return systems and, if asked for, their derivatives by n."""
 
     def at(n: jax.Array) -> cone.System:
         return jax.vmap(lambda one: cone.system(n, one, x_nodes, angles))(k)
@@ -237,7 +237,7 @@ def _systems(
 
 @partial(jit, static_argnums=(2, 3, 4))
 def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax.Array:
-    """Of each order of scattering, or its derivative by n: (k, 2, orders)."""
+    """Return the transform of each order of scattering, or its derivative by n: (k, 2, orders)."""
 
     def at(n: jax.Array) -> jax.Array:
         return jax.vmap(lambda one: cone.series(n, one, ORDERS, x_nodes, angles))(k)
@@ -251,7 +251,7 @@ def _sizes(rule: Rule, factors: tuple[float, float]) -> tuple[int, int]:
 
 @lru_cache(maxsize=8)
 def _lines(nodes: int) -> tuple[_Contour, ...]:
-    """Of each group, of one length: the shorter ones end with nodes that have no weight."""
+    """Return the line of each group, of one length: the shorter ones end with nodes that have no weight."""
     lines = []
     for kappa in KAPPAS[1:]:
         start = 1j * START * kappa

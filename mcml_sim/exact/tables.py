@@ -25,7 +25,7 @@ VERSION = 2  # of what `table.made` puts into a table
 
 @lru_cache(maxsize=16)
 def table(n: float, rule: Rule, slope: bool = False) -> Table:
-    """Of the half space of index n > 1, or its derivative by n."""
+    """Return the table of the half space of index n > 1, or its derivative by n."""
     nodes, kind = "-".join(map(str, astuple(rule)[3:])), "-slope" if slope else ""
     found = kept(
         f"half-space-n{n!r}-{nodes}{kind}-v{VERSION}",
@@ -37,7 +37,7 @@ def table(n: float, rule: Rule, slope: bool = False) -> Table:
 
 @partial(jax.custom_jvp, nondiff_argnums=(1,))
 def traced_table(n: jax.Array, rule: Rule) -> Table:
-    """Of an n that may be traced and is differentiable, n >= 1; nan below. At n = 1 it is that of LEAST."""
+    """Return the table of an n that may be traced, n >= 1; nan below. At n = 1 it is that of LEAST."""
     return _called(n, rule, False)
 
 
@@ -58,5 +58,5 @@ def _called(n: jax.Array, rule: Rule, slope: bool) -> Table:
 
 
 def _reals(part: Complexes) -> Floats:
-    """Real and imaginary parts along one more axis."""
+    """Return real and imaginary parts along one more axis."""
     return np.ascontiguousarray(part, dtype=complex)[..., None].view(float)

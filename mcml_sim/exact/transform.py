@@ -1,4 +1,4 @@
-"""The two-dimensional Fourier transform of a half space's reflectance profile, over jax.numpy.
+"""Two-dimensional Fourier transform of a half space's reflectance profile, over jax.numpy.
 
 At transverse wave number k the half space is a "pseudo" medium with an H function of its own (Chandrasekhar 1950;
 Rybicki, J. Quant. Spectrosc. Radiat. Transf. 11, 1971; Williams, J. Fluid Mech. 2007; d'Eon, A Hitchhiker's Guide to
@@ -59,15 +59,15 @@ class Rule:
     m: int
     x: int
     line: int = 12
-    """Wave numbers of a panel."""
+    """Number of wave numbers of a panel."""
     depth: int = 96
-    """Nodes x of `cone`."""
+    """Number of nodes x of `cone`."""
     angles: int = 72
     degree: int = 18
-    """Polynomials in w."""
+    """Number of polynomials in w."""
 
     def scaled(self, factor: float) -> Rule:
-        """The rule with that many times as many nodes."""
+        """Return the rule with that many times as many nodes."""
         return Rule(*(round(factor * count) for count in astuple(self)))
 
 
@@ -77,16 +77,16 @@ STANDARD = Rule(k=224, m=24, x=40)
 
 
 class Transform(NamedTuple):
-    """One albedo's transform on its contour, over alpha, so that it has a limit where alpha is 0."""
+    """Transform of one albedo on its contour, over alpha, so that it has a limit where alpha is 0."""
 
     k: jax.Array
     """Wave numbers, complex128 (nodes,) [1/mfp]."""
     weight: jax.Array
-    """dk, complex128 (nodes,) [1/mfp]."""
+    """Steps dk, complex128 (nodes,) [1/mfp]."""
     value: jax.Array
-    """R^(k) / alpha, complex128 (nodes,) [-]."""
+    """Values R^(k) / alpha, complex128 (nodes,) [-]."""
     reflectance: jax.Array
-    """A / alpha, float64 () [-]."""
+    """Ratio A / alpha, float64 () [-]."""
     pole: jax.Array
     """Part of A that the contour leaves out of the energy beyond a radius, float64 () [-]: 1/2 where it starts at 0."""
     farthest: jax.Array
@@ -95,7 +95,7 @@ class Transform(NamedTuple):
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
 def solve(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> Transform:
-    """The transform of one albedo, a float64 scalar in [0, 1]."""
+    """Return the transform of one albedo, a float64 scalar in [0, 1]."""
     k, weight = _contour(alpha, rule)
     value = over_alpha(alpha, jnp.append(k, ORIGIN), illumination, rule)
     return Transform(k, weight, value[:-1], _total(alpha, value), _pole(alpha), _farthest(alpha))
@@ -103,7 +103,7 @@ def solve(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> Transfo
 
 @solve.defjvp
 def _solve_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tuple) -> tuple[Transform, Transform]:
-    """The derivative under the integral, on held nodes: reverse mode keeps no more of it than the result."""
+    """Differentiate under the integral, on held nodes: reverse mode keeps no more of it than the result."""
     (alpha,), (d_alpha,) = primals, tangents
     k, weight = _contour(alpha, rule)
     value, slope = _with_slope(alpha, jnp.append(k, ORIGIN), illumination, rule)
@@ -115,7 +115,7 @@ def _solve_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tuple) -
 
 @partial(jax.custom_jvp, nondiff_argnums=(1, 2))
 def reflectance_over_alpha(alpha: jax.Array, illumination: str, rule: Rule = STANDARD) -> jax.Array:
-    """A / alpha = R^(0) / alpha of one albedo, a float64 scalar in [0, 1]; 1 at alpha = 1."""
+    """Return A / alpha = R^(0) / alpha of one albedo, a float64 scalar in [0, 1]; 1 at alpha = 1."""
     return _total(alpha, over_alpha(alpha, jnp.full(1, ORIGIN), illumination, rule))
 
 
@@ -126,18 +126,18 @@ def _reflectance_jvp(illumination: str, rule: Rule, primals: tuple, tangents: tu
 
 
 def _with_slope(alpha: jax.Array, k: jax.Array, illumination: str, rule: Rule) -> tuple[jax.Array, jax.Array]:
-    """R^(k) / alpha and its derivative in alpha; infinite at alpha = 1, k = 0: 1 - A goes with sqrt(1 - alpha)."""
+    """Return R^(k) / alpha and its derivative in alpha, infinite at alpha = 1, k = 0: 1 - A goes with its root."""
     value, slope = jax.jvp(lambda a: over_alpha(a, k, illumination, rule), (alpha,), (jnp.ones_like(alpha),))
     return value, jnp.where((alpha == 1.0) & (k == ORIGIN), jnp.inf, slope)
 
 
 def _total(alpha: jax.Array, value: jax.Array) -> jax.Array:
-    """A / alpha, from the last wave number, which is none; all light comes back where nothing is absorbed."""
+    """Return A / alpha, from the last wave number, which is none; 1 where nothing is absorbed."""
     return jnp.where(alpha == 1.0, 1.0, value[-1].real)
 
 
 def _pole(alpha: jax.Array) -> jax.Array:
-    """The contour that starts at the origin itself passes half of the pole of H1 there."""
+    """Return the part of H1's pole: a contour that starts at the origin itself passes half of it there."""
     return jnp.where(alpha == 1.0, 0.5, 0.0)
 
 
@@ -146,7 +146,7 @@ def _farthest(alpha: jax.Array) -> jax.Array:
 
 
 def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
-    """k and dk, each (rule.k,)."""
+    """Return k and dk, each (rule.k,)."""
     kappa = jnp.sqrt(squared_decay_rate(jax.lax.stop_gradient(alpha)))
     scale = jnp.where(kappa > 0.0, (1.0 - START) * kappa, CONSERVATIVE_SCALE)
     step = (jnp.log(LAST_WAVE / (NEAREST_RADIUS * scale)) - FIRST_V) / (rule.k - 1)
@@ -156,7 +156,7 @@ def _contour(alpha: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
 
 
 def over_alpha(alpha: jax.Array, k: jax.Array, illumination: str, rule: Rule) -> jax.Array:
-    """R^(k) / alpha for k of shape (n,), not 0."""
+    """Return R^(k) / alpha for k of shape (n,), not 0."""
     branch = square_root(1.0 + k * k)[:, None]
     cosh, m, dm = _m_line(k[:, None], branch, rule)
     s = cosh / m
@@ -171,7 +171,7 @@ def over_alpha(alpha: jax.Array, k: jax.Array, illumination: str, rule: Rule) ->
 
 
 def _m_line(k: jax.Array, branch: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array, jax.Array]:
-    """sqrt(1 + k^2 m^2), m and dm for k and sqrt(1 + k^2) of shape (n, 1), each (n, m).
+    """Return sqrt(1 + k^2 m^2), m and dm for k and sqrt(1 + k^2) of shape (n, 1), each (n, m).
 
     Gauss nodes t on (0, 1); y = t^2 asinh(k), whose square suits the m ln m of H at grazing angles.
     """
@@ -185,7 +185,7 @@ def _m_line(k: jax.Array, branch: jax.Array, rule: Rule) -> tuple[jax.Array, jax
 def _h_function(
     alpha: jax.Array, k: jax.Array, branch: jax.Array, s: jax.Array, rule: Rule
 ) -> tuple[jax.Array, jax.Array]:
-    """H_k(1/s) for k and sqrt(1 + k^2) of shape (n, 1) and s of shape (n, m), and L(k), (n,)."""
+    """Return H_k(1/s) for k and sqrt(1 + k^2) of shape (n, 1) and s of shape (n, m), and L(k), (n,)."""
     square = squared_decay_rate(alpha)
     sinh_u, cosh_u, weights = _x_nodes(rule)
     ray = 0.5 * X_SCALE * (branch + jnp.sqrt(branch.real**2 + branch.imag**2))  # halves the argument of the branch
@@ -200,7 +200,7 @@ def _h_function(
 
 
 def _x_nodes(rule: Rule) -> tuple[Floats, Floats, Floats]:
-    """sinh(u), cosh(u) and du; the first node, u = 0, has no weight and is there for its integrand."""
+    """Return sinh(u), cosh(u) and du; the first node, u = 0, has no weight and is there for its integrand."""
     step = np.log(2.0 * X_LAST / X_SCALE) / rule.x
     u = np.append(0.0, step * (np.arange(rule.x) + 0.5))
     weights = np.append(0.0, np.full(rule.x, step))

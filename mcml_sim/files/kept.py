@@ -25,7 +25,7 @@ MOST_BYTES = 1 << 26  # of a file that is read
 
 
 def kept(name: str, arrays: Collection[str], make: Callable[[], Arrays]) -> Arrays:
-    """What `make` gives, or gave before: `arrays` by name. The file's name says all that they depend on."""
+    """Return the arrays of that name from the cache, else from `make`. The file's name says all that they depend on."""
     path = file_of(name)
     if path.is_file():
         try:
@@ -40,12 +40,12 @@ def kept(name: str, arrays: Collection[str], make: Callable[[], Arrays]) -> Arra
 
 
 def file_of(name: str) -> Path:
-    """Where arrays of that name are kept."""
+    """Return the path of the file that keeps arrays of that name."""
     return platformdirs.user_cache_path("mcml_sim") / f"{name}.npz"
 
 
 def _read(content: bytes, wanted: Collection[str]) -> Arrays:
-    """ValueError where the content is not `_content`."""
+    """Return the wanted arrays of a file; ValueError where its content is not that of `_content`."""
     arrays = read_npz(content, MOST_BYTES, text=("sha256",))
     if not {"sha256", *wanted} <= arrays.keys():
         raise ValueError("an array is missing")

@@ -43,12 +43,13 @@ DAMAGED = (OSError, ValueError, TypeError, LookupError, EOFError, RuntimeError, 
 
 
 def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Collection[str] = ()) -> dict[str, NDArray]:
-    """The arrays of an .npz file by name, in this machine's byte order; those that it lacks are left out.
+    """Return the arrays of an .npz file by name, in this machine's byte order; those that it lacks are left out.
 
-    content  of the file
-    most     bytes that all of them may fill; more is an error before any is unpacked
-    wanted   shapes by name, None for any; other arrays are not looked at. None: all that the file has
-    text     names of those that are one text each, in place of real numbers
+    Args:
+        content: of the file.
+        most: bytes that all of them may fill; more is an error before any is unpacked.
+        wanted: shapes by name, None for any; other arrays are not looked at. None: all that the file has.
+        text: names of those that are one text each, in place of real numbers.
 
     ValueError says in one line what is wrong with the file.
     """
@@ -75,7 +76,7 @@ def _zip_file(content: bytes) -> bytes:
 
 
 def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfile.ZipInfo]:
-    """The wanted members by the name of their array."""
+    """Return the wanted members by the name of their array."""
     found: dict[str, zipfile.ZipInfo] = {}
     for member in archive.infolist():
         name = member.filename.removesuffix(SUFFIX)
@@ -94,7 +95,7 @@ def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfi
 def _checked_size(
     archive: zipfile.ZipFile, name: str, member: zipfile.ZipInfo, shape: tuple[int, ...] | None, is_text: bool
 ) -> int:
-    """Bytes of a member; ValueError unless its header says what is wanted, and as much as the directory says."""
+    """Return the bytes of a member; ValueError unless its header fits what is wanted and the directory."""
     with archive.open(member) as file:
         head = HEADER.match(file.read(LONGEST_HEADER))
     if head is None or int.from_bytes(head["length"], "little") != len(head["text"]):

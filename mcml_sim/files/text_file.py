@@ -36,7 +36,7 @@ LONGEST_SHOWN = 40  # characters of a number or key in a message
 
 
 def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
-    """What a JSON file of at most so many bytes says. InputError in one line, `FILE: is not JSON: ...`."""
+    """Read a JSON file of at most so many bytes. InputError in one line, `FILE: is not JSON: ...`."""
     content = read_whole(path, most)
     try:
         return parse_json(content, most)
@@ -45,7 +45,7 @@ def read_json(path: str | os.PathLike[str], most: int = MOST_JSON) -> Any:
 
 
 def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, Any]:
-    """What a TOML file of at most so many bytes says. InputError in one line, `FILE: is not TOML: ...`."""
+    """Read a TOML file of at most so many bytes. InputError in one line, `FILE: is not TOML: ...`."""
     content = read_whole(path, most)
     try:
         return parse_toml(content, most)
@@ -54,7 +54,7 @@ def read_toml(path: str | os.PathLike[str], most: int = MOST_TOML) -> dict[str, 
 
 
 def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) -> Any:
-    """What JSON text says; ValueError in one line if it is none, or not to be trusted (see above).
+    """Parse JSON text; ValueError in one line if it is none, or not to be trusted (see above).
 
     infinite  whether Infinity is a number, as Python writes it; NaN never is one
     """
@@ -84,7 +84,7 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
 
 
 def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
-    """What TOML text says; ValueError in one line if it is none, or not to be trusted (see above)."""
+    """Parse TOML text; ValueError in one line if it is none, or not to be trusted (see above)."""
     text = _text(content, most)
     if LONG_KEY.search(text):
         raise ValueError(_too_deep())
@@ -145,7 +145,7 @@ def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 
 
 def _checked(value: Any) -> Any:
-    """The same; ValueError if it nests too deep, or has half a character."""
+    """Return a parsed value; ValueError if it nests too deep, or has half a character."""
     level = [value]
     for _ in range(MOST_LEVELS + 1):
         level = [inner for one in level for inner in _inside(one)]
@@ -174,7 +174,7 @@ ALL_DIGITS = 17  # give every float64 back
 
 
 def plain(value: Any, digits: int = ALL_DIGITS) -> Any:
-    """Numbers, text, lists and dicts only; floats to so many digits; what is not finite becomes None."""
+    """Return numbers, text, lists and dicts only; floats to so many digits; None for what is not finite."""
     if is_dataclass(value) and not isinstance(value, type):
         own = getattr(value, "as_table", None)  # of one that says itself what files have of it
         return plain(own() if callable(own) else asdict(value), digits)
@@ -196,5 +196,5 @@ def plain(value: Any, digits: int = ALL_DIGITS) -> Any:
 
 
 def as_json(value: Any, ascii_only: bool = False) -> str:
-    """What --json prints, and what lies in .json files: `plain`, in the order given, and a line break."""
+    """Return JSON text as --json prints it and .json files hold it: `plain`, in the order given, and a line break."""
     return json.dumps(plain(value), indent=1, ensure_ascii=ascii_only, allow_nan=False) + "\n"

@@ -1,4 +1,4 @@
-"""The version of the distribution that holds this package."""
+"""Version of the distribution that holds this package."""
 
 from importlib.metadata import version
 

@@ -1,1 +1,1 @@
-"""What light meets: layers, their surfaces and phase functions, the light that falls on them, and grids of bins."""
+"""Media: layers, their surfaces and phase functions, the light that falls on them, and grids of bins."""

@@ -20,7 +20,7 @@ LONGEST_SHOWN = 60  # characters of a value in a message
 
 
 def shown(value: object) -> str:
-    """A value for a message: one line, shortened. A whole number can have as many digits as a file."""
+    """Return a value for a message: one line, shortened. A whole number can have as many digits as a file."""
     try:
         text = repr(value)
     except ValueError:  # Python spells no whole number beyond 4300 digits
@@ -32,14 +32,14 @@ def shown(value: object) -> str:
 
 
 def is_number(value: object) -> TypeGuard[float]:
-    """True of a real number, infinite ones included; neither of nan, nor of True, nor beyond floating point."""
+    """Return True for a real number, infinite ones included; not for nan, True, or what is beyond floating point."""
     if isinstance(value, int):
         return not isinstance(value, bool) and abs(value) <= sys.float_info.max
     return isinstance(value, (float, np.integer, np.floating)) and not math.isnan(value)
 
 
 def checked_numbers(name: str, value: object, accepted: str) -> Floats:
-    """Real numbers as float64, of any shape; `accepted` says what they are.
+    """Return real numbers as float64, of any shape; `accepted` says what they are.
 
     InputError on text, complex numbers, other objects, ragged lists and what is masked: none is silently made a number.
     """
@@ -55,7 +55,7 @@ def checked_numbers(name: str, value: object, accepted: str) -> Floats:
 
 
 def require_one_shape(**arrays: Any) -> None:
-    """InputError unless the arguments broadcast to one shape."""
+    """Raise InputError unless the arguments broadcast to one shape."""
     try:
         np.broadcast_shapes(*(np.shape(one) for one in arrays.values()))
     except ValueError:
@@ -67,7 +67,7 @@ _worked_in: int | None = None  # the process whose JAX has worked
 
 
 def require_own_process() -> None:
-    """ForkError in a fork of a process that had called this: the threads of JAX that it would wait for are not there.
+    """Raise ForkError in a fork of a process that had called this, since the threads of JAX were not forked.
 
     A process that was forked before may go on, as may one that was spawned.
     """
@@ -82,7 +82,7 @@ def require_own_process() -> None:
 
 
 def checked_whole(name: str, number: object, lowest: int, highest: int | None = None) -> int:
-    """A whole number, 1e6 included; InputError on anything else."""
+    """Return a whole number, 1e6 included; InputError on anything else."""
     accepted = f"a whole number >= {lowest}" + (f" and <= {highest:g}" if highest else "")
     try:
         whole = int(number) if isinstance(number, float) and number.is_integer() else operator.index(number)  # type: ignore[arg-type]
@@ -94,7 +94,7 @@ def checked_whole(name: str, number: object, lowest: int, highest: int | None = 
 
 
 def checked_workers(workers: int | None, scheduler: str | None = None) -> int | None:
-    """A number of threads, or None for one a core; a scheduler has workers of its own."""
+    """Return a number of threads, or None for one per core; a scheduler has workers of its own."""
     if workers is not None and scheduler is not None:
         raise InputError(
             f"workers must be None where a scheduler is given, whose workers they are, got {shown(workers)}"
@@ -103,7 +103,7 @@ def checked_workers(workers: int | None, scheduler: str | None = None) -> int | 
 
 
 def checked_folder(store: str | os.PathLike[str] | None) -> Path | None:
-    """The folder of a store, or None."""
+    """Return the folder of a store, or None."""
     if store is not None and not isinstance(store, (str, os.PathLike)):
         raise InputError(f"store must be the path of a folder, got {shown(store)}")
     return None if store is None else Path(store)

@@ -12,10 +12,12 @@ from mcml_sim.media.medium import Medium
 
 
 def fresnel(n1: Any, n2: Any, cos1: Any) -> tuple[Any, Any]:
-    """Reflectance of an interface [-], and the cosine of the refracted ray to its normal [-].
+    """Return the reflectance of an interface [-], and the cosine of the refracted ray to its normal [-].
 
-    n1, n2  refractive indices on the side the light comes from, and on the other [-]
-    cos1    cosine of the angle of incidence, 0 ... 1 [-]
+    Args:
+        n1: refractive index on the side the light comes from [-].
+        n2: refractive index on the other side [-].
+        cos1: cosine of the angle of incidence, 0 ... 1 [-].
 
     The mean of the two polarisations (Born & Wolf, Principles of Optics, sec. 1.5). Beyond the critical angle the
     reflectance is 1 and the refracted cosine 0; equal indices reflect nothing, at grazing incidence either.
@@ -37,7 +39,7 @@ def fresnel(n1: Any, n2: Any, cos1: Any) -> tuple[Any, Any]:
 
 
 def specular_reflectance(medium: Medium) -> float:
-    """Share of the beam that the surface throws back at once [-], as MCML counts it (Wang & Jacques 1995, sec. 3.2).
+    """Return the share of the beam that the surface throws back at once [-] (Wang & Jacques 1995, sec. 3.2).
 
     Below a first layer of clear glass the light that goes to and fro inside the glass is counted too, all orders of
     it: r1 + (1 - r1)^2 r2 / (1 - r1 r2).
@@ -52,5 +54,5 @@ def specular_reflectance(medium: Medium) -> float:
 
 
 def normal_reflectance(n1: float, n2: float) -> float:
-    """Fresnel reflectance at normal incidence, ((n1 - n2) / (n1 + n2))^2 [-]."""
+    """Return Fresnel's reflectance at normal incidence, ((n1 - n2) / (n1 + n2))^2 [-]."""
     return ((n1 - n2) / (n1 + n2)) ** 2

@@ -1,4 +1,4 @@
-"""The bins into which light is sorted: distance from the beam, depth, and exit angle."""
+"""Bins into which light is sorted: distance from the beam, depth, and exit angle."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Grid:
 
     @classmethod
     def from_edges(cls, *, r: ArrayLike, z: ArrayLike | None = None, na: int | None = None) -> Grid:
-        """Rings (and depths) between any rising edges [length], the first of them 0; `na` even angles."""
+        """Return rings (and depths) between any rising edges [length], the first of them 0; `na` even angles."""
         grid = object.__new__(cls)
         grid._set_edges(_checked_edges("r", r), None if z is None else _checked_edges("z", z), _angle_edges(na))
         return grid
@@ -161,7 +161,7 @@ def _checked_edges(axis: str, values: ArrayLike) -> Floats:
 
 
 def require_resolved(grid: Grid) -> None:
-    """InputError unless `grid` is one, whose bins hold many float32 places each."""
+    """Raise InputError unless `grid` is one, whose bins hold many float32 places each."""
     if not isinstance(grid, Grid):
         raise InputError(f"grid must be a mcml_sim.Grid, got {grid!r}")
     for across, number in (("depths", grid.depths), ("angles", grid.angles)):

@@ -1,4 +1,4 @@
-"""Layered media: what light meets on its way down."""
+"""Layered media."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ MAX_LAYERS = 1000  # more than any published stack; a larger number is a slip of
 
 @dataclass(frozen=True)
 class Layer:
-    """A homogeneous plane layer. Any one unit of length; InputError on values that no physics allows.
+    """Homogeneous plane layer. Any one unit of length; InputError on values that no physics allows.
 
     n          refractive index [-], > 0
     mu_a       absorption coefficient [1/length], >= 0
@@ -66,12 +66,12 @@ class Layer:
 
     @property
     def is_isotropic(self) -> bool:
-        """True where scattering has no preferred direction."""
+        """Whether scattering has no preferred direction."""
         return self.g == 0 and self.phase is None
 
     @property
     def similar(self) -> Layer:
-        """The isotropic layer of equal reduced scattering mu_s' = mu_s (1 - g), which looks the same from afar.
+        """Isotropic layer of equal reduced scattering mu_s' = mu_s (1 - g), which looks the same from afar.
 
         Similarity is an approximation: it fails within a few mean free paths of the source.
         """
@@ -107,17 +107,17 @@ class Medium:
 
     @property
     def is_half_space(self) -> bool:
-        """True if light cannot come out below."""
+        """Whether no light can come out below."""
         return math.isinf(self.layers[-1].thickness)
 
     @property
     def is_matched_isotropic_half_space(self) -> bool:
-        """True if the medium is one infinite layer that neither refracts at its surface nor prefers a direction."""
+        """Whether the medium is one infinite layer that neither refracts at its surface nor prefers a direction."""
         (first, *others) = self.layers
         return not others and self.is_half_space and first.is_isotropic and first.n == self.n_above and first.mu_t > 0
 
     def with_first(self, thickness: float) -> Medium:
-        """The same layers under a first one of another thickness [length]."""
+        """Return these layers under a first one of another thickness [length]."""
         first, *others = self.layers
         return replace(self, layers=(replace(first, thickness=thickness), *others))
 
@@ -128,12 +128,13 @@ class Medium:
 
 
 def half_space(alpha: float, mfp: float = 1.0, n: float = 1.0, g: float = 0.0) -> Medium:
-    """One infinite layer under air.
+    """Return one infinite layer under air.
 
-    alpha  single-scattering albedo mu_s / (mu_a + mu_s) [-], 0 ... 1
-    mfp    mean free path 1 / (mu_a + mu_s) [length]: of the light itself, not the reduced one where g != 0
-    n      refractive index [-]
-    g      mean cosine of the scattering angle [-]
+    Args:
+        alpha: single-scattering albedo mu_s / (mu_a + mu_s) [-], 0 ... 1.
+        mfp: mean free path 1 / (mu_a + mu_s) [length]: of the light itself, not the reduced one where g != 0.
+        n: refractive index [-].
+        g: mean cosine of the scattering angle [-].
     """
     if not (is_number(alpha) and 0 <= alpha <= 1):
         raise InputError(f"alpha must be a single-scattering albedo in [0, 1], got {shown(alpha)}")

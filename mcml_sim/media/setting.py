@@ -19,7 +19,7 @@ FORWARD_N, FORWARD_G = (1.33, 1.45), 0.95
 
 @dataclass(frozen=True)
 class Setting:
-    """The light and the surface that a half-space profile belongs to.
+    """Illumination and surface that a half-space profile belongs to.
 
     illumination  "searchlight", a pencil beam (normal, collimated; MCML's), or "diffuse", cosine-weighted light
     n             refractive index of the half space over that outside [-], > 0; a jax array () where an exact solution
@@ -47,35 +47,35 @@ class Setting:
 
     @property
     def is_matched_isotropic(self) -> bool:
-        """True where the surface does not refract and scattering has no preferred direction."""
+        """Whether the surface does not refract and scattering has no preferred direction."""
         return self.n == 1.0 and self.is_isotropic
 
     @property
     def is_isotropic(self) -> bool:
-        """True where scattering has no preferred direction."""
+        """Whether scattering has no preferred direction."""
         return self.g == 0.0 and self.phase is None
 
     @property
     def scattering(self) -> phases.Phase:
-        """The phase function."""
+        """Phase function."""
         return phases.HenyeyGreenstein(self.g) if self.phase is None else self.phase
 
     @property
     def is_solved(self) -> bool:
-        """True where `mcml_sim.exact` has the half space."""
+        """Whether `mcml_sim.exact` has the half space."""
         if self.is_isotropic:
             return is_traced(self.n) or self.n >= 1.0
         in_table = not is_traced(self.n) and FORWARD_N[0] <= self.n <= FORWARD_N[1] and 0.0 < self.g <= FORWARD_G
         return in_table and self.phase is None
 
     def as_table(self) -> dict[str, Any]:
-        """What files say of it; `phase` where it is not Henyey and Greenstein's."""
+        """Return the setting for files; `phase` only where it is not Henyey and Greenstein's."""
         told = {"illumination": self.illumination, "n": self.n, "g": self.g}
         return told if self.phase is None else {**told, "phase": phases.as_table(self.phase)}
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Setting:
-        """What `as_table` gave; InputError or TypeError on anything else."""
+        """Return the setting of a table from `as_table`; InputError or TypeError on anything else."""
         if "phase" not in content:
             return cls(**content)
         return cls(**{**content, "phase": phases.from_table(content["phase"])})
@@ -87,12 +87,12 @@ class Setting:
 
 
 def require_illumination(name: object) -> None:
-    """InputError unless that is one of ILLUMINATIONS."""
+    """Raise InputError unless that is one of ILLUMINATIONS."""
     if name not in ILLUMINATIONS:
         raise InputError(f"illumination must be one of {', '.join(ILLUMINATIONS)}, got {shown(name)}")
 
 
 def is_traced(n: object) -> bool:
-    """True for an index by which jax may differentiate."""
+    """Return whether jax may differentiate by an index."""
     jax = sys.modules.get("jax")  # half a second to import, for those who only name a setting
     return jax is not None and isinstance(n, jax.Array) and n.shape == ()

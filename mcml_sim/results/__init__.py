@@ -1,1 +1,1 @@
-"""What a run found, with errors, and the files that hold it."""
+"""Results of runs with errors, and the files that hold them."""

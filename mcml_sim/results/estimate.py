@@ -20,9 +20,9 @@ class Estimate:
     """Numbers from a simulation with their errors: arrays of one shape, or floats."""
 
     value: float | Floats
-    """The estimate, in the unit its maker states."""
+    """Value of the estimate, in the unit its maker states."""
     standard_error: float | Floats
-    """Its standard error, in the same unit. Meaningless where `effective_samples` is small: see `is_sampled`."""
+    """Standard error, in the same unit. Meaningless where `effective_samples` is small: see `is_sampled`."""
     effective_samples: float | Floats
     """Number of equally weighted photons that would be worth as much, (sum w)^2 / sum w^2 [-]."""
 
@@ -32,7 +32,7 @@ class Estimate:
         return float(self.value)
 
     def is_sampled(self, at_least: float = ENOUGH_SAMPLES) -> bool | NDArray[np.bool_]:
-        """True where enough photons arrived to believe value and standard error.
+        """Return True where enough photons arrived to believe value and standard error.
 
         Where the photons that carry most of the light were never seen, the standard error collapses along with the
         value: a small error bar there is no sign of accuracy.
@@ -40,12 +40,12 @@ class Estimate:
         return cast("bool | NDArray[np.bool_]", np.greater_equal(self.effective_samples, at_least))
 
     def scaled(self, factor: float | Floats) -> Estimate:
-        """The estimate times a positive constant, which broadcasts against it."""
+        """Return the estimate times a positive constant, which broadcasts against it."""
         return Estimate(self.value * factor, self.standard_error * factor, self.effective_samples)
 
 
 def estimate(counts: NDArray[np.int64], weights: Floats, photons: int) -> Estimate:
-    """Mean weight per photon started, of photons counted by bin, in float64.
+    """Return the mean weight per photon started, of photons counted by bin, in float64.
 
     counts (rows, bins), weights (..., bins) per photon of a bin -> Estimate of shape (..., rows). A photon that adds
     to no bin adds 0, so the variance of the mean is (sum w^2 - (sum w)^2 / N) / (N (N - 1)): infinite for one photon.
@@ -59,7 +59,7 @@ def estimate(counts: NDArray[np.int64], weights: Floats, photons: int) -> Estima
 
 
 def covariance_factor(counts: NDArray[np.int64], weights: Floats, photons: int, rank: int) -> tuple[Floats, float]:
-    """Factors of each row's covariance between weightings, truncated to `rank` directions.
+    """Return factors of each row's covariance between weightings, truncated to `rank` directions.
 
     counts (rows, bins), weights (alphas, bins) -> L (rows, alphas, rank) with L L^T the covariance of the row's means,
     (sum_n H_n g_n(a) g_n(b) / N - E(a) E(b)) / (N - 1), and the largest share of any one variance that truncation

@@ -1,4 +1,4 @@
-"""MCML's input files: a .mci names runs, each with an output file, photons, bins and layers. Lengths in cm.
+r"""Input files of MCML: a .mci names runs, each with an output file, photons, bins and layers. Lengths in cm.
 
 The first format is that of MCML V1 (Wang, Jacques & Zheng 1995, and the function ReadParm of its mcmlio.c): a version,
 the number of runs, and for each run
@@ -34,7 +34,7 @@ runs until `end`.
     0
     0.01 0.01 0.1           dz dr dt
     40 50 1 1               nz nr nt na
-    Rd_r A_rz               what is scored; a line that ends in \\ goes on in the next
+    Rd_r A_rz               what is scored; a line that ends in \ goes on in the next
     1000000 10:00           photons, and a time limit
     1E-4                    threshold weight of the roulette
     1                       seed
@@ -95,12 +95,12 @@ OUTPUT = "the name of an output file, and A or B"
 
 @dataclass(frozen=True)
 class Run:
-    """One run of a .mci file. Lengths in cm."""
+    """Run of a .mci file. Lengths in cm."""
 
     output: str
     """Name of the output file, as it stands in the input."""
     format: str
-    """"A" or "B", as it stands in the input; the output is text in both cases, as V1's is."""
+    """Letter "A" or "B", as it stands in the input; the output is text in both cases, as V1's is."""
     photons: int
     dz: float
     """Width of the depth bins [cm]."""
@@ -112,13 +112,13 @@ class Run:
     """Numbers of depths, rings and exit angles."""
     medium: Medium
     seed: int | None = None
-    """Of an input of MCML 2."""
+    """Seed in an input of MCML 2, else None."""
     limit: str = ""
     """Time limit of an input of MCML 2, which ends no run here."""
 
     @property
     def grid(self) -> Grid:
-        """The bins, in cm. Made on first use: thousands of runs with fine grids would fill the memory."""
+        """Grid in cm. Made on first use: thousands of runs with fine grids would fill the memory."""
         return Grid(self.dr, self.nr, self.dz, self.nz, na=self.na)
 
     @property
@@ -137,7 +137,7 @@ def read_mci(path: str | os.PathLike[str]) -> tuple[Run, ...]:
 
 
 def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
-    """What `read_mci` gives for a file of this name and content."""
+    """Return what `read_mci` gives for a file of this name and content."""
     lines = Lines(name, _checked(name, content))
     (version,) = lines.take(1, "the file version, 1.0 or mcmli2.0")
     if version.startswith(VERSION_2):
@@ -150,7 +150,7 @@ def parse_mci(content: bytes, name: str) -> tuple[Run, ...]:
 
 
 class Lines:
-    """The data lines of a file, one after the other, and where they stand."""
+    """Data lines of a file, one after the other, and their places."""
 
     def __init__(self, name: str, content: bytes) -> None:
         self._name = name
@@ -160,7 +160,7 @@ class Lines:
         self._number = 0
 
     def take(self, count: int, expected: str, optional: int = 0) -> list[str]:
-        """The first `count` words of the next line that has any, and up to `optional` more; no number may follow."""
+        """Return the first `count` words of the next line with any, and up to `optional` more; no number may follow."""
         for line in self._lines:
             self._number += 1
             if self._number > MAX_LINES:
@@ -191,7 +191,7 @@ class Lines:
         return word
 
     def error(self, expected: str, got: str) -> InputError:
-        """What to raise about the line that was read last."""
+        """Return the error to raise about the line that was read last."""
         return InputError(f"{self._name}:{self._number}: expected {expected}, got {got}")
 
     def whole(self, name: str, word: str, most: int, least: int = 1, decimal: bool = False) -> int:
@@ -203,20 +203,20 @@ class Lines:
         raise self.error(f"{name}, a whole number from {least} to {most}", shown(word))
 
     def decimal(self, name: str, word: str, bounds: tuple[float, float], or_else: str = "") -> float:
-        """A number within bounds, both included."""
+        """Return a number within bounds, both included."""
         if DECIMAL.fullmatch(word) and bounds[0] <= float(word) <= bounds[1]:
             return float(word) + 0.0  # no -0
         raise self.error(f"{name}, {or_else}a number from {bounds[0]:g} to {bounds[1]:g}", shown(word))
 
     def coefficient(self, name: str, word: str) -> float:
-        """A coefficient, which may be 0, but not so little that no float32 holds the mean free path."""
+        """Return a coefficient: 0, or large enough that a float32 holds the mean free path."""
         if DECIMAL.fullmatch(word) and float(word) == 0:
             return 0.0
         return self.decimal(name, word, COEFFICIENTS, or_else="0 or ")
 
 
 def read_run(lines: Lines, taken: set[str]) -> Run:
-    """The run that the next lines are of; `taken` are the output files of those before it."""
+    """Return the run of the next lines; `taken` are the output files of those before it."""
     output, form = _output(lines, taken, *lines.take(1, OUTPUT, optional=1))
     (word,) = lines.take(1, "the number of photons")
     photons = lines.whole("the number of photons", word, MAX_PHOTONS)
@@ -341,7 +341,7 @@ def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
 
 
 def _output(lines: Lines, taken: set[str], name: str, *form: str) -> tuple[str, str]:
-    """Name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
+    """Return name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     if len(name) > MAX_NAME or not name.isprintable():
         raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", shown(name))
     if form and not FORMAT.fullmatch(form[0]):
@@ -383,7 +383,7 @@ def _layer(lines: Lines, at: int, number: int) -> Layer:
 
 
 def require_g(lines: Lines, of: str, word: str, mu_s: float) -> float:
-    """A mean cosine, 1 only where nothing scatters."""
+    """Return a mean cosine, 1 only where nothing scatters; InputError on others."""
     g = lines.decimal(f"g {of}", word, (-1.0, 1.0))
     if abs(g) == 1 and (mu_s > 0 or g < 0):
         raise lines.error(f"g {of} between -1 and 1, or 1 where nothing scatters", shown(word))
@@ -405,9 +405,10 @@ def _is_number(word: str) -> bool:
 
 
 def _numbers(words: list[str]) -> int:
-    """How many numbers there are before the first other word."""
+    """Return how many numbers there are before the first other word."""
     return sum(1 for _ in itertools.takewhile(_is_number, " ".join(words).split()))
 
 
 def shown(word: str) -> str:
+    """Return a word for a message, shortened."""
     return repr(word if len(word) <= LONGEST_SHOWN else f"{word[: LONGEST_SHOWN - 3]}...")

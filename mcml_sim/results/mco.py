@@ -1,4 +1,4 @@
-"""MCML's output files: written as MCML 1.2.2 does, and read back as far as a reflectance profile needs.
+"""Output files of MCML: written as MCML 1.2.2 does, and read back as far as a reflectance profile needs.
 
 Files of MCML 2 (Wang and Jacques) are read, too: the version mcmloA2.0, then the input file with one run (`mci`), RAT
 (specular reflectance first), and a section for each quantity that was scored. Lengths in cm.
@@ -55,7 +55,7 @@ def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
 
 
 def mco_text(tally: Tally, name: str) -> str:
-    """What `write_mco` writes into a file of that name."""
+    """Return the text that `write_mco` writes into a file of that name."""
     if tally.illumination != "searchlight":
         raise InputError(f"an .mco is of a searchlight, got a tally of {tally.illumination} light")
     for number, layer in enumerate(tally.medium.layers, start=1):
@@ -65,7 +65,7 @@ def mco_text(tally: Tally, name: str) -> str:
 
 
 def made_by(seed: int) -> str:
-    """The line of an .mco that stands where V1 reports its time, which would make equal runs differ."""
+    """Return the line of an .mco in the place of V1's report of its time, which would make equal runs differ."""
     return f"# Made by mcml-sim {__version__}, seed {seed}.\n"
 
 
@@ -92,12 +92,12 @@ class _Bins:
 
     @property
     def areas(self) -> Floats:
-        """Of the rings [cm^2], (nr,)."""
+        """Areas of the rings [cm^2], (nr,)."""
         return np.asarray(2 * math.pi * (np.arange(self.nr) + 0.5) * self.dr**2, np.float64)
 
     @property
     def solid_angles(self) -> Floats:
-        """V1's, width times middle [sr], (na,)."""
+        """Solid angles as V1 has them, width times middle [sr], (na,)."""
         return 2 * math.pi * np.sin((np.arange(self.na) + 0.5) * self.da) * self.da
 
     @property
@@ -181,7 +181,7 @@ def _table(key: str, title: str, last: str, values: Floats) -> str:
 
 
 def _folded(weights: Floats, axis: int) -> Floats:
-    """The last bin along an axis, an overflow, added to the one before it."""
+    """Return bins along an axis, the last of which, an overflow, is added to the one before it."""
     last = weights.shape[axis] - 1
     folded = np.delete(weights, last, axis)
     index = [slice(None)] * weights.ndim
@@ -191,7 +191,7 @@ def _folded(weights: Floats, axis: int) -> Floats:
 
 
 def _even_width(name: str, edges: Floats) -> float:
-    """Width of the bins; InputError if they differ by more than rounding."""
+    """Return the width of the bins; InputError if they differ by more than rounding."""
     width = float(edges[1])
     widths = np.diff(edges)
     if not np.allclose(edges, width * np.arange(len(edges)), rtol=EVEN, atol=0):
@@ -206,7 +206,7 @@ def _finite(thickness: float) -> float:
 
 
 def _number(value: float) -> str:
-    """As V1 prints it, six digits, unless the number has more."""
+    """Return a number as V1 prints it, six digits, unless it has more."""
     short = f"{value:.6G}"
     return short if float(short) == value else repr(float(value))
 
@@ -218,7 +218,7 @@ LARGEST = 1e30  # of a printed number
 
 @dataclass(frozen=True, eq=False)
 class Output:
-    """What an .mco says of a run and of the light that it reflected. Lengths in cm.
+    """Content of an .mco: its run, and the light that it reflected. Lengths in cm.
 
     run                   parameters: photons, bins, medium
     specular_reflectance  light that never entered [-]
@@ -233,12 +233,12 @@ class Output:
 
 
 def read_mco(path: str | os.PathLike[str]) -> Output:
-    """Parameters, totals and Rd_r of an .mco of MCML V1 or 2; InputError, `FILE:LINE: expected ..., got ...`."""
+    """Read parameters, totals and Rd_r of an .mco of V1 or 2; InputError, `FILE:LINE: expected ..., got ...`."""
     return parse_mco(read_whole(path, MAX_BYTES), str(path))
 
 
 def parse_mco(content: bytes, name: str) -> Output:
-    """What `read_mco` gives for a file of this name and content."""
+    """Return what `read_mco` gives for a file of this name and content."""
     if len(content) > MAX_BYTES:
         raise InputError(f"{name}: expected an .mco file of at most {MAX_BYTES} bytes, got a longer one")
     lines = Lines(name, content.replace(b"\x00", b"\xff"))
@@ -276,7 +276,7 @@ def _first(lines: Lines, what: str) -> float:
 
 
 def begins_mco(path: str | os.PathLike[str]) -> bool:
-    """Whether a file begins as an .mco of V1 does, down to its parameters."""
+    """Return whether a file begins as an .mco of V1 does, down to its parameters."""
     try:
         return _beginning(Lines(str(path), read_whole(path, HEAD_BYTES))) == "A1"
     except InputError:
@@ -284,7 +284,7 @@ def begins_mco(path: str | os.PathLike[str]) -> bool:
 
 
 def _beginning(lines: Lines) -> str:
-    """The version."""
+    """Return the version."""
     (version,) = lines.take(1, "the file version, A1")
     if version not in ("A1", OUTPUT_2):
         raise lines.error(f"the file version, A1 or {OUTPUT_2}", repr(version[:10]))

@@ -1,4 +1,4 @@
-"""The order-resolved run: one simulation without absorption answers for every albedo, and for its derivative."""
+"""Order-resolved run: one simulation without absorption answers for every albedo, and for its derivative."""
 
 from __future__ import annotations
 
@@ -42,37 +42,37 @@ class Orders:
     seed: int
     setting: Setting
     counts: Counts
-    """The whole-numbered result from which all estimates come."""
+    """Whole numbers from which all estimates come."""
 
     def reflectance(self, alpha: ArrayLike) -> Estimate:
-        """Total diffuse reflectance A [-], beyond the last ring included."""
+        """Return the total diffuse reflectance A [-], beyond the last ring included."""
         return self._of_row(self.counts.exits.sum(axis=0), self._shares.sum(), alpha)
 
     def energy(self, alpha: ArrayLike) -> Estimate:
-        """Integral of 2 pi r R_d over each ring [-]."""
+        """Return the integral of 2 pi r R_d over each ring [-]."""
         return self._estimate(self.ring_order_counts, self._shares[:-1], alpha)
 
     def overflow(self, alpha: ArrayLike) -> Estimate:
-        """Reflectance beyond the last ring [-]."""
+        """Return the reflectance beyond the last ring [-]."""
         return self._of_row(self.counts.exits[-1], self._shares[-1], alpha)
 
     def profile(self, alpha: ArrayLike) -> Estimate:
-        """Mean of R_d over the area of each ring [1/mfp^2]: not its value at the middle, R_d rises as 1/r to r = 0."""
+        """Return the mean of R_d over the area of each ring [1/mfp^2]; R_d rises as 1/r to r = 0 within the first."""
         return self.energy(alpha).scaled(1 / self.grid.r_areas)
 
     def profile_derivative(self, alpha: ArrayLike) -> Estimate:
-        """d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
+        """Return d profile / d alpha [1/mfp^2], from the same photons: sum over n of n alpha^(n-1) R_n."""
         albedo = _checked_alpha(alpha)
         weights, ones = self._bins.weight_derivatives(albedo), np.ones_like(albedo)
         slope = self._from_weights(self.ring_order_counts, weights, np.multiply.outer(ones, self._shares[:-1]))
         return slope.scaled(1 / self.grid.r_areas)
 
     def once(self, alpha: ArrayLike) -> Floats:
-        """Light scattered exactly once, by ring, the last beyond the last ring [-]: part of `energy`, without error."""
+        """Return light scattered once, by ring, the last beyond the last ring [-]: part of `energy`, without error."""
         return np.multiply.outer(_checked_alpha(alpha), self._shares)
 
     def covariance_factor(self, alpha: ArrayLike, rank: int = 8, overflow: bool = False) -> tuple[Floats, float]:
-        """Covariance of `energy` between albedos, ring by ring, in closed form.
+        """Return the covariance of `energy` between albedos, ring by ring, in closed form.
 
         alpha (alphas,) -> L (rings, alphas, rank) with L[i] @ L[i].T the covariance of ring i, and the largest share
         of any one variance that the truncation drops. Many albedos of one ring are nearly dependent (32 of them:
@@ -88,7 +88,7 @@ class Orders:
         return estimate.covariance_factor(counts[:, 1:], self.weights(albedos)[:, 1:], self.photons, limit)
 
     def merged(self, r_edges: ArrayLike) -> Orders:
-        """The same photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
+        """Return these photons on fewer, wider rings: `r_edges` [mfp] rise from 0, each one an edge of this grid."""
         grid = Grid.from_edges(r=r_edges)
         index = np.searchsorted(self.grid.r_edges, grid.r_edges)
         if index[-1] >= self.grid.r_edges.size or np.any(self.grid.r_edges[index] != grid.r_edges):
@@ -97,14 +97,14 @@ class Orders:
         return replace(self, grid=grid, counts=replace(self.counts, exits=exits))
 
     def cut(self, alpha: ArrayLike) -> float | Floats:
-        """Upper bound on the reflectance that ending photons at the highest order took away [-]."""
+        """Return an upper bound on the reflectance that ending photons at the highest order took away [-]."""
         last = self._bins.max_order
         lost = self.entered * float(self._bins.roulette_weight(last)) * self.counts.cut / self.photons
         return _scalar_or_array(lost * _checked_alpha(alpha) ** last)
 
     @property
     def ledger(self) -> Ledger:
-        """What became of every photon started."""
+        """Ledger of all photons started."""
         return self.counts.ledger
 
     @property
@@ -118,12 +118,12 @@ class Orders:
         return self._bins.mean_orders
 
     def weights(self, alpha: ArrayLike) -> Floats:
-        """What one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
+        """Return what one counted photon of each bin adds to the energy, times N [-]: shape of alpha, then (bins,)."""
         return self.entered * self._bins.weights(_checked_alpha(alpha))
 
     @property
     def entered(self) -> float:
-        """Share of the light that the surface lets in [-]; the photons counted are of that."""
+        """Share of the light that the surface lets in [-]; the photons counted are of this light."""
         return single_scattering.entered(self.setting)
 
     @property
@@ -132,7 +132,7 @@ class Orders:
 
     @cached_property
     def _shares(self) -> Floats:
-        """`once` at alpha = 1, (rings + 1,)."""
+        """Light scattered once at alpha = 1, (rings + 1,)."""
         return self.entered * single_scattering.ring_shares(self.grid.r_edges, self.setting)
 
     def _estimate(self, counts: NDArray[np.int64], shares: Floats, alpha: ArrayLike) -> Estimate:
@@ -140,12 +140,12 @@ class Orders:
         return self._from_weights(counts, self._bins.weights(albedo), np.multiply.outer(albedo, shares))
 
     def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
-        """Estimate from `exact`, the light scattered once, and the counted photons that were scattered again."""
+        """Return the estimate from `exact`, light scattered once, and the counted photons scattered more often."""
         again = estimate.estimate(counts[:, 1:], self.entered * weights[..., 1:], self.photons)
         return replace(again, value=again.value + exact)
 
     def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
-        """Estimate from one row of counts, in the shape of alpha."""
+        """Return the estimate from one row of counts, in the shape of alpha."""
         rows = self._estimate(counts[None, :], np.array([share]), alpha)
         parts = (np.asarray(part)[..., 0] for part in (rows.value, rows.standard_error, rows.effective_samples))
         return Estimate(*map(_scalar_or_array, parts))

@@ -1,4 +1,4 @@
-"""What became of the light in a layered medium, quantity by quantity, with errors."""
+"""Shares of the light in a layered medium, quantity by quantity, with errors."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ BY_ANGLE = ("reflectance_a", "reflectance_ra", "transmittance_a", "transmittance
 
 
 def quantities(grid: Grid) -> tuple[str, ...]:
-    """Names of all estimates that a grid resolves."""
+    """Return the names of all estimates that a grid resolves."""
     z = BY_DEPTH if grid.depths else ()
     a = BY_ANGLE if grid.angles else ()
     return (*SCALARS, *BY_LAYER, *BY_RADIUS, *z, *a)
 
 
 def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
-    """Shape of every estimate that a grid resolves, in a medium of so many layers."""
+    """Return the shape of every estimate that a grid resolves, in a medium of so many layers."""
     bins = {"r": grid.rings, "z": grid.depths, "a": grid.angles}
     found = {name: name.rpartition("_")[2] for name in quantities(grid)}
     axes = {name: tuple(bins[axis] for axis in end) for name, end in found.items() if set(end) <= set(bins)}
@@ -50,7 +50,7 @@ def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
 
 @dataclass(frozen=True)
 class Precision:
-    """When to stop: as soon as a quantity's standard error, in every bin, is this share of its value.
+    """Precision at which a run stops: a quantity's standard error, in every bin, is this share of its value.
 
     relative_error  of the standard error to the value [-], in (0, 1)
     quantity        a name of `Tally.quantities`
@@ -65,14 +65,14 @@ class Precision:
             raise InputError(f"precision must be a relative standard error in (0, 1), got {share!r}")
 
     def is_reached(self, estimate: Estimate) -> bool:
-        """True if the error is small enough in every bin; a bin without light is not known at all."""
+        """Return True if the error is small enough in every bin; a bin without light is not known at all."""
         value, error = np.asarray(estimate.value), np.asarray(estimate.standard_error)
         return bool(np.all((value > 0) & (error <= self.relative_error * value)))
 
 
 @dataclass(frozen=True, eq=False)
 class Tally:
-    """What became of the light, in shares of the light that came in; lengths in the unit of the medium.
+    """Shares of the light that came in, by where it went; lengths in the unit of the medium.
 
     Every quantity is an Estimate: value, standard error, effective samples. Bins hold means over themselves, never
     values at their middles. Those of radius leave out what fell beyond the last ring (`..._overflow`); what was
@@ -85,9 +85,9 @@ class Tally:
     photons: int
     seed: int
     deposits: Deposits
-    """The sums that all estimates come from, for photons of weight 1 that have entered."""
+    """Sums that all estimates come from, for photons of weight 1 that have entered."""
     illumination: str = "searchlight"
-    """As in `Setting`."""
+    """Illumination, "searchlight" or "diffuse", as in `Setting`."""
 
     @property
     def quantities(self) -> tuple[str, ...]:
@@ -95,7 +95,7 @@ class Tally:
         return quantities(self.grid)
 
     def quantity(self, name: str) -> Estimate:
-        """The estimate of that name."""
+        """Return the estimate of that name."""
         require_quantity(name, self.grid)
         return cast(Estimate, getattr(self, name))
 
@@ -228,19 +228,19 @@ class Tally:
         return _rows(self._leaving(what, ()), slice(-1)).scaled(1 / bins)
 
     def _leaving(self, what: str, axes: tuple[int, ...]) -> Estimate:
-        """Light out of one side, summed over `axes` (0: radius, 1: angle)."""
+        """Return the light out of one side, summed over `axes` (0: radius, 1: angle)."""
         sums, squares = getattr(self.deposits, what), getattr(self.deposits, f"{what}_squares")
         return self._exits(sums.sum(axis=axes), squares.sum(axis=axes))
 
     def _exits(self, sums: Floats, squares: Floats) -> Estimate:
-        """Estimate from each photon's weight and its square, which every photon gives at most once."""
+        """Return the estimate from each photon's weight and its square, which every photon gives at most once."""
         if self.photons == 1:  # alone it says nothing of its error
             return self._spread(sums, np.full(np.shape(sums), math.inf))
         spread = np.maximum(squares - sums**2 / self.photons, 0)
         return self._spread(sums, spread * (self.photons / (self.photons - 1)))
 
     def _spread(self, sums: Floats, variance: Floats) -> Estimate:
-        """Estimate from a sum over photons and the variance of that sum."""
+        """Return the estimate from a sum over photons and the variance of that sum."""
         sums, variance = np.asarray(sums, np.float64), np.asarray(variance, np.float64)
         squares = variance + sums**2 / self.photons
         effective = np.divide(sums**2, squares, out=np.zeros_like(sums), where=squares > 0)
@@ -249,7 +249,7 @@ class Tally:
 
 
 def require_quantity(name: str, grid: Grid) -> None:
-    """InputError unless a grid resolves the quantity of that name."""
+    """Raise InputError unless a grid resolves the quantity of that name."""
     if name not in quantities(grid):
         raise InputError(f"quantity must be one of {', '.join(quantities(grid))}, got {name!r}")
 
@@ -259,7 +259,7 @@ def _rows(estimate: Estimate, rows: slice | int) -> Estimate:
 
 
 def _scalar(estimate: Estimate) -> Estimate:
-    """Floats in place of arrays without a dimension."""
+    """Return floats in place of arrays without a dimension."""
     return estimate if np.ndim(estimate.value) else Estimate(*map(float, _parts(estimate)))
 
 

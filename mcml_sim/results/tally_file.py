@@ -1,4 +1,4 @@
-"""What a run found, with all its errors, in one .npz file that numpy alone can open.
+"""Results of a run, with all its errors, in one .npz file that numpy alone can open.
 
 For each quantity of a tally: NAME, NAME_standard_error, NAME_effective_samples; the edges r_edges, z_edges, a_edges;
 and `header`, JSON text that says what was run. numpy.load(path)["absorbed_rz"] is all it takes elsewhere.
@@ -48,18 +48,18 @@ LONGEST_VERSION = 60  # characters
 
 @dataclass(frozen=True, eq=False)
 class Results:
-    """What `write_results` kept of a tally; lengths in the unit of its medium."""
+    """Content of a file of `write_results`; lengths in the unit of its medium."""
 
     medium: Medium
     grid: Grid
     photons: int
     seed: int
     version: str
-    """Of mcml_sim, that made it."""
+    """Version of mcml_sim that made it."""
     cut: float
     """Light terminated at the scattering limit, still inside [-]."""
     estimates: Mapping[str, Estimate]
-    """By the names of the tally's properties."""
+    """Estimates by the names of the tally's properties."""
     illumination: str = "searchlight"
 
 
@@ -74,7 +74,7 @@ def write_results(tally: Tally, path: str | os.PathLike[str]) -> None:
 
 
 def results_bytes(tally: Tally) -> bytes:
-    """What `write_results` writes."""
+    """Return the bytes that `write_results` writes."""
     header: dict[str, object] = {
         "format": FORMAT,
         "mcml_sim": __version__,
@@ -97,7 +97,7 @@ def results_bytes(tally: Tally) -> bytes:
 
 
 def read_results(path: str | os.PathLike[str]) -> Results:
-    """What `write_results` wrote. InputError names the file and says what is wrong with it."""
+    """Read a file of `write_results`. InputError names the file and says what is wrong with it."""
     try:
         with Path(path).open("rb") as file:
             content = file.read(MAX_BYTES + 1)
@@ -108,7 +108,7 @@ def read_results(path: str | os.PathLike[str]) -> Results:
 
 
 def parse_results(content: bytes, name: str) -> Results:
-    """What `read_results` gives for a file of this name and content."""
+    """Return what `read_results` gives for a file of this name and content."""
     try:
         if len(content) > MAX_BYTES:
             raise ValueError(f"more than {MAX_BYTES} bytes")
@@ -118,7 +118,7 @@ def parse_results(content: bytes, name: str) -> Results:
 
 
 def _results(content: bytes) -> Results:
-    """What was run comes first: it says how large everything else is. ValueError in one line."""
+    """Return the results; the header is read first, which says how large all else is. ValueError in one line."""
     first = read_npz(content, MOST_FIRST, {"header": (), **dict.fromkeys(EDGES)}, text=["header"])
     told = parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True)
     light = told.pop(LIGHT, "searchlight") if isinstance(told, dict) else None
@@ -157,7 +157,7 @@ def _medium(value: object) -> Medium:
 
 
 def _told(layer: Layer) -> dict[str, Any]:
-    """A layer; of its phase function only where that is not Henyey and Greenstein's, as files always did."""
+    """Return a layer; its phase function only where that is not Henyey and Greenstein's, as files always did."""
     told = {field.name: getattr(layer, field.name) for field in fields(Layer) if field.name != PHASE}
     return told if layer.phase is None else {**told, PHASE: as_table(layer.phase)}
 
@@ -180,7 +180,7 @@ def _grid(arrays: Mapping[str, NDArray]) -> Grid:
 
 
 def _table(name: str, value: object, keys: frozenset[str]) -> dict[str, Any]:
-    """An object of just these keys."""
+    """Return an object of just these keys."""
     if not isinstance(value, dict):
         raise ValueError(f"{name} must be an object, got {shown(value)}")
     for key in sorted(keys ^ value.keys()):

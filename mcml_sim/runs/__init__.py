@@ -1,1 +1,1 @@
-"""Many batches, the same bits: stores, threads, clusters, and the two ways to simulate."""
+"""Runs of many batches, with the same bits whoever traces them: stores, threads, clusters, two ways to simulate."""

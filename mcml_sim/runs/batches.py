@@ -36,12 +36,15 @@ def run_batches(
 ) -> R:
     """Sum over `photons` photons, in batches of `batch_photons` and a last one with the rest.
 
-    trace      (batch number, photons) -> result of that batch's first photons
-    workers    threads, by default one a core
-    store      batches it holds in the size needed are read, the others traced and saved
-    progress   show a bar on stderr; by default only if that is a terminal
-    scheduler  address of a Dask scheduler whose workers trace, instead of threads; `trace` must pickle
-    enough     called with the sum after 8, 16, 32, ... batches; True ends the run with that sum
+    Args:
+        trace: (batch number, photons) -> result of that batch's first photons.
+        batch_photons: photons of a batch.
+        photons: photons of all batches.
+        workers: threads, by default one a core.
+        store: batches it holds in the size needed are read, the others traced and saved.
+        progress: show a bar on stderr; by default only if that is a terminal.
+        scheduler: address of a Dask scheduler whose workers trace, instead of threads; `trace` must pickle.
+        enough: called with the sum after 8, 16, 32, ... batches; True ends the run with that sum.
 
     Results are added in the order of their numbers, so the same bits come out whatever the workers. That `enough`
     sees few sums, the same ones in every run, keeps small the bias of stopping by an error estimated from the photons
@@ -71,7 +74,7 @@ def run_batches(
 
 
 class _Fold(Generic[R]):
-    """Hands out numbers, and adds the results in their order, however they come in."""
+    """Queue of batch numbers, and the sum of the results in their order, however they come in."""
 
     def __init__(self, enough: Callable[[R], bool] | None, ahead: int) -> None:
         self._enough, self._ahead = enough, ahead
@@ -82,7 +85,7 @@ class _Fold(Generic[R]):
         self._sum: R | None = None
 
     def take(self) -> int | None:
-        """The next batch, as soon as it is not too far ahead of the sum; None if no more are wanted."""
+        """Return the next batch, as soon as it is not too far ahead of the sum; None if no more are needed."""
         with self._turn:
             self._turn.wait_for(lambda: self._stopped or self._next < self._added + self._ahead)
             self._next += 1
@@ -106,19 +109,19 @@ class _Fold(Generic[R]):
             self._turn.notify_all()
 
     def total(self) -> R:
-        """The sum so far."""
+        """Return the sum so far."""
         if self._sum is None:
             raise RuntimeError("no batch was run")
         return self._sum
 
 
 def _is_look(batches: int) -> bool:
-    """True after 8, 16, 32, ... batches."""
+    """Return True after 8, 16, 32, ... batches."""
     return batches >= FIRST_LOOK and batches & (batches - 1) == 0
 
 
 class _Run(Generic[R]):
-    """What the threads of one run share."""
+    """State that the threads of one run share."""
 
     def __init__(
         self,

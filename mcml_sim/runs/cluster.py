@@ -22,11 +22,11 @@ REMEDY = "install the same profilefit there as here"
 
 
 class Deserted(Notice):
-    """A Dask cluster has no workers; the run waits for one."""
+    """Notice that a Dask cluster has no workers; the run waits for one."""
 
 
 class Cluster(Generic[R]):
-    """A connection to the scheduler at an address such as tcp://host:8786, whose workers call `trace`.
+    """Connection to the scheduler at an address such as tcp://host:8786, whose workers call `trace`.
 
     A batch whose worker dies goes to another one. A worker that would not give the bits of this machine (another
     version, jaxlib, device or kind of CPU) refuses, whenever it joins: ClusterError says which, and what differs.
@@ -42,11 +42,11 @@ class Cluster(Generic[R]):
         self._require_package()
         threads = sum(self._client.nthreads().values())
         self.tasks = min(max(BATCHES_PER_THREAD * threads, MIN_TASKS), MAX_TASKS)
-        """Batches that may be under way at once."""
+        """Number of batches that may be under way at once."""
         self._warning, self._has_warned = threading.Lock(), False
 
     def trace(self, batch: int, photons: int) -> R:
-        """What `trace` gives, computed by a worker; may be called from several threads."""
+        """Return the result of `trace`, computed by a worker; may be called from several threads."""
         try:
             task = self._client.submit(_trace_alike, maker(), self._trace, batch, photons, pure=False)
             while True:
@@ -88,7 +88,7 @@ class Cluster(Generic[R]):
             warnings.warn(text, Deserted, stacklevel=2)
 
     def _require_package(self) -> None:
-        """The scheduler unpickles what it passes on, so it too needs the package."""
+        """Raise ClusterError unless the scheduler has the package: it unpickles what it passes on."""
         try:
             self._client.run_on_scheduler(cpu_class)
         except Exception as error:  # whatever unpickling raises over there
@@ -108,7 +108,6 @@ def _dask() -> ModuleType:
 
 def _require_scheduler(dask: ModuleType, address: str) -> None:
     """Ask who is there, since a dask Client waits forever for a port that accepts and then is silent."""
-
     if not isinstance(address, str):
         raise InputError(f"scheduler must be an address like tcp://host:8786, got {address!r}")
 
@@ -129,7 +128,7 @@ def _require_scheduler(dask: ModuleType, address: str) -> None:
 
 
 def _trace_alike(made_by: dict[str, object], trace: Callable[[int, int], R], batch: int, photons: int) -> R:
-    """On a worker: trace, if that gives the bits it would give to whoever sent `made_by`."""
+    """Trace, on a worker, if that gives the bits it would give to whoever sent `made_by`."""
     here = maker()
     for name, value in made_by.items():
         if here.get(name) != value:

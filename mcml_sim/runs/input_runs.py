@@ -1,4 +1,4 @@
-"""The runs of an MCML input file: where each keeps its results, what they may replace, and what was done before."""
+"""Runs of an MCML input file: where each keeps its results, what they may replace, and what was done before."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ EVENTS = "/jax/core/compile/"  # tracing, lowering and compiling
 
 
 class Compiling:
-    """While entered, notes when this process compiles, on whichever thread."""
+    """Stopwatch that, while entered, notes when this process compiles, on whichever thread."""
 
     def __init__(self) -> None:
         self._spans: list[tuple[float, float]] = []
@@ -57,7 +57,7 @@ class Compiling:
 
 @dataclass(frozen=True)
 class RunOptions:
-    """What all runs have in common; arguments as for `simulate`.
+    """Options that all runs have in common; arguments as for `simulate`.
 
     seed  of all runs; None is the seed that an input of MCML 2 gives each, else 0
     goal  the precision at which a run may stop early
@@ -72,7 +72,7 @@ class RunOptions:
 
 @dataclass(frozen=True)
 class Job:
-    """A run, and where its results go, and its batches until then."""
+    """Run, with the paths of its results and of its batches until then."""
 
     run: Run
     photons: int
@@ -83,16 +83,16 @@ class Job:
 
     @property
     def is_begun(self) -> bool:
-        """True if the store holds batches."""
+        """Whether the store holds batches."""
         return bool(batches(self.store))
 
     @property
     def is_part_of_more(self) -> bool:
-        """True if the store holds batches beyond this run's photons, which are a longer run's."""
+        """Whether the store holds batches beyond this run's photons, which are a longer run's."""
         return self._holds_more(self.run.medium, self.photons)
 
     def is_in_the_way(self) -> bool:
-        """True if the store holds what another run left, finished: no more photons than the results to be replaced.
+        """Return True if the store holds what another run left, finished: no more photons than the results to replace.
 
         StoreError if it holds anything else of another run.
         """
@@ -113,7 +113,7 @@ class Job:
 
 @dataclass(frozen=True)
 class Done:
-    """A run that is done: its results, and how that went.
+    """Run that is done: its results, and how that went.
 
     seconds  it took, of which compiling [s]; None if it was finished before
     resumed  whether some of its batches were there
@@ -126,10 +126,10 @@ class Done:
 
 
 def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | None, options: RunOptions) -> list[Job]:
-    """The runs of an input file, each with the paths of its results; nothing is written yet.
+    """Return the runs of an input file, each with the paths of its results; nothing is written yet.
 
-    photons  instead of the file's;  folder  for the results instead of the current one
-    InputError, OutputError or StoreError where a run could not keep its results: better now than hours later.
+    `photons` are for each run in place of the file's, `folder` is in place of the current one. InputError,
+    OutputError or StoreError where a run could not keep its results: better now than hours later.
     """
     seeds = [(one.seed or 0) if options.seed is None else options.seed for one in runs]
     found = [
@@ -173,7 +173,7 @@ def _traced(job: Job, options: RunOptions) -> Done:
 
 
 def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
-    """Paths by the name in the input file, in `folder` or, as MCML does, seen from where we are.
+    """Return paths by the name in the input file, in `folder` or, as MCML does, in the current folder.
 
     A name that leads out of there is a stranger's say over our files: it takes a folder, which gets its last part.
     """
@@ -210,7 +210,7 @@ def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
 
 
 def _require_ours(job: Job) -> None:
-    """InputError where a file or a folder that is to be replaced is no output of a run."""
+    """Raise InputError where a file or a folder that is to be replaced is no output of a run."""
     found = None
     if job.mco.is_file() and job.mco.stat().st_size and not begins_mco(job.mco):
         found = f"{job.mco} is there already, and no output of MCML"
@@ -223,7 +223,7 @@ def _require_ours(job: Job) -> None:
 
 
 def _finished(job: Job, options: RunOptions) -> Results | None:
-    """The run's results, if its files are there and of this very run."""
+    """Return the run's results, if its files are there and of this very run."""
     found = _results(job.npz)
     if found is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
@@ -240,7 +240,7 @@ def _finished(job: Job, options: RunOptions) -> Results | None:
 
 
 def _results(path: Path) -> Results | None:
-    """What a run has kept there, if anything."""
+    """Return the results of a run in that file, if there are any."""
     try:
         return read_results(path)
     except InputError:

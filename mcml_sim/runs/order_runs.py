@@ -36,14 +36,15 @@ def simulate_orders(
 ) -> Orders:
     """Simulate a conservative half space (alpha = 1), resolved by scattering order.
 
-    grid      rings, edges in mean free paths [mfp]
-    photons   how many to start, 1 to 1e13
-    seed      whole number >= 0; equal seeds start with equal photons
-    setting   the light and the surface; Setting() and its diffuse twin are the fastest
-    store     folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes
-    workers   threads, by default one a core; the result does not depend on it
-    progress  show a bar on stderr; by default only if that is a terminal
-    scheduler address of a Dask scheduler whose workers trace the batches, instead of threads here
+    Args:
+        grid: rings, edges in mean free paths [mfp].
+        photons: how many to start, 1 to 1e13.
+        seed: whole number >= 0; equal seeds start with equal photons.
+        setting: the light and the surface; Setting() and its diffuse twin are the fastest.
+        store: folder that keeps each finished batch of 2^20 photons; a run that finds batches there resumes.
+        workers: threads, by default one a core; the result does not depend on it.
+        progress: show a bar on stderr; by default only if that is a terminal.
+        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
 
     InputError on other arguments; StoreError if the folder is another run's or cannot be written; a damaged batch is
     named in a warning and traced again. Ctrl-C stops after the batches in flight, which the store keeps too.
@@ -78,8 +79,8 @@ def trace_share(
     For jobs that share a folder but no network: when each of them has traced its share, `simulate_orders` with the same
     arguments and that `store` reads all batches and traces none. Returns the number of batches that had to be traced.
 
-    share     which of the shares [-], 0 ... shares - 1; the other arguments as for `simulate_orders`
-    InputError, StoreError as there; what is finished stays, and the same call goes on from it.
+    `share` is one of 0 ... shares - 1; the other arguments are as for `simulate_orders`. InputError and
+    StoreError as there; what is finished stays, and the same call goes on from it.
     """
     number, key = _checked_run(grid, photons, seed, setting)
     parts = checked_whole("shares", shares, lowest=1)
@@ -97,7 +98,7 @@ def trace_share(
 
 
 def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple[int, int]:
-    """How many photons, and the seed."""
+    """Return the number of photons and the seed; InputError if the run cannot be done."""
     require_own_process()
     if not isinstance(setting, Setting):
         raise InputError(f"setting must be a mcml_sim.Setting, got {setting!r}")
@@ -110,7 +111,7 @@ def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Count
 
 
 def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
-    """What decides which photons a batch holds and how they are counted."""
+    """Return what decides which photons a batch holds and how they are counted."""
     bins = order_bins.bins_of(setting)
     return {
         "kind": "orders",

@@ -1,4 +1,4 @@
-"""The one progress bar: how far, how fast, how long still; on stderr, and only where that is a terminal."""
+"""Progress bar: how far, how fast, how long still; on stderr, and only where that is a terminal."""
 
 from __future__ import annotations
 
@@ -28,15 +28,17 @@ PERIOD = 300.0  # over which a rate is estimated [s]; rich's own 30 s forget eve
 
 
 def is_watched() -> bool:
-    """Whether somebody sees stderr; there is none where a shell has closed it."""
+    """Return whether somebody sees stderr; there is none where a shell has closed it."""
     return sys.stderr is not None and sys.stderr.isatty()
 
 
 def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
-    """A bar that counts in `unit`, such as "photons".
+    """Return a bar that counts in `unit`, such as "photons".
 
-    shown  None: on a terminal only; True there likewise, as elsewhere it would be a file full of bars
-    kept   stays on the screen when all is done
+    Args:
+        unit: what is counted.
+        shown: whether it is shown; None and True: on a terminal only, as elsewhere it would be a file full of bars.
+        kept: whether it stays on the screen when all is done.
     """
     counted = () if unit == "photons" else (MofNCompleteColumn(),)
     columns = (TextColumn("{task.description}"), BarColumn(), *counted, TimeElapsedColumn(), _Rate(unit), _Remaining())
@@ -49,7 +51,7 @@ def bar(unit: str, shown: bool | None = None, kept: bool = False) -> Progress:
 def tracked(
     items: Iterable[T], title: str, unit: str = "items", total: int | None = None, quiet: bool = False
 ) -> Iterator[T]:
-    """The items as they come, with a bar that goes when all are done; total is their number if they have no length."""
+    """Yield the items as they come, with a bar until all are done; `total` is their number if they have no length."""
     count = total if total is not None else len(items) if isinstance(items, Sized) else None
     with bar(unit, False if quiet else None) as shown:
         yield from shown.track(items, count, description=title)
@@ -57,7 +59,7 @@ def tracked(
 
 @contextlib.contextmanager
 def working(what: str, quiet: bool = False) -> Iterator[None]:
-    """A sign of life, and for how long already, while something runs whose length nobody knows."""
+    """Show a spinner, and for how long already, while something runs whose length nobody knows."""
     columns = (SpinnerColumn(), TextColumn("{task.description}"), TimeElapsedColumn())
     shown = Progress(*columns, console=Console(stderr=True), transient=True, disable=quiet or not is_watched())
     with shown:
@@ -66,35 +68,35 @@ def working(what: str, quiet: bool = False) -> Iterator[None]:
 
 
 class _Rate(ProgressColumn):
-    """How many a second, or how long one takes."""
+    """Column with the rate."""
 
     def __init__(self, unit: str) -> None:
         super().__init__()
         self._unit = unit
 
     def render(self, task: Task) -> Text:
-        """Blank until there is one."""
+        """Return the rate, blank until there is one."""
         return Text(rate(_speed(task), self._unit), style="dim")
 
 
 class _Remaining(ProgressColumn):
-    """How long still."""
+    """Column with the time that remains."""
 
     def render(self, task: Task) -> Text:
-        """Blank until anything is done, and once all is."""
+        """Return the time, blank until anything is done, and once all is."""
         speed = _speed(task)
         left = 0.0 if task.total is None or not speed else (task.total - task.completed) / speed
         return Text(f"{timedelta(seconds=round(left))} left" if left > 0 else "", style="cyan")
 
 
 def _speed(task: Task) -> float | None:
-    """Units a second, lately; or since the start, before there are two steps."""
+    """Return the units per second, lately; or since the start, before there are two steps."""
     since = task.completed / task.elapsed if task.elapsed else None
     return task.finished_speed or task.speed or since
 
 
 def rate(speed: float | None, unit: str) -> str:
-    """`speed` [units/s] in words: 2.30 M photons/s, 4.1 laws/s, 1 law in 12 s."""
+    """Return `speed` [units/s] in words: 2.30 M photons/s, 4.1 laws/s, 1 law in 12 s."""
     if not speed:
         return ""
     if speed >= 0.1 * MILLION:

@@ -34,19 +34,20 @@ def simulate(
 ) -> Tally:
     """Trace photons, by default of a normal pencil beam, through a layered medium (Wang, Jacques & Zheng 1995).
 
-    medium     layers; lengths in any unit
-    grid       bins in the same unit: rings, and if wanted depths (for absorption) and exit angles
-    photons    how many to start, 1 to 1e13; with `precision`, at most so many
-    seed       whole number >= 0; equal seeds start with equal photons, in a matched isotropic half space those of
-               `simulate_orders` too, so give runs that are to be compared seeds of their own
-    store      folder that keeps each finished batch; a run that finds batches there resumes
-    workers    threads, by default one a core; the result does not depend on it
-    precision  stop early: the relative standard error of the diffuse reflectance to reach, or a Precision that names
-               another quantity. It is looked at after 8, 16, 32, ... batches only, since stopping at the first lucky
-               look would make the error bars too small
-    progress   show a bar on stderr; by default only if that is a terminal
-    scheduler  address of a Dask scheduler whose workers trace the batches, instead of threads here
-    illumination  "searchlight", the pencil beam, or "diffuse", cosine-weighted light that arrives at r = 0
+    Args:
+        medium: layers; lengths in any unit.
+        grid: bins in the same unit: rings, and if wanted depths (for absorption) and exit angles.
+        photons: how many to start, 1 to 1e13; with `precision`, at most so many.
+        seed: whole number >= 0; equal seeds start with equal photons, in a matched isotropic half space those of
+            `simulate_orders` too, so give runs that are to be compared seeds of their own.
+        store: folder that keeps each finished batch; a run that finds batches there resumes.
+        workers: threads, by default one a core; the result does not depend on it.
+        precision: where to stop early: a relative standard error of the diffuse reflectance, or a Precision that
+            names another quantity. It is looked at after 8, 16, 32, ... batches only, since stopping at the first
+            lucky look would make the error bars too small.
+        progress: show a bar on stderr; by default only if that is a terminal.
+        scheduler: address of a Dask scheduler whose workers trace the batches, instead of threads here.
+        illumination: "searchlight", the pencil beam, or "diffuse", cosine-weighted light that arrives at r = 0.
 
     InputError on other arguments; StoreError if the folder is another run's or cannot be written. Ctrl-C stops after
     the batches in flight, which the store keeps too.
@@ -78,22 +79,22 @@ def simulate(
 
 
 def batch_photons(medium: Medium) -> int:
-    """Photons of a batch of `simulate` in this medium."""
+    """Return how many photons a batch of `simulate` has in this medium."""
     return BATCH_PHOTONS[_kernel(medium, "searchlight")]
 
 
 def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
-    """StoreError if `simulate` could not keep batches in that folder because of what is there; nothing is written."""
+    """Raise StoreError if what is in that folder keeps `simulate` from storing batches there; nothing is written."""
     require_ours(folder, _made_by(medium, grid, seed, "searchlight"))
 
 
 def is_store_of(folder: Path, medium: Medium, grid: Grid, seed: int) -> bool:
-    """Whether the batches in that folder are of such a run, by whatever version and on whatever machine."""
+    """Return whether the batches in that folder are of such a run, by whatever version and on whatever machine."""
     return _made_by(medium, grid, seed, "searchlight").items() <= (manifest(folder) or {}).items()
 
 
 class _Enough:
-    """Whether a run's sums so far are as precise as requested."""
+    """Test whether a run's sums so far are as precise as requested."""
 
     def __init__(self, precision: Precision, medium: Medium, grid: Grid, seed: int, illumination: str) -> None:
         self._precision, self._medium, self._grid, self._seed = precision, medium, grid, seed
@@ -116,7 +117,7 @@ def _kernel(medium: Medium, illumination: str) -> ModuleType:
 
 
 def _made_by(medium: Medium, grid: Grid, seed: int, illumination: str) -> dict[str, object]:
-    """What decides which photons a batch holds and how they are counted."""
+    """Return what decides which photons a batch holds and how they are counted."""
     return {
         "kind": "simulate" if illumination == "searchlight" else f"simulate, {illumination} light",
         "medium": repr(medium),

@@ -1,4 +1,4 @@
-"""A folder of finished photon batches, from which an interrupted or enlarged run goes on.
+"""Folder of finished photon batches, from which an interrupted or enlarged run goes on.
 
 run.json says what made the batches; batch-00000000.npz, ... hold one each: the arrays of its result and the digest of
 run.json's contents, sealed with a digest of the whole file. A file is written under another name and renamed, so it is
@@ -47,27 +47,27 @@ SHARED_SHOWN = 12  # of them, those before the first that differs
 
 
 class DamagedBatch(Notice):
-    """A batch in a store is not what was written there; it is traced again."""
+    """Notice that a batch in a store is not what was written there; it is traced again."""
 
 
 class Result(Protocol):
-    """What a batch gives: sums over photons, which add."""
+    """Result of a batch: sums over photons, which add."""
 
     @property
     def started(self) -> int:
-        """Photons."""
+        """Number of photons."""
 
     def __add__(self, other: Self, /) -> Self: ...
 
     def arrays(self) -> dict[str, NDArray]:
-        """All of it, by name; `made_by` is no name."""
+        """Return all of the result, by name; `made_by` is no name."""
 
 
 R = TypeVar("R", bound=Result)
 
 
 class Store(Generic[R]):
-    """The batches in one folder, made by one kind of run.
+    """Batches in one folder, made by one kind of run.
 
     made_by  what the run is, JSON values; version, jaxlib, device and kind of CPU are added, since they decide bits
     read     makes a result of what its `arrays` gave; ValueError if they are not one
@@ -84,7 +84,7 @@ class Store(Generic[R]):
         self._open()
 
     def load(self, batch: int) -> R | None:
-        """The batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
+        """Return the batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
         path = self._path(batch)
         try:
             fields = _unsealed(_read(path, MAX_BATCH))
@@ -134,7 +134,7 @@ class Store(Generic[R]):
 
 
 def require_ours(folder: Path, made_by: dict[str, object]) -> None:
-    """StoreError if that is no folder, or holds batches of a run other than `made_by`; nothing is written."""
+    """Raise StoreError if that is no folder, or holds batches of a run other than `made_by`; nothing is written."""
     here = {**made_by, **maker()}
     if folder.exists() and not folder.is_dir():
         raise StoreError(f"cannot use {folder} as a store: it is there already, and no folder")
@@ -154,13 +154,13 @@ def require_ours(folder: Path, made_by: dict[str, object]) -> None:
 
 
 def batches(folder: Path) -> list[int]:
-    """The numbers of the batches in a folder, of whatever run."""
+    """Return the numbers of the batches in a folder, of whatever run."""
     numbers = (path.stem.removeprefix("batch-") for path in folder.glob("batch-*.npz"))
     return sorted(int(number) for number in numbers if number.isdecimal())
 
 
 def strange(folder: Path) -> list[str]:
-    """The names in a folder of what no store has put there; none if there is no folder."""
+    """Return the names in a folder that no store has put there; none if there is no folder."""
     if not folder.is_dir():
         return []
     ours = [name for name in os.listdir(folder) if KEPT.fullmatch(name) or HALF_WRITTEN.fullmatch(name)]
@@ -179,7 +179,7 @@ def discard(folder: Path) -> None:
 
 
 def _read(path: Path, most: int) -> bytes:
-    """The bytes of a file; ValueError if they are more than so many."""
+    """Return the bytes of a file; ValueError if they are more than so many."""
     with path.open("rb") as file:
         content = file.read(most + 1)
     if len(content) > most:
@@ -195,7 +195,7 @@ def _holds(path: Path, contents: bytes) -> bool:
 
 
 def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
-    """An .npz file whose last bytes, a zip file's comment, are the digest of all the others."""
+    """Return an .npz file whose last bytes, a zip file's comment, are the digest of all the others."""
     file = io.BytesIO()
     np.savez_compressed(file, allow_pickle=False, **arrays)
     body = file.getvalue()[:-2] + SEAL_BYTES.to_bytes(2, "little")  # a zip file ends in the length of its comment
@@ -203,7 +203,7 @@ def _sealed(arrays: Mapping[str, NDArray]) -> bytes:
 
 
 def _unsealed(data: bytes) -> dict[str, NDArray]:
-    """The arrays of a sealed file; ValueError if a bit of it has changed."""
+    """Return the arrays of a sealed file; ValueError if a bit of it has changed."""
     if data[-SEAL_BYTES:] != _seal(data[:-SEAL_BYTES]):
         raise ValueError("its bytes are not those that were written")
     return read_npz(data, MAX_BATCH, text=["made_by"])
@@ -214,7 +214,7 @@ def _seal(body: bytes) -> bytes:
 
 
 def manifest(folder: Path) -> dict[str, object] | None:
-    """What made the batches in a folder, None if nothing says; StoreError if that is damaged."""
+    """Return the manifest of a folder of batches, None if there is none; StoreError if that is damaged."""
     path = folder / MANIFEST
     try:
         found = parse_json(_read(path, MAX_MANIFEST), MAX_MANIFEST, infinite=True)
@@ -232,7 +232,7 @@ def _damaged(path: Path, reason: str) -> StoreError:
 
 
 def maker() -> dict[str, object]:
-    """What decides the bits of a batch besides the run itself: equal makers give equal bits."""
+    """Return what decides the bits of a batch besides the run itself: equal makers give equal bits."""
     return {
         "mcml_sim": __version__,
         "jaxlib": jaxlib.version.__version__,
@@ -243,7 +243,7 @@ def maker() -> dict[str, object]:
 
 @functools.cache
 def cpu_class() -> str:
-    """Machine and the instruction sets that change how floats round: equal classes give equal bits."""
+    """Return machine and instruction sets that change how floats round: equal classes give equal bits."""
     try:
         flags = Path("/proc/cpuinfo").read_text(encoding="utf-8").split()
     except OSError:  # not Linux
@@ -256,7 +256,7 @@ def _digest(made_by: dict[str, object]) -> str:
 
 
 def _apart(one: object, other: object) -> tuple[str, str]:
-    """Two values, long ones from shortly before where they differ."""
+    """Return two values, long ones from shortly before where they differ."""
     there, here = json.dumps(one), json.dumps(other)
     if max(len(there), len(here)) <= LONGEST_SHOWN:
         return there, here

@@ -1,4 +1,4 @@
-"""A grid as the kernels want it: float32 edges in the run's own unit of length."""
+"""Grids as the kernels need them: float32 edges in the run's own unit of length."""
 
 from __future__ import annotations
 
@@ -25,33 +25,33 @@ class Axis:
     """Bins of one coordinate; what is beyond them has the number `bins`."""
 
     edges: Array
-    """All but the first [length], float32 (bins,)."""
+    """Edges but the first [length], float32 (bins,)."""
     per_length: Array
     """Bins in a unit of length, if all are equal, float32 ()."""
     bins: int
     even: bool
 
     def index(self, values: Array) -> Array:
-        """Bins of values, int32; even ones by a product, which may round a value to the other side of an edge."""
+        """Return bins of values, int32; even ones by a product, which may round across an edge."""
         if self.even:
             return jnp.clip(values * self.per_length, 0, jnp.float32(self.bins)).astype(jnp.int32)
         return jnp.searchsorted(self.edges, values, side="right", method="scan_unrolled").astype(jnp.int32)
 
 
 def axis(edges: Floats, unit: float) -> Axis:
-    """Bins between edges that start at 0, where `unit` is the kernel's unit of length."""
+    """Return bins between edges that start at 0, where `unit` is the kernel's unit of length."""
     even = np.array_equal(edges, edges[1] * np.arange(len(edges)))
     return Axis(jnp.asarray(rounded_up(edges[1:] / unit)), jnp.float32(unit / edges[1]), len(edges) - 1, even)
 
 
 def rounded_up(values: Floats) -> NDArray[np.float32]:
-    """The smallest float32 that are not below these: a float32 is in the same bin by them as by the float64 ones."""
+    """Return the smallest float32 that are not below these: float32 places are in the same bins by both."""
     nearest = values.astype(np.float32)
     return np.where(nearest < values, np.nextafter(nearest, np.float32(np.inf)), nearest)
 
 
 def groups(grid: Grid, photons: int, most: int) -> int:
-    """Into how many groups photons are divided, whose spread gives the errors of what is absorbed by ring and depth.
+    """Return into how many groups photons are divided, whose spread gives the errors of absorption by ring and depth.
 
     Fewer than `most` if their tables would take more than 64 MiB, or if there are few photons; one has no spread.
     """

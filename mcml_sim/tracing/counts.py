@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 @dataclass(frozen=True)
 class Ledger:
-    """What became of all photons: started = exited + rouletted + cut."""
+    """Numbers of photons by how they ended: started = exited + rouletted + cut."""
 
     started: int
     exited: int
@@ -40,14 +40,14 @@ class Counts:
         )
 
     def arrays(self) -> dict[str, NDArray]:
-        """Everything, by name, as a store keeps it: of `exits`, which is mostly 0, only the other cells."""
+        """Return all parts by name, as a store keeps them: of `exits`, which is mostly 0, only the other cells."""
         cells = np.flatnonzero(self.exits)
         rest = np.array([self.rouletted, self.cut, self.started], np.int64)
         return {"cells": cells, "exits": self.exits.ravel()[cells], "rest": rest}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray], shape: tuple[int, int]) -> Counts:
-        """What `arrays` gave, `shape` being that of `exits`; ValueError if it is not that."""
+        """Return the counts of `arrays`, `shape` being that of `exits`; ValueError if they are none."""
         try:
             if any(arrays[name].dtype.kind != "i" or np.any(arrays[name] < 0) for name in ("cells", "exits", "rest")):
                 raise TypeError("numbers of cells and photons are whole and >= 0")
@@ -63,16 +63,16 @@ class Counts:
 
     @property
     def ledger(self) -> Ledger:
-        """The totals."""
+        """Ledger of these photons."""
         return Ledger(self.started, int(self.exits.sum()), self.rouletted, self.cut)
 
     @property
     def is_closed(self) -> bool:
-        """True if every photon started is accounted for."""
+        """Whether every photon started is accounted for."""
         ledger = self.ledger
         return ledger.started == ledger.exited + ledger.rouletted + ledger.cut
 
     def require_closed(self) -> None:
-        """RuntimeError if a photon was lost: a defect of the tracer, not of its input."""
+        """Raise RuntimeError if a photon was lost: a defect of the tracer, not of its input."""
         if not self.is_closed:
             raise RuntimeError(f"photons were lost or made: {self.ledger}")

@@ -1,4 +1,4 @@
-"""Where the weight of photons went: the sums of one or more batches, which add."""
+"""Weight of photons by where it went: the sums of one or more batches, which add."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class Deposits:
     """
 
     started: int
-    """Photons."""
+    """Number of photons."""
     reflected: Floats
     """Weight out of the top, by ring (the last row: beyond the last ring) and angle, (rings + 1, angles or 1)."""
     reflected_squares: Floats
@@ -45,19 +45,19 @@ class Deposits:
     """Weight absorbed by ring and depth, overflows last, (rings + 1, depths + 1); (0, 0) if depth is not resolved."""
     absorbed_rz_variance: Floats
     absorbed_z: Floats
-    """The same by depth, (depths + 1,) or (0,)."""
+    """Weight absorbed by depth, (depths + 1,) or (0,)."""
     absorbed_z_variance: Floats
 
     def __add__(self, other: Deposits) -> Deposits:
         return Deposits(*(getattr(self, f.name) + getattr(other, f.name) for f in fields(self)))
 
     def arrays(self) -> dict[str, NDArray]:
-        """Everything, by name, as a store keeps it."""
+        """Return all sums by name, as a store keeps them."""
         return {field.name: np.asarray(getattr(self, field.name)) for field in fields(self)}
 
     @classmethod
     def from_arrays(cls, arrays: Mapping[str, NDArray], shapes: Mapping[str, tuple[int, ...]]) -> Deposits:
-        """What `arrays` gave; ValueError if something is missing, no sum, or has another shape than `shapes`."""
+        """Return the sums of `arrays`; ValueError if one is missing, no sum, or has another shape than in `shapes`."""
         for name, shape in shapes.items():
             if name not in arrays:
                 raise ValueError(f"{name} is missing")
@@ -71,7 +71,7 @@ class Deposits:
 
 
 def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
-    """Shape of every field of Deposits for a grid and a number of layers."""
+    """Return the shape of every field of Deposits for a grid and a number of layers."""
     exits = (grid.rings + 1, max(grid.angles, 1))
     rz = (grid.rings + 1, grid.depths + 1) if grid.depths else (0, 0)
     z = (grid.depths + 1,) if grid.depths else (0,)

@@ -30,7 +30,7 @@ STEPS = 4096
 
 
 class HalfSpace(NamedTuple):
-    """A Setting as the kernel wants it: arrays, so that no other one makes it compile again."""
+    """Setting for the kernel: arrays, so that no other setting makes it compile again."""
 
     n: Array
     phase: Phase
@@ -42,11 +42,11 @@ class HalfSpaceLanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
-    """As in `isotropic_event.IsotropicLanes`: rho + i z, complex64, where -z counts events once it has ended."""
+    """Complex rho + i z as in `isotropic_event.IsotropicLanes`, where -z counts events once the photon has ended."""
     direction: Array
     """Components outwards + i down of the flight that ended here, complex64."""
     order: Array
-    """Scatterings so far, int32."""
+    """Number of scatterings so far, int32."""
     last: Array
     """Order at which the photon will be stopped if it is still inside, int32."""
     photon: Array
@@ -64,12 +64,12 @@ class HalfSpaceLanes(NamedTuple):
 
 
 def half_space(setting: Setting) -> HalfSpace:
-    """What the kernel needs to know of a setting."""
+    """Return the arrays of a setting for the kernel."""
     return HalfSpace(jnp.float32(setting.n), setting.scattering.for_kernel(), jnp.asarray(entry_cosines(setting)))
 
 
 def enter(key: Array, photon: Array, stops: Array, where: HalfSpace) -> HalfSpaceLanes:
-    """Photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
+    """Return photons at the place of their first scattering; `stops` as in `isotropic_event.enter`."""
     event = jnp.zeros_like(photon)
     toss_word, path_word, entry_word, _ = rng.draw(key, photon, event)
     cosine = entering_cosine(rng.uniform(entry_word), where.entry)
@@ -102,7 +102,7 @@ def _scattered(
     left: Array,
     where: HalfSpace,
 ) -> tuple[Array, Array]:
-    """Places and directions after one more scattering and flight, as in `isotropic_event.scatter`."""
+    """Return places and directions after one more scattering and flight, as in `isotropic_event.scatter`."""
     cosine_word, path_word, azimuth_word, surface_word = words
     outwards, around, down = _deflected(direction, cosine_word, azimuth_word, surface_word, where.phase)
     path = rng.exponential(path_word)
@@ -123,7 +123,7 @@ def _scattered(
 def _deflected(
     direction: Array, cosine_word: Array, azimuth_word: Array, sign_word: Array, phase: Phase
 ) -> tuple[Array, Array, Array]:
-    """Components outwards, around and down after a scattering.
+    """Return the components outwards, around and down after a scattering.
 
     In the frame of Duff et al., Building an orthonormal basis, revisited, JCGT 6(1), 2017: no direction is special.
     """
@@ -145,7 +145,7 @@ def _deflected(
 
 
 def entering_cosine(xi: Array, entry: Array) -> Array:
-    """Cosine of the light that has entered, at the share xi in (0, 1) of it."""
+    """Return the cosine of the light that has entered, at the share xi in (0, 1) of it."""
     at = jnp.cbrt(xi) * jnp.float32(STEPS)
     step = jnp.minimum(at.astype(jnp.int32), STEPS - 1)
     lower, upper = entry[step], entry[step + 1]
@@ -153,7 +153,7 @@ def entering_cosine(xi: Array, entry: Array) -> Array:
 
 
 def entry_cosines(setting: Setting) -> NDArray[np.float32]:
-    """Cosines inside at even steps of the cube root of probability, float32 (STEPS + 1,).
+    """Return cosines inside at even steps of the cube root of probability, float32 (STEPS + 1,).
 
     Diffuse light that has entered has the density 2 mu T(mu) there, T being the transmittance of the surface, which
     is the same from inside as from outside; beyond the critical angle there is none.

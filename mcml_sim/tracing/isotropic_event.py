@@ -37,10 +37,10 @@ class IsotropicLanes(NamedTuple):
     """Photons in flight, arrays of one shape (lanes,)."""
 
     place: Array
-    """rho + i z, distance from the beam and depth [mfp], complex64; once it has ended, -z is the number of its events
+    """Complex rho + i z, distance from the beam and depth [mfp], complex64; -z counts events once the photon has ended
     since it was last looked at, and half an event more if it was stopped inside."""
     order: Array
-    """Scatterings so far, int32."""
+    """Number of scatterings so far, int32."""
     last: Array
     """Order at which the photon will be stopped if it is still inside, int32."""
     photon: Array
@@ -58,17 +58,17 @@ class IsotropicLanes(NamedTuple):
 
 
 def has_ended(place: Array) -> Array:
-    """True where a place, as in IsotropicLanes, is that of a photon that has left or was stopped."""
+    """Return True where a place, as in IsotropicLanes, is that of a photon that has left or was stopped."""
     return place.imag < 0
 
 
 def was_stopped(place: Array) -> Array:
-    """True where a photon was stopped inside, among those that have ended."""
+    """Return True where a photon was stopped inside, among those that have ended."""
     return place.imag != jnp.floor(place.imag)
 
 
 def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchlight") -> IsotropicLanes:
-    """Photons at the place of their first scattering; `stops` rise, int32 (at most 32,).
+    """Return photons at the place of their first scattering; `stops` rise, int32 (at most 32,).
 
     A searchlight comes straight down. Diffuse light comes from all sides alike, so the square of its cosine to the
     surface's normal is uniform; all of it falls on the one point rho = 0.
@@ -84,7 +84,7 @@ def enter(key: Array, photon: Array, stops: Array, illumination: str = "searchli
 
 
 def stop(words: Array, stops: Array) -> Array:
-    """Order at which each photon is stopped: each leading zero of its word is a toss won."""
+    """Return the order at which each photon is stopped: each leading zero of its word is a toss won."""
     return stops[jnp.minimum(lax.clz(words).astype(jnp.int32), len(stops) - 1)]
 
 
@@ -98,7 +98,7 @@ def fly(key: Array, lanes: IsotropicLanes, events: int) -> IsotropicLanes:
 
 
 def scatter(key: Array, lanes: IsotropicLanes, place: Array, number: Array) -> Array:
-    """Places after one more scattering and flight, where `number` of them (int32) have brought the lanes to `place`.
+    """Return places after one more scattering and flight, where `number` of them (int32) led the lanes to `place`.
 
     XLA compiles one loop an output, and each would draw all random words again. So a place is one complex number, and
     nothing but it goes from event to event: where a photon has ended, its depth says how and after how many of these.
@@ -119,19 +119,19 @@ def scatter(key: Array, lanes: IsotropicLanes, place: Array, number: Array) -> A
 
 
 def landed(lanes: L, place: Array, events: int) -> L:
-    """Lanes, these or `half_space_event`'s, that `events` scatterings have brought to `place`, or that ended before."""
+    """Return lanes, of this or another event, after `events` scatterings that led to `place`, or that ended before."""
     done = jnp.where(place.imag < 0, (-place.imag).astype(jnp.int32), events)
     return lanes._replace(place=place, order=lanes.order + done)
 
 
 def displaced(rho: Array, path: Array, sine_squared: Array, cosine: Array) -> Array:
-    """Distance from the beam after a `path` [mfp] with this squared sine to the depth, and cosine to the radius."""
+    """Return the distance from the beam after a `path` [mfp], by squared sine to the depth and cosine to the radius."""
     along = rho + path * jnp.sqrt(sine_squared) * cosine
     return jnp.sqrt(along * along + path * path * sine_squared * ((1 - cosine) * (1 + cosine)))
 
 
 def azimuth_cosine(words: Array) -> Array:
-    """Cosine of an angle uniform in (0, pi), as the sine of one uniform in (-pi/2, pi/2): |value| <= 1."""
+    """Return the cosine of an angle uniform in (0, pi), as the sine of one uniform in (-pi/2, pi/2): |value| <= 1."""
     v = rng.symmetric(words) * jnp.float32(0.5)
     square = v * v
     value = jnp.float32(SINE[-1])

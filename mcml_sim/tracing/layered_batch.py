@@ -44,7 +44,7 @@ BALLISTIC, INSIDE = -1.0, -2.0  # "radii" of light that was transmitted unscatte
 
 
 class LayeredBins(NamedTuple):
-    """A grid as the kernels want it."""
+    """Grid for the kernels."""
 
     r: Axis
     z: Axis
@@ -57,29 +57,29 @@ class LayeredBins(NamedTuple):
 
 
 class KernelShape(NamedTuple):
-    """What the kernels are compiled for, besides the shapes of their arrays."""
+    """Properties that the kernels are compiled for, besides the shapes of their arrays."""
 
     groups: int
-    """Groups of photons."""
+    """Number of groups of photons."""
     depths: bool
     """Whether depth is resolved."""
     lanes: int
 
 
 class PhotonFates(NamedTuple):
-    """What became of the photons of a batch; by photon, then by lane for what is not needed."""
+    """Ends of the photons of a batch; by photon, then by lane for what is not needed."""
 
     exits: Array
-    """rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 if roulette ended it,
+    """Complex rho [length] + i weight, the weight negative below; rho may be BALLISTIC or INSIDE; 0 after roulette,
     complex64 (BATCH_PHOTONS + lanes,)."""
     cosines: Array
-    """Of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
+    """Cosines of the direction to the normal [-]; float32 like exits, or (1,) if angles are not resolved."""
     absorbed: tuple[Array, ...]
-    """What it left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
+    """Weight left in each layer, or in all together if they are many, float32 (BATCH_PHOTONS + lanes,) each."""
     by_layer: Array
-    """What each group left in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
+    """Weight left by each group in each layer, in units, int64 (groups * layers,), or (0,) if photons know it."""
     by_cell: Array
-    """What each group left in each ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
+    """Weight left by each group by ring and depth, in units, int64 (groups * (rings + 1) * (depths + 1),) or (0,)."""
 
 
 def trace_batch(
@@ -116,7 +116,7 @@ def trace_batch(
 def trace(
     key: Array, photons: Array, first: Array, entry: Array, stack: Stack, bins: LayeredBins, shape: KernelShape
 ) -> tuple[Array, Array, Array, Array]:
-    """The first `photons` (int32) photons of a batch: exits, sums, and what was left by layer and by cell.
+    """Return the first `photons` (int32) photons of a batch: exits, sums, and what was left by layer and by cell.
 
     They start in the layer number `first` (int32); `entry` as in `layered_event.enter`.
     """
@@ -157,7 +157,7 @@ State = tuple[LayeredLanes, Array, Array]
 
 
 def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelShape, state: State) -> State:
-    """Flights, what they leave behind, the step across interfaces, and roulette."""
+    """Return the lanes after flights, what they leave behind, the step across interfaces, and roulette."""
     lanes, by_layer, by_cell = state
     here, group = layered_event.optics(stack, lanes.layer), _group(lanes, bins, shape.groups)
 
@@ -186,24 +186,24 @@ def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelS
 
 
 def _group(lanes: LayeredLanes, bins: LayeredBins, parts: int) -> Array:
-    """Group of each photon, int32."""
+    """Return the group of each photon, int32."""
     return jnp.minimum(lanes.photon.astype(jnp.float32) * bins.groups_per_photon, parts - 1).astype(jnp.int32)
 
 
 def _cell(bins: LayeredBins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
-    """Index into the table of groups, rings and depths, and what is left there, in units."""
+    """Return the index into the table of groups, rings and depths, and what is left there, in units."""
     ring = bins.r.index(jnp.sqrt(place.real * place.real + place.imag * place.imag))
     depth = bins.z.index(top + down.real)
     return (group * (bins.r.bins + 1) + ring) * (bins.z.bins + 1) + depth, _units(left, bins)
 
 
 def _units(left: Array, bins: LayeredBins) -> Array:
-    """Weights in whole units, int64."""
+    """Return weights in whole units, int64."""
     return jnp.round(left.astype(jnp.float64) * bins.per_weight).astype(jnp.int64)
 
 
 def _recorded(results: PhotonFates, lanes: LayeredLanes, scattered: Array, layers: int, angles: bool) -> PhotonFates:
-    """Keep what became of the photons that have ended since the last time."""
+    """Record the ends of the photons that have ended since the last time."""
     number = pool.places(lanes, BATCH_PHOTONS)
     transmitted = lanes.layer == layers + 1
     rho = jnp.sqrt(lanes.place.real * lanes.place.real + lanes.place.imag * lanes.place.imag)
@@ -225,7 +225,7 @@ def _written(values: Array, number: Array, new: Array) -> Array:
 
 
 def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
-    """Weights and squared weights by side (above, below), ring and angle, float64 (2, rings + 1, angles or 1, 2)."""
+    """Return weights and their squares by side (above, below), ring, angle, float64 (2, rings + 1, angles or 1, 2)."""
     rho, signed = results.exits.real[:BATCH_PHOTONS], results.exits.imag[:BATCH_PHOTONS]
     weight = jnp.where(rho >= 0, jnp.abs(signed), 0).astype(jnp.float64)
     cell = jnp.where(signed < 0, 1, 0) * (bins.r.bins + 1) + bins.r.index(rho)
@@ -242,7 +242,7 @@ def _sorted(results: PhotonFates, bins: LayeredBins) -> Array:
 
 
 def _summed(results: PhotonFates) -> Array:
-    """Sums and sums of squares over photons, float64 (quantities, 2).
+    """Return sums and sums of squares over photons, float64 (quantities, 2).
 
     Quantities: what was left in layers, in all of them, what is accounted for, ballistic, cut.
     """
@@ -255,7 +255,7 @@ def _summed(results: PhotonFates) -> Array:
 
 
 def _unit(medium: Medium) -> float:
-    """A length of the medium's own: its shortest free path, or its thickness if it is all clear."""
+    """Return a length of the medium's own: its shortest free path, or its thickness if it is all clear."""
     mu_t = max(layer.mu_t for layer in medium.layers)
     return 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
 
@@ -277,7 +277,7 @@ def _bins(medium: Medium, grid: Grid, unit: float, photons: int, lanes: int) -> 
 
 
 def _sum_bits(medium: Medium) -> int:
-    """How many binary digits after the point sums have."""
+    """Return how many binary digits after the point sums have."""
     most = max(layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in medium.layers)
     return SUM_BITS + max(0, math.floor(-math.log2(most)) - EVENT_BITS) if most else SUM_BITS
 
@@ -310,19 +310,19 @@ def _deposits(exits: Floats, sums: Floats, by_layer: Floats, by_cell: Floats, ph
 
 
 def _variance(parts: Floats) -> Floats:
-    """Of the sum of independent, equally distributed groups, by their spread: (groups, ...) -> (...)."""
+    """Return the variance of the sum of independent, equally distributed groups, by spread: (groups, ...) -> (...)."""
     number = len(parts)
     return number * parts.var(axis=0, ddof=1) if number > 1 else np.full(parts.shape[1:], np.inf)
 
 
 def _with_squares(parts: Floats, photons: int) -> tuple[float, float]:
-    """Sum, and the sum of squares by photon that has the variance of the groups' spread."""
+    """Return the sum, and the sum of squares by photon that has the variance of the groups' spread."""
     total = parts.sum()
     return total, float(_variance(parts)) + total**2 / photons
 
 
 def _all_ballistic(grid: Grid, photons: int) -> Deposits:
-    """A single sheet of clear glass: what is not reflected at once goes through."""
+    """Return the sums of a single sheet of clear glass: what is not reflected at once goes through."""
     sums: dict[str, Floats] = {name: np.zeros(shape) for name, shape in deposits.shapes(grid, 1).items()}
     for name in ("started", "ballistic", "ballistic_squares", "accounted", "accounted_squares"):
         sums[name] = np.asarray(float(photons))

@@ -1,4 +1,4 @@
-"""What happens to photons in a layered medium: they fly, are absorbed in part and scattered, and meet interfaces.
+"""Event of photons in a layered medium: they fly, are absorbed in part and scattered, and meet interfaces.
 
 A lane is one photon in flight. Its depth is counted from the top of its layer, so a thin layer deep down is as precise
 as one at the surface. Lengths are in any one unit, all numbers float32.
@@ -57,18 +57,18 @@ COSINE = (
 
 
 class Stack(NamedTuple):
-    """A medium as float32 arrays by layer, (layers,)."""
+    """Medium as float32 arrays by layer, (layers,)."""
 
     thickness: Array
-    """[length]"""
+    """Thickness [length]."""
     top: Array
     """Depth of the layer's upper interface [length]."""
     mfp: Array
-    """[length], FARTHEST in clear glass."""
+    """Mean free path [length], FARTHEST in clear glass."""
     absorbs: Array
-    """1 - alpha = mu_a / mu_t [-]: a number of its own, since 1 - alpha would lose the digits of weak absorption."""
+    """Number 1 - alpha = mu_a / mu_t [-], kept apart: the difference would lose the digits of weak absorption."""
     phase: Phase
-    """Henyey and Greenstein's, its g by layer too."""
+    """Phase function of Henyey and Greenstein, its g by layer."""
     others: tuple[Phase | None, ...]
     """Phase functions of layers that have another one, a single one each; what is None is no array."""
     n: Array
@@ -84,22 +84,22 @@ class LayeredLanes(NamedTuple):
     """Photons in flight, arrays (lanes,)."""
 
     place: Array
-    """x + i y [length], complex64."""
+    """Complex x + i y [length], complex64."""
     down: Array
     """Depth below the top of the layer [length], and i times the direction's cosine to the axis [-], complex64."""
     heading: Array
-    """The direction's other cosines, ux + i uy [-], complex64."""
+    """Other cosines of the direction, ux + i uy [-], complex64."""
     weight: Array
-    """What is left of the photon [-], negative while it waits at an interface and once it has ended."""
+    """Weight left of the photon [-], negative while it waits at an interface and once it has ended."""
     layer: Array
     """Number of the layer it is in, from 1, int32; once it has ended REFLECTED, ROULETTED, CUT or, if it was
     transmitted, one more than there are layers."""
     event: Array
-    """Events so far, waiting included, uint32."""
+    """Number of events so far, waiting included, uint32."""
     photon: Array
     """Number of the photon in its batch, uint32."""
     absorbed: tuple[Array, ...]
-    """What it has left in each of the layers, as far as they are followed one by one, or in all of them [-]."""
+    """Weight it has left in each of the layers, as far as they are followed one by one, or in all of them [-]."""
 
     @property
     def ended(self) -> Array:
@@ -108,7 +108,7 @@ class LayeredLanes(NamedTuple):
 
 
 def stack(medium: Medium, unit: float) -> Stack:
-    """The arrays of a medium, lengths in `unit`."""
+    """Return the arrays of a medium, lengths in `unit`."""
     layers = medium.layers
     columns = {
         "thickness": [layer.thickness / unit for layer in layers],
@@ -124,7 +124,7 @@ def stack(medium: Medium, unit: float) -> Stack:
 
 
 def enter(key: Array, photon: Array, first: Array, entry: Array, followed: int) -> LayeredLanes:
-    """Photons on their way down from the top of the layer `first`, not scattered yet.
+    """Return photons on their way down from the top of the layer `first`, not scattered yet.
 
     They go straight down, or, where `entry` is no empty array but `half_space_event.entry_cosines`, in the plane y = 0
     with those cosines: nothing is resolved by azimuth. What they leave behind is followed in that many layers one by
@@ -150,19 +150,19 @@ def enter(key: Array, photon: Array, first: Array, entry: Array, followed: int) 
 
 
 def inside(layer: Array, layers: int | Array) -> Array:
-    """True where a photon has not ended."""
+    """Return True where a photon has not ended."""
     return (layer > 0) & (layer <= layers)
 
 
 def is_scattered(lanes: LayeredLanes, entry: Array) -> Array:
-    """False where a photon is still on the line of the beam, or in the plane it came in; `entry` as in `enter`."""
+    """Return False where a photon is still on the line of the beam, or in its plane of entry; `entry` as in `enter`."""
     if len(entry):
         return (lanes.heading.imag != 0) | (lanes.place.imag != 0)
     return (lanes.heading != 0) | (lanes.place != 0)
 
 
 def staged(go: Array, make: Callable[..., Any], *arrays: Any) -> Any:
-    """make(*arrays), computed once and kept: `go` is True, which XLA cannot know when it compiles."""
+    """Return make(*arrays), computed once and kept: `go` is True, which XLA cannot know when it compiles."""
     if not pool.on_cpu():
         return make(*arrays)
     shapes = jax.eval_shape(make, *arrays)
@@ -170,7 +170,7 @@ def staged(go: Array, make: Callable[..., Any], *arrays: Any) -> Any:
 
 
 class LayerOptics(NamedTuple):
-    """What a photon's layer is made of, arrays (lanes,); see Stack."""
+    """Properties of each photon's layer, arrays (lanes,); see Stack."""
 
     thickness: Array
     mfp: Array
@@ -179,7 +179,7 @@ class LayerOptics(NamedTuple):
 
 
 def optics(stack: Stack, layer: Array) -> LayerOptics:
-    """That of each photon."""
+    """Return the optical properties of each photon's layer."""
     everywhere = LayerOptics(stack.thickness, stack.mfp, stack.absorbs, stack.phase)
     return jax.tree.map(lambda values: pick(values, layer), everywhere)
 
@@ -235,7 +235,7 @@ def settle(go: Array, key: Array, stack: Stack, lanes: LayeredLanes, event: Arra
 
 
 def azimuth(v: Array) -> tuple[Array, Array]:
-    """Cosine and sine of pi v for v in [-1, 1], by the half angle."""
+    """Return cosine and sine of pi v for v in [-1, 1], by the half angle."""
     half = v * jnp.float32(0.5)
     square = half * half
     sine, cosine = half * _polynomial(SINE, square), _polynomial(COSINE, square)
@@ -243,7 +243,7 @@ def azimuth(v: Array) -> tuple[Array, Array]:
 
 
 def pick(values: Array, layer: Array) -> Array:
-    """values[layer - 1], with any of the values for a photon that has ended."""
+    """Return values[layer - 1], with any of the values for a photon that has ended."""
     if len(values) > SELECTED_LAYERS:
         return values[jnp.clip(layer - 1, 0, len(values) - 1)]
     picked = jnp.broadcast_to(values[0], layer.shape)
@@ -253,7 +253,7 @@ def pick(values: Array, layer: Array) -> Array:
 
 
 def _paths(key: Array, down: Array, weight: Array, photon: Array, event: Array, thickness: Array, mfp: Array) -> Array:
-    """Free path [length]; 0 for photons that do not fly, or would fly beyond their layer."""
+    """Return the free path [length]; 0 for photons that do not fly, or would fly beyond their layer."""
     word, _, _ = rng.draw_three(key, photon, event)
     path = rng.exponential(word) * mfp
     z = down.real + path * down.imag
@@ -263,7 +263,7 @@ def _paths(key: Array, down: Array, weight: Array, photon: Array, event: Array, 
 def _turns(
     key: Array, photon: Array, event: Array, phase: Phase, layer: Array, others: tuple[Phase | None, ...]
 ) -> Array:
-    """1 - cosine of the scattering angle, and i times the azimuth / pi."""
+    """Return 1 - cosine of the scattering angle, and i times the azimuth / pi."""
     _, cosine_word, azimuth_word = rng.draw_three(key, photon, event)
     v = rng.symmetric(cosine_word)
     below_one, _ = phase.deflection(v)
@@ -274,14 +274,14 @@ def _turns(
 
 
 def _aside(turns: Array) -> Array:
-    """Components of the new direction at right angles to the old one."""
+    """Return the components of the new direction at right angles to the old one."""
     sine = jnp.sqrt(turns.real * (2 - turns.real))
     cos_azimuth, sin_azimuth = azimuth(turns.imag)
     return lax.complex(sine * cos_azimuth, sine * sin_azimuth)
 
 
 def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits: Array) -> Array:
-    """uz afterwards, and i times n1 / n2 where a photon passes, 0 elsewhere; BACK or ON where roulette ends it."""
+    """Return uz afterwards, and i n1 / n2 where a photon passes, 0 elsewhere; BACK or ON where roulette ends it."""
     toss, coin, _ = rng.draw_three(key, lanes.photon, event)
     uz = lanes.down.imag * _renormalising(lanes, len(n) - 2)
     n1 = pick(n[1:-1], lanes.layer)
@@ -297,7 +297,7 @@ def _at_interface(key: Array, n: Array, lanes: LayeredLanes, event: Array, waits
 
 
 def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array) -> Array:
-    """Layer after the interface and after roulette."""
+    """Return the layer after the interface and after roulette."""
     passes = (outcome.imag > 0) | (outcome.imag == ON)
     step = jnp.where(passes, jnp.where(outcome.real > 0, 1, -1), 0)
     layer = lanes.layer + step.astype(jnp.int32)
@@ -307,19 +307,19 @@ def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array
 
 
 def _odds(weight: Array, event: Array) -> Array:
-    """How many photons one that survived roulette stands for."""
+    """Return how many photons one that survived roulette stands for."""
     small = jnp.where(weight < THRESHOLD, jnp.float32(256 / CHANCE_IN_256), 1)
     return small * jnp.where(is_late(event), jnp.float32(2), 1)
 
 
 def is_late(event: Array) -> Array:
-    """True in the turn in which the number of events passes a power of two from FIRST_TOSS on, before MAX_EVENTS."""
+    """Return True in turns in which the number of events passes a power of two >= FIRST_TOSS, before MAX_EVENTS."""
     before = event - EVENTS_PER_TURN
     return (event >= FIRST_TOSS) & (event < MAX_EVENTS) & (event ^ before > before)
 
 
 def _renormalising(lanes: LayeredLanes, layers: int) -> Array:
-    """1 / length of the direction, to first order: rounding lets it drift by 1e-7 an event. 1 for those that ended."""
+    """Return 1 / length of the direction, to first order: rounding lets it drift by 1e-7 an event. 1 after the end."""
     ux, uy, uz = lanes.heading.real, lanes.heading.imag, lanes.down.imag
     return jnp.where(inside(lanes.layer, layers), 1.5 - 0.5 * (ux * ux + uy * uy + uz * uz), 1)
 

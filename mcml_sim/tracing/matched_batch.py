@@ -1,4 +1,4 @@
-"""One numbered batch of `simulate` in a matched, isotropic half space, where only the order decides a photon's weight.
+"""Batch of `simulate` in a matched, isotropic half space, where only the order decides a photon's weight.
 
 A photon is traced as if nothing were absorbed: after n scatterings its weight is alpha^n, and twice that for each toss
 of roulette it has won, which is a table of n. What it leaves behind at each place and takes out with it is looked up
@@ -49,7 +49,7 @@ MOST_GROUPS = 16  # of photons, whose spread gives the errors of what is absorbe
 
 @dataclass(frozen=True, eq=False)
 class Weights:
-    """What a photon is worth, by order n = 0 ... MAX_ORDER; all arrays float64 (MAX_ORDER + 1,) but `stops`."""
+    """Weights of a photon by order n = 0 ... MAX_ORDER; all arrays float64 (MAX_ORDER + 1,) but `stops`."""
 
     stops: NDArray[np.int32]
     """Orders at which half of those inside end, and the last at which all do, int32 (STOPS,)."""
@@ -58,17 +58,17 @@ class Weights:
     visiting: Floats
     """Weight of one that arrives at its n-th place; 1 - alpha of it stays there."""
     absorbed: Floats
-    """What one left at its first n places."""
+    """Weight left by a photon at its first n places."""
 
     @property
     def last(self) -> int:
-        """The order at which photons are cut."""
+        """Order at which photons are cut."""
         return int(self.stops[-1])
 
 
 @lru_cache(maxsize=16)
 def weights(alpha: float) -> Weights:
-    """The roulette for an albedo, and the weights that follow from it."""
+    """Return the roulette for an albedo, and the weights that follow from it."""
     order = np.arange(MAX_ORDER + 1)
     plain = alpha ** order.astype(np.float64)
     stops = _stops(np.minimum(plain / THRESHOLD, 1) * np.sqrt(LONG_PATH / np.maximum(order, LONG_PATH)))
@@ -79,7 +79,7 @@ def weights(alpha: float) -> Weights:
 
 
 def _stops(survival: Floats) -> NDArray[np.int32]:
-    """Orders where the survival by order, (MAX_ORDER + 1,), falls below 1, 1/2, 1/4, ..., and a last one for all."""
+    """Return orders where the survival, (MAX_ORDER + 1,), falls below 1, 1/2, 1/4, ..., and a last one for all."""
     below = np.argmax(survival < 0.5 ** np.arange(STOPS - 1)[:, None], axis=1)
     tosses = np.maximum(below[below > 0], 1)
     last = tosses[-1] + 1 if len(tosses) == STOPS - 1 else MAX_ORDER
@@ -111,12 +111,12 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
 
 
 class MatchedBins(NamedTuple):
-    """A grid as the kernels want it."""
+    """Grid for the kernels."""
 
     r: Axis
     z: Axis | None
     cosines: Array
-    """Of the edges between angle bins, rising, float32 (angles - 1,); empty if angles are not resolved."""
+    """Cosines of the edges between angle bins, rising, float32 (angles - 1,); empty if angles are not resolved."""
 
 
 class Visits(NamedTuple):
@@ -138,7 +138,7 @@ def _bins(grid: Grid, mfp: float) -> MatchedBins:
 def _trace_visits(
     key: Array, photons: Array, stops: Array, visiting: Array, bins: MatchedBins, parts: int, lanes: int
 ) -> tuple[Ends, Visits]:
-    """Ends as of `orders_batch.trace`, and what arrived where; `visiting` (MAX_ORDER + 1,) int64 in units of UNIT."""
+    """Return ends as `orders_batch.trace` does, and arrivals by place; `visiting` (MAX_ORDER + 1,) int64, in UNITs."""
     depths = cast("Axis", bins.z)
     shape = (parts, bins.r.bins + 1, depths.bins + 1)
     size = int(np.prod(shape))
@@ -170,7 +170,7 @@ def _trace_visits(
 
 
 def _summed(by_group: Array) -> tuple[Array, Array]:
-    """Sum over groups, and its variance from their spread."""
+    """Return the sum over groups, and its variance from their spread."""
     groups = len(by_group)
     if groups == 1:
         return by_group[0], jnp.full_like(by_group[0], jnp.inf)
@@ -180,7 +180,7 @@ def _summed(by_group: Array) -> tuple[Array, Array]:
 
 @jax.jit
 def _counted(key: Array, ends: Ends, leaving: Array, bins: MatchedBins) -> tuple[Array, Array]:
-    """Weight that left, w + i w^2 by ring and angle, and photons by order + MAX_ORDER, int32 (2 MAX_ORDER + 1,).
+    """Count weight that left, w + i w^2 by ring and angle, and photons by order + MAX_ORDER, int32 (2 MAX_ORDER + 1,).
 
     The direction in which a photon left is the last it drew, so it is drawn again.
     """
@@ -202,7 +202,7 @@ def _counted(key: Array, ends: Ends, leaving: Array, bins: MatchedBins) -> tuple
 def deposited(
     exits: NDArray, orders: NDArray, values: Weights, photons: int, share: float, visited: list[NDArray]
 ) -> Deposits:
-    """All sums of a batch; whatever does not depend on the place follows from the numbers of photons by order."""
+    """Return all sums of a batch; whatever does not depend on the place follows from the photons by order."""
     number = np.concatenate([orders[MAX_ORDER + 1 :], orders[MAX_ORDER - 1 :: -1]]).astype(np.float64)
     if number.sum() != photons:
         raise RuntimeError(f"photons were lost or made: {photons} started and {number.sum():.0f} ended")

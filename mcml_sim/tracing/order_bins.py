@@ -33,10 +33,10 @@ FARTHEST = 64  # reach, at most: MAX_ORDER times it is a whole float32
 
 @dataclass(frozen=True)
 class OrderBins:
-    """Where one scattering turns light as far as 1 / `reach` of one without direction."""
+    """Bins of order for a half space where one scattering turns light as far as 1 / `reach` of isotropic ones."""
 
     reach: int = 1
-    """A power of two from 1 to FARTHEST."""
+    """Power of two from 1 to FARTHEST."""
 
     @property
     def first_roulette(self) -> int:
@@ -56,7 +56,7 @@ class OrderBins:
 
     @cached_property
     def orders(self) -> NDArray[np.int64]:
-        """1 ... max_order."""
+        """Orders 1 ... max_order."""
         return np.arange(1, self.max_order + 1)
 
     @cached_property
@@ -87,31 +87,31 @@ class OrderBins:
         return self.roulette_weight(self.last_orders)
 
     def roulette_weight(self, order: ArrayLike) -> NDArray[np.int64]:
-        """How many photons one that leaves (or is cut) at this order stands for: 1 to the first roulette, then 2."""
+        """Return how many photons one that leaves (or is cut) at this order stands for: 1 before the first roulette."""
         return 2 ** np.ceil(np.log2(np.maximum(np.asarray(order) / self.first_roulette, 1))).astype(np.int64)
 
     def mean(self, values: Floats, exponent: float = LONG_PATHS) -> Floats:
-        """In each bin, under the density n^exponent, of values at every order: (..., max_order) -> (..., bins)."""
+        """Return means per bin, under the density n^exponent, of values by order: (..., max_order) -> (..., bins)."""
         density = self.orders**exponent
         starts = self.first_orders - 1
         return np.add.reduceat(values * density, starts, axis=-1) / np.add.reduceat(density, starts)
 
     def weights(self, alpha: Floats) -> Floats:
-        """What a photon of each bin adds to the reflectance at albedo alpha: (...) -> (..., bins)."""
+        """Return what a photon of each bin adds to the reflectance at albedo alpha: (...) -> (..., bins)."""
         return self.roulette_weights * self._each(alpha, lambda one: one**self.orders)
 
     def weight_derivatives(self, alpha: Floats) -> Floats:
-        """d weights / d alpha: (...) -> (..., bins)."""
+        """Return d weights / d alpha: (...) -> (..., bins)."""
         return self.roulette_weights * self._each(alpha, lambda one: self.orders * one ** (self.orders - 1))
 
     def _each(self, alpha: Floats, power: Callable[[float], NDArray]) -> Floats:
-        """Mean in each bin of a power of one albedo after the other: the orders of all would fill the memory."""
+        """Return the mean per bin of a power of one albedo after the other: the orders of all would fill the memory."""
         found: Floats = np.stack([self.mean(power(one)) for one in np.ravel(alpha)])
         return found.reshape(*np.shape(alpha), -1)
 
 
 def bins_of(setting: Setting) -> OrderBins:
-    """Of a half space."""
+    """Return the bins of a half space."""
     turned = max(1.0 - setting.g, 1.0 / FARTHEST)
     return _bins(2 ** max(round(np.log2(1.0 / turned)), 0))
 

@@ -1,4 +1,4 @@
-"""One numbered batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
+"""Batch of the order-resolved run on one device: where each photon left, and after how many scatterings.
 
 Since random words belong to (photon, event), and ends to photons, the number of lanes does not change a bit.
 """
@@ -29,12 +29,12 @@ EVENTS_PER_TURN = 16  # 8 are slower by 9 %, 32 by 8 %
 
 
 class Ends(NamedTuple):
-    """How each photon of a batch ended, arrays (BATCH_PHOTONS,) by photon number."""
+    """Ends of the photons of a batch, arrays (BATCH_PHOTONS,) by photon number."""
 
     rho: Array
-    """Where, distance from the beam [mfp], float32."""
+    """Distance from the beam [mfp], float32."""
     order: Array
-    """After n scatterings, int32: n out of the surface, -n inside (roulette, or the last order), 0 never started."""
+    """Scatterings n, int32: n of one that left, -n of one that ended inside (roulette, last order), 0 never started."""
 
 
 def trace_batch(
@@ -73,13 +73,12 @@ def trace(
     events: int = EVENTS_PER_TURN,
     illumination: str = "searchlight",
 ) -> Ends:
-    """The ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
+    """Return the ends of the first `photons` (int32) photons of the batch with this key (uint32[4]).
 
     `where` is the half space and its light, by default matched and isotropic under this `illumination`. `stops` as in
     `isotropic_event.enter`, the last of them at most 2^24. The number of lanes, and that of events in a turn, decide
     nothing but the speed.
     """
-
     lanes = lanes or pool.lanes()
 
     def enter(photon: Array) -> OrderLanes:
@@ -98,12 +97,12 @@ def trace(
 
 
 def no_ends(lanes: int) -> Array:
-    """rho + i order of photons that were never started, and of idle lanes, complex64 (BATCH_PHOTONS + lanes,)."""
+    """Return rho + i order of photons never started, and of idle lanes, complex64 (BATCH_PHOTONS + lanes,)."""
     return jnp.zeros(BATCH_PHOTONS + lanes, jnp.complex64)
 
 
 def as_ends(ends: Array) -> Ends:
-    """The parts of rho + i order of all photons."""
+    """Return the parts of rho + i order of all photons."""
     ends = ends[:BATCH_PHOTONS]
     return Ends(ends.real, ends.imag.astype(jnp.int32))
 
@@ -126,7 +125,7 @@ def histogram(ends: Ends, edges: Array, columns: Array, count: int) -> Array:
 
 
 def _columns(bins: OrderBins) -> NDArray[np.int32]:
-    """Column of the histogram for each end, at index order + max_order: bins, then roulette, then the cut."""
+    """Return the histogram's column for each end, at index order + max_order: bins, then roulette, then the cut."""
     columns = np.full(2 * bins.max_order + 1, bins.last_orders.size, np.int32)
     columns[0] = bins.last_orders.size + 1
     columns[bins.max_order + 1 :] = bins.bin_of_order

@@ -1,4 +1,4 @@
-"""A pool of lanes that is kept full of photons, from the first of a batch to the exit of the last.
+"""Pool of lanes that is kept full of photons, from the first of a batch to the exit of the last.
 
 After a few events each lane whose photon has ended takes the next photon. When none is left to start, the pool is
 drained through ever smaller pools, so no photon is dropped and the last long path does not occupy thousands of
@@ -32,22 +32,25 @@ Turn = Callable[[Lanes, Results], tuple[Lanes, Results]]
 
 
 def on_cpu() -> bool:
-    """Whether jax computes on the processor, whose fastest ways are not those of a GPU."""
+    """Return whether jax computes on the processor, whose fastest ways are not those of a GPU."""
     return jax.default_backend() == "cpu"
 
 
 def lanes() -> int:
-    """How many photons are followed at once, by where jax computes."""
+    """Return how many photons are followed at once, by where jax computes."""
     return LANES if on_cpu() else GPU_LANES
 
 
 def follow(enter: Enter, turn: Turn[Results], results: Results, photons: Array, lanes: int) -> Results:
     """Follow the photons 0 ... photons - 1 (int32) to their ends.
 
-    enter    photon numbers, uint32 (lanes,) -> lanes at their start
-    turn     flies all lanes some events on and adds what became of them to the results. A lane without a photon has
-             ended, and its photon number is BATCH_PHOTONS: so an end is seen once
-    lanes    how many at once, a multiple of 64; it decides nothing but the speed
+    Args:
+        enter: photon numbers, uint32 (lanes,) -> lanes at their start.
+        turn: flies all lanes some events on and adds what became of them to the results. A lane without a photon has
+            ended, and its photon number is BATCH_PHOTONS: so an end is seen once.
+        results: what the first turn adds to.
+        photons: how many there are, int32.
+        lanes: how many at once, a multiple of 64; it decides nothing but the speed.
     """
 
     def fill(pool: Lanes, started: Array) -> tuple[Lanes, Array]:
@@ -72,7 +75,7 @@ def follow(enter: Enter, turn: Turn[Results], results: Results, photons: Array, 
 
 
 def _drain(turn: Turn[Results], pool: Lanes, results: Results, lanes: int) -> tuple[Lanes, Results]:
-    """Turns until no more than so many photons are in flight."""
+    """Turn until no more than so many photons are in flight."""
 
     def step(state: tuple[Lanes, Results]) -> tuple[Lanes, Results]:
         return turn(_emptied(state[0]), state[1])
@@ -81,12 +84,12 @@ def _drain(turn: Turn[Results], pool: Lanes, results: Results, lanes: int) -> tu
 
 
 def _emptied(pool: Lanes) -> Lanes:
-    """Lanes whose photons have ended, and were seen to, without them."""
+    """Return the lanes without photons that have ended, and were seen to."""
     return pool._replace(photon=jnp.where(pool.ended, jnp.uint32(BATCH_PHOTONS), pool.photon))
 
 
 def _idle(enter: Enter, lanes: int) -> Lanes:
-    """Lanes without a photon."""
+    """Return lanes without a photon."""
     shapes = jax.eval_shape(enter, jax.ShapeDtypeStruct((lanes,), jnp.uint32))
     empty = jax.tree.map(lambda leaf: jnp.zeros(leaf.shape, leaf.dtype), shapes)
     place, photon = jnp.full(lanes, -1j, jnp.complex64), jnp.full(lanes, BATCH_PHOTONS, jnp.uint32)
@@ -94,13 +97,13 @@ def _idle(enter: Enter, lanes: int) -> Lanes:
 
 
 def _shrunk(pool: Lanes, idle: Lanes, lanes: int) -> Lanes:
-    """The photons in flight, moved to fewer lanes."""
+    """Return the photons in flight, moved to fewer lanes."""
     (places,) = jnp.nonzero(~pool.ended, size=lanes, fill_value=len(pool.place))
     return jax.tree.map(lambda leaf, none: jnp.append(leaf, none)[places], pool, idle)
 
 
 def places(lanes: Lanes, photons: int) -> Array:
-    """Where the lanes write what became of them, int32: those that have just ended at their photons' numbers.
+    """Return where the lanes write their results, int32: those that have just ended at their photons' numbers.
 
     The others write too, from `photons` on: a branch that no processor can foresee costs more, and a GPU that many
     lanes write to one place of lets them wait for one another.
@@ -110,7 +113,7 @@ def places(lanes: Lanes, photons: int) -> Array:
 
 
 def ranks(flags: Array) -> Array:
-    """Inclusive count of set flags, int32: along rows, then down columns, as products with triangles of ones.
+    """Return the inclusive count of set flags, int32, along rows, then down columns: products with triangles of ones.
 
     On a processor `cumsum` takes so much longer that a third of all time would go into it.
     """

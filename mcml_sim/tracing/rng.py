@@ -29,12 +29,12 @@ LOGARITHM = (
 
 
 def batch_key(seed: int, batch: int) -> NDArray[np.uint32]:
-    """Four key words for one batch of one seed, mixed on the host so that neighbouring seeds share nothing."""
+    """Return four key words for one batch of one seed, mixed on the host so that neighbouring seeds share nothing."""
     return np.random.SeedSequence(seed, spawn_key=(batch,)).generate_state(4, np.uint32).astype(np.uint32)
 
 
 def draw(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array, Array]:
-    """Four independent uint32 words for each (photon, event); both are uint32 arrays of one shape, `key` uint32[4]."""
+    """Return four independent uint32 words for each (photon, event), uint32 arrays of one shape; `key` is uint32[4]."""
     x, y, z, w = (
         v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2], key[3])
     )
@@ -43,19 +43,19 @@ def draw(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array, 
 
 
 def draw_three(key: Array, photon: Array, event: Array) -> tuple[Array, Array, Array]:
-    """Three independent uint32 words for each (photon, event), a fifth cheaper than four; only key[:3] counts."""
+    """Return three independent uint32 words for each (photon, event), a fifth cheaper than four; key[:3] counts."""
     x, y, z = (v * jnp.uint32(MULTIPLIER) + jnp.uint32(INCREMENT) for v in (photon + key[0], event + key[1], key[2]))
     z = z | jnp.uint32(1)  # the one word that no event changes: odd, or its first product would lose some of `event`
     return _xor_shift_three(*_round_three(*_xor_shift_three(*_round_three(x, y, z))))
 
 
 def uniform(words: Array) -> Array:
-    """float32 in (0, 1): 24 bits everywhere and steps of 2^-32 near 0, so -log(u) reaches 22.9, not 16."""
+    """Return float32 in (0, 1): 24 bits everywhere and steps of 2^-32 near 0, so -log(u) reaches 22.9, not 16."""
     return jnp.minimum((words.astype(jnp.float32) + 0.5) * jnp.float32(2.0**-32), jnp.float32(BELOW_ONE))
 
 
 def exponential(words: Array) -> Array:
-    """-ln of uniforms that have 31 bits near 0: float32 in (0, 22.2), relative error below 4e-7.
+    """Return -ln of uniforms that have 31 bits near 0: float32 in (0, 22.2), relative error below 4e-7.
 
     A word is 2^(32 - k) (1 - y/2), so its logarithm is a multiple of ln 2 and a polynomial: half the work of a general
     logarithm, which XLA takes care to get right for negative and infinite numbers too.
@@ -71,7 +71,7 @@ def exponential(words: Array) -> Array:
 
 
 def symmetric(words: Array) -> Array:
-    """float32 in [-1, 1], never 0, with steps of 2^-31 near 0."""
+    """Return float32 in [-1, 1], never 0, with steps of 2^-31 near 0."""
     signed = lax.bitcast_convert_type(words, jnp.int32)
     return (signed.astype(jnp.float32) + 0.5) * jnp.float32(2.0**-31)
 

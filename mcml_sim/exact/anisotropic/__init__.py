@@ -1,1 +1,1 @@
-"""The half space whose scattering has a direction: high orders solved, low ones from photons, as tables."""
+"""Half space whose scattering has a direction: high orders solved, low ones from photons, as tables."""

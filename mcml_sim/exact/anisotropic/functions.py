@@ -1,4 +1,4 @@
-"""What `mcml_sim.exact` answers of a half space that scatters forwards, from the table: arrays in, arrays out.
+"""Functions of `mcml_sim.exact` for a half space that scatters forwards, from the table: arrays in, arrays out.
 
 Albedos and radii are those of the medium itself, radii in mean free paths. Arguments are float64 arrays of one shape,
 after broadcasting, of numpy or of jax, and so are the answers.
@@ -28,27 +28,27 @@ DARKEST, LEAST = 1e-200, 1e-300  # an albedo that stands for 0, whose shares are
 
 
 def reflectance(alpha: Any, setting: Setting) -> Any:
-    """A [-]."""
+    """Return A [-]."""
     return _called(_reflectance, light(setting), alpha, alpha)
 
 
 def profile(x: Any, alpha: Any, setting: Setting, coarse: bool = False) -> Any:
-    """R_d [1/mfp^2]; `coarse` as in `table.curves`."""
+    """Return R_d [1/mfp^2]; `coarse` as in `table.curves`."""
     return _called(_profile, light(setting, coarse), x, alpha)
 
 
 def cdf(x: Any, alpha: Any, setting: Setting) -> Any:
-    """Share of the reflected energy within x [-]."""
+    """Return the share of the reflected energy within x [-]."""
     return _called(_cdf, light(setting), x, alpha)
 
 
 def quantile(xi: Any, alpha: Any, setting: Setting) -> Any:
-    """Radius within which that share leaves [mfp]."""
+    """Return the radius within which that share leaves [mfp]."""
     return _called(_quantile, light(setting), xi, alpha)
 
 
 def _called(function: Any, own: ExactLight, x: Any, alpha: Any) -> Any:
-    """Of jax arrays at once; of numpy's a block at a time, so that no shape of them compiles anew."""
+    """Call a function of jax arrays at once; of numpy's a block at a time, so that no shape of them compiles anew."""
     own = own.unlabelled
     if any(isinstance(one, jax.Array) for one in (x, alpha)):
         x, alpha = jnp.broadcast_arrays(x, alpha)
@@ -64,7 +64,7 @@ def _called(function: Any, own: ExactLight, x: Any, alpha: Any) -> Any:
 
 @filter_jit
 def _each(function: Any, own: ExactLight, x: Array, alpha: Array) -> Array:
-    """At each radius; what depends on the albedo alone is worked out once where there is but one."""
+    """Call a function at each radius; what depends on the albedo alone is computed once where there is but one."""
     return jax.vmap(partial(function, own), in_axes=(0, None if alpha.ndim == 0 else 0))(x, alpha)
 
 
@@ -85,14 +85,17 @@ def _cdf(own: ExactLight, x: Array, alpha: Array) -> Array:
 
 
 def _within(own: ExactLight, x: Array, alpha: Array, of: tuple[Array, Array, Array]) -> Array:
-    """The share within x [l*], of reduced albedos: of all light of their profile, from which A differs by as much as
-    the table is off. Beyond FAR light falls off as that of a white medium, if there is any. `of` as in `_whole`."""
+    """Return the share within x [l*], of reduced albedos; `of` as in `_whole`.
+
+    It is the share in all light of their profile, from which A differs by the error of the table. Beyond FAR light
+    falls off as that of a white medium, if there is any.
+    """
     (far, whole, tail), alpha = of, jnp.maximum(alpha, DARKEST)
     return jnp.minimum((own.energy(jnp.minimum(x, far), alpha) + tail * (1.0 - far / jnp.maximum(x, far))) / whole, 1.0)
 
 
 def _whole(own: ExactLight, alpha: Array) -> tuple[Array, Array, Array]:
-    """How far there is light, or else FAR; all light of a profile, and that beyond."""
+    """Return how far there is light, or else FAR; all light of a profile, and that beyond."""
     alpha = jnp.maximum(alpha, DARKEST)
     far = jnp.minimum(FAR, jax.lax.stop_gradient(own.reach(alpha)))
     tail = far * own.ring_density(far, alpha)

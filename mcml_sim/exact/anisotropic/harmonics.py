@@ -21,7 +21,7 @@ NODES = 80  # of Gauss and Legendre, along K
 
 
 def legendre(degree: int, mu: Any) -> Array:
-    """P_lm at cosines mu (...), (degree + 1, degree + 1, ...)."""
+    """Return P_lm at cosines mu (...), (degree + 1, degree + 1, ...)."""
     sine, zero = jnp.sqrt((1.0 - mu) * (1.0 + mu)), jnp.zeros_like(mu)
     columns, first = [], jnp.full_like(mu, np.sqrt(0.5))
     for m in range(degree + 1):
@@ -37,21 +37,21 @@ def legendre(degree: int, mu: Any) -> Array:
 
 
 def harmonics(degree: int, mu: NDArray, phi: NDArray) -> NDArray:
-    """Z_lm in directions (...), (..., degree + 1, degree + 1)."""
+    """Return Z_lm in directions (...), (..., degree + 1, degree + 1)."""
     m = np.arange(degree + 1)
     waves = np.cos(np.multiply.outer(phi, m)) / np.sqrt(np.pi * (1 + (m == 0)))
     return np.moveaxis(np.asarray(legendre(degree, jnp.asarray(mu))), (0, 1), (-2, -1)) * waves[..., None, :]
 
 
 def rotations(degree: int, beta: Array) -> Array:
-    """By complex angles beta (x,), which bring K from (sin, 0, cos) to the pole: (x, l, m in its frame, m)."""
+    """Return rotations by complex angles beta (x,), which bring K from (sin, 0, cos) to the pole: (x, l, m, m)."""
     turns, vectors = _generators(degree)
     return jnp.einsum("lmj,xlj,lnj->xlmn", vectors, jnp.exp(-1j * beta[:, None, None] * turns), vectors.conj())
 
 
 @lru_cache(maxsize=8)
 def _generators(degree: int) -> tuple[NDArray, NDArray]:
-    """Eigenvalues over -i, (l, j), and eigenvectors, (l, m, j), of the rotation about y."""
+    """Return eigenvalues over -i, (l, j), and eigenvectors, (l, m, j), of the rotation about y."""
     size = degree + 1
     turns, vectors = np.zeros((size, size)), np.zeros((size, size, size), complex)
     for ell in range(size):
@@ -63,7 +63,7 @@ def _generators(degree: int) -> tuple[NDArray, NDArray]:
 
 
 def flights(degree: int, wave: Array) -> Array:
-    """int P_lm P_l'm / (1 + i K mu) dmu at K = `wave` (x,), complex and not i times more than 1: (x, m, l, l')."""
+    """Return int P_lm P_l'm / (1 + i K mu) dmu at K = `wave` (x,), not i times more than 1: (x, m, l, l')."""
     t, weight = np.polynomial.legendre.leggauss(NODES)
     size = jnp.maximum(jnp.abs(wave), 1e-6)[:, None]
     reach = jnp.arcsinh(size)

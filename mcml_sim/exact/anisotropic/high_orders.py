@@ -40,25 +40,25 @@ CHUNK = 16  # wave numbers at once
 
 
 class Fineness(NamedTuple):
-    """How finely it is solved."""
+    """Fineness of a solution."""
 
     degree: int
     per_panel: int = 7
     steps: int = 6
-    """Of the Krylov space: 4 leave 1e-12."""
+    """Size of the Krylov space: 4 leave 1e-12."""
 
 
 DEGREES = ((0.25, 8), (0.45, 10), (0.65, 12), (0.85, 14), (1.0, 16))
-"""By g up to: four more change light from .05 to 15 l* by 4e-6 at g = .58, 9e-4 at g = .9 (`half_spaces --finer`)."""
+"""Degree by g up to: four more change light from .05 to 15 l* by 4e-6, 9e-4 at g = .58, .9 (`half_spaces --finer`)."""
 
 
 def fine(g: float) -> Fineness:
-    """Enough for the table."""
+    """Return the fineness of the table."""
     return Fineness(next(degree for most, degree in DEGREES if g <= most))
 
 
 class Contour(NamedTuple):
-    """Where R^ is wanted for some albedos."""
+    """Line of wave numbers on which R^ is needed for some albedos."""
 
     k: Complexes
     dk: Complexes
@@ -66,7 +66,7 @@ class Contour(NamedTuple):
 
 
 def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
-    """kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [1/mfp].
+    """Return kappa of Henyey and Greenstein's scattering: R_d falls off as e^{-kappa r} r^-2 [1/mfp].
 
     1 over the largest eigenvalue of the tridiagonal matrix of l / sqrt(h_l-1 h_l), h_l = (2 l + 1)(1 - alpha g^l).
     """
@@ -78,13 +78,13 @@ def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
 
 
 def decay_rates(reduced: Floats, g: float) -> Floats:
-    """kappa of reduced albedos [1/l*]."""
+    """Return kappa of reduced albedos [1/l*]."""
     alpha = unreduced(reduced, g)
     return np.array([decay_rate(one, g) for one in alpha]) / (1.0 - alpha * g)
 
 
 def lines(alphas: Floats, g: float) -> list[tuple[Contour, NDArray[np.intp]]]:
-    """Of all albedos (m,) below 1, each with the indices of its own."""
+    """Return the lines of all albedos (m,) below 1, each with the indices of its own."""
     kappas = np.array([decay_rate(alpha, g) for alpha in alphas])
     found = []
     for high, low in pairwise(KAPPAS):
@@ -109,7 +109,7 @@ def _contour(kappa: float) -> tuple[Complexes, Complexes]:
 
 
 def transforms(n: float, g: float, beyond: int, k: Complexes, alpha: Floats, rule: Fineness) -> Complexes:
-    """R^ of the orders beyond so many, at wave numbers (k,) and albedos (m,), of searchlight and diffuse: (2, k, m)."""
+    """Return R^ of the orders beyond so many, at wave numbers (k,) and albedos (m,), of both lights: (2, k, m)."""
     with jax.enable_x64(True):
         of = directions(n, rule.degree)
         moments = jnp.asarray(systems.moments(g, rule.degree))
@@ -127,7 +127,7 @@ def transforms(n: float, g: float, beyond: int, k: Complexes, alpha: Floats, rul
 
 
 def totals(n: float, g: float, beyond: int, alpha: Floats, rule: Fineness) -> Floats:
-    """Their share of the light that arrives, of searchlight and diffuse: (2, m)."""
+    """Return the share of these orders in the light that arrives, of searchlight and diffuse: (2, m)."""
     k = np.array([LEAST_WAVE / 10.0 + 0j])
     return transforms(n, g, beyond, k, alpha, rule._replace(per_panel=2 * rule.per_panel))[:, 0].real
 
@@ -146,7 +146,7 @@ def _solved(
 
 
 def _resolved(of: systems.HarmonicSystem, alpha: Array, beyond: int, steps: int) -> Array:
-    """alpha^(N+1) s . (1 - alpha M)^-1 M^N b for s of a searchlight and b itself: (2, m).
+    """Return alpha^(N+1) s . (1 - alpha M)^-1 M^N b for s of a searchlight and b itself: (2, m).
 
     Without the surface the inverse is one of small blocks; what the surface does is an equation for the light that
     arrives at it, whose Krylov space is small for any alpha.
@@ -170,7 +170,7 @@ def _resolved(of: systems.HarmonicSystem, alpha: Array, beyond: int, steps: int)
 
 
 def _solution(operator: Callable[[Array], Array], right: Array, steps: int) -> Array:
-    """Of operator y = right, by Arnoldi's method (full orthogonalisation, Saad 1981)."""
+    """Solve operator y = right by Arnoldi's method (full orthogonalisation, Saad 1981)."""
     size = jnp.linalg.norm(right)
     basis = jnp.zeros((steps + 1, right.size), complex).at[0].set(right / size)
     small = jnp.zeros((steps + 1, steps), complex)
@@ -191,8 +191,10 @@ def _solution(operator: Callable[[Array], Array], right: Array, steps: int) -> A
 
 
 def ring_density(line: Contour, values: Complexes, x: Floats) -> tuple[Floats, Floats]:
-    """2 pi x R_d [1/mfp] at radii (x,) from R^ on a line, (..., k, m): (..., x, m). And the share of it in the sizes of
-    the waves that it is the sum of: what cancels takes digits."""
+    """Return 2 pi x R_d [1/mfp] at radii (x,) from R^ on a line, (..., k, m): (..., x, m).
+
+    And its share in the sizes of the waves that it is the sum of: what cancels takes digits.
+    """
     k, dk, finer = _refined(line, values)
     waves = hankel1(0, np.multiply.outer(x, k)) * (k * dk)
     found: Floats = (waves @ finer).real
@@ -200,7 +202,7 @@ def ring_density(line: Contour, values: Complexes, x: Floats) -> tuple[Floats, F
 
 
 def _refined(line: Contour, values: Complexes) -> tuple[Complexes, Complexes, Complexes]:
-    """k, dk and R^ at four times as many nodes a panel: R^ is a polynomial there, waves of far radii are not."""
+    """Return k, dk and R^ at four times as many nodes a panel: R^ is a polynomial there, waves of far radii are not."""
     coarse, weight = np.polynomial.legendre.leggauss(NODES)
     fine, fine_weight = np.polynomial.legendre.leggauss(4 * NODES)
     way = np.stack([np.prod((fine[:, None] - (rest := np.delete(coarse, at))) / (t - rest), axis=1)

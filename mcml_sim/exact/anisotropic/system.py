@@ -1,4 +1,4 @@
-"""One transverse wave number of a half space whose scattering has a direction: mirror, escape cone and harmonics.
+"""Half space whose scattering has a direction, at one transverse wave number: mirror, escape cone and harmonics.
 
 As in `cone`, the surface is a mirror, which makes the half space an infinite medium, less the light that leaves through
 the escape cone. The radiance that light scattered into direction Omega makes at wave vector K = (k, 0, x) has moments
@@ -43,49 +43,49 @@ OUTSIDE, AROUND = 8, 4  # directions of the cone, by polar angle, and by azimuth
 
 
 class HarmonicSystem(NamedTuple):
-    """M, b and s at one k. Unknowns (x, degree + 1, degree + 1)."""
+    """Matrix M and vectors b and s at one k. Unknowns (x, degree + 1, degree + 1)."""
 
     rotation: Array
     flight: Array
     root: Array
-    """sqrt(g_l), (degree + 1, 1)."""
+    """Roots sqrt(g_l), (degree + 1, 1)."""
     scale: Array
-    """sqrt(w g_l / 2 pi), (x, degree + 1, 1)."""
+    """Scales sqrt(w g_l / 2 pi), (x, degree + 1, 1)."""
     even: Array
-    """a where l + m is even, (Omega, x)."""
+    """Part of a where l + m is even, (Omega, x)."""
     odd: Array
     even_waves: Array
-    """Z_lm where l + m is even and m <= l, (Omega, pairs)."""
+    """Harmonics Z_lm where l + m is even and m <= l, (Omega, pairs)."""
     odd_waves: Array
     weight: Array
-    """w mu T, (Omega,)."""
+    """Weights w mu T, (Omega,)."""
     source: Array
-    """s under a searchlight."""
+    """Source s under a searchlight."""
     leaving: Array
-    """b; under diffuse light s is n^2 / pi of it."""
+    """Vector b; under diffuse light s is n^2 / pi of it."""
 
 
 class Directions(NamedTuple):
-    """Of the escape cone, arrays (Omega,)."""
+    """Directions of the escape cone, arrays (Omega,)."""
 
     mu: Floats
     along: Floats
-    """sin(theta) cos(phi)."""
+    """Component sin(theta) cos(phi)."""
     even: Floats
-    """As `HarmonicSystem.even_waves`."""
+    """Harmonics as in `HarmonicSystem.even_waves`."""
     odd: Floats
     weight: Floats
 
 
 def moments(g: float, degree: int) -> Floats:
-    """g_l of Henyey and Greenstein's phase function, faded to 0 beyond the degree, (degree + 1,)."""
+    """Return g_l of Henyey and Greenstein's phase function, faded to 0 beyond the degree, (degree + 1,)."""
     ell = np.arange(degree + 1)
     fading = np.clip((ell - FADES * degree) / (degree + 1 - FADES * degree), 0.0, 1.0)
     return g**ell * np.cos(0.5 * np.pi * fading) ** 2
 
 
 def directions(n: float, degree: int) -> Directions:
-    """Gauss and Legendre's by the cosine outside, in which Fresnel's transmittance is smooth; midpoints in azimuth."""
+    """Return Gauss nodes by the cosine outside, in which Fresnel's transmittance is smooth; midpoints in azimuth."""
     t, weight = np.polynomial.legendre.leggauss(OUTSIDE)
     outside, count = 0.5 * (t + 1.0), AROUND + degree
     mu, sine = np.sqrt(1.0 - (1.0 - outside**2) / n**2), np.sqrt(1.0 - outside**2) / n
@@ -98,7 +98,7 @@ def directions(n: float, degree: int) -> Directions:
 
 
 def depth_nodes(k: complex, per_panel: int) -> tuple[Complexes, Complexes]:
-    """x and weights: panels from the scale of k, the last to infinity in 1 / x."""
+    """Return x and weights: panels from the scale of k, the last to infinity in 1 / x."""
     first = min(0.02, max(abs(k) / 4.0, 1e-5))
     near = np.append(0.0, np.geomspace(first, MIDDLE[0], PANELS))
     edges = np.concatenate([near, MIDDLE[1:], np.geomspace(MIDDLE[-1], FARTHEST, 4)[1:]])
@@ -111,7 +111,7 @@ def depth_nodes(k: complex, per_panel: int) -> tuple[Complexes, Complexes]:
 
 
 def system(g: Array, k: Array, x: Array, dx: Array, of: Directions) -> HarmonicSystem:
-    """At k, complex128 () with an imaginary part below 1; `g` are the moments."""
+    """Return the system at k, complex128 () with an imaginary part below 1; `g` are the moments."""
     degree = g.size - 1
     ell, m = np.arange(degree + 1)[:, None], np.arange(degree + 1)[None]
     wave = jnp.sqrt(k * k + x * x)
@@ -139,31 +139,31 @@ def system(g: Array, k: Array, x: Array, dx: Array, of: Directions) -> HarmonicS
 
 
 def applied(of: HarmonicSystem, v: Array) -> Array:
-    """M v."""
+    """Return M v."""
     return of.root * in_own_frames(of, of.flight, of.root * v) - returned(of, arriving(of, v))
 
 
 def in_own_frames(of: HarmonicSystem, blocks: Array, v: Array) -> Array:
-    """Blocks (x, m, l, l') that act where K is the axis."""
+    """Return blocks (x, m, l, l') that act where K is the axis."""
     turned = jnp.einsum("xlMm,xlm->xlM", of.rotation, v)
     turned = jnp.einsum("xMlk,xkM->xlM", blocks, turned)
     return jnp.einsum("xlMm,xlM->xlm", of.rotation, turned)
 
 
 def inverse_of_flights(of: HarmonicSystem, alpha: Array) -> Array:
-    """Blocks of the inverse of 1 - alpha F, the infinite medium's."""
+    """Return blocks of the inverse of 1 - alpha F, the infinite medium's."""
     return jnp.linalg.inv(jnp.eye(of.root.size) - alpha * of.root * of.flight * of.root[:, 0])
 
 
 def arriving(of: HarmonicSystem, v: Array) -> Array:
-    """What arrives at the surface, (Omega,), of unknowns."""
+    """Return the light that arrives at the surface, (Omega,), of unknowns."""
     q = (of.scale * v).reshape(v.shape[0], -1)
     even, odd = _pairs(of.root.size - 1)
     return jnp.sum(of.even * _times(of.even_waves, q[:, even].T) + of.odd * _times(of.odd_waves, q[:, odd].T), axis=1)
 
 
 def returned(of: HarmonicSystem, j: Array) -> Array:
-    """What is missing behind the surface, in unknowns, where j (Omega,) arrives and leaves."""
+    """Return what is missing behind the surface, in unknowns, where j (Omega,) arrives and leaves."""
     even, odd = _pairs(of.root.size - 1)
     leaving, shape = (of.weight * j)[:, None], of.leaving.shape
     missing = jnp.zeros((shape[0], shape[1] * shape[2]), complex)
@@ -173,13 +173,13 @@ def returned(of: HarmonicSystem, j: Array) -> Array:
 
 
 def _times(matrix: Array, values: Array) -> Array:
-    """Real times complex."""
+    """Multiply real by complex."""
     return jax.lax.complex(matrix @ values.real, matrix @ values.imag)
 
 
 @lru_cache(maxsize=8)
 def _pairs(degree: int) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Places of (l, m) with m <= l in a flattened square, where l + m is even, and odd."""
+    """Return places of (l, m) with m <= l in a flattened square, where l + m is even, and odd."""
     ell, m = np.indices((degree + 1, degree + 1)).reshape(2, -1)
     even = (ell + m) % 2 == 0
     return np.flatnonzero((m <= ell) & even), np.flatnonzero((m <= ell) & ~even)

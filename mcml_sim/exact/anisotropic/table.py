@@ -1,4 +1,4 @@
-"""The table of half spaces that scatter forwards, by refractive index and mean cosine; and what lies between.
+"""Table of half spaces that scatter forwards, by refractive index and mean cosine; and what lies between.
 
 Lengths are in l* = 1 / (mu_a + mu_s (1 - g)), albedos alpha' = mu_s (1 - g) l*: in these light changes little with g
 (similarity), and smoothly up to g = 1. Light scattered once is closed (`single_scattering`). The rest is kept as
@@ -38,17 +38,17 @@ MOST_BYTES = 1 << 23
 
 
 class SplinedLight(NamedTuple):
-    """Of one half space."""
+    """Light of one half space."""
 
     rest: Floats
     """Coefficients of f in B-splines on KNOTS, by node of s, (s, splines)."""
     share: Floats
-    """A / alpha', (s,)."""
+    """Ratio A / alpha', (s,)."""
 
 
 @lru_cache(maxsize=32)
 def light(setting: Setting, coarse: bool = False) -> ExactLight:
-    """Of a half space that the table has (`Setting.is_solved`); `coarse` as in `curves`."""
+    """Return the light of a half space that the table has (`Setting.is_solved`); `coarse` as in `curves`."""
     own, whole = curves(setting, coarse), 0.5 * (1.0 + nodes(S.size))
     share = np.polynomial.chebyshev.chebval(2.0 * whole / np.sqrt(1.0 - LEAST) - 1.0, coefficients(own.share))
     tables = map(coefficients, (pieces(own.rest), _decay_rates(setting.g), share))
@@ -57,12 +57,12 @@ def light(setting: Setting, coarse: bool = False) -> ExactLight:
 
 @lru_cache(maxsize=32)
 def _decay_rates(g: float) -> Floats:
-    """kappa at the nodes of s, which no surface changes."""
+    """Return kappa at the nodes of s, which no surface changes."""
     return high_orders.decay_rates(1.0 - S**2, g)
 
 
 def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
-    """At the nodes of s; where `coarse`, without the g of the table that is farthest from the setting's."""
+    """Return curves at the nodes of s; where `coarse`, without the g of the table that is farthest from g."""
     rest, share = _table()
     of = ILLUMINATIONS.index(setting.illumination)
     by_n, kept = _polynomial(INDICES, setting.n), np.full(COSINES.size, True)
@@ -76,14 +76,14 @@ def curves(setting: Setting, coarse: bool = False) -> SplinedLight:
 
 
 def pieces(rest: Floats) -> Floats:
-    """f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
+    """Return f as cubics in ln x from one knot to the next, (s, intervals, 4), powers falling, from FIRST on."""
     found: Floats = np.tensordot(rest, _cubics(), 1)
     return found
 
 
 @lru_cache(maxsize=1)
 def _cubics() -> Floats:
-    """The cubics of every B-spline, (splines, intervals, 4)."""
+    """Return the cubics of every B-spline, (splines, intervals, 4)."""
     t = np.arange(4) * STEP / 3.0
     starts = KNOTS[3:-4]
     basis = BSpline.design_matrix((starts[:, None] + t * (1 - 1e-12)).ravel(), KNOTS, 3).toarray()
@@ -92,7 +92,7 @@ def _cubics() -> Floats:
 
 
 def _polynomial(nodes: Floats, at: float) -> Floats:
-    """Weights of the values at the nodes, of the polynomial through them."""
+    """Return weights of the values at the nodes, of the polynomial through them."""
     apart = np.where(np.eye(nodes.size, dtype=bool), 1.0, nodes[:, None] - nodes)
     away = np.where(np.eye(nodes.size, dtype=bool), 1.0, at - nodes[None])
     return np.prod(away / apart, axis=1)
@@ -100,7 +100,7 @@ def _polynomial(nodes: Floats, at: float) -> Floats:
 
 @lru_cache(maxsize=1)
 def _table() -> SplinedLight:
-    """Of all lights, n and g: (2, n, g, ...)."""
+    """Return the table of all lights, n and g: (2, n, g, ...)."""
     arrays = read_npz(read_whole(FILE, MOST_BYTES), MOST_BYTES, text=("sha256",))
     found = SplinedLight(*(arrays[name].astype(float) for name in SplinedLight._fields))
     if str(arrays["sha256"]) != digest(found):
@@ -109,5 +109,5 @@ def _table() -> SplinedLight:
 
 
 def digest(table: SplinedLight) -> str:
-    """Of its numbers."""
+    """Return the SHA-256 of the table."""
     return hashlib.sha256(b"".join(np.ascontiguousarray(part, "<f8").tobytes() for part in table)).hexdigest()

@@ -47,7 +47,7 @@ class Nodes:
 
     @property
     def fewer(self) -> Nodes:
-        """Those that an error is estimated with: what they change is above it."""
+        """Nodes that an error is estimated with: what they change is above it."""
         depth, slope, azimuth = self.depth * 4 // 5, self.slope * 3 // 4, self.azimuth * 3 // 4
         return replace(self, depth=max(FEWEST, depth), slope=max(FEWEST, slope), azimuth=max(FEWEST, azimuth))
 
@@ -56,33 +56,33 @@ class Depths(NamedTuple):
     """Depths in the layers of a medium that scatter, N = panels * nodes, for one wave number. Lengths in its unit."""
 
     z: Floats
-    """(N,) [length]."""
+    """Depths of the nodes, (N,) [length]."""
     tau: Floats
-    """Optical depths, (N,) [-]."""
+    """Optical depths of the nodes, (N,) [-]."""
     weight: Floats
-    """mu_s dz, (N,) [-]."""
+    """Weights mu_s dz, (N,) [-]."""
     absorbs: Floats
-    """mu_a dz, (N,) [-]."""
+    """Weights mu_a dz, (N,) [-]."""
     z_ends: Floats
-    """(2, panels) [length]."""
+    """Depths of the ends of panels, (2, panels) [length]."""
     tau_ends: Floats
-    """(2, panels) [-]."""
+    """Optical depths of the ends of panels, (2, panels) [-]."""
     alpha: Floats
     """Albedo, (panels,) [-]."""
     tail: Floats
     """Depths, optical depths and mu_s dz below the last node in an infinite layer, (3, tail)."""
     last: Layer
-    """The layer at the bottom."""
+    """Layer at the bottom."""
     height: float
-    """d, infinite in a half space [length]."""
+    """Thickness d, infinite in a half space [length]."""
     optical: float
     """Optical thickness [-]."""
     above: float
-    """n over the index above."""
+    """Index n over the index above."""
     below: float
-    """n over the index below; 1 in a half space."""
+    """Index n over the index below; 1 in a half space."""
     pane: bool
-    """True of a single layer of clear glass."""
+    """Whether this is a single layer of clear glass."""
 
     @property
     def panels(self) -> int:
@@ -91,12 +91,12 @@ class Depths(NamedTuple):
 
     @property
     def nodes(self) -> int:
-        """Nodes of a panel."""
+        """Number of nodes of a panel."""
         return self.z.size // max(self.panels, 1)
 
 
 def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
-    """Depths of a medium whose layers share one index, for light of wave number k [1/length]."""
+    """Return the depths of a medium whose layers share one index, for light of wave number k [1/length]."""
     layers, tops = medium.layers, medium.z_edges
     tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
     z_ends, tau_ends, scatters = _panels(layers, tops, tau_tops, k)
@@ -123,7 +123,7 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
 
 
 def _panels(layers: tuple[Layer, ...], tops: Floats, tau_tops: Floats, k: float) -> tuple[Floats, Floats, list[Layer]]:
-    """Depths and optical depths of the ends of panels, (2, panels) each, and the panels' layers."""
+    """Return depths and optical depths of the ends of panels, (2, panels) each, and the panels' layers."""
     ends: list[tuple[float, float, float, float]] = []
     scatters: list[Layer] = []
     faded = 0.0
@@ -147,12 +147,12 @@ def _panels(layers: tuple[Layer, ...], tops: Floats, tau_tops: Floats, k: float)
 
 @lru_cache(maxsize=512)
 def slowest(alpha: float) -> float:
-    """The rate at which light far from all sources fades [1/mfp]."""
+    """Return the rate at which light far from all sources fades [1/mfp]."""
     return float(decay_rate(alpha))
 
 
 def _cuts(optical: float, first: float, last: float) -> Floats:
-    """Ends of panels in a layer [mfp]: from either end each twice as long as the one before."""
+    """Return ends of panels in a layer [mfp]: from either end each twice as long as the one before."""
     growth = 2.0 ** np.arange(60) - 1
     from_top, from_bottom = first * growth, last * growth
     if np.isinf(optical):
@@ -173,37 +173,37 @@ def _tail(layer: Layer, top: float, tau_top: float, seen: bool) -> Floats:
 
 @lru_cache(maxsize=512)
 def gauss(nodes: int) -> tuple[Floats, Floats]:
-    """Gauss's rule on (0, 1)."""
+    """Return Gauss's rule on (0, 1)."""
     x, weight = roots_legendre(nodes)  # numpy's takes seconds for thousands of nodes
     return (1 + x) / 2, weight / 2
 
 
 def _crowded(s: Floats) -> Floats:
-    """s on [0, 1] drawn towards both ends (Kress, Numer. Math. 58, 1990)."""
+    """Return s on [0, 1] drawn towards both ends (Kress, Numer. Math. 58, 1990)."""
     up, down = s**GRADING, (1 - s) ** GRADING
     return up / (up + down)
 
 
 def _crowding(s: Floats) -> Floats:
-    """Its derivative."""
+    """Return the derivative of `_crowded`."""
     up, down = s**GRADING, (1 - s) ** GRADING
     return GRADING * (s * (1 - s)) ** (GRADING - 1) / (up + down) ** 2
 
 
 class Near(NamedTuple):
-    """A double-exponential rule (Takahasi & Mori, Publ. RIMS 9, 1974) on a panel of length 1, for each of its nodes."""
+    """Double-exponential rule (Takahasi & Mori, Publ. RIMS 9, 1974) on a panel of length 1, for each node of it."""
 
     height: Floats
-    """From the node, on both sides of it, (nodes, rule)."""
+    """Distances from the node, on both sides of it, (nodes, rule)."""
     weight: Floats
-    """(nodes, rule)."""
+    """Weights, (nodes, rule)."""
     through: Floats
-    """Values there of the polynomials in s that are 1 at one of the panel's nodes, (nodes, rule, nodes)."""
+    """Values of the polynomials in s that are 1 at one of the panel's nodes, (nodes, rule, nodes)."""
 
 
 @lru_cache
 def near_node(nodes: int) -> Near:
-    """From the node to both ends, in x, not s: K is a logarithm times what is smooth as far as those."""
+    """Return the rule from each node to both ends, in x, not s: K is a logarithm times what is smooth in x."""
     share, d_share = double_exponential()
     x = _crowded(gauss(nodes)[0])[:, None, None]
     side = np.concatenate([-x, 1 - x], axis=1)
@@ -213,20 +213,20 @@ def near_node(nodes: int) -> Near:
 
 @lru_cache
 def near_end(nodes: int) -> Near:
-    """The same from the panel's upper end, (rule,) and (rule, nodes)."""
+    """Return the rule from the panel's upper end, (rule,) and (rule, nodes)."""
     share, d_share = double_exponential()
     return Near(share, d_share, _through(share, nodes))
 
 
 def double_exponential() -> tuple[Floats, Floats]:
-    """Nodes and weights on (0, 1)."""
+    """Return nodes and weights on (0, 1)."""
     y = np.arange(-NEAR_LAST, NEAR_LAST + NEAR_STEP / 2, NEAR_STEP)
     share = 1 / (1 + np.exp(np.pi * np.sinh(y)))
     return share, NEAR_STEP * np.pi * np.cosh(y) * share * (1 - share)
 
 
 def _through(x: Floats, nodes: int) -> Floats:
-    """sum over l of P_l(x) P_l(x_j) w_j (2l + 1)/2 is 1 at node j and 0 at the others, (..., nodes)."""
+    """Return the sum over l of P_l(x) P_l(x_j) w_j (2l + 1)/2: 1 at node j and 0 at the others, (..., nodes)."""
     x = np.clip(x, 0.0, 1.0)
     low, high = x ** (1 / GRADING), (1 - x) ** (1 / GRADING)
     s, weight = gauss(nodes)

@@ -1,4 +1,4 @@
-"""The fluence in a stack of layers that scatter isotropically and share one index, at one transverse wave number.
+"""Fluence in a stack of layers that scatter isotropically and share one index, at one transverse wave number.
 
 With light that varies as e^{i k x} along the surface, every path of slope t = tan(theta) and azimuth psi has the
 amplitude E(Z) = exp(-T sqrt(1 + t^2) + i k Z t cos psi) after a height Z of optical thickness T, whatever layers it
@@ -39,22 +39,22 @@ DIRECT_NODES, FALLEN = 16, 28.0  # Gauss's, as far as the integrand has fallen b
 
 
 class Field(NamedTuple):
-    """At one wave number; arrays (N,)."""
+    """Light at one wave number; arrays (N,)."""
 
     phi: dict[str, Floats]
     """Fluence over the light that arrives, under each illumination [-]."""
     unscattered: dict[str, Floats]
-    """phi_0 [-]."""
+    """Fluence phi_0 of unscattered light [-]."""
     up: Floats
-    """X."""
+    """Response X of the light that comes out above."""
     up_at_once: Floats
-    """X without the light that the upper surface had reflected before."""
+    """Part of X without the light that the upper surface had reflected before."""
     down: Floats
-    """X of the light that comes out below."""
+    """Response X of the light that comes out below."""
 
 
 def direct(optical: Floats, height: Floats, k: float) -> Floats:
-    """K at optical thicknesses T > 0 and heights Z, of one shape."""
+    """Return K at optical thicknesses T > 0 and heights Z, of one shape."""
     across = k * height
     length = np.sqrt(optical**2 + across**2)
     # a e^v + b e^-v is the exponent
@@ -68,7 +68,7 @@ def direct(optical: Floats, height: Floats, k: float) -> Floats:
 
 
 def _direct_close(a: Floats, b: Floats) -> Floats:
-    """(1/2) sum over m of (-b)^m/m! E_{m+1}(a)."""
+    """Return (1/2) sum over m of (-b)^m/m! E_{m+1}(a)."""
     decay, integral = np.exp(-a), exp1(a)
     total, power = integral.copy(), np.ones_like(a)
     for m in range(1, SERIES_TERMS):
@@ -79,7 +79,7 @@ def _direct_close(a: Floats, b: Floats) -> Floats:
 
 
 def _direct_far(a: Floats, b: Floats) -> Floats:
-    """Gauss's rule in v."""
+    """Return K by Gauss's rule in v."""
     largest = a + b + FALLEN
     v = np.log((largest + np.sqrt(largest**2 - 4 * a * b)) / (2 * a))
     total = np.zeros_like(a)
@@ -90,7 +90,7 @@ def _direct_far(a: Floats, b: Floats) -> Floats:
 
 
 def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
-    """X without surfaces."""
+    """Return X without surfaces."""
     return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
 
 
@@ -113,20 +113,20 @@ def solve(here: Depths, k: float, rule: Nodes) -> Field:
 
 
 def beam(here: Depths, tau: Floats) -> Floats:
-    """phi_0 of a searchlight at optical depths tau, per photon that arrives [-]."""
+    """Return phi_0 of a searchlight at optical depths tau, per photon that arrives [-]."""
     a, b = normal_reflectances(here)
     back = b * np.exp(-(2 * here.optical - tau)) if b else 0.0
     return (1 - a) * (np.exp(-tau) + back) / (1 - a * b * np.exp(-2 * here.optical))
 
 
 def normal_reflectances(here: Depths) -> tuple[float, float]:
-    """Of the two surfaces, at normal incidence [-]."""
+    """Return the reflectances of the two surfaces at normal incidence [-]."""
     a, b = (((ratio - 1) / (ratio + 1)) ** 2 for ratio in (here.above, here.below))
     return a, b
 
 
 def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
-    """The integral operator on fluences at the nodes, (N, N)."""
+    """Return the the integral operator on fluences at the nodes, (N, N)."""
     matrix = _by_panel(here, k)
     for mirror in _mirrors(here):
         matrix += _by_panel(here, k, mirror)
@@ -137,13 +137,13 @@ def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
 
 
 def _mirrors(here: Depths) -> list[tuple[float, float]]:
-    """Twice the depth and the optical depth of the surfaces that reflect."""
+    """Return twice the depth and the optical depth of the surfaces that reflect."""
     top = [(0.0, 0.0)] if here.above != 1 else []
     return top + ([(2 * here.height, 2 * here.optical)] if here.below != 1 else [])
 
 
 def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None) -> Floats:
-    """mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
+    """Return mu_s K dz' from every panel, or from its mirror image, to every node, (N, N)."""
     z, tau, z_ends, tau_ends = here.z, here.tau, here.z_ends, here.tau_ends
     if mirror is not None:
         z, tau, z_ends, tau_ends = mirror[0] - z, mirror[1] - tau, mirror[0] - z_ends[::-1], mirror[1] - tau_ends[::-1]
@@ -180,7 +180,7 @@ def _by_panel(here: Depths, k: float, mirror: tuple[float, float] | None = None)
 
 
 def _is_close(here: Depths, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool_]:
-    """Whether K varies on a source panel (second axis) faster than its nodes follow, seen from a target panel."""
+    """Return whether K varies on a source panel (second axis) faster than its nodes follow, from a target panel."""
     close = np.zeros((here.panels, here.panels), bool)
     for own, ends in ((here.z_ends, z_ends), (here.tau_ends, tau_ends)):
         gap = np.maximum(own[0][:, None] - ends[1], ends[0] - own[1][:, None])
@@ -189,7 +189,7 @@ def _is_close(here: Depths, z_ends: Floats, tau_ends: Floats) -> NDArray[np.bool
 
 
 def _own(here: Depths, k: float) -> Floats:
-    """mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
+    """Return mu_s K dz' from each panel to its own nodes, (panels, nodes, nodes)."""
     rule = near_node(here.nodes)
     tau_length, z_length = (np.diff(ends, axis=0)[0][:, None, None] for ends in (here.tau_ends, here.z_ends))
     upwards = rule.height[:, : rule.height.shape[1] // 2]
@@ -200,7 +200,7 @@ def _own(here: Depths, k: float) -> Floats:
 
 
 def _slanted(here: Depths, slants: Slants) -> Floats:
-    """G without the mirror images, (N, N)."""
+    """Return G without the mirror images, (N, N)."""
     a, b, whole = slants.a, slants.b, slants.whole
     series = slants.weight / (1 - a * b * whole**2)
     kernel = _real_product(slants.from_top, a * series - (here.above != 1) * slants.weight, slants.from_top)
@@ -212,7 +212,7 @@ def _slanted(here: Depths, slants: Slants) -> Floats:
 
 
 def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Floats:
-    """Re(left^T diag(weight) right), (N, N): in half the time where weights are real, in a quarter of it squared."""
+    """Return Re(left^T diag(weight) right), (N, N): in half the time where weights are real, a quarter if squared."""
     if np.any(weight.imag):
         return np.asarray((left.T @ (weight[:, None] * right)).real)
     if right is left and np.all(weight.real <= 0):
@@ -225,7 +225,7 @@ def _real_product(left: Complexes, weight: Complexes, right: Complexes) -> Float
 
 
 def _below(here: Depths, k: float) -> Floats:
-    """mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode goes on for ever."""
+    """Return mu_s K dz' from below the last node, per fluence there, to all nodes: the slowest mode never ends."""
     z, tau, weight = here.tail
     decay = np.hypot(here.last.mu_t * slowest(here.last.alpha), k)
     mode = weight * np.exp(-decay * (z - here.z[-1]))
@@ -233,7 +233,7 @@ def _below(here: Depths, k: float) -> Floats:
 
 
 def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
-    """X, (N,), of light that goes straight up, or by way of the lower surface."""
+    """Return X, (N,), of light that goes straight up, or by way of the lower surface."""
     matched = here.above == 1
     t, d_mu = cones(here, rule.slope + int(0.55 * k * deepest(here) * min(steepest(here), 1.5)))
     a, b = reflectance(here.above, t), reflectance(here.below, t)
@@ -255,7 +255,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
 
 
 def _out_later(here: Depths, slants: Slants) -> Floats:
-    """X, (N,), of light that the upper surface has reflected before."""
+    """Return X, (N,), of light that the upper surface has reflected before."""
     a, b, whole = slants.a, slants.b, slants.whole
     passes = slants.weight * slants.mu * (1 - a) * a * b * whole**2 / (1 - a * b * whole**2)
     out = (passes @ slants.from_top).real
@@ -271,7 +271,7 @@ def _slants_upside_down(slants: Slants) -> Slants:
 
 
 def thrown_back(here: Depths, k: float, illumination: str, rule: Nodes) -> float:
-    """Share of the light that comes out above, never scattered but reflected below, transformed [-]."""
+    """Return the share of light that comes out above, reflected below but never scattered, transformed [-]."""
     if here.below == 1:
         return 0.0
     if illumination == "searchlight":
@@ -286,7 +286,7 @@ def thrown_back(here: Depths, k: float, illumination: str, rule: Nodes) -> float
 
 
 def straight_through(here: Depths, illumination: str, rule: Nodes) -> float:
-    """Share of the light that comes out below unscattered [-]."""
+    """Return the share of the light that comes out below unscattered [-]."""
     if illumination == "searchlight":
         top, bottom = normal_reflectances(here)
         left = np.exp(-here.optical)
@@ -300,7 +300,7 @@ def straight_through(here: Depths, illumination: str, rule: Nodes) -> float:
 
 
 def net_flux(here: Depths, phi: Floats, tau: Floats, illumination: str, rule: Nodes) -> Floats:
-    """Return the net flux downwards through interfaces at optical depths `tau`, k = 0, over the light that arrives [-].
+    """Return the net flux downwards through interfaces at optical depths `tau`, k = 0, over what arrives [-].
 
     phi  (N,) fluences at the nodes;  tau  (interfaces,)
 

@@ -32,19 +32,19 @@ MOST_TURNS = 10_000
 
 
 class _Piece(NamedTuple):
-    """A layer, or its image in the lower surface, as the light flies."""
+    """Layer, or its image in the lower surface, as the light flies."""
 
     near: float
     """Height at its nearer end [length]."""
     far: float
-    """At its farther end [length]."""
+    """Height at its farther end [length]."""
     optical: float
     """Optical thickness up to the nearer end [-]."""
     layer: Layer
     image: bool
 
     def scattered(self, here: Depths, low: Floats, high: Floats, slow: Floats) -> Floats:
-        """Integral of mu_s phi_0 e^{-T slow} from height low to high [-]."""
+        """Return the integral of mu_s phi_0 e^{-T slow} from height low to high [-]."""
         a, b = fluence.normal_reflectances(here)
         entering = (1 - a) / (1 - a * b * np.exp(-2 * here.optical))
         start = self.optical + self.layer.mu_t * (low - self.near)
@@ -60,18 +60,18 @@ class _Piece(NamedTuple):
         return entering * self.layer.mu_s * (high - low) * total
 
     def fluence(self, here: Depths, height: Floats) -> Floats:
-        """mu_s phi_0 [1/length]."""
+        """Return mu_s phi_0 [1/length]."""
         tau = self.optical + self.layer.mu_t * (height - self.near)
         return self.layer.mu_s * fluence.beam(here, 2 * here.optical - tau if self.image else tau)
 
     def passes(self, here: Depths, t: Floats) -> Floats:
-        """Share of light of that slope that the surfaces let out [-]."""
+        """Return the share of light of that slope that the surfaces let out [-]."""
         out = 1 - reflectance(here.above, t + 0j).real
         return out * reflectance(here.below, t + 0j).real if self.image else out
 
 
 def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
-    """R_d of that light [1/length^2] at radii r > 0 of shape (n,)."""
+    """Return R_d of that light [1/length^2] at radii r > 0 of shape (n,)."""
     here = depths.stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back(here, r)
@@ -87,7 +87,7 @@ def profile(medium: Medium, illumination: str, r: Floats) -> Floats:
 
 
 def within(medium: Medium, illumination: str, r: Floats) -> Floats:
-    """What of that light leaves within radii r > 0 of shape (n,), and the beam that comes straight back [-]."""
+    """Return the light that leaves within radii r > 0 of shape (n,), and the beam that comes straight back [-]."""
     here = depths.stack(medium, 0.0, SURFACES)
     if illumination == "diffuse":
         return _thrown_back_within(here, r)
@@ -116,7 +116,7 @@ def _pieces(here: Depths, medium: Medium) -> list[_Piece]:
 
 
 def _ranges(here: Depths, medium: Medium, r: Floats, ends: bool) -> Iterator[tuple[_Piece, Floats, Floats]]:
-    """Each piece with the least and largest angles inside, (n, 1), under which its light leaves at r, or within r."""
+    """Yield each piece with the least and largest angles inside, (n, 1), under which light leaves at r, or within r."""
     for piece in _pieces(here, medium):
         heights = [piece.near, piece.far] if ends or piece.far == np.inf else [piece.near, piece.far, np.inf]
         for near, far in itertools.pairwise(heights):
@@ -126,13 +126,13 @@ def _ranges(here: Depths, medium: Medium, r: Floats, ends: bool) -> Iterator[tup
 
 
 def _breaks(here: Depths) -> list[float]:
-    """0, the critical angles inside as far as light gets out above, and the last of these."""
+    """Return 0, the critical angles inside as far as light gets out above, and the last of these."""
     above, below = (float(np.arctan(critical_slope(ratio))) for ratio in (here.above, here.below))
     return [0.0, below, above] if below < above else [0.0, above]
 
 
 def _turns(here: Depths) -> range:
-    """As often as light goes to and fro until LEAST of it is left."""
+    """Return how often light goes to and fro until LEAST of it is left."""
     if here.below == 1:
         return range(0)
     return range(int(min(-np.log(LEAST) / max(2 * here.optical, 1e-9) + 1, MOST_TURNS)))
@@ -151,7 +151,7 @@ def _thrown_back(here: Depths, r: Floats) -> Floats:
 
 
 def _thrown_back_within(here: Depths, r: Floats) -> Floats:
-    """2 n^2 int mu ... dmu as far as the slope that leaves at r, from sin(theta)^2."""
+    """Return 2 n^2 int mu ... dmu as far as the slope that leaves at r, from sin(theta)^2."""
     value = np.zeros_like(r)
     share, weight = depths.double_exponential()
     for turn in _turns(here):
@@ -168,6 +168,6 @@ def _thrown_back_within(here: Depths, r: Floats) -> Floats:
 
 
 def _returned(here: Depths, t: Floats, turn: int) -> Floats:
-    """(1 - a)^2 b (a b)^turn e^{-T / mu} after that many turns more than one."""
+    """Return (1 - a)^2 b (a b)^turn e^{-T / mu} after that many turns more than one."""
     a, b = (reflectance(ratio, t + 0j).real for ratio in (here.above, here.below))
     return (1 - a) ** 2 * b * (a * b) ** turn * np.exp(-2 * (turn + 1) * here.optical * np.sqrt(1 + t * t))

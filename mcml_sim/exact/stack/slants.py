@@ -30,23 +30,23 @@ class Slants(NamedTuple):
     """Directions, arrays (directions,), and light along them."""
 
     weight: Complexes
-    """dmu/mu, times 1/2, times the share of the azimuth."""
+    """Weight: dmu/mu, times 1/2, times the share of the azimuth."""
     mu: Complexes
     a: Complexes
     """Reflectance of the upper surface from inside."""
     b: Complexes
     whole: Complexes
-    """E(d), 0 in a half space."""
+    """Transmission E(d), 0 in a half space."""
     from_top: Complexes
-    """E(z), (directions, N)."""
+    """Transmission E(z), (directions, N)."""
     to_bottom: Complexes
-    """E(d - z), (directions, N)."""
+    """Transmission E(d - z), (directions, N)."""
     cones: int
-    """So many of them, the first, are inside the cones of escape."""
+    """Number of the first directions, those inside the cones of escape."""
 
 
 def reflectance(ratio: float, t: Any) -> Any:
-    """Fresnel's for unpolarised light, from inside, n over the index outside `ratio`; 1 beyond the critical angle."""
+    """Return Fresnel's reflectance for unpolarised light, from inside, n over the index outside `ratio`."""
     if ratio == 1:
         return np.zeros_like(t)
     mu = 1 / np.sqrt(1 + t * t)
@@ -56,12 +56,12 @@ def reflectance(ratio: float, t: Any) -> Any:
 
 
 def critical_slope(ratio: float) -> float:
-    """tan of the critical angle inside; infinite where there is none."""
+    """Return tan of the critical angle inside; infinite where there is none."""
     return float(1 / np.sqrt(ratio**2 - 1)) if ratio > 1 else np.inf
 
 
 def cones(here: Depths, nodes: int) -> tuple[Complexes, Complexes]:
-    """Slopes under which light gets out somewhere, and dmu/mu, in the cosine outside: there Fresnel's law is smooth."""
+    """Return slopes of light that gets out, and dmu/mu, in the cosine outside, where Fresnel's law is smooth."""
     slopes, weights, low = [np.empty(0)], [np.empty(0)], 0.0
     for ratio in sorted({ratio for ratio in (here.above, here.below) if ratio > 1}, reverse=True):
         top = np.sqrt(1 - (ratio * low) ** 2 / (1 + low**2))
@@ -79,7 +79,7 @@ def cones(here: Depths, nodes: int) -> tuple[Complexes, Complexes]:
 
 
 def _ray(start: float, phase: float, last: float) -> tuple[Complexes, Complexes]:
-    """Slopes from `start` along a complex ray, and dmu/mu: panels that grow fourfold up to a distance `last`."""
+    """Return slopes from `start` along a complex ray, and dmu/mu: panels that grow fourfold up to a distance `last`."""
     first = min(0.3, 1 / max(phase, 1.0))
     steps = max(int(np.ceil(np.log(last / first) / np.log(4.0))), 1)
     edges = np.append(0.0, np.geomspace(first, last, steps + 1))
@@ -90,18 +90,18 @@ def _ray(start: float, phase: float, last: float) -> tuple[Complexes, Complexes]
 
 
 def steepest(here: Depths) -> float:
-    """The largest of the critical slopes; 0 where there is none."""
+    """Return the largest of the critical slopes; 0 where there is none."""
     return max((critical_slope(ratio) for ratio in (here.above, here.below) if ratio > 1), default=0.0)
 
 
 def deepest(here: Depths) -> float:
-    """Depth from which slanted light still gets out [length]."""
+    """Return the depth from which slanted light still gets out [length]."""
     seen = here.z[here.tau < RESOLVED]
     return float(max(seen.max(initial=0.0), here.height if here.optical < RESOLVED else 0.0))
 
 
 def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexes, Floats, Complexes, int]:
-    """tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
+    """Return tan(theta), cos(azimuth) and weight of directions, for phases that turn so far; how many lie in cones."""
     t, d_mu = cones(here, rule.slope + int(0.55 * phase))
     # Of each slope as many azimuths as its own phases take.
     share = np.minimum(t.real / (min(steepest(here), 1.5) or 1.0), 1.0)
@@ -123,7 +123,7 @@ def _slopes(here: Depths, k: float, phase: float, rule: Nodes) -> tuple[Complexe
 
 
 def directions(here: Depths, k: float, rule: Nodes) -> Slants:
-    """Light whose phase turns farther than MOST_PHASE is left out: it is as good as averaged away."""
+    """Return light along directions; a phase that turns farther than MOST_PHASE is left out: it averages away."""
     wave = k * min(steepest(here), 1.5)
     last = min(deepest(here), MOST_PHASE / wave if wave > 0 else np.inf)
     t, cosine, weight, inside = _slopes(here, k, 2 * wave * last, rule)

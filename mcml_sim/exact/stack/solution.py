@@ -57,7 +57,7 @@ KEPT = 4096  # transforms of some ten media, so that their other illumination ta
 
 @dataclass(frozen=True)
 class Solution:
-    """What becomes of light in a stack, in shares of what arrives; lengths in the unit of the medium.
+    """Shares of the light that arrives at a stack, by where it goes; lengths in the unit of the medium.
 
     As in MCML, light that an interface below throws back counts as diffuse reflectance even if it was never scattered.
     Under a searchlight it leaves at r = 0: it is in `reflectance`, `transform` and `cdf`, and not in `profile`.
@@ -84,19 +84,19 @@ class Solution:
     nodes: Nodes = field(default=STANDARD, repr=False)
 
     def transform(self, k: ArrayLike) -> float | Floats:
-        """2 pi int_0^inf r R_d(r) J0(k r) dr at wave numbers k >= 0 [1/length], of any shape [-]; A at k = 0."""
+        """Return 2 pi int_0^inf r R_d(r) J0(k r) dr at wave numbers k >= 0 [1/length], of any shape [-]; A at 0."""
         waves = _checked("k", k, "a finite wave number >= 0")
         if np.any(np.isinf(waves)):
             raise InputError("k must be a finite wave number >= 0, got inf")
         return _scalar_or_array(_each(lambda k: _reflected(self.medium, k, self.illumination, self.nodes), waves))
 
     def profile(self, r: ArrayLike) -> float | Floats:
-        """R_d(r) [1/length^2] at radii r >= 0 of any shape: 2 pi r R_d integrates to what is not left at r = 0."""
+        """Return R_d(r) [1/length^2] at radii r >= 0 of any shape; 2 pi r R_d integrates to what is not at r = 0."""
         radius = _checked("r", r, "a radius >= 0")
         return _scalar_or_array(self._difference.profile(radius.ravel()).reshape(radius.shape))
 
     def cdf(self, r: ArrayLike) -> float | Floats:
-        """Share of `reflectance` that leaves within radius r >= 0 of any shape [-]; 1 at infinity."""
+        """Return the share of `reflectance` that leaves within radius r >= 0 of any shape [-]; 1 at infinity."""
         radius = _checked("r", r, "a radius >= 0")
         within = self._difference.within(radius.ravel()).reshape(radius.shape)
         all_of_it = np.isinf(radius) | (self.reflectance == 0)
@@ -108,7 +108,7 @@ class Solution:
 
 
 def solve(medium: Medium, illumination: str = "searchlight", nodes: Nodes = STANDARD) -> Solution:
-    """Light in a stack of up to 20 layers of one index that scatter isotropically, or not at all.
+    """Solve the light in a stack of up to 20 layers of one index that scatter isotropically, or not at all.
 
     medium        its indices above and below may be any
     illumination  "searchlight" or "diffuse", as in `mcml_sim.Setting`
@@ -167,7 +167,7 @@ def _require_solved(medium: Medium, illumination: str) -> None:
 
 
 def _reflected(medium: Medium, k: float, illumination: str, rule: Nodes) -> float:
-    """R^(k) [-]."""
+    """Return R^(k) [-]."""
     return _leaves_above(*_answer(medium, k, rule), k, illumination, rule)
 
 
@@ -182,7 +182,7 @@ def _leaves_above(here: Depths, answer: Field, k: float, illumination: str, rule
 
 
 def _shares(medium: Medium, illumination: str, rule: Nodes) -> tuple[float, float, Floats]:
-    """Light that leaves above and below, and that each layer absorbs, (layers,) [-]."""
+    """Return the light that leaves above and below, and that each layer absorbs, (layers,) [-]."""
     with threadpool_limits(1, "blas"):
         here, answer = _answer(medium, 0.0, rule)
         reflected, transmitted = _leaves_above(here, answer, 0.0, illumination, rule), 0.0
@@ -202,7 +202,7 @@ def _shares(medium: Medium, illumination: str, rule: Nodes) -> tuple[float, floa
 
 
 def _specular(medium: Medium, illumination: str) -> float:
-    """As `mcml_sim.simulate` counts it: of a single pane of clear glass, all that comes back."""
+    """Return the specular light as `mcml_sim.simulate` counts it: of a single pane of clear glass, all of it."""
     if illumination == "searchlight":
         return fresnel.specular_reflectance(medium)
     return 1 - entered(Setting(illumination, n=medium.layers[0].n / medium.n_above))
@@ -210,21 +210,21 @@ def _specular(medium: Medium, illumination: str) -> float:
 
 @dataclass(frozen=True)
 class _Difference:
-    """A profile as what is known of it, and the transform of the rest."""
+    """Profile as what is known of it, and the transform of the rest."""
 
     medium: Medium
     illumination: str
     base: Medium | None
-    """The half space whose profile, without what is known of it, is taken away; None where nothing is."""
+    """Half space whose profile, without what is known of it, is taken away; None where nothing is."""
     share: float
-    """Of that profile [-]."""
+    """Share of that profile [-]."""
     edges: Floats
-    """Of panels of k, (panels + 1,) [1/length]."""
+    """Edges of panels of k, (panels + 1,) [1/length]."""
     rest: Floats
     """Transform of the rest, (panels, nodes) [-]."""
 
     def profile(self, r: Floats) -> Floats:
-        """R_d [1/length^2] at radii of shape (n,)."""
+        """Return R_d [1/length^2] at radii of shape (n,)."""
         unit, scatters = _unit(self.medium), self.medium.layers[0].mu_s > 0
         near = np.clip(r, NEAREST * unit, FARTHEST * unit)
         value = self._inverse(near, 0) / (2 * np.pi) + known.profile(self.medium, self.illumination, near)
@@ -235,7 +235,7 @@ class _Difference:
         return np.where(r > FARTHEST * unit, 0.0, np.where((r == 0) & scatters, np.inf, value))
 
     def within(self, r: Floats) -> Floats:
-        """Light that leaves within radii of shape (n,) [-]."""
+        """Return the light that leaves within radii of shape (n,) [-]."""
         unit = _unit(self.medium)
         near = np.clip(r, NEAREST * unit, FARTHEST * unit)
         value = near * self._inverse(near, 1) + known.within(self.medium, self.illumination, near)
@@ -246,7 +246,7 @@ class _Difference:
         return value
 
     def _inverse(self, r: Floats, order: int) -> Floats:
-        """int_0^inf f(k) J(k r) dk, f the rest times k with J0 and the rest itself with J1, (n,)."""
+        """Return int_0^inf f(k) J(k r) dk, f the rest times k with J0 and the rest itself with J1, (n,)."""
         value = np.zeros_like(r)
         size = np.ceil(np.log2(r))  # radii of like size share nodes
         for group in np.unique(size):
@@ -259,7 +259,7 @@ class _Difference:
 
 
 def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order: int) -> Floats:
-    """The part of the integral between two wave numbers, in steps of a few periods of J."""
+    """Return the part of the integral between two wave numbers, in steps of a few periods of J."""
     stop = min(high, last)
     steps = int(np.ceil((stop - low) * r.max() / PHASE_STEP)) or 1
     x, weight = depths.gauss(PHASE_NODES)
@@ -273,7 +273,7 @@ def _panel(low: float, high: float, last: float, rest: Floats, r: Floats, order:
 
 
 def _interpolation(at: Floats, nodes: int) -> Floats:
-    """From so many Gauss nodes on (0, 1) to places there, (places, nodes)."""
+    """Return the interpolation from so many Gauss nodes on (0, 1) to places there, (places, nodes)."""
     x, weight = depths.gauss(nodes)
     degree = np.arange(nodes)
     basis = np.polynomial.legendre.legvander(2 * x - 1, nodes - 1) * (2 * degree + 1) * weight[:, None]
@@ -281,7 +281,7 @@ def _interpolation(at: Floats, nodes: int) -> Floats:
 
 
 def _unit(medium: Medium) -> float:
-    """A length of the medium's own: the shortest mean free path, or thickness where nothing scatters [length]."""
+    """Return a length of the medium's own: its shortest mean free path, or thickness where nothing scatters."""
     return min(layer.mfp if layer.mu_s > 0 else layer.thickness for layer in medium.layers)
 
 
@@ -298,13 +298,13 @@ def _difference(medium: Medium, illumination: str, rule: Nodes) -> _Difference:
 
 
 def _each(transform: Callable[[float], float], waves: Floats) -> Floats:
-    """A transform at wave numbers of any shape: more threads, BLAS's own or others, only slow such small ones down."""
+    """Return a transform at wave numbers of any shape; more threads, BLAS's or others, slow such small ones down."""
     with threadpool_limits(1, "blas"):
         return np.reshape([transform(k) for k in waves.ravel().tolist()], waves.shape)
 
 
 def _rest_of_half_space(base: Medium, medium: Medium, waves: Floats, illumination: str, rule: Nodes) -> Floats:
-    """What of the half space is to be taken away from the medium's rest at wave numbers of any shape [-]."""
+    """Return what of the half space is taken away from the medium's rest at wave numbers of any shape [-]."""
     layer, light = _half_space(base, illumination)
     if _is_thin(medium) and layer.n > 1:
         with jax.enable_x64(True):
@@ -325,14 +325,14 @@ def _half_space(base: Medium, illumination: str) -> tuple[Layer, Setting]:
 
 @lru_cache(maxsize=KEPT)
 def _rests(medium: Medium, k: float, rule: Nodes) -> dict[str, float]:
-    """Transform of the light that `known` has no formula for, of each illumination [-]."""
+    """Return the transform of the light that `known` has no formula for, of each illumination [-]."""
     here, answer = _answer(medium, k, rule)
     once = {"searchlight": answer.unscattered["searchlight"] * answer.up_at_once, "diffuse": np.zeros_like(answer.up)}
     return {light: float(here.weight @ (phi * answer.up - once[light])) for light, phi in answer.phi.items()}
 
 
 def _base(medium: Medium) -> tuple[Medium | None, float]:
-    """The half space to take away, and the wave number from which the rest of the light is its."""
+    """Return the half space to take away, and the wave number from which the rest of the light is its."""
     layers, tops = medium.layers, medium.z_edges
     number = _first_to_scatter(medium)
     if number is None:
@@ -358,7 +358,7 @@ def _is_thin(medium: Medium) -> bool:
 
 
 def _wave_edges(medium: Medium, last: float) -> Floats:
-    """Panels of k, each as long as it is far from 0, (panels + 1,)."""
+    """Return panels of k, each as long as it is far from 0, (panels + 1,)."""
     scatter = [layer for layer in medium.layers if layer.mu_s > 0]
     if last == 0:
         return np.zeros(1)

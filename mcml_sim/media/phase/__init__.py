@@ -36,12 +36,12 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """JAX takes half a second to import, which who only names a layer or a setting has no use for."""
+    """Import a phase function on first use: JAX takes half a second, which a layer or a setting need not wait for."""
     if name not in HOMES:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     return getattr(import_module(f"{__name__}.{HOMES[name]}"), name)
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return the names that an interactive shell completes, unused ones included."""
     return [*globals(), *__all__]

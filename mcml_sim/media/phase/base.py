@@ -1,4 +1,4 @@
-"""What a phase function answers: the one signature of the shelf."""
+"""Signature of a phase function, the one of this shelf."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import jax.numpy as jnp
 
 
 class Phase(ABC):
-    """How far scattering turns the light, by the cosine c of the angle, -1 ... 1; around its course all is alike.
+    """Distribution of the cosine c of the angle of scattering, -1 ... 1; the azimuth is uniform.
 
     A frozen dataclass, and a pytree whose leaves are its fields: jax carries it into a kernel, differentiates by it
     and maps over it. The fields, and every argument, are numbers, numpy arrays or jax arrays, which broadcast, and
@@ -21,43 +21,43 @@ class Phase(ABC):
     """
 
     def __init_subclass__(cls) -> None:
-        """Every phase function is a pytree."""
+        """Register every phase function as a pytree."""
         super().__init_subclass__()
         jax.tree_util.register_pytree_node(cls, _leaves, partial(_from_leaves, cls))
 
     @classmethod
     def of(cls, **leaves: Any) -> Self:
-        """With these fields, without the checks of the constructor: arrays that a kernel needs in place of numbers."""
+        """Return a phase function of these fields, unchecked: arrays that a kernel needs in place of numbers."""
         names = (field.name for field in fields(cls))  # type: ignore[arg-type]
         return _from_leaves(cls, None, [leaves[name] for name in names])
 
     @abstractmethod
     def pdf(self, cosine: Any) -> Any:
-        """Density p(c) of the direction [1/sr]: over all directions its integral, 2 pi int p dc, is 1."""
+        """Return the density p(c) of the direction [1/sr]: over all directions its integral, 2 pi int p dc, is 1."""
 
     @abstractmethod
     def invert(self, cosine: Any) -> Any:
-        """The `xi` in [0, 1] whose sample is `cosine`: the cumulative distribution [-]."""
+        """Return the `xi` in [0, 1] whose sample is `cosine`: the cumulative distribution [-]."""
 
     @abstractmethod
     def deflection(self, v: Any) -> tuple[Any, Any]:
-        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, v in [-1, 1], without cancellation at the ends."""
+        """Return 1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, v in [-1, 1], accurate at both ends."""
 
     @abstractmethod
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """Legendre moment [-] of the order l >= 0: 2 pi int p(c) P_l(c) dc. That of order 0 is 1."""
+        """Return the Legendre moment [-] of the order l >= 0: 2 pi int p(c) P_l(c) dc. That of order 0 is 1."""
 
     @property
     def simplest(self) -> Phase:
-        """The same without what it does not need: of a sum without empty terms."""
+        """Equal phase function without what it does not need: a mixture without empty terms."""
         return self
 
     def for_kernel(self) -> Phase:
-        """The phase function as a kernel draws from it: float32."""
+        """Return the phase function as a kernel draws from it: float32."""
         return jax.tree.map(jnp.float32, self)
 
     def sample(self, xi: Any) -> Any:
-        """Cosine [-] below which lies the share `xi` in [0, 1] of all scatterings."""
+        """Return the cosine [-] below which lies the share `xi` in [0, 1] of all scatterings."""
         below_one, _ = self.deflection(2 * xi - 1)
         return 1 - below_one
 
@@ -72,7 +72,7 @@ def _leaves(phase: Phase) -> tuple[tuple[Any, ...], None]:
 
 
 def _from_leaves(cls: Any, _: None, leaves: Sequence[Any]) -> Any:
-    """Without the checks of the constructor: jax puts in place of numbers whatever it needs."""
+    """Return a phase function of these leaves, unchecked: jax puts in place of numbers whatever it needs."""
     phase = object.__new__(cls)
     for field, leaf in zip(fields(cls), leaves, strict=True):
         object.__setattr__(phase, field.name, leaf)

@@ -46,24 +46,24 @@ class FournierForand(Phase):
                 raise InputError(f"{name} must be in ({low:g}, {high:g}), got {shown(value)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]; straight on, of the nearest cosine below 1."""
+        """Return the density of the direction [1/sr]; straight on, that of the nearest cosine below 1."""
         return self._density(namespace(self.n, self.mu, cosine).maximum(1 - cosine, STRAIGHT))
 
     def invert(self, cosine: Any) -> Any:
-        """The share of all scatterings that turn the light to a smaller cosine [-]."""
+        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return 1 - self._below(1 - cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
-        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, from the table."""
+        """Return 1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2, from the table."""
         below_one = _pieces(self).quantile(0.5 * (1 - v))
         return below_one, 2 - below_one
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """By quadrature over the table [-]."""
+        """Return the Legendre moment of order l [-], by quadrature over the table."""
         return _pieces(self).moment(l)
 
     def for_kernel(self) -> Tabulated:
-        """The table."""
+        """Return the table in float32."""
         return Tabulated.of(angles=(), values=(), pieces=_pieces(self), integral=()).for_kernel()
 
     @property
@@ -72,18 +72,18 @@ class FournierForand(Phase):
 
     @property
     def _largest(self) -> Any:
-        """delta of the light that turns back [-]."""
+        """Parameter delta of the light that turns back [-]."""
         return 4 / (3 * (self.n - 1) ** 2)
 
     @property
     def _back(self) -> Any:
-        """(1 - delta^nu) / ((delta - 1) delta^nu) of the light that turns back [-]."""
+        """Value of (1 - delta^nu) / ((delta - 1) delta^nu) for the light that turns back [-]."""
         xp = namespace(self.n, self.mu)
         log = xp.log(self._largest)
         return -xp.expm1(self._nu * log) / (xp.expm1(log) * xp.exp(self._nu * log))
 
     def _density(self, u: Any) -> Any:
-        """p at u = 1 - c [1/sr]."""
+        """Return p at u = 1 - c [1/sr]."""
         xp, nu = namespace(self.n, self.mu, u), self._nu
         half = 0.5 * u  # sin^2(theta / 2)
         log = xp.log(half * self._largest)
@@ -93,7 +93,7 @@ class FournierForand(Phase):
         return main + self._back * (3 * (1 - u) ** 2 - 1) / (16 * np.pi)
 
     def _below(self, u: Any) -> Any:
-        """Share of all scatterings with 1 - c < u [-]."""
+        """Return the share of all scatterings with 1 - c < u [-]."""
         xp, nu = namespace(self.n, self.mu, u), self._nu
         half = 0.5 * u
         log = xp.log(xp.where(u > 0, half * self._largest, 1.0))
@@ -103,7 +103,7 @@ class FournierForand(Phase):
 
 
 def _second_order(xp: Any, nu: Any, log: Any) -> Any:
-    """(delta^nu - 1 - nu (delta - 1)) / (delta - 1)^2 [-]."""
+    """Return (delta^nu - 1 - nu (delta - 1)) / (delta - 1)^2 [-]."""
     is_small = xp.abs(log) < SMALL
     near, far = xp.where(is_small, log, 0.0), xp.where(is_small, 1.0, log)
     series, term, power = 0.0, 0.5, nu
@@ -118,7 +118,7 @@ def _second_order(xp: Any, nu: Any, log: Any) -> Any:
 
 @lru_cache(maxsize=64)
 def _pieces(phase: FournierForand) -> Pieces:
-    """The table that draws."""
+    """Return the table that draws."""
     u = np.geomspace(LEAST, 2.0, ROWS)
     u[-1] = 2.0
     return Pieces.of(u, 2 * np.pi * phase._density(u), phase._below(u))

@@ -16,7 +16,7 @@ from mcml_sim.media.phase.base import Phase
 
 @dataclass(frozen=True)
 class HenyeyGreenstein(Phase):
-    """p(c) = (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2)) [1/sr] (Henyey & Greenstein, Astrophys. J. 93, 70, 1941).
+    """Density (1 - g^2) / (4 pi (1 + g^2 - 2 g c)^(3/2)) [1/sr] (Henyey & Greenstein, Astrophys. J. 93, 70, 1941).
 
     g  mean cosine of the scattering angle [-], -1 < g < 1; InputError beyond, but not of a jax array, which nobody can
        look into while jax compiles
@@ -34,19 +34,19 @@ class HenyeyGreenstein(Phase):
             raise InputError(f"g must be a mean cosine in (-1, 1), got {shown(self.g)}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]."""
+        """Return the density of the direction [1/sr]."""
         xp = namespace(self.g, cosine)
         square = self._square(cosine)
         return (1 - self.g * self.g) / (2 * square * xp.sqrt(square)) / (2 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """The `xi` whose sample is `cosine` [-], the integral of the density from -1 on."""
+        """Return the `xi` whose sample is `cosine` [-], the integral of the density from -1 on."""
         xp, g = namespace(self.g, cosine), self.g
         distance = xp.sqrt(self._square(cosine))
         return 0.5 + 0.5 * (2 * cosine - 3 * g + g * g * g) / (distance * (1 - g * g + distance))
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
-        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2; both >= 0, and g -> -g, v -> -v swaps them."""
+        """Return 1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2; both >= 0, and g -> -g, v -> -v swaps them."""
         g = self.g
         reciprocal = 1 / (1 + g * v)
         half_square = 0.5 * reciprocal * reciprocal
@@ -55,10 +55,10 @@ class HenyeyGreenstein(Phase):
         return below_one, above_minus_one
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """g^l [-]."""
+        """Return the Legendre moment g^l [-]."""
         return self.g**l
 
     def _square(self, cosine: Any) -> Any:
-        """1 + g^2 - 2 g c, without cancellation at c = 1."""
+        """Return 1 + g^2 - 2 g c, without cancellation at c = 1."""
         g = self.g
         return (1 - g) * (1 - g) + 2 * g * (1 - cosine)

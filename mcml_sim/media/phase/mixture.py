@@ -1,4 +1,4 @@
-"""Sums of phase functions: what one term cannot follow, a few can."""
+"""Sums of phase functions: a few terms can follow what one cannot."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ HALVINGS = 60  # of [-1, 1], until float64 has no number between
 
 @dataclass(frozen=True)
 class Mixture(Phase):
-    """p(c) = sum over i of w_i p_i(c) [1/sr]: a share w_i of all scatterings turns the light as p_i does.
+    """Sum p(c) = sum over i of w_i p_i(c) [1/sr]: a share w_i of all scatterings turns the light as p_i does.
 
     weights  w_i >= 0, which sum to 1
     phases   p_i, as many
@@ -56,15 +56,15 @@ class Mixture(Phase):
             raise InputError(f"weights must sum to 1, got {math.fsum(self.weights):.12g}")
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]."""
+        """Return the density of the direction [1/sr]."""
         return self._mean([phase.pdf(cosine) for phase in self.phases])
 
     def invert(self, cosine: Any) -> Any:
-        """The share of all scatterings that turn the light to a smaller cosine [-]."""
+        """Return the share of all scatterings that turn the light to a smaller cosine [-]."""
         return self._mean([phase.invert(cosine) for phase in self.phases])
 
     def sample(self, xi: Any) -> Any:
-        """Cosine [-] below which lies the share `xi` in [0, 1] of all scatterings, by bisection."""
+        """Return the cosine [-] below which lies the share `xi` in [0, 1] of all scatterings, by bisection."""
         xp = namespace(xi, *self.weights)
         low = 0.0 * xi - 1.0
         high = -low
@@ -75,7 +75,7 @@ class Mixture(Phase):
         return 0.5 * (low + high)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
-        """1 - c and 1 + c [-] of the term that owns xi = (1 + v) / 2."""
+        """Return 1 - c and 1 + c [-] of the term that owns xi = (1 + v) / 2."""
         xp = namespace(v, *self.weights)
         begin, found = -1.0, (0.0 * v, 0.0 * v)
         for weight, phase in zip(self.weights, self.phases, strict=True):
@@ -89,17 +89,17 @@ class Mixture(Phase):
         return found
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
-        """The mean of the terms' moments [-]."""
+        """Return the mean of the terms' Legendre moments of order l [-]."""
         return self._mean([phase.moment(l) for phase in self.phases])
 
     @property
     def simplest(self) -> Phase:
-        """Without terms of weight 0; one that is alone is itself."""
+        """Mixture without terms of weight 0, or its only term."""
         kept = [(weight, phase.simplest) for weight, phase in zip(self.weights, self.phases, strict=True) if weight > 0]
         return kept[0][1] if len(kept) == 1 else Mixture(*zip(*kept, strict=True))
 
     def for_kernel(self) -> Mixture:
-        """With float32 weights, each term as a kernel draws from it: of some that is a table."""
+        """Return float32 weights, and each term as a kernel draws from it: of some that is a table."""
         return self.of(
             weights=tuple(jnp.float32(weight) for weight in self.weights),
             phases=tuple(phase.for_kernel() for phase in self.phases),

@@ -1,4 +1,4 @@
-"""A density along 1 - cosine in pieces that integrate and invert in closed form."""
+"""Density along 1 - cosine in pieces that integrate and invert in closed form."""
 
 from __future__ import annotations
 
@@ -14,29 +14,29 @@ NODES = 24  # of Gauss and Legendre's rule in a piece, besides those that a poly
 
 
 class Pieces(NamedTuple):
-    """A density f(u) of u = 1 - c on [0, 2], piece by piece a power of u or a straight line; arrays (pieces,).
+    """Density f(u) of u = 1 - c on [0, 2], piece by piece a power of u or a straight line; arrays (pieces,).
 
     The densities of measured phase functions rise over many powers of ten toward u = 0 and are straight in logarithms;
     where a row is zero no power goes through it, and a line does.
     """
 
     end: Any
-    """Where a piece ends [-], rising to 2."""
+    """End of each piece [-], rising to 2."""
     at: Any
-    """u of a piece's point of reference [-], its beginning; of a first power law the end, which alone is positive."""
+    """Point of reference u of a piece [-]: its beginning; of a first power law its end, which alone is positive."""
     share: Any
     """Share of all scatterings with a smaller u than that point [-]."""
     before: Any
-    """The same for the beginning [-], rising from 0."""
+    """Share of all scatterings before the beginning of each piece [-], rising from 0."""
     density: Any
-    """f at that point [-]."""
+    """Density f at that point [-]."""
     slope: Any
     """Exponent s of a power f ~ u^s, or df/du of a line."""
     is_power: Any
 
     @classmethod
     def of(cls, u: Floats, f: Floats, shares: Floats | None = None) -> Pieces:
-        """Through f (rows,) at u (rows,), rising from > 0 or 0 to 2, with these shares below each row, or f's own.
+        """Lay pieces through f (rows,) at u (rows,), which rises to 2, with these shares below each row, or f's own.
 
         A first u > 0 is reached from 0 by the power law of the first two rows. Not normalised.
         """
@@ -66,7 +66,7 @@ class Pieces(NamedTuple):
         return float(self.below(self.end[-1]))
 
     def normalised(self) -> Pieces:
-        """The same, with an integral of 1."""
+        """Return these pieces with an integral of 1."""
         total = self.total
         lines = np.where(self.is_power, self.slope, self.slope / total)
         return self._replace(
@@ -74,7 +74,7 @@ class Pieces(NamedTuple):
         )
 
     def value(self, u: Any) -> Any:
-        """f(u) [-]; infinite at 0 where its power law says so."""
+        """Return f(u) [-]; infinite at 0 where its power law says so."""
         xp = namespace(u, self.end)
         number = self._piece(self.end, u)
         at, density, slope = self.at[number], self.density[number], self.slope[number]
@@ -83,12 +83,12 @@ class Pieces(NamedTuple):
         return xp.where(is_power, density * ratio ** xp.where(is_power, slope, 0.0), density + slope * (u - at))
 
     def below(self, u: Any) -> Any:
-        """Share of all scatterings with a smaller one than u [-]."""
+        """Return the share of all scatterings with a smaller one than u [-]."""
         number = self._piece(self.end, u)
         return self.share[number] + self._within(u, number)
 
     def quantile(self, share: Any) -> Any:
-        """The u below which lies that share."""
+        """Return the u below which lies that share."""
         xp = namespace(share, self.end)
         number = self._piece(self.before[1:], share)
         at, density, slope = self.at[number], self.density[number], self.slope[number]
@@ -103,7 +103,7 @@ class Pieces(NamedTuple):
         return xp.clip(xp.where(is_power, at * xp.exp(grown), line), 0.0, self.end[number])
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """Mean of P_l(1 - u) [-], by quadrature over shares: there the density is even."""
+        """Return the mean of P_l(1 - u) [-], by quadrature over shares: there the density is even."""
         x, w = np.polynomial.legendre.leggauss(NODES + l)
         edges = np.append(self.before, 1.0)
         width = np.diff(edges)[:, None]
@@ -118,7 +118,7 @@ class Pieces(NamedTuple):
         return jnp.minimum(found, len(self.end) - 1)
 
     def _within(self, u: Any, number: Any) -> Any:
-        """Integral of the density from a piece's point of reference to u."""
+        """Return the integral of the density from a piece's point of reference to u."""
         xp = namespace(u, self.end)
         at, density, slope = self.at[number], self.density[number], self.slope[number]
         is_power, step = self.is_power[number], u - self.at[number]
@@ -127,7 +127,7 @@ class Pieces(NamedTuple):
 
 
 def _of_power(begin: Any, end: Any, density: Any, slope: Any) -> Any:
-    """Integral of density (u / begin)^slope over u = begin ... end; infinite or NaN where there is none."""
+    """Return the integral of density (u / begin)^slope over u = begin ... end; infinite or NaN where there is none."""
     xp = namespace(begin, end, density, slope)
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         e, log = slope + 1, xp.log(end / begin)

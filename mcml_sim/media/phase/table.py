@@ -1,4 +1,4 @@
-"""A phase function as tables of files have it, and back."""
+"""Phase functions as tables of files have them, and back."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ def settle(of: Any) -> None:
 
 
 def as_table(phase: Phase) -> dict[str, Any]:
-    """Its kind, and what its constructor takes: numbers, lists, and tables of the same form."""
+    """Return the kind of a phase function, and the arguments of its constructor: numbers, lists, and such tables."""
     kind = next(name for name, one in KINDS.items() if type(phase) is one)
     return {"kind": kind, **{name: _plain(getattr(phase, name)) for name in _arguments(type(phase))}}
 
 
 def from_table(table: object, deepest: int = DEEPEST) -> Phase:
-    """What `as_table` gave; InputError on anything else."""
+    """Return the phase function of a table from `as_table`; InputError on anything else."""
     if not isinstance(table, Mapping):
         raise InputError(f"a phase function must be a table, got {shown(table)}")
     kind = table.get("kind")

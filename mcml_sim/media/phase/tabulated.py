@@ -1,4 +1,4 @@
-"""A phase function as it was measured or computed elsewhere: numbers at angles."""
+"""Phase functions that were measured or computed elsewhere: numbers at angles."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Tabulated(Phase):
     values: Any
     pieces: Pieces = field(init=False, compare=False)
     integral: float = field(init=False, compare=False)
-    """Of the rows as they were given [-]."""
+    """Integral of the rows as they were given [-]."""
 
     def __post_init__(self) -> None:
         angles = _checked("angles", self.angles, "angles in radians, rising from >= 0 to <= pi")
@@ -73,30 +73,30 @@ class Tabulated(Phase):
         return Pieces.of(u, 2 * np.pi * values)
 
     def __repr__(self) -> str:
-        """Short, and another one for other numbers: it says what a run was made with."""
+        """Return a short text, another one for other numbers: it says what a run was made with."""
         digest = hashlib.sha256(np.array([self.angles, self.values]).tobytes()).hexdigest()
         return f"Tabulated({len(self.angles)} angles, {digest[:DIGITS]})"
 
     def pdf(self, cosine: Any) -> Any:
-        """Density of the direction [1/sr]; straight on, of the nearest cosine below 1."""
+        """Return the density of the direction [1/sr]; straight on, that of the nearest cosine below 1."""
         xp = namespace(cosine, self.pieces.end)
         return self.pieces.value(xp.maximum(1 - cosine, STRAIGHT)) / (2 * np.pi)
 
     def invert(self, cosine: Any) -> Any:
-        """The `xi` whose sample is `cosine` [-]."""
+        """Return the `xi` whose sample is `cosine` [-]."""
         return 1 - self.pieces.below(1 - cosine)
 
     def deflection(self, v: Any) -> tuple[Any, Any]:
-        """1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2; the second without relative precision near 0."""
+        """Return 1 - c and 1 + c [-] for the sample of xi = (1 + v) / 2; the second with an absolute error near 0."""
         below_one = self.pieces.quantile(0.5 * (1 - v))
         return below_one, 2 - below_one
 
     def moment(self, l: int) -> float:  # noqa: E741 - the field's letter
-        """By quadrature [-]."""
+        """Return the Legendre moment of order l [-], by quadrature."""
         return self.pieces.moment(l)
 
     def for_kernel(self) -> Tabulated:
-        """Its pieces in float32, without the rows."""
+        """Return the pieces in float32, without the rows."""
         arrays = (jnp.asarray(part, bool if np.asarray(part).dtype == bool else jnp.float32) for part in self.pieces)
         return type(self).of(angles=(), values=(), pieces=Pieces(*arrays), integral=())
 
