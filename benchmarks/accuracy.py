@@ -1,4 +1,4 @@
-"""How long until every ring is known to 1 %, at 32 albedos: by 32 scalar runs, and by one order-resolved run.
+"""Time until every ring is known to 1 %, at 32 albedos: by 32 scalar runs, and by one order-resolved run.
 
 A run of N photons knows a ring with the relative variance v / N; it takes N = v / 1e-4 photons to reach 1 %, and N over
 the photons a second is the time. So the time is measured as variance times time, by runs shorter than it. A scalar run
@@ -36,10 +36,10 @@ FIRST_RING = 1  # the disc inside the innermost of the 100 rings is not one of t
 
 @dataclass(frozen=True)
 class Need:
-    """What it takes to know every ring to 1 %."""
+    """Work until every ring is known to 1 %."""
 
     scalar_photons: Floats
-    """By albedo, (32,)."""
+    """Photons of the scalar runs by albedo, (32,)."""
     scalar_seconds: Floats
     orders_photons: float
     orders_seconds: float
@@ -49,25 +49,25 @@ class Need:
 
     @property
     def ratio(self) -> float:
-        """How many times as fast the one run is."""
+        """Time of the scalar runs over that of the one run."""
         return float(self.scalar_seconds.sum() / self.orders_seconds)
 
 
 def ring_energy(alphas: Floats) -> Floats:
-    """Exact share of light in each ring, (alphas, rings)."""
+    """Return Exact share of light in each ring, (alphas, rings)."""
     edges = problems.ORDER_RINGS.r_edges
     return np.diff(exact.cdf(edges, alphas[:, None]), axis=1) * np.asarray(exact.reflectance(alphas))[:, None]
 
 
 def exit_probabilities(run: Orders) -> Floats:
-    """P_n of a photon where alpha = 1, by ring and bin of order, (rings, bins)."""
+    """Return P_n of a photon where alpha = 1, by ring and bin of order, (rings, bins)."""
     probabilities = run.ring_order_counts * run.weights(1.0) / run.photons
     probabilities[:, 0] = single_scattering.ring_shares(run.grid.r_edges)[:-1]
     return probabilities
 
 
 def scalar_second_moments(alphas: Floats, probabilities: Floats) -> Floats:
-    """Mean squared weight that one scalar photon brings to each ring, (alphas, rings)."""
+    """Return the mean squared weight that one scalar photon brings to each ring, (alphas, rings)."""
     moments = np.empty((alphas.size, probabilities.shape[0]))
     for row, alpha in enumerate(alphas):
         by_order = np.empty(ORDERS.max_order)
@@ -82,7 +82,7 @@ def scalar_second_moments(alphas: Floats, probabilities: Floats) -> Floats:
 
 
 def relative_variances(run: Orders) -> tuple[Floats, Floats]:
-    """v of one scalar photon, and of one order-resolved photon, each (32, 100)."""
+    """Return v of one scalar photon, and of one order-resolved photon, each (32, 100)."""
     energy = ring_energy(ALPHAS)[:, FIRST_RING:]
     moments = scalar_second_moments(ALPHAS, exit_probabilities(run))[:, FIRST_RING:]
     of_orders = run.energy(ALPHAS).standard_error[:, FIRST_RING:]
@@ -90,7 +90,7 @@ def relative_variances(run: Orders) -> tuple[Floats, Floats]:
 
 
 def measure(run: Orders, photons_a_second: float, photons: int, turns: int) -> Need:
-    """From a long order-resolved run and the rate of such runs; times the scalar runs with `photons` each."""
+    """Measure the work, by a long order-resolved run and the rate of such runs; scalar runs have `photons` each."""
     scalar, of_orders = relative_variances(run)
     works = {str(i): problems.yardstick(photons, False, alpha) for i, alpha in enumerate(ALPHAS)}
     rates = take_turns(works, turns)
@@ -105,7 +105,7 @@ def measure(run: Orders, photons_a_second: float, photons: int, turns: int) -> N
 
 
 def check(run: Orders, alpha: float, photons: int) -> Floats:
-    """z of the squared weights that a scalar run brings to the rings, against `scalar_second_moments`, where it hits.
+    """Return z of the squared weights that a scalar run brings to rings, against `scalar_second_moments`.
 
     The error of a mean of squares would need fourth powers; so many photons of nearly one weight hit a ring that
     Poisson's, and as much for the run behind the prediction, is it nearly.

@@ -86,7 +86,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Row:
-    """One method at one colour: pairs are a value and its standard error, lengths are over the typed radius.
+    """Method at one colour: pairs are a value and its standard error, lengths are over the typed radius.
 
     reflectance  A under uniform light [-]; reflectance_source what it should be by the source
     length       fitted with the entry of the source; length_source what it should be; pencil, diffuse: with other edges
@@ -171,7 +171,7 @@ def fitted(picture: Floats, half_width: float, edge: Edge) -> tuple[float, float
 
 @dataclass(frozen=True)
 class Blender:
-    """A Python with bpy.
+    """Python with bpy.
 
     Attributes:
         python: path of the interpreter.
@@ -244,7 +244,7 @@ class Blender:
 
 
 def asked(python: str, requests: Sequence[dict[str, Any]]) -> list[Any]:
-    """Return what `blender_render.py` prints: the version, and a reply to each request.
+    """Return the output of `blender_render.py`: the version, and a reply to each request.
 
     Raises RuntimeError with the last line of its errors.
     """

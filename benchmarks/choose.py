@@ -1,4 +1,4 @@
-"""Whether `profilefit choose` is right: its predicted errors against measured ones, on random scenes.
+"""Test of `profilefit choose`: its predicted errors against measured ones, on random scenes.
 
     python -m benchmarks.choose                        # ten minutes on two cores; --quick for three scenes
                                 [--scenes N] [--seed N] [--json FILE]
@@ -49,7 +49,7 @@ TOLD = 0.03
 
 @dataclass(frozen=True)
 class Compared:
-    """One option of a scene: predicted, and measured [share of white]."""
+    """Option of a scene: predicted, and measured [share of white]."""
 
     predicted: Predicted
     measured: float
@@ -61,7 +61,7 @@ class Compared:
 
 @dataclass(frozen=True)
 class Verified:
-    """A scene, what was chosen, and every option that was rendered, cheapest first."""
+    """Scene, what was chosen, and every option that was rendered, cheapest first."""
 
     name: str
     choice: Choice
@@ -69,12 +69,12 @@ class Verified:
 
     @property
     def own(self) -> Compared:
-        """Of the choice."""
+        """Comparison of the choice."""
         return next(one for one in self.compared if one.predicted is self.choice.nearest)
 
     @property
     def worst_ratio(self) -> float:
-        """Of all options, the one farthest from 1."""
+        """Comparison of all options that is farthest from 1."""
         return max((one.ratio for one in self.compared), key=lambda ratio: abs(math.log(ratio)))
 
     @property
@@ -83,18 +83,18 @@ class Verified:
 
     @property
     def disappoints(self) -> bool:
-        """Whether the choice misses the tolerance after all, by more than can be told."""
+        """Whether the choice misses the tolerance after all, by more than the errors."""
         return self.own.measured > self.choice.scene.tolerance * (1.0 + TOLD)
 
     @property
     def wasteful(self) -> list[Compared]:
-        """Cheaper options that met the tolerance after all, by more than can be told."""
+        """Cheaper options that met the tolerance after all, by more than the errors."""
         cheaper = self.compared[: self.compared.index(self.own)]
         return [one for one in cheaper if one.measured * (1.0 + TOLD) <= self.choice.scene.tolerance]
 
 
 def scenes(count: int, seed: int) -> Iterator[tuple[str, Requirements]]:
-    """Name and scene, in millimetres."""
+    """Yield name and scene, in millimetres."""
     random = np.random.default_rng(seed)
 
     def log_uniform(ends: tuple[float, float]) -> float:
@@ -130,7 +130,7 @@ def verified(context: moderngl.Context, name: str, scene: Requirements) -> Verif
 
 
 def row(one: Verified) -> tuple[str, ...]:
-    """Cells of the table."""
+    """Return the cells of the table."""
     scene, own = one.choice.scene, one.own
     longest = max(high for _, high in scene.mfp)
     kind = "" if one.choice.chosen else "nearest: "
@@ -163,7 +163,7 @@ COLUMNS = (
 
 
 def as_json(found: Sequence[Verified]) -> list[dict]:
-    """All that was compared."""
+    """Return all comparisons for JSON."""
     return [
         {
             "material": one.name,
@@ -182,7 +182,7 @@ def as_json(found: Sequence[Verified]) -> list[dict]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command; status 1 if a prediction or a choice is wrong."""
+    """Run the command; status 1 if a prediction or a choice is wrong."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--scenes", type=int, default=SCENES)
     parser.add_argument("--quick", action="store_true", help=f"{QUICK} scenes")
@@ -212,7 +212,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def report(found: Sequence[Verified]) -> None:
-    """Print the table, and what it comes to."""
+    """Print the table, and its summary."""
     show("Predicted and measured error at an edge of light, % of white", COLUMNS, [row(one) for one in found])
     ratios = np.array([one.own.ratio for one in found])
     every = np.array([c.ratio for one in found for c in one.compared])

@@ -1,4 +1,4 @@
-"""The error of a way to scatter light, measured: rendered through OpenGL on a grid of pixels, against the reference.
+"""Error of a technique, measured: rendered through OpenGL on a grid of pixels, against the reference.
 
 The surface is a plane or a cylinder, lit on one side of a step edge, seen by parallel rays. The reference is the exact
 profile over the visible surface, summed pair by pair on a grid as much finer as short paths ask for, and averaged over
@@ -38,7 +38,7 @@ FINE, FINEST, MOST_FINE = 8.0, 48, 1_000_000
 
 
 def surface(case: Case, columns: int, rows: int, factor: int = 1) -> Buffers:
-    """The edge with pixels so many times as fine."""
+    """Return the edge with pixels so many times as fine."""
     pixel = case.pixel / factor
     flat = step_edge((columns * factor, rows * factor), pixel, np.array(case.reflectance))
     if case.is_flat:
@@ -54,13 +54,13 @@ def surface(case: Case, columns: int, rows: int, factor: int = 1) -> Buffers:
 
 
 def fits(case: Case, setting: Setting, within: Within) -> bool:
-    """Whether a picture of MOST_PIXELS holds what the places gather from."""
+    """Return whether a picture of MOST_PIXELS holds what the places gather from."""
     small = math.prod(size(case, setting, within)) <= MOST_PIXELS
     return small and _lost(case, setting, REACHES[-1]) < LOST
 
 
 def size(case: Case, setting: Setting, within: Within) -> tuple[int, int]:
-    """Columns and rows of the picture that a plane needs; a cylinder needs no more."""
+    """Return columns and rows of the picture that a plane needs; a cylinder needs no more."""
     reach = next((r for r in REACHES if _lost(case, setting, r) < HELD), REACHES[-1])
     longest = max(case.mfp)
     half = max(within.mfp * longest, within.pixels * case.pixel) + reach * longest
@@ -69,14 +69,14 @@ def size(case: Case, setting: Setting, within: Within) -> tuple[int, int]:
 
 
 def _lost(case: Case, setting: Setting, reach: float) -> float:
-    """The largest share of a channel's light from beyond an edge that many of the longest mean free paths away."""
+    """Return the largest share of a channel's light from that many longest mean free paths beyond an edge."""
     pairs = zip(case.reflectance, case.mfp, strict=True)
     far = reach * max(case.mfp)
     return max(float(reference_light(setting).beyond(a)(np.array(far / length))) for a, length in pairs)
 
 
 class Measured:
-    """A case, drawn once: the error of any option on it. Use it in a `with`."""
+    """Case, drawn once: the error of any option on it. Use it in a `with`."""
 
     def __init__(
         self, context: moderngl.Context, case: Case, setting: Setting, within: Within, size: tuple[int, int]
@@ -95,13 +95,13 @@ class Measured:
         self._stage.release()
 
     def error(self, option: Option, seed: int = 0) -> float:
-        """Root mean square error of the worst channel, as a share of white [-]."""
+        """Return the root mean square error of the worst channel, as a share of white [-]."""
         light = self._rendered(option, seed)
         pairs = [(light[:, columns, c], self._truth[columns, c]) for c, columns in enumerate(self._columns)]
         return max(float(np.sqrt(np.mean((found - wanted) ** 2))) for found, wanted in pairs)
 
     def _rendered(self, option: Option, seed: int) -> Floats:
-        """(ROWS, columns, 3) radiant exitance under an irradiance of 1."""
+        """Render (ROWS, columns, 3) radiant exitance under an irradiance of 1."""
         rows = (self.size[1] - ROWS) // 2, (self.size[1] + ROWS) // 2
         if option.kind == "nothing":
             return (self._drawn.irradiance * self._drawn.reflectance.astype(float))[slice(*rows)]
@@ -122,14 +122,14 @@ class Measured:
         return [albedo_of(a, self.setting) for a in self.case.filter_reflectance]
 
     def _places(self, channel: int) -> NDArray[np.int64]:
-        """Columns on both sides of the edge."""
+        """Return the columns on both sides of the edge."""
         beyond = (self.case.places(channel, self.within) / self.case.pixel).astype(int)
         beyond = beyond[beyond < self.size[0] // 2]
         middle = self.size[0] // 2
         return np.concatenate([middle - 1 - beyond, middle + beyond])
 
     def _reference(self) -> Floats:
-        """(columns, 3), where there are places, NaN elsewhere."""
+        """Return the reference (columns, 3), where there are places, NaN elsewhere."""
         wanted = math.ceil(FINE * self.case.pixel / min(self.case.mfp))
         factor = max(min(wanted, FINEST, int((MOST_FINE / math.prod(self.size)) ** 0.5)), 1)
         scene, view = seen(surface(self.case, *self.size, factor))

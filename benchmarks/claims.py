@@ -1,4 +1,4 @@
-"""Every figure that README and guides promise, beside what is measured: `make claims` writes fits/evidence/claims.json.
+"""Figures that README and guides promise, beside what is measured: `make claims` writes fits/evidence/claims.json.
 
     python -m benchmarks.claims [--only NAME ...] [--quick] [--out FOLDER]
 
@@ -38,7 +38,7 @@ WIDTH = 160  # of the tables
 
 
 class Run(NamedTuple):
-    """A command whose numbers hold figures; what they are held against; what their spread is; what --quick adds to it.
+    """Command whose numbers hold figures; what they are held against; what their spread is; what --quick adds to it.
 
     promises  name, bound, place of the figure in the numbers or a function of them, what it is of, and its noise where
               that is not the run's: a figure is a value, or value, low and high
@@ -54,17 +54,17 @@ class Run(NamedTuple):
 
 
 def at(numbers: Any, place: str) -> Any:
-    """What lies at a dotted place."""
+    """Return what lies at a dotted place."""
     return reduce(lambda inside, key: inside[key], place.split("."), numbers)
 
 
 def of_phase(form: str) -> Callable[[Any], float]:
-    """How far a form with its moments held is from the data."""
+    """Return the error of a form with its moments held, against the data."""
     return lambda numbers: numbers["phases"]["petzold"]["phases"][form]["held"]["rms"]
 
 
 def splat_of(f: float, fragments: int, key: str) -> Callable[[Any], float]:
-    """A figure's size, of the map with the least rms of all that draw no more fragments."""
+    """Return a figure's size, of the map with the least rms of all that draw no more fragments."""
 
     def found(numbers: Any) -> float:
         fits = [one for one in numbers["splats"] if one["F"] == f and one["fragments"] <= fragments]
@@ -74,22 +74,22 @@ def splat_of(f: float, fragments: int, key: str) -> Callable[[Any], float]:
 
 
 def factor_of(numbers: Any, truth: str) -> Any:
-    """The row of all numbers of layers."""
+    """Return the row of all numbers of layers."""
     return next(one for one in numbers["third"] if one["error, truth"] == truth and one["N"] == "all")
 
 
 def least_of(way: str) -> Callable[[Any], float]:
-    """Layers at 45 degrees."""
+    """Return the least layers at 45 degrees."""
     return lambda numbers: next(one["45"] for one in numbers["least"] if one["way"] == way)
 
 
 def worst(place: str, scale: float = 1.0):
-    """The largest of the list there, over what a unit is."""
+    """Return the largest of the list there, over a unit."""
     return lambda numbers: max(at(numbers, place)) / scale
 
 
 def by_index(what: str, scale: float = 1.0):
-    """The largest of all records, indices and albedos, over what a unit is; of those that have such a figure."""
+    """Return the largest of all records, indices and albedos that have such a figure, over a unit."""
 
     def read(numbers: Any) -> float:
         found = [one["quality"]["by_index"] for one in numbers["records"].values()]
@@ -99,17 +99,17 @@ def by_index(what: str, scale: float = 1.0):
 
 
 def times(place: str, over: str):
-    """One figure over another."""
+    """Return one figure over another."""
     return lambda numbers: at(numbers, place) / at(numbers, over)
 
 
 def ratio(place: str):
-    """A ratio of tracer.py with its spread."""
+    """Return a ratio of tracer.py with its spread."""
     return lambda numbers: [numbers[place][end] for end in ("median", "least", "most")]
 
 
 def less_work(method: str):
-    """How many times less time x error² the longest order-resolved run takes, of all of a time."""
+    """Return how many times less time x error² the longest order-resolved run takes, of all of a time."""
 
     def read(numbers: Any) -> list[float]:
         points = {point["method"]: point for point in at(numbers, "truth.panels.rings.points")}
@@ -124,45 +124,45 @@ def _work(point: dict[str, Any], end: str) -> float:
 
 
 def exact_error(numbers: Any) -> float:
-    """The worst of the standard quadratures."""
+    """Return the worst of the standard quadratures."""
     points = at(numbers, "truth.panels.rings.points")
     return next(point["worst"]["value"] for point in points if point["label"] == "standard nodes")
 
 
 def rounding(numbers: Any) -> float:
-    """Largest error that float32 adds over the law's own; the limit is a tenth of that [%]."""
+    """Return the largest error that float32 adds over the law's own; the limit is a tenth of that [%]."""
     bounds = [bound for kind in ("laws", "maps") for one in numbers[kind] for bound in one["bounds"]]
     return max(10 * bound["value"] / bound["limit"] for bound in bounds if bound["name"].startswith("float32 "))
 
 
 def edge(*measures: str, scale: float = 1.0):
-    """The largest of the law hazard's, over lights and albedos."""
+    """Return the largest of the law hazard's, over lights and albedos."""
     return lambda numbers: max(
         value / scale for light in numbers["laws"].values() for one in measures for value in light["hazard"][one]
     )
 
 
 def edge_nearer(numbers: Any) -> float:
-    """Least bias of normalized diffusion over that of hazard, over lights and albedos."""
+    """Return the least bias of normalized diffusion over that of hazard, over lights and albedos."""
     pairs = [zip(light["normalized diffusion"]["bias"], light["hazard"]["bias"], strict=True)
              for light in numbers["laws"].values()]  # fmt: skip
     return min(diffusion / hazard for both in pairs for diffusion, hazard in both)
 
 
 def flip(numbers: Any, law: str = "hazard") -> tuple[float, float, float]:
-    """FLIP with the most samples: mean, least and most of the seeds."""
+    """Return FLIP with the most samples: mean, least and most of the seeds."""
     seeds = numbers["laws"][law]["flip"][-1]
     return sum(seeds) / len(seeds), min(seeds), max(seeds)
 
 
 def flip_nearer(numbers: Any) -> tuple[float, float, float]:
-    """The same of normalized diffusion, refitted, over that of hazard."""
+    """Return FLIP of normalized diffusion, refitted, over that of hazard."""
     (own, least, most), (other, low, high) = flip(numbers), flip(numbers, "burley refitted")
     return other / own, low / most, high / least
 
 
 def recovered(numbers: Any) -> float:
-    """The farthest of what a file of a simulation knows, in errors that the fit states."""
+    """Return the farthest constant of a file of a simulation, in errors that the fit states."""
     known = [one for one in numbers["quantities"].values() if one["of_file"] is not None]
     return max(
         abs(one["value"] - one["of_file"]) / math.hypot(one["statistical_error"], one["law_error"]) for one in known
@@ -170,7 +170,7 @@ def recovered(numbers: Any) -> float:
 
 
 def apart(only_chosen: bool):
-    """Predicted and rendered error, larger over smaller, at worst."""
+    """Return predicted and rendered error, larger over smaller, at worst."""
 
     def read(numbers: Any) -> float:
         pairs = [pair for one in numbers for option, pair in one["options"].items()
@@ -181,14 +181,14 @@ def apart(only_chosen: bool):
 
 
 def uncovered(numbers: Any) -> int:
-    """Shares of stated intervals outside their binomial band."""
+    """Return the shares of stated intervals outside their binomial band."""
     rows = [row for row in numbers if row["errors"] == "sandwich"]
     pairs = [pair for row in rows for pair in zip(row["shares"].values(), row["band"], strict=True)]
     return sum(not low <= share <= high for shares, (low, high) in pairs for share in shares)
 
 
 def pictured(read):
-    """Of the head of layers by 64 samples, in each pose: what `read` makes of the errors by way."""
+    """Return what `read` makes of the errors by way, of the head of layers by 64 samples, in each pose."""
 
     def figure(rows: Any) -> float:
         poses: dict[str, dict[str, float]] = {}
@@ -398,7 +398,7 @@ RUNS = (
 
 
 def numbers(command: str) -> Any:
-    """What a command says as JSON."""
+    """Return the numbers of a command, from its JSON."""
     program, *words = shlex.split(command)
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "numbers.json"
@@ -416,7 +416,7 @@ def numbers(command: str) -> Any:
 
 
 def claimed(run: Run, command: str, told: Any, date: str = "", load: str = "unknown") -> Iterator[Claim]:
-    """The rows of a run whose command told these numbers."""
+    """Return the rows of a run whose command printed these numbers."""
     for name, bound, read, says, *noise in run.promises:
         found = at(told, read) if isinstance(read, str) else read(told)
         value, low, high = found if isinstance(found, Sequence) else (found,) * 3
@@ -428,7 +428,7 @@ def claimed(run: Run, command: str, told: Any, date: str = "", load: str = "unkn
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Run the command."""
     names = [promise[0] for run in RUNS for promise in run.promises]
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", nargs="+", choices=names, default=names, metavar="NAME", help="others stay")

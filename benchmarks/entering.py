@@ -40,25 +40,25 @@ class Entry:
     share: Floats
 
     def __add__(self, other: Entry) -> Entry:
-        """Half of the light in the directions of each."""
+        """Return half of the light in the directions of each."""
         shares = np.concatenate([0.5 * self.share, 0.5 * other.share])
         return Entry(np.concatenate([self.cosine, other.cosine]), shares)
 
 
 def unit_nodes(count: int) -> tuple[Floats, Floats]:
-    """Gauss's rule on (0, 1)."""
+    """Return Gauss's rule on (0, 1)."""
     nodes, weights = np.polynomial.legendre.leggauss(count)
     return 0.5 * (nodes + 1.0), 0.5 * weights
 
 
 def cosine_weighted(count: int = 10) -> Entry:
-    """Directions of diffuse illumination."""
+    """Return the directions of diffuse illumination."""
     cosine, weight = unit_nodes(count)
     return Entry(cosine, 2.0 * cosine * weight)
 
 
 def refracted(n: float, roughness: float, count: int = 10) -> Entry:
-    """Directions of a normal ray behind a rough refracting surface, as Cycles enters a medium: no Fresnel factor.
+    """Return directions of a normal ray behind a rough surface, as Cycles enters a medium: no Fresnel factor.
 
     Normals of the facets are distributed as GGX has those visible from the normal, tan^2 = a^2 u / (1 - u) with uniform
     u, a the roughness; each deviates a ray by its angle less the refracted one.
@@ -80,7 +80,7 @@ def reflectance(alpha: float, entry: Entry, most: int | None = None) -> float:
 
 
 def _total(alpha: Complexes, entry: Entry) -> Complexes:
-    """A at albedos (n,) of any argument [-], averaged over the directions."""
+    """Return A at albedos (n,) of any argument [-], averaged over the directions."""
     return np.asarray(reflectance_by_cosine(alpha, entry.cosine) @ entry.share)
 
 
@@ -95,7 +95,7 @@ def dark_edge(alpha: float, entry: Entry) -> CubicSpline:
 
 
 def _dark(x: float, curve: CubicSpline, last: float) -> float:
-    """1/2 - (1/pi) int_0^inf sin(k x) R^(k) / (k A) dk, with R^ / A = last / k beyond LAST_K."""
+    """Return 1/2 - (1/pi) int_0^inf sin(k x) R^(k) / (k A) dk, with R^ / A = last / k beyond LAST_K."""
     even = np.linspace(0.0, LAST_K, 2 + int(LAST_K * x))
     edges = np.union1d(even, np.geomspace(LEAST_K, LAST_K, 48))
     nodes, weights = unit_nodes(12)
@@ -106,7 +106,7 @@ def _dark(x: float, curve: CubicSpline, last: float) -> float:
 
 
 def _transform(alpha: float, k: float, entry: Entry) -> float:
-    """R^(k) of one real wave number [1/mfp]."""
+    """Return R^(k) of one real wave number [1/mfp]."""
     t, weight = unit_nodes(32)
     s = np.sqrt(1.0 / t**4 + k * k)  # m = t^2
     outgoing = 2.0 * t * weight * _h(alpha, k, s)
@@ -120,7 +120,7 @@ def _transform(alpha: float, k: float, entry: Entry) -> float:
 
 
 def _h(alpha: float, k: float, s: Complexes | Floats) -> Complexes:
-    """H_k(1/s) for s (n,) of positive real part and imaginary part >= 0."""
+    """Return H_k(1/s) for s (n,) of positive real part and imaginary part >= 0."""
     x = np.exp(LN_X + 0.5j * np.angle(s)[:, None])  # halfway between the poles at +-i s and the singularities of ln L
     size = np.sqrt(k * k + x * x)
     small = np.abs(size) < SMALL

@@ -1,4 +1,4 @@
-"""Errors of constants side by side: `python -m benchmarks.errors` fits one run, and asks six ways how far to trust it.
+"""Errors of constants side by side: `python -m benchmarks.errors` estimates the errors of one run in six ways.
 
 photons         sandwich: the closed-form covariance of the photons through the derivative of the optimum
 bootstrap       the same from outside: 64 batches drawn with replacement, fitted again; known to 9 %
@@ -33,7 +33,7 @@ COLUMNS = ("photons", "bootstrap", "emcee, photons", "misfit", "emcee, misfit", 
 
 
 def table(name: str, batches: int, photons: int, chain: int) -> list[tuple[str, ...]]:
-    """A line a constant: its value and each of its errors."""
+    """Return a line per constant: its value and each of its errors."""
     chosen = recipe.find(name, catalogue.fits_folder())
     grid = Grid.from_edges(r=ring_edges(chosen.rings))
     runs = [simulate_orders(grid, photons, SEED + batch, chosen.setting, progress=False) for batch in range(batches)]
@@ -58,7 +58,7 @@ def table(name: str, batches: int, photons: int, chain: int) -> list[tuple[str, 
 
 
 def whole(runs: Sequence[Orders]) -> Orders:
-    """One run of all batches' photons; its seed is the first one's."""
+    """Return one run of all batches' photons; its seed is the first one's."""
     counts = sum((run.counts for run in runs[1:]), runs[0].counts)
     first = runs[0]
     return Orders(first.grid, sum(run.photons for run in runs), first.seed, first.setting, counts)

@@ -36,12 +36,12 @@ TURNS = 10
 
 @dataclass(frozen=True)
 class Point:
-    """What one choice costs and how wrong it is."""
+    """Cost and error of one choice."""
 
     label: str
     seconds: float
     errors: Floats
-    """Relative, of all that counts, (radii or rings and albedos that do,)."""
+    """Relative errors of all that counts, (radii or rings and albedos that do,)."""
 
     @property
     def median(self) -> float:
@@ -53,13 +53,13 @@ class Point:
 
 
 def solved(rule: Rule) -> Floats:
-    """R_d (albedos, radii), from nothing."""
+    """Return R_d (albedos, radii), from nothing."""
     forget()
     return by_alpha(profile, RADII, ALPHAS[:, None], exact.SEARCHLIGHT, rule)
 
 
 def fastest(works: dict[str, Callable[[], object]]) -> dict[str, float]:
-    """Seconds of each work's fastest turn, after one that compiles it."""
+    """Return the seconds of each work's fastest turn, after one that compiles it."""
     for work in works.values():
         work()
     seconds = dict.fromkeys(works, np.inf)
@@ -72,7 +72,7 @@ def fastest(works: dict[str, Callable[[], object]]) -> dict[str, float]:
 
 
 def of_exact() -> list[Point]:
-    """One point for each number of nodes, fewest first."""
+    """Yield one point for each number of nodes, fewest first."""
     truth = solved(STANDARD.scaled(2.0))
     bright = truth >= LEAST_PROFILE
     rules = {f"{rule.k}, {rule.m}, {rule.x}": rule for rule in map(STANDARD.scaled, FACTORS)}
@@ -82,7 +82,7 @@ def of_exact() -> list[Point]:
 
 
 def of_tracer(photons: int) -> Point:
-    """The order-resolved run of that many photons."""
+    """Return the point of the order-resolved run of that many photons."""
     edges = np.append(0.0, RADII)
     grid = Grid.from_edges(r=edges)
     begin = time.perf_counter()
@@ -95,7 +95,7 @@ def of_tracer(photons: int) -> Point:
 
 
 def draw(points: dict[str, list[Point]], path: str) -> None:
-    """Error over seconds, both logarithmic; the median filled, the largest open; by the ends, nodes or photons."""
+    """Draw error over seconds, both logarithmic; the median filled, the largest open; by the ends, nodes or photons."""
     figure, axes = pyplot.subplots(figsize=(7.0, 4.6), layout="constrained")
     for (name, line), colour, marker in zip(points.items(), ("#0072B2", "#D55E00"), "os", strict=True):
         seconds = [point.seconds for point in line]
@@ -114,7 +114,7 @@ def draw(points: dict[str, list[Point]], path: str) -> None:
 
 
 def main() -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--photons", type=float, nargs="+", default=[1e6, 1e7, 1e8], help="of the tracer's runs")
     parser.add_argument("--figure", help="where to draw error over seconds, .png or .svg")

@@ -32,7 +32,7 @@ XS = (0.7, 1.0, 2.0, 4.0, 6.4)
 
 
 def closed() -> Rows:
-    """`visibility` less what rays see, the worst of four heights, its standard error, and the largest over its own."""
+    """Return `visibility` less what rays see, worst of four heights, its standard error, and the largest ratio."""
     found: Rows = []
     for lean in LEANS:
         for density in DENSITIES:
@@ -53,7 +53,7 @@ def _random(density: float, lean: tuple[float, float], side: float, seed: int) -
 
 
 def exponents() -> Rows:
-    """p by its law and the best of each L / r0, which are between whole numbers of layers; their range over p."""
+    """Return p by its law and the best of each L / r0, between whole numbers of layers; their range over p."""
     found: Rows = []
     for x in XS:
         each = [_best(x * slender, slender) for slender in law.SLENDER]
@@ -63,7 +63,7 @@ def exponents() -> Rows:
 
 
 def _best(number: float, slender: float) -> float:
-    """Between whole numbers of layers ln(p - 1) is a straight line of ln N."""
+    """Return the best N: between whole numbers of layers ln(p - 1) is a straight line of ln N."""
     low, high = int(np.floor(number + 1e-9)), int(np.ceil(number - 1e-9))
     ends = [np.log(law.best_of(n, slender) - 1.0) for n in (low, high)]
     at = np.log(number / low) / np.log(high / low) if high > low else 0.0
@@ -71,7 +71,7 @@ def _best(number: float, slender: float) -> float:
 
 
 def constants() -> Rows:
-    """Of the exponent, fitted now, with their errors, and as they are kept."""
+    """Return the constants of the exponent, fitted now, with their errors, and as they are kept."""
     found, error = law.fitted()
     return [
         (name, *(float(getattr(one, name)) for one in (found, error, law.FITTED, law.FITTED_ERRORS)))

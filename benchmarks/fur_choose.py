@@ -1,4 +1,4 @@
-"""Whether the number of layers that `profilefit choose` says of fur holds for other rays, and whether fewer would.
+"""Test of the number of layers that `profilefit choose` states for fur: on other rays, and against fewer layers.
 
     python -m benchmarks.fur_choose                  # 50 random furs: nine minutes on a core
     python -m benchmarks.fur_choose --furs 5         # fewer of them
@@ -29,7 +29,7 @@ PATCHES, RAYS, OTHERS = 40, 4000, 500_000  # of a truth; where its seeds begin
 
 
 class Fur(NamedTuple):
-    """Drawn at random: lengths in r0.
+    """Fur drawn at random: lengths in r0.
 
     density  [1/r0^2];  length  [r0];  degrees  of the view to the normal;  tolerance  rms over the length
     """
@@ -41,7 +41,7 @@ class Fur(NamedTuple):
 
 
 class Judged(NamedTuple):
-    """A fur, its cheapest way and layers, and what they are wrong by [-]; least  that would do; None: no way does."""
+    """Fur, its cheapest way and layers, and their error [-]; `least` layers that would do; None: no way does."""
 
     fur: Fur
     way: str | None
@@ -55,12 +55,12 @@ class Judged(NamedTuple):
 
     @property
     def ratio(self) -> float | None:
-        """Layers over the least [-]."""
+        """Ratio of the layers to the least [-]."""
         return self.layers / self.least if self.layers and self.least else None
 
 
 def furs(count: int, seed: int = SEED) -> list[Fur]:
-    """Even in the logarithm of all but the angle."""
+    """Draw furs, even in the logarithm of all but the angle."""
     u = np.random.default_rng(seed).random((count, 4))
     ends = np.array([COVER, SLENDER, TOLERANCES])
     logs = np.exp(np.log(ends[:, 0]) + u[:, :3] * np.log(ends[:, 1] / ends[:, 0]))
@@ -72,7 +72,7 @@ def furs(count: int, seed: int = SEED) -> list[Fur]:
 
 
 def judged(fur: Fur, seed: int) -> Judged:
-    """By patches that were not looked at to choose."""
+    """Judge a fur by patches that were not used to choose."""
     theta = float(np.radians(fur.degrees))
     looked = RandomFur(fur.density, 1.0, fur.length, theta, seed)
     least = {way.name: looked.least_layers(way, fur.tolerance) for way in WAYS}
@@ -89,7 +89,7 @@ def judged(fur: Fur, seed: int) -> Judged:
 
 
 def _least(trials: Sequence[FurTrial], way: FurWay, layers: int, tolerance: float) -> int:
-    """The least number that is within the tolerance and next to others that are, from one that nearly is."""
+    """Return the least number within the tolerance and next to others that are, from one that nearly is."""
     while error_of(trials, way, layers) > tolerance:
         layers += 1
     while layers > 1 and error_of(trials, way, layers - 1) <= tolerance:
@@ -98,7 +98,7 @@ def _least(trials: Sequence[FurTrial], way: FurWay, layers: int, tolerance: floa
 
 
 def summary(found: Sequence[Judged]) -> dict[str, float]:
-    """Share that is within the tolerance, of those that have a way; layers over the least."""
+    """Return the share within the tolerance, of those that have a way; layers over the least."""
     chosen = [one for one in found if one.way is not None]
     ratios = [one.ratio for one in chosen if one.ratio is not None]
     return {

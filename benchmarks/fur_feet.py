@@ -1,4 +1,4 @@
-"""Fur that no closed form was made for: feet apart or in tufts, leans that differ; and a lamp next to the eye.
+"""Fur that no closed form is for: feet apart or in tufts, leans that differ; and a lamp next to the eye.
 
 What is seen is exp(-kappa n (1 - z / L)^2 A), where kappa is 1 for feet that are independent of each other.
 """
@@ -57,7 +57,7 @@ def seen(
     patches: int = PATCHES,
     least_side: float = SIDE,
 ) -> Seen:
-    """Of patches `make` makes of a side and a seed, so wide that no ray comes by a strand twice."""
+    """Trace patches that `make` makes of a side and a seed, so wide that no ray comes by a strand twice."""
     side, found = max(least_side, 1.3 * float(np.tan(theta))), []
     for seed in range(patches):
         patch = make(side, seed)
@@ -67,13 +67,13 @@ def seen(
 
 
 def spread(patch: Patch, seed: int) -> Floats:
-    """Where rays pass the tips (RAYS, 2), more evenly than those of `rays`."""
+    """Return where rays pass the tips (RAYS, 2), more evenly than those of `rays`."""
     cell = np.stack(np.meshgrid(np.arange(LATTICE), np.arange(LATTICE)), axis=-1).reshape(-1, 2)
     return (cell + np.random.default_rng([seed, 5]).random(cell.shape)) * (patch.side / LATTICE)
 
 
 class Factor(NamedTuple):
-    """kappa, and what it is of."""
+    """Factor kappa, and what it is of."""
 
     kind: str
     density: float
@@ -84,7 +84,7 @@ class Factor(NamedTuple):
 
     @property
     def thick(self) -> float:
-        """r0 sqrt(n) of the strands at their height."""
+        """Density r0 sqrt(n) of the strands at their height."""
         return RADIUS * self.density**0.5 * (1.0 - self.z)
 
 
@@ -105,7 +105,7 @@ def factors() -> list[Factor]:
 
 
 def feet() -> Rows:
-    """kappa over height for each kind, density and angle, and its largest standard error."""
+    """Return kappa over height for each kind, density and angle, and its largest standard error."""
     found: Rows = []
     for kind in KINDS:
         for density in DENSITIES:
@@ -119,7 +119,7 @@ def feet() -> Rows:
 
 
 def feet_laws() -> Rows:
-    """kappa = (1 + a q^b)^(+-1), q = r0 sqrt(n) (1 - z / L), aslant; and as one constant."""
+    """Fit kappa = (1 + a q^b)^(+-1), q = r0 sqrt(n) (1 - z / L), oblique; and as one constant."""
     found: Rows = []
     for (kind, _), power in zip(KINDS.items(), (1.0, -1.0), strict=True):
         own = [f for f in factors() if f.kind == kind and f.degrees > 0.0]
@@ -147,7 +147,7 @@ def feet_laws() -> Rows:
 
 
 def mean_shadow(theta: float, lean: float, radius: float = RADIUS) -> float:
-    """A of strands of length 1 that lean every way, over all: Gaussian, root mean square `lean` [-]."""
+    """Return A of strands of length 1 that lean every way, over all: Gaussian, root mean square `lean` [-]."""
     node, weight = np.polynomial.hermite_e.hermegauss(NODES)
     one = node * lean / np.sqrt(2.0)  # of each of the two parts
     aside = np.hypot(np.tan(theta) - one[:, None], one)
@@ -155,7 +155,7 @@ def mean_shadow(theta: float, lean: float, radius: float = RADIUS) -> float:
 
 
 def leans() -> Rows:
-    """<A> / A of upright strands, and ln of what rays see over -n <A>, density 16, whole strands and half ones."""
+    """Return <A> / A of upright strands, and ln of what rays see over -n <A>, density 16, whole and half strands."""
     found: Rows = []
     density, heights = DENSITIES[0], (0.0, 0.5)
     for lean in LEANS:
@@ -176,7 +176,7 @@ def leans() -> Rows:
 
 
 def lamps() -> Rows:
-    """Light that comes to what an eye sees, on the skin and on sides of strands that face the lamp.
+    """Return light that comes to what an eye sees, on the skin and on sides of strands that face the lamp.
 
     Over the mean of `visibility`, and over exp(-n (1 - z / L)^2 (A of the lamp - shared shadow)), with their noise.
     """
@@ -190,7 +190,7 @@ def lamps() -> Rows:
 
 
 def _lit(density: float, eye: float, lamp: float, aside: bool = False) -> list[float]:
-    """Lamp in the eye's plane, or at a right angle to it about the normal."""
+    """Light by a lamp in the eye's plane, or at a right angle to it about the normal."""
     to_eye, to_lamp = float(np.radians(eye)), float(np.radians(lamp))
     turn = 0.5 * np.pi if aside else 0.0 if lamp >= 0 else np.pi
     area = float(shadow(RADIUS, 1.0, abs(to_lamp)))

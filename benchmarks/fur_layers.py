@@ -1,4 +1,4 @@
-"""Layers of fur against its truths: linear shells for one quadratic one, every way over N, and the swept slabs' law."""
+"""Layers of fur against its truths: linear shells per quadratic one, every way over N, and the swept slabs' law."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ WITHIN = (0.01, 0.1)  # rms for which swept slabs' law is fitted
 
 
 class Cell(NamedTuple):
-    """One fur toward one angle, strands of length 1: r0 sqrt(n), L / r0 and the angle; errors are rms of heights.
+    """Fur toward one angle, strands of length 1: r0 sqrt(n), L / r0 and the angle; errors are rms of heights.
 
     linear        to the cone, of LINEAR shells: it is their own limit
     cone, own     of quadratic shells and twice as many, to the cone and to their own limit: by N
@@ -91,13 +91,13 @@ def _cell(patch: Patch, degrees: float, thick: float, start: Floats) -> Cell:
 
 
 def layers_for(error: float, errors: Floats) -> float:
-    """So many LINEAR shells have this error: a straight line between logarithms; nan beyond them."""
+    """Return how many LINEAR shells have this error: a straight line between logarithms; nan beyond them."""
     falling = np.log(np.minimum.accumulate(errors))
     return float(np.exp(np.interp(-np.log(error), -falling, np.log(LINEAR), np.nan, np.nan)))
 
 
 def third() -> Rows:
-    """Linear shells for each quadratic one at equal error, by the truth that both are held against."""
+    """Return the linear shells per quadratic one at equal error, by the truth that both are held against."""
     found: Rows = []
     furs = cells()
     for n in (*QUADRATIC, 0):
@@ -137,7 +137,7 @@ def _covered(cell: Cell, layers: int) -> float:
 def _factors(
     name: str, layers: int, linear: Callable[[Cell, int], float], furs: Sequence[Cell]
 ) -> tuple[str | float, ...]:
-    """Geometric mean, 95 % of that by furs and angles drawn anew, 5 % and 95 % of single ones, and the odd ones."""
+    """Return the geometric mean, 95 % of it by bootstrap, 5 % and 95 % of single ones, and the odd ones."""
     numbers = (layers,) if layers else QUADRATIC
     each = np.array([[linear(cell, n) / n for n in numbers] for cell in furs])
     logs = np.log(each)
@@ -169,7 +169,7 @@ def trials(degrees: float) -> tuple[FurTrial, ...]:
 
 
 def ways() -> Rows:
-    """Root mean square error of the heights over N, and the standard error over patches of that of 16 layers."""
+    """Return the root mean square error of heights over N, and the standard error over patches at 16 layers."""
     found: Rows = []
     for way in WAYS:
         for degrees in DEGREES:
@@ -180,7 +180,7 @@ def ways() -> Rows:
 
 
 def least() -> Rows:
-    """The fewest layers of each way, by angle."""
+    """Return the fewest layers of each way, by angle."""
     found: Rows = []
     for way in WAYS:
         each = [least_layers(partial(error_of, trials(degrees), way), TOLERANCE) for degrees in LEAST_AT]
@@ -189,7 +189,7 @@ def least() -> Rows:
 
 
 def swept() -> Rows:
-    """ln rms = ln c + a ln y + b ln(r0 sqrt(n)), and with L tan / r0, too: constants, errors, what they leave."""
+    """Fit ln rms = ln c + a ln y + b ln(r0 sqrt(n)), and with L tan / r0, too: constants, errors, residuals."""
     found: Rows = []
     for tested in (1, 2):
         table, of = _swept_points(tested)
@@ -210,7 +210,7 @@ def swept() -> Rows:
 
 
 def _swept_points(tested: int) -> tuple[Floats, NDArray[np.intp]]:
-    """Rows rms, y, r0 sqrt(n), L tan / r0, of those within WITHIN, and which cell each is of."""
+    """Return rows rms, y, r0 sqrt(n), L tan / r0, of those within WITHIN, and the cell of each."""
     rows, of = [], []
     for number, cell in enumerate(cells()):
         aside = float(np.tan(np.radians(cell.degrees))) * cell.slender
@@ -222,7 +222,7 @@ def _swept_points(tested: int) -> tuple[Floats, NDArray[np.intp]]:
 
 
 def _errors(made: Floats, logs: Floats, of: NDArray[np.intp]) -> Floats:
-    """Standard deviations of a line's constants by furs and angles drawn anew."""
+    """Return the standard deviations of a line's constants by furs and angles drawn anew."""
     own, rng, found = [np.flatnonzero(of == number) for number in np.unique(of)], np.random.default_rng(0), []
     for _ in range(DRAWS // 4):
         rows = np.concatenate([own[i] for i in rng.integers(0, len(own), len(own))])
@@ -231,7 +231,7 @@ def _errors(made: Floats, logs: Floats, of: NDArray[np.intp]) -> Floats:
 
 
 def cost() -> Rows:
-    """Time of a layer over that of a shell, where a ray meets next to nothing; by OpenGL, ends over the turns."""
+    """Return the time of a layer over a shell's, where a ray meets next to nothing; by OpenGL, ends over turns."""
     patch, (few, many) = random_patch(1.0, 0.01, 1.0, 6.0), COST_LAYERS
     view, _ = patch_view(patch, 0.25 * np.pi, (256, 256))
     taken: dict[str, list[float]] = {way.name: [] for way in COSTS}

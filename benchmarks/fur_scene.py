@@ -33,7 +33,7 @@ COLOURS = {LINEAR.name: GREY, QUADRATIC.name: VERMILION, FITTED.name: ORANGE, SW
 
 
 def unions() -> Rows:
-    """The share of rays that meet a strand's discs, over the cone's shadow; by its closed form, and what is off."""
+    """Return the share of rays that meet a strand's discs, over the cone's shadow; its closed form, and error."""
     patch, found = Patch(np.array([[1.0, 1.0]]), SIDE, ROOT, 1.0), Rows()
     with opened() as context, FurPasses(context, FurSurface.of_patch(patch), (RAYS, RAYS)) as passes:
         for way in (LINEAR, QUADRATIC):
@@ -48,7 +48,7 @@ def unions() -> Rows:
 
 
 def pictures() -> Rows:
-    """The example by each way: errors over the mean of its light."""
+    """Return errors of the example by each way, over the mean of its light."""
     with opened() as context:
         panel = tradeoff.picture(context, tradeoff.FurSizes(layers=LAYERS))
     errors = {(one.method, one.label): one.error.value for one in panel.points}
@@ -56,7 +56,7 @@ def pictures() -> Rows:
 
 
 def gamma() -> Rows:
-    """The example's truth, its rays encoded and then averaged, less the average encoded, in steps of 8 bits."""
+    """Return the example's truth, its rays encoded and then averaged, less the average encoded, in steps of 8 bits."""
     found: Rows = []
     with opened() as context:
         for fine in FINER:
@@ -69,14 +69,14 @@ def gamma() -> Rows:
 
 
 def lobes() -> Rows:
-    """Mean of a lobe over all directions by quadrature over the cosine, as published and normalised."""
+    """Return the mean of a lobe over all directions by quadrature over the cosine, as published and normalised."""
     cosine, weight = np.polynomial.legendre.leggauss(256)
     means = [(p, float(0.5 * weight @ (1.0 - cosine**2) ** (0.5 * p))) for p in EXPONENTS]
     return [(p, mean, mean / float(law.lobe_mean(p))) for p, mean in means]
 
 
 def figures(context: moderngl.Context, folder: Path, panels: Sequence[Panel], device: str) -> None:
-    """The example's truth and the five ways, three beside three, and error over time toward six angles."""
+    """Draw the example's truth and the five ways, three beside three, and error over time toward six angles."""
     with scene.bench(context, tradeoff.request()) as found:
         each = [found.truth, *(found.averaged(found.rays(way, SHOWN)[0]) for way in WAYS)]
         larger = [np.kron(to_srgb(one[::-1], found.exposure), np.ones((LARGER, LARGER, 1), np.uint8)) for one in each]

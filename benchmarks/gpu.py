@@ -1,4 +1,4 @@
-"""The order-resolved run on a GPU, if jax sees one. A process of its own, since jax's platform is chosen once.
+"""Order-resolved run on a GPU, if jax sees one. A process of its own, since jax's platform is chosen once.
 
 `gpu.py PHOTONS` prints a line of JSON: the device, events and photons a second; or null, where there is no GPU.
 """
@@ -17,7 +17,7 @@ QUIET = {"TF_CPP_MIN_LOG_LEVEL": "3"}
 
 
 class Measured(TypedDict):
-    """What `measure` tells."""
+    """Result of `measure`."""
 
     device: str
     events_per_second: float
@@ -25,7 +25,7 @@ class Measured(TypedDict):
 
 
 def measure(photons: int) -> Measured | None:
-    """Best of three runs; None without a GPU."""
+    """Return the best of three runs; None without a GPU."""
     environment = {k: v for k, v in os.environ.items() if k != "JAX_PLATFORMS"} | QUIET
     command = [sys.executable, __file__, str(photons)]
     answer = subprocess.run(

@@ -1,4 +1,4 @@
-"""The table of half spaces that scatter forwards, which `mcml_sim.exact` reads: made anew.
+"""Table of half spaces that scatter forwards, which `mcml_sim.exact` reads: made anew.
 
     python -m benchmarks.half_space_table [--photons 2e9] [--out FILE]
 
@@ -57,17 +57,17 @@ class Low(NamedTuple):
     """Photons of a conservative half space that left after few scatterings."""
 
     exits: NDArray[np.int64]
-    """By ring (the last: beyond) and order, (rings + 1, orders)."""
+    """Photons by ring (the last: beyond) and order, (rings + 1, orders)."""
     started: int
 
 
 def beyond(g: float) -> int:
-    """How many orders are photons'. Light that turns slowly is narrow for longer."""
+    """Return how many orders are photons'. Light that turns slowly is narrow for longer."""
     return 24 if g < SLOW else MOST_ORDERS
 
 
 def traced(setting: Setting, photons: int, seed: int) -> Low:
-    """At least so many photons, up to `beyond` scatterings."""
+    """Trace at least so many photons, up to `beyond` scatterings."""
     orders = beyond(setting.g)
     columns = np.full(2 * MOST_ORDERS + 1, MOST_ORDERS, np.int32)
     columns[MOST_ORDERS + 1 :] = np.arange(MOST_ORDERS)
@@ -82,13 +82,13 @@ def traced(setting: Setting, photons: int, seed: int) -> Low:
 
 
 def solved(n: float, g: float) -> list[SplinedLight]:
-    """Under either light, from stored photons."""
+    """Solve under either light, from stored photons."""
     settings = [Setting(name, n, g) for name in ILLUMINATIONS]
     return joined(settings, [stored(setting) for setting in settings])
 
 
 def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness | None = None) -> list[SplinedLight]:
-    """Of one n and g under both lights: the photons' orders, which are known at any albedo, and the rest."""
+    """Join one n and g under both lights: the photons' orders, which are known at any albedo, and the rest."""
     n, g = settings[0].n, settings[0].g
     orders, rule = beyond(g), rule or high_orders.fine(g)
     alpha, kappa = unreduced(1.0 - S**2, g), high_orders.decay_rates(1.0 - S**2, g)
@@ -119,7 +119,7 @@ def joined(settings: list[Setting], low: list[Low], rule: high_orders.Fineness |
 
 
 def _high(n: float, g: float, orders: int, x: Floats, rule: high_orders.Fineness) -> tuple[Floats, Floats]:
-    """Of both lights, at S, over alpha^(orders + 1): solved at fewer albedos. And its relative error.
+    """Solve both lights, at S, over alpha^(orders + 1), at fewer albedos; and their relative error.
 
     Where digits are lost it goes on as light far away does, x^-2 once its decay is taken out, which its slope
     approaches as 1 / x.
@@ -155,7 +155,7 @@ def _continued(row: Floats, x: Floats, known: NDArray[np.intp]) -> None:
 
 
 def _locally() -> tuple[Floats, Floats]:
-    """From values at SOLVED to those at S, (64, 20): polynomials through the eight next ones, in Chebyshev's angle.
+    """Interpolate values at SOLVED to S, (64, 20): polynomials through the eight next ones, in Chebyshev's angle.
 
     And how many of the four next ones each is. One polynomial through all of them would carry what happens next to
     black over all albedos.
@@ -176,7 +176,7 @@ def _locally() -> tuple[Floats, Floats]:
 def _rest(
     alpha: float, g: float, kappa: float, low: Low, entered: float, x: Floats, high: Floats, doubt: Floats
 ) -> Floats:
-    """Splines of f at one albedo, from rings of photons and what is solved at x [mfp]."""
+    """Return splines of f at one albedo, from rings of photons and what is solved at x [mfp]."""
     once_more = alpha ** np.arange(1, low.exits.shape[1] + 1)
     once_more[0] = 0.0
     length = 1.0 / (1.0 - alpha * g)
@@ -203,7 +203,7 @@ def _rest(
 
 
 def _held(spline: Floats, logs: Floats) -> Callable[[Floats], Floats]:
-    """A spline on KNOTS, straight on from its data's ends by the slope of the last half."""
+    """Return a spline on KNOTS, straight on from its data's ends by the slope of the last half."""
     curve, first, last = BSpline(KNOTS, spline, 3), logs[0], logs[-1]
     slope = (curve(last) - curve(last - 0.5)) / 0.5
 
@@ -222,7 +222,7 @@ def _decay(x: Floats) -> Floats:
 
 
 def isotropic(setting: Setting) -> SplinedLight:
-    """Where g = 0, from the exact solution."""
+    """Return the splines where g = 0, from the exact solution."""
     alpha, log = 1.0 - S**2, np.arange(np.log(table.FIRST), np.log(table.LAST), 0.06)
     kappa, rest = np.asarray(exact.decay_rate(alpha)), []
     for a, rate in zip(alpha, kappa, strict=True):
@@ -233,7 +233,7 @@ def isotropic(setting: Setting) -> SplinedLight:
 
 
 def smoothed(log: Floats, values: Floats, error: Floats) -> Floats:
-    """B-splines on KNOTS: the smoothest whose misfit is no more than the errors."""
+    """Return B-splines on KNOTS: the smoothest whose misfit is no more than the errors."""
     basis = BSpline.design_matrix(log, KNOTS, 3).toarray() / error[:, None]
     bends = np.diff(np.eye(KNOTS.size - 4), 3, axis=0)
     allowed, found = values.size + np.sqrt(2.0 * values.size), None
@@ -246,19 +246,19 @@ def smoothed(log: Floats, values: Floats, error: Floats) -> Floats:
 
 
 def at_white(values: Floats) -> float:
-    """At s = 0, of the polynomial through values at the nodes S."""
+    """Return the value at s = 0, of the polynomial through values at the nodes S."""
     return float(np.polynomial.chebyshev.chebval(-1.0, coefficients(values)))
 
 
 def stored(setting: Setting) -> Low:
-    """Photons traced before."""
+    """Return photons traced before."""
     arrays = read_npz(read_whole(COUNTS, 1 << 26), 1 << 26)
     name = name_of(setting)
     return Low(arrays[f"{name} exits"].astype(np.int64), int(arrays[f"{name} started"]))
 
 
 def name_of(setting: Setting) -> str:
-    """What its arrays are called."""
+    """Return the name of arrays."""
     return f"{setting.illumination} n {setting.n:g} g {setting.g:.4f}"
 
 
@@ -293,7 +293,7 @@ def main() -> None:
 
 
 def content(arrays: dict) -> bytes:
-    """Of a file that holds them."""
+    """Return the content of a file that holds arrays."""
     file = io.BytesIO()
     np.savez_compressed(file, allow_pickle=False, **arrays)
     return file.getvalue()

@@ -42,7 +42,7 @@ NODES = np.polynomial.legendre.leggauss(5)
 
 
 class Row(NamedTuple):
-    """One albedo."""
+    """Errors at one albedo."""
 
     alpha: float
     middle: tuple[float, int]
@@ -51,11 +51,11 @@ class Row(NamedTuple):
     worst: tuple[float, float, float]
     """The largest relative difference, its standard error, and the ring's middle [l*]."""
     total: tuple[float, float]
-    """A: relative difference, and in standard errors."""
+    """Relative difference of A, and the same in standard errors."""
 
 
 def reference(setting: Setting) -> Orders:
-    """The photons of a half space."""
+    """Return the photons of a half space."""
     arrays, name = read_npz(read_whole(REFERENCE, 1 << 26), 1 << 26), half_space_table.name_of(setting)
     exits, started = arrays[f"{name} exits"], int(arrays[f"{name} started"])
     if exits.shape[0] == arrays[f"{name} edges"].size - 1:
@@ -64,12 +64,12 @@ def reference(setting: Setting) -> Orders:
 
 
 def rows(setting: Setting, found: Orders) -> list[Row]:
-    """Of every albedo."""
+    """Yield the row of every albedo."""
     return [row(setting, found, alpha) for alpha in ALPHAS]
 
 
 def row(setting: Setting, found: Orders, reduced: float) -> Row:
-    """Of one reduced albedo."""
+    """Return the row of one reduced albedo."""
     alpha, edges = unreduced(reduced, setting.g), found.grid.r_edges
     width = np.diff(edges)[:, None]
     r = 0.5 * (edges[:-1, None] + edges[1:, None] + width * NODES[0])
@@ -93,7 +93,7 @@ def row(setting: Setting, found: Orders, reduced: float) -> Row:
 
 
 def finer(n: float, g: float) -> float:
-    """The largest relative change of light scattered more than once, .05 to 15 l*, with four more harmonics."""
+    """Return the largest relative change of light scattered more than once, .05 to 15 l*, with four more harmonics."""
     rule = high_orders.fine(g)
     settings = [Setting(name, n, g) for name in half_space_table.ILLUMINATIONS]
     low = [half_space_table.stored(one) for one in settings]

@@ -1,4 +1,4 @@
-"""The balance of texture and screen, fitted to sixty random scenes and judged on sixty others; and the heart's scene.
+"""Balance of texture and screen, fitted to sixty random scenes and judged on sixty others; and the heart's scene.
 
     python -m benchmarks.heart            # half an hour on two cores
     python -m benchmarks.heart --count 6  # fewer scenes
@@ -52,7 +52,7 @@ PIXEL, OF_SHEET, MOST = 0.1, (0.5, 1.0), 800
 
 
 def kernels() -> list[Kernel]:
-    """Of the stacks, in diffuse light."""
+    """Return kernels of the stacks, in diffuse light."""
     found = []
     for name in STACKS:
         media = request_of(name).stack.media
@@ -62,7 +62,7 @@ def kernels() -> list[Kernel]:
 
 
 def rows(own: Errors, judged: Errors) -> list[tuple[str, ...]]:
-    """What is fitted, and what it is worth."""
+    """Yield what is fitted, and its errors."""
     best, refits = fitted(own)
     row, column = (int(np.argmin(np.abs(grid - one))) for grid, one in zip(GRID, best, strict=True))
     found = judged.balanced[:, row, column]
@@ -85,7 +85,7 @@ def rows(own: Errors, judged: Errors) -> list[tuple[str, ...]]:
 
 
 def choices(lights: list[SplitLight], units: list[float]) -> list[tuple[str, ...]]:
-    """How often what the screen misses says rightly whether an atlas is needed: numbers of scenes."""
+    """Count how often what the screen misses says rightly whether an atlas is needed: numbers of scenes."""
     needs = [AtlasNeed(light.rms(light.screen), light.rms(light.truth + light.missed), TOLERANCE) for light in lights]
     said, broken = np.array([(one.verdict == "atlas", one.is_broken) for one in needs]).T
     clear = np.array([light.hidden > NEAR * one for light, one in zip(lights, units, strict=True)])
@@ -99,7 +99,7 @@ def choices(lights: list[SplitLight], units: list[float]) -> list[tuple[str, ...
 
 
 def sheets() -> list[tuple[str, ...]]:
-    """Errors on a sheet that hides light, of white, by texels [mean free paths]."""
+    """Return errors on a sheet that hides light, of white, by texels [mean free paths]."""
     law = profilefit.load("gaussians")
     weights = np.exp(np.asarray(law.log_weights(ALPHA)))
     kernel = Kernel(np.asarray(law.variances(ALPHA)), np.repeat(weights[:, None], 3, axis=1))
@@ -120,13 +120,13 @@ def sheets() -> list[tuple[str, ...]]:
 
 
 def request(size: tuple[int, int] = (160, 120)) -> scene.HeartRequest:
-    """The example, at that many pixels."""
+    """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
     return replace(scene.read(str(path), read_toml(Path(path))), size=size)
 
 
 def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tuple[str, ...]], str]:
-    """Error and cost of each way at each size; rows of them and of frames; the device."""
+    """Return error and cost of each way at each size; rows of them and of frames; the device."""
     light, found, told = scene.light_of(request().stack, COUNT), {}, []
     with opened() as context:
         for size in SIZES:
@@ -144,7 +144,7 @@ def costs() -> tuple[dict[tuple[int, int], dict[str, list[ChartPoint]]], list[tu
 
 
 def finer() -> list[tuple[str, ...]]:
-    """Errors as the atlas is refined."""
+    """Return errors as the atlas is refined."""
     found = []
     light = scene.light_of(request().stack, COUNT)
     with opened() as context, scene.bench(context, request(), light, JUDGED) as own:
@@ -156,7 +156,7 @@ def finer() -> list[tuple[str, ...]]:
 
 
 def edges() -> list[tuple[str, ...]]:
-    """Errors of radiance next to outlines, over the mean of what is seen, against 8 x 8 samples a pixel.
+    """Return errors of radiance next to outlines, over the mean of what is seen, against 8 x 8 samples a pixel.
 
     Jitter is the mean over many frames of a pixel's place moved by a Gaussian: a blur, by its variance.
     """
@@ -189,7 +189,7 @@ def edges() -> list[tuple[str, ...]]:
 
 
 def mapped() -> dict[str, np.ndarray]:
-    """Errors by texel and view."""
+    """Return errors by texel and view."""
     with opened() as context:
         return chart.over_texel_and_view(context, request(), scene.light_of(request().stack, COUNT), TEXELS, VIEWS)
 

@@ -21,7 +21,7 @@ PICTURED = ("split", "texture", "screen", "none")
 
 @styled
 def cost_figure(of_size: Mapping[tuple[int, int], Mapping[str, Sequence[ChartPoint]]], device: str, path: Path) -> None:
-    """A panel a size: each way with its samples, bars from the least time to the most; the front in grey."""
+    """Draw a panel per size: each way with its samples, bars from the least time to the most; the front in grey."""
     figure = canvas(3.1, 2.6 * len(of_size))
     panels = figure.subplots(1, len(of_size), sharey=True, squeeze=False)[0]
     for ax, (size, ways) in zip(panels, of_size.items(), strict=True):
@@ -47,7 +47,7 @@ def cost_figure(of_size: Mapping[tuple[int, int], Mapping[str, Sequence[ChartPoi
 
 @styled
 def map_figure(errors: Mapping[str, np.ndarray], texels: Sequence[float], views: Sequence[float], path: Path) -> None:
-    """Errors of each way over texel and view, the least of a cell in bold."""
+    """Draw errors of each way over texel and view, the least of a cell in bold."""
     figure = canvas(2.8, 3.2 * len(errors))
     least = np.min(np.stack(list(errors.values())), axis=0)
     top = max(float(one.max()) for one in errors.values())
@@ -72,7 +72,7 @@ def map_figure(errors: Mapping[str, np.ndarray], texels: Sequence[float], views:
 
 
 def heart_picture(request: scene.HeartRequest, path: Path) -> None:
-    """The truth, and the heart by each way, side by side."""
+    """Draw the truth, and the heart by each way, side by side."""
     light = scene.light_of(request.stack, request.gaussians)
     with opened() as context, scene.bench(context, request, light) as own:
         judge, pictures = own.judge, []

@@ -42,7 +42,7 @@ SEED, PHOTONS, REPLICATES = 41, 20 * 2**20, 2000
 
 @dataclass(frozen=True)
 class Row:
-    """One line: whose constants, which truth, which errors, and what came out."""
+    """Line of the table: whose constants, which truth, which errors, and the result."""
 
     law: str
     truth: str
@@ -65,7 +65,7 @@ class Row:
 
 
 def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
-    """Every line of one recipe's law."""
+    """Yield every line of one recipe's law."""
     chosen = recipe.find(name, catalogue.fits_folder())
     edges = ring_edges(chosen.rings)
     light = simulate_orders(Grid.from_edges(r=edges), photons, SEED, chosen.setting, progress=False)
@@ -90,13 +90,13 @@ def rows(name: str, photons: int, replicates: int) -> Iterator[Row]:
 
 
 def _matched(noise: Floats, run: Profiles) -> Floats:
-    """Draws (k, m, n + 1) with a column for the light beyond, whether the covariance has one or not."""
+    """Return draws (k, m, n + 1) with a column for the light beyond, whether the covariance has one or not."""
     missing = run.energy.shape[1] + 1 - noise.shape[2]
     return np.pad(noise, ((0, 0), (0, 0), (0, missing)))
 
 
 def fitted(chosen: Recipe, law, profiles: Profiles, jackknife: bool = False) -> Fit:
-    """The fit of a recipe to other profiles, begun at `law`."""
+    """Fit a recipe to other profiles, from `law` on."""
     weighting = chosen.weighting
     shares = tuple((np.arange(weighting.shares) + 0.5) / max(weighting.shares, 1) * weighting.last_share)
     limits = weighting.energy_limit, weighting.source_limit, weighting.rising
@@ -105,7 +105,7 @@ def fitted(chosen: Recipe, law, profiles: Profiles, jackknife: bool = False) -> 
 
 
 def _of_law(chosen: Recipe, law, run: Profiles) -> Profiles:
-    """The energies that the law itself gives, with the run's noise, as photons would have it where there are fewer."""
+    """Return the energies of the law itself, with the run's noise, as photons would have it where there are fewer."""
     none = np.zeros_like(run.energy)
     reflectance = np.asarray(law.albedo.reflectance(run.alpha)) if chosen.pipeline != "albedo" else run.reflectance
     rings = Rings(run.alpha, run.r_edges, none, reflectance, none, run.alpha, np.zeros(3), np.zeros(0))
@@ -123,7 +123,7 @@ def _of_law(chosen: Recipe, law, run: Profiles) -> Profiles:
 
 
 def _with_its_noise(made: Profiles, run: Profiles) -> Profiles:
-    """Noise goes with the root of the light: where a law has hardly any, the run's own would drown it."""
+    """Scale noise with the root of the light: where a law has hardly any, the run's own would drown it."""
     fewer = np.divide(made.energy, run.energy, out=np.zeros_like(run.energy), where=run.energy > 0).clip(0.0, 1.0)
     whole = np.sqrt(np.column_stack([fewer, np.ones(len(fewer))]))
     if run.covariance is None:
@@ -135,7 +135,7 @@ def _with_its_noise(made: Profiles, run: Profiles) -> Profiles:
 
 
 def replace_edges(rings: Rings, edges: Floats) -> Rings:
-    """The same albedos on other rings, which hold nothing yet."""
+    """Return these albedos on other rings, which hold nothing yet."""
     none = np.zeros((np.asarray(rings.alpha).size, edges.size - 1))
     return Rings(rings.alpha, edges, none, rings.beyond, none, rings.weight, rings.limits, rings.xi)
 
@@ -146,7 +146,7 @@ def _exact(run: Profiles) -> Profiles:
 
 
 def _of_counts(chosen: Recipe, law, light: Orders, run: Profiles, replicates: int) -> Row:
-    """Runs of whole photons: those of `light` shared out anew, which makes its own energies the truth."""
+    """Yield runs of whole photons: those of `light` shared out anew, which makes its own energies the truth."""
     one = fitted(chosen, law, run)
     cells = np.append(light.counts.exits.ravel(), light.photons - light.counts.exits.sum())
     generator = np.random.default_rng(SEED + 2)

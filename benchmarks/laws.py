@@ -1,4 +1,4 @@
-"""What each profile law costs and how wrong it is: constants, functions, time over normalized diffusion's, rel and ks.
+"""Cost and error of each profile law: constants, functions, time over normalized diffusion's, rel and ks.
 
     python -m benchmarks.laws [--quick] [--json FILE] [--fits FOLDER]
 
@@ -25,7 +25,7 @@ from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, Contender
 
 
 def as_cells(row: ContenderResult) -> tuple[str, ...]:
-    """The row of the table of costs."""
+    """Return the the row of the table of costs."""
     profile, sampler = row.contender.constants
     return (
         row.contender.name,
@@ -42,12 +42,12 @@ def _few(counted: FunctionCounts) -> str:
 
 
 def as_errors(row: ContenderResult) -> tuple[str, ...]:
-    """The row of the table of errors."""
+    """Return the the row of the table of errors."""
     return row.contender.name, *(f"{value:.2g}" for e in (row.rel, row.ks) for value in (e.mean(), e.max()))
 
 
 def as_numbers(row: ContenderResult) -> dict[str, object]:
-    """The same for --json."""
+    """Return the row for --json."""
     return {
         "constants": sum(row.contender.constants),
         "functions": {part: dict(counted.point) for part, counted in row.counts.items()},
@@ -60,7 +60,7 @@ def as_numbers(row: ContenderResult) -> dict[str, object]:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="few points, turns and albedos: noisy")
     parser.add_argument("--json", type=Path, metavar="FILE", help="write all numbers there too")

@@ -1,4 +1,4 @@
-"""A head of layers, way by way: error and cost in three poses, shares of its light, where layers matter.
+"""Head of layers, way by way: error and cost in three poses, shares of its light, where layers matter.
 
     python -m benchmarks.layers            # six minutes on two cores, of which the exact light takes two
     python -m benchmarks.layers --frames   # time of a frame over resolution and number of faces
@@ -52,13 +52,13 @@ THICKNESSES, MFPS = (0.1, 0.3, 1.0, 3.0, 10.0), (0.1, 0.3, 1.0, 3.0, 10.0)
 
 
 def request_of(size: tuple[int, int] = (128, 96)) -> scene.LayersRequest:
-    """The example, at that many pixels."""
+    """Return the example, at that many pixels."""
     path = shipped("examples") / FILE
     return replace(scene.read(str(path), read_toml(Path(path))), size=size)
 
 
 def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
-    """Rows of error and milliseconds of each way in each pose; one table of exact light serves all."""
+    """Yield error and milliseconds of each way in each pose; one table of exact light serves all."""
     table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
     rows = []
     with opened() as context, Stage(context, request.size) as stage:
@@ -72,7 +72,7 @@ def poses(request: scene.LayersRequest) -> list[tuple[str, ...]]:
 
 
 def shares() -> list[tuple[str, ...]]:
-    """Single : multiple : mirrored light of the stacks, by colour, isotropic and with g = 0.9."""
+    """Yield single : multiple : specular light of the stacks, by colour, isotropic and with g = 0.9."""
     rows = []
     for channel in range(3):
         for name, medium in stacks(channel).items():
@@ -85,13 +85,13 @@ def shares() -> list[tuple[str, ...]]:
 
 
 def matter() -> list[tuple[str, ...]]:
-    """Error of one half space over thickness and the mean free path below."""
+    """Return the error of one half space over thickness and the mean free path below."""
     errors = chart.one_half_space_errors(THICKNESSES, MFPS)
     return [(f"{d:g}", *(f"{100 * value:.2g}" for value in row)) for d, row in zip(THICKNESSES, errors, strict=True)]
 
 
 def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
-    """Milliseconds of a whole frame over resolution and faces: what figure 11 a of Zhao et al. charts."""
+    """Return milliseconds of a whole frame over resolution and faces: figure 11 a of Zhao et al."""
     laws, rows = scene.laws_of(request.stack), []
     with opened() as context:
         for size in SIZES:
@@ -109,7 +109,7 @@ def frames(request: scene.LayersRequest) -> list[tuple[str, ...]]:
 
 
 def head_picture(file: Path) -> None:
-    """Truth, stack, first layer's dipole, half space, side by side."""
+    """Draw truth, stack, first layer's dipole and half space, side by side."""
     request = request_of(LARGE)
     table = stack_table(request.stack.stack.media, request.least, request.most, request.stack.illumination)
     laws, pictures = scene.laws_of(request.stack), []
@@ -127,8 +127,11 @@ def head_picture(file: Path) -> None:
 
 
 def ear(file: Path) -> list[tuple[str, ...]]:
-    """Draw it by each way, side by side; rows of the light through a part with the layers on both sides, over what
-    arrives: exact plates, the scene's closed form, and what a half space's law has left beyond the thickness."""
+    """Draw an ear by each way, side by side.
+
+    Returns rows of the light through a part with the layers on both sides, over what arrives: exact plates, the scene's
+    closed form, and what a half space's law has left beyond the thickness.
+    """
     request = replace(
         request_of((320, 320)), camera=BEHIND, light=Light((0.4, 0.25, -0.9)), ambient=(0.05, 0.055, 0.06)
     )

@@ -1,4 +1,4 @@
-"""How often intervals of `profilefit fit` hold the truth, and what a measurement can know at all.
+"""Coverage of the intervals of `profilefit fit`, and what a measurement can know at all.
 
     python -m benchmarks.own_data                          # 200 media, n and g given and open: ten minutes
     python -m benchmarks.own_data --beams                  # under beams of .25 to 1 mm, given or not: the same
@@ -50,7 +50,7 @@ SCALE = {"scale": 1.0}
 
 
 class Medium(NamedTuple):
-    """One that is drawn; lengths in mm."""
+    """Medium that is drawn; lengths in mm."""
 
     setting: Setting
     alpha: float
@@ -59,7 +59,7 @@ class Medium(NamedTuple):
 
 
 class Coverage(NamedTuple):
-    """Of one quantity."""
+    """Coverage of one quantity."""
 
     held: float
     """Share of the intervals that hold the truth."""
@@ -70,14 +70,14 @@ class Coverage(NamedTuple):
 
 
 def drawn(rng: np.random.Generator) -> Medium:
-    """A medium of the prior."""
+    """Draw a medium of the prior."""
     n, g, s = rng.uniform(*FORWARD_N), rng.uniform(0.0, FORWARD_G), rng.uniform(0.03, 0.95)
     length = MIDDLE * np.exp(rng.uniform(-np.log(5.0), np.log(5.0)))
     return Medium(Setting(n=float(n), g=float(g)), 1.0 - s * s, float(length), rng.uniform(0.01, 0.03))
 
 
 def rows(one: Medium, rng: np.random.Generator, seen: Instrument = PENCIL, edges: Floats = EDGES) -> Measured:
-    """What is measured of it."""
+    """Return what is measured of a medium."""
     inner, outer = edges[:-1], edges[1:]
     light = Model(exact_light(one.setting), seen).predicted(_point(one)[None], inner, outer)[0, :-1]
     keep = light > 1e-9 * light[0]
@@ -88,14 +88,14 @@ def rows(one: Medium, rng: np.random.Generator, seen: Instrument = PENCIL, edges
 
 
 def coverage(count: int, opened: bool, jobs: int) -> dict[str, Coverage]:
-    """Over so many media, n and g given or `opened`."""
+    """Count over so many media, n and g given or `opened`."""
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         each = np.array(list(pool.map(partial(covered, opened), range(count))), float)
     return {name: _summary(each[:, at]) for at, name in enumerate(NAMES)}
 
 
 def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
-    """Of one medium of the series, by quantity: the truth is held; there is an answer; half-width over Fisher's."""
+    """Fit one medium of the series, by quantity: the truth is held; there is an answer; half-width over Fisher's."""
     rng = np.random.default_rng([1, at])
     one = drawn(rng)
     data, premises = rows(one, rng), _premises(one, opened)
@@ -110,7 +110,7 @@ def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
 
 
 def _ends(answer: Answer, name: str) -> tuple[float, float] | None:
-    """Of the interval that has two."""
+    """Return the ends of the interval that has two."""
     low, high = answer.whole_interval(name) or answer.interval(name) or (None, None)
     return None if low is None or high is None else (low, high)
 
@@ -141,7 +141,7 @@ def _question(premises: Premises) -> Question:
 def _fisher(
     one: Medium, data: Measured, seen: Instrument, ranges: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
-    """Relative errors that no unbiased estimate undercuts; what is a range is normal with the range's variance."""
+    """Return relative errors that no unbiased estimate undercuts; a range is normal with the range's variance."""
     truth, point = Question(exact_light(one.setting), SCALE, instrument=seen), _point(one)
     light, slopes = Model(truth.law, seen).linearised(point, data.inner, data.outer)
     rows = np.diag(data.sigma**2)
@@ -167,21 +167,21 @@ class Beams(NamedTuple):
     """Shares of media under beams of .25 to 1 mm, seen from 0 to 4 w on, scale known or free."""
 
     held: dict[str, float]
-    """Of the intervals, the beam given, those that hold the truth, by quantity."""
+    """Share of intervals, the beam given, that hold the truth, by quantity."""
     answered: float
-    """The beam given: both quantities have an interval, and no other medium fits as well."""
+    """Share, the beam given, where both quantities have an interval, and no other medium fits as well."""
     wrong: float
-    """The beam not given: an interval misses the truth."""
+    """Share, the beam not given, where an interval misses the truth."""
     warned: float
-    """Of these, the answer says so: the width or a misfit is noticed, or a beam as wide is said to matter."""
+    """Share of these where the answer says so: width or misfit are noticed, or a beam as wide is said to matter."""
     noticed: float
-    """Of these, the width or a misfit is noticed."""
+    """Share of these where the width or a misfit is noticed."""
     accused: float
-    """Of media under a pencil beam those where a width is noticed."""
+    """Share of media under a pencil beam where a width is noticed."""
 
 
 class Beamed(NamedTuple):
-    """One medium under a beam; as `Beams`, None where the share is not of it."""
+    """Medium under a beam; as `Beams`, None where the share is not of it."""
 
     held: tuple[bool, ...] | None
     answered: bool
@@ -192,13 +192,13 @@ class Beamed(NamedTuple):
 
 
 def beams(count: int, jobs: int) -> Beams:
-    """Over so many media; isotropic, n = 1, errors of .2 to 2 %."""
+    """Count over so many media; isotropic, n = 1, errors of .2 to 2 %."""
     with ProcessPoolExecutor(jobs, get_context("spawn")) as pool:
         return shares(list(pool.map(beamed, range(count))))
 
 
 def shares(each: list[Beamed]) -> Beams:
-    """Of many media."""
+    """Return the shares of many media."""
     held = np.mean([one.held for one in each if one.held is not None], axis=0)
     columns = ([getattr(one, name) for one in each] for name in Beamed._fields[1:])
     rest = (float(np.mean([one for one in column if one is not None])) for column in columns)
@@ -206,7 +206,7 @@ def shares(each: list[Beamed]) -> Beams:
 
 
 def beamed(at: int) -> Beamed:
-    """One medium of the series; the scale is known of every other."""
+    """Fit one medium of the series; the scale is known of every other."""
     rng, light = np.random.default_rng([2, at]), exact_light(Setting())
     s, length = rng.uniform(0.05, 0.8), np.exp(rng.uniform(np.log(0.2), np.log(2.0)))
     one = Medium(Setting(), 1.0 - s * s, float(length), float(np.exp(rng.uniform(np.log(0.002), np.log(0.02)))))
@@ -230,7 +230,7 @@ def beamed(at: int) -> Beamed:
 
 
 def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
-    """Whether the intervals hold the truth; None where a quantity has none with two ends."""
+    """Return whether the intervals hold the truth; None where a quantity has none with two ends."""
     inside = []
     for name in NAMES:
         if (ends := _ends(answer, name)) is None:
@@ -250,11 +250,11 @@ class Distortions(NamedTuple):
     """Shares of media whose light has a smooth relative error."""
 
     held: dict[str, float]
-    """Of the intervals by all errors, those that hold the truth, by quantity."""
+    """Share of intervals by all errors that hold the truth, by quantity."""
     answered: float
-    """Media that have such intervals."""
+    """Share of media that have such intervals."""
     accused: float | None
-    """Media under a pencil beam where a width is noticed; None where the beam is open."""
+    """Share of media under a pencil beam where a width is noticed; None where the beam is open."""
 
 
 def distortions(known: str, count: int, jobs: int) -> Distortions:
@@ -271,7 +271,7 @@ def distortions(known: str, count: int, jobs: int) -> Distortions:
 
 
 def distorted(known: str, at: int, noise: tuple[float, float] = (0.003, 0.01), **waves) -> tuple:
-    """Whether the intervals of one medium of the series hold mu_s', mu_a and A, and whether a width is noticed."""
+    """Return whether the intervals of one medium hold mu_s', mu_a and A, and whether a width is noticed."""
     data, one, seen = waved(np.random.default_rng([3, at]), "beam" in ALLOWED[known], noise, **waves)
     ranges = ALLOWED[known]
     middles = {name: float(np.mean(ends)) for name, ends in ranges.items()}
@@ -335,7 +335,7 @@ KNOWN = {
 
 
 def known_to(nearest: float, farthest: float, error: float, ranges: dict) -> dict[str, float]:
-    """Relative errors of tissue from rings a fifth apart in r."""
+    """Return relative errors of tissue from rings a fifth apart in r."""
     edges = np.geomspace(nearest, farthest, max(int(np.log(farthest / nearest) / 0.2), 4) + 1)
     seen = Instrument(Gaussian(0.5) if "beam" in ranges else None)
     light = Model(exact_light(TISSUE.setting), seen).predicted(_point(TISSUE)[None], edges[:-1], edges[1:])[0, :-1]
@@ -346,7 +346,7 @@ def known_to(nearest: float, farthest: float, error: float, ranges: dict) -> dic
 
 @styled
 def chart(path: Path) -> None:
-    """Error of mu_a and mu_s' over the nearest ring, the farthest, and the noise."""
+    """Draw the error of mu_a and mu_s' over the nearest ring, the farthest, and the noise."""
     panels = (
         ("nearest ring [mm], up to 15 mm", NEAREST, lambda x, ranges: known_to(x, 15.0, 0.02, ranges)),
         ("farthest ring [mm], from 0.2 mm", FARTHEST, lambda x, ranges: known_to(0.2, x, 0.02, ranges)),

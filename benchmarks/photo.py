@@ -1,4 +1,4 @@
-"""How well `profilefit photo` does on photographs whose truth is known, and what a mistake costs.
+"""Accuracy of `profilefit photo` on photographs whose truth is known, and what a mistake costs.
 
     python -m benchmarks.photo --jobs 2     # 200 photographs of four setups: an hour
     python -m benchmarks.photo --setups     # 200 photographs of as many setups
@@ -66,7 +66,7 @@ UNSAID = 5.0  # intervals, that a value may be wrong by without a warning
 
 
 class Truth(NamedTuple):
-    """What is photographed; lengths in mm."""
+    """Truth of a photograph; lengths in mm."""
 
     alpha: float
     length: float
@@ -76,7 +76,7 @@ class Truth(NamedTuple):
 
 
 class Setup(NamedTuple):
-    """What is photographed by a camera of its own: albedo and length [mm] of each channel's medium.
+    """Setup that is photographed by a camera of its own: albedo and length [mm] of each channel's medium.
 
     beam  1/e^2 radius as the fit is told it; white, grey whether there is such a card
     """
@@ -90,7 +90,7 @@ class Setup(NamedTuple):
 
 
 class Verdict(NamedTuple):
-    """What a photograph's answer says of one colour; an answer that was refused holds no value.
+    """Answer of a photograph for one colour; an answer that was refused holds no value.
 
     refusal  why there is no answer; empty where there is one
     warned   names of the values that a misfit, a rival or "not identified" warns of
@@ -104,7 +104,7 @@ class Verdict(NamedTuple):
 
 
 class Outcome(NamedTuple):
-    """Of one photograph, by quantity: relative error, stated, and Fisher's."""
+    """Errors of one photograph, by quantity: relative error, stated, and Fisher's."""
 
     off: Floats
     stated: Floats
@@ -112,7 +112,7 @@ class Outcome(NamedTuple):
 
 
 def drawn(rng: np.random.Generator) -> Truth:
-    """From what a fit believes, of media such as skin, wax and milk."""
+    """Draw from the prior of a fit, of media such as skin, wax and milk."""
     mu_s, mu_a = np.exp(rng.uniform(np.log(0.6), np.log(2.0))), np.exp(rng.uniform(np.log(0.01), np.log(0.15)))
     optics, camera = nuisances(rng, BEAM, CAMERA)
     length = 1.0 / (mu_s + mu_a)
@@ -120,7 +120,7 @@ def drawn(rng: np.random.Generator) -> Truth:
 
 
 def nuisances(rng: np.random.Generator, told: Known, camera: SpotCamera) -> tuple[SpotOptics, SpotCamera]:
-    """Beam, lens and surface as a fit believes them, and a lens that darkens the corners, the spot off the middle."""
+    """Draw beam, lens and surface from the prior of a fit; the lens darkens the corners, the spot is off centre."""
     beam, core = told.value * (1.0 + told.error / told.value * rng.standard_normal()), 0.06 * told.value
     glare = float(np.abs(0.02 + 0.02 * rng.standard_normal()))
     optics = SpotOptics(
@@ -138,7 +138,7 @@ def nuisances(rng: np.random.Generator, told: Known, camera: SpotCamera) -> tupl
 def exposures(
     radii: Floats, light: Floats | Mapping[str, Floats], camera: SpotCamera, rng: np.random.Generator
 ) -> list[Exposure]:
-    """A bracket, its times off by LATE; its light, of all channels or by channel, off by a correlated 1 %."""
+    """Return a bracket, its times off by LATE; its light, of all channels or by channel, off by a correlated 1 %."""
     by_channel = light if isinstance(light, Mapping) else {"": light}
     smooth = law_error.waves(np.maximum(radii, 0.1)) + 1e-9 * np.eye(radii.size)
     root = medium.UNEVEN * np.linalg.cholesky(smooth)
@@ -153,12 +153,12 @@ def exposures(
 
 
 def as_read(one: simulated.Taken, source: str) -> Exposure:
-    """As a raw file of it would be read."""
+    """Return a bracket as a raw file of it would be read."""
     return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
 
 
 def outcome(cards: bool, shaped: bool, at: int) -> Outcome:
-    """Of one photograph of the series, and where there are `cards`, of theirs; `shaped`: glare of another shape."""
+    """Fit one photograph of the series, and where there are `cards`, theirs; `shaped`: glare of another shape."""
     rng = np.random.default_rng([11, at])
     one = drawn(rng)
     if shaped:
@@ -188,7 +188,7 @@ def outcome(cards: bool, shaped: bool, at: int) -> Outcome:
 
 
 def _coordinates(one: Truth, shot: Shot, found: Floats) -> Floats:
-    """The truth, in the fit's coordinates; scales as fitted, and glare shared out among its halos."""
+    """Return the truth in the fit's coordinates; scales as fitted, and glare shared out among its halos."""
     x = found.copy()
     x[:2], x[3], x[4] = (u_of(one.alpha), np.log(one.length)), np.log(one.optics.sigma), one.optics.surface
     near = np.abs(np.log(np.array(shot.beliefs.halos) / one.optics.width))
@@ -197,7 +197,7 @@ def _coordinates(one: Truth, shot: Shot, found: Floats) -> Floats:
 
 
 def setup(at: int) -> Setup:
-    """The setup of this number of the series."""
+    """Return the setup of this number of the series."""
     rng = np.random.default_rng([13, at])
     while True:
         pitch, pixels = float(rng.uniform(0.05, 0.3)), float(np.exp(rng.uniform(np.log(2.0), np.log(12.0))))
@@ -218,12 +218,12 @@ def setup(at: int) -> Setup:
 
 
 def _farthest(camera: SpotCamera) -> float:
-    """[mm], beyond the corners."""
+    """Return the farthest radius [mm], beyond the corners."""
     return 1.2 * camera.pitch * float(np.hypot(*camera.sides))
 
 
 def verdicts(at: int) -> list[Verdict]:
-    """The answer to one photograph of the series, colour by colour."""
+    """Return the answer to one photograph of the series, colour by colour."""
     one, rng = setup(at), np.random.default_rng([17, at])
     radii = simulated.radii(_farthest(one.camera), one.optics)
     size = PixelScale(np.diag([one.camera.pitch, one.camera.pitch, 1.0]), "known")
@@ -281,7 +281,7 @@ def setups(count: int, jobs: int) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Mistake:
-    """What is done or believed wrongly; the photographs are taken so, or the fit is told so.
+    """Mistake in what is done or believed; the photographs are taken so, or the fit is told so.
 
     bent  power of the sensor's response;  pixel  its size over the true one
     """
@@ -312,7 +312,7 @@ MISTAKES = (
 
 
 def mistaken(one: Mistake) -> medium.PhotoFit:
-    """The fit of a medium of mu_s' 1 and mu_a .05 per mm, without cards."""
+    """Fit a medium of mu_s' 1 and mu_a .05 per mm, without cards."""
     optics, camera = SpotOptics(), replace(CAMERA, **one.camera)
     radii = simulated.radii(FARTHEST, optics)
     light = simulated.light(1.0 / 1.05, 1.0 / 1.05, SETTING, optics, radii)
@@ -332,7 +332,7 @@ def _bent(plane: BayerPlane, power: float) -> BayerPlane:
 
 
 def mistakes() -> None:
-    """Print what each does to the answer, over that of the same photographs, or ones like them, without it."""
+    """Print the effect of each on the answer, over that of the same photographs, or ones like them, without it."""
     right = None
     for one in MISTAKES:
         fit = mistaken(one)

@@ -1,4 +1,4 @@
-"""What is timed: the yardsticks and the tracer on the same problems."""
+"""Problems that are timed: the yardsticks and the tracer on the same ones."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ QUANTITIES = ("diffuse_reflectance", "transmittance", "absorbed")
 
 @dataclass(frozen=True)
 class Sizes:
-    """Photons that each work traces in one turn."""
+    """Numbers of photons that each work traces in one turn."""
 
     yardstick: int
     layered_yardstick: int
@@ -47,7 +47,7 @@ QUICK = Sizes(yardstick=50_000, layered_yardstick=20_000, half_space=2**19, laye
 
 
 def yardstick(photons: int, tally_rz: bool, alpha: float = ALPHA) -> Work:
-    """The scalar half space."""
+    """Trace the scalar half space."""
 
     def work(seed: int) -> int:
         reflected, absorbed = np.zeros(NR), np.zeros((NR, NZ)) if tally_rz else None
@@ -58,12 +58,12 @@ def yardstick(photons: int, tally_rz: bool, alpha: float = ALPHA) -> Work:
 
 
 def yardstick_events(photons: int = 200_000, alpha: float = ALPHA) -> float:
-    """Events a photon of the scalar half space."""
+    """Return the events per photon of the scalar half space."""
     return scalar_half_space.trace(0, photons, 1 - alpha, alpha, DR, np.zeros(NR), None, DZ)[0] / photons
 
 
 def layered_yardstick(photons: int, tally_rz: bool) -> Work:
-    """The scalar tracer of layers on the three-layer sample."""
+    """Trace the three-layer sample by the scalar tracer of layers."""
 
     def work(seed: int) -> int:
         scalar_layered.trace(THREE_LAYERS, EXITS_AND_RZ, photons, seed, tally_rz)
@@ -73,17 +73,17 @@ def layered_yardstick(photons: int, tally_rz: bool) -> Work:
 
 
 def half_space_grid(tally_rz: bool) -> Grid:
-    """The bins of the scalar half space."""
+    """Return the bins of the scalar half space."""
     return Grid(DR, NR, DZ, NZ) if tally_rz else Grid(DR, NR)
 
 
 def half_space_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) -> Tally:
-    """`simulate` on the scalar half space's problem."""
+    """Run `simulate` on the scalar half space's problem."""
     return simulate(half_space(ALPHA), half_space_grid(tally_rz), photons, seed, workers=workers, progress=False)
 
 
 def half_space_by_layers(photons: int, tally_rz: bool) -> Work:
-    """The same problem by the kernel for any layers, which `simulate` does not take for it."""
+    """Run the kernel for any layers, which `simulate` does not take for it, on the same problem."""
 
     def work(seed: int) -> int:
         for batch, first in enumerate(range(0, photons, layered_batch.BATCH_PHOTONS)):
@@ -95,24 +95,24 @@ def half_space_by_layers(photons: int, tally_rz: bool) -> Work:
 
 
 def half_space_events(photons: int = 2**18) -> float:
-    """Events a photon of `half_space_tally`: its scatterings, and its last flight as the yardstick counts it."""
+    """Return events per photon of `half_space_tally`: scatterings, and the last flight as the yardstick counts it."""
     stops = jnp.asarray(matched_batch.weights(ALPHA).stops)
     ends = orders_batch.trace(jnp.asarray(rng.batch_key(0, 0)), jnp.int32(photons), stops)
     return float(np.abs(np.asarray(ends.order)).sum() / photons) + 1
 
 
 def layered_tally(photons: int, tally_rz: bool, seed: int, workers: int = 1) -> Tally:
-    """`simulate` on the three-layer sample."""
+    """Run `simulate` on the three-layer sample."""
     return simulate(THREE_LAYERS, EXITS_AND_RZ if tally_rz else EXITS, photons, seed, workers=workers, progress=False)
 
 
 def orders(photons: int, seed: int, workers: int = 1) -> Orders:
-    """`simulate_orders` on the rings of the time to accuracy."""
+    """Run `simulate_orders` on the rings of the time to accuracy."""
     return simulate_orders(ORDER_RINGS, photons, seed, workers=workers, progress=False)
 
 
 def order_events(run: Orders) -> float:
-    """Scatterings a photon of `simulate_orders`, of those that roulette or the cap ended too.
+    """Return scatterings per photon of `simulate_orders`, of those that roulette or the cap ended too.
 
     Where roulette raises the weight from w to w' as many photons end, on average, as go on times w'/w - 1. So how many
     ended at which order follows from how many left after it; that it adds up to the run's own number is checked.
@@ -133,7 +133,7 @@ def order_events(run: Orders) -> float:
 
 
 def works(sizes: Sizes) -> dict[str, Work]:
-    """All that one core is timed on, by name."""
+    """Return all that one core is timed on, by name."""
     return {
         "yardstick": yardstick(sizes.yardstick, tally_rz=False),
         "yardstick, r-z": yardstick(sizes.yardstick, tally_rz=True),
@@ -150,7 +150,7 @@ def works(sizes: Sizes) -> dict[str, Work]:
 
 
 def yardstick_variance(blocks: int = 400, photons: int = 2000) -> tuple[float, float]:
-    """Diffuse reflectance of the scalar half space: mean, and variance of one photon."""
+    """Return the diffuse reflectance of the scalar half space: mean, and variance of one photon."""
     means = np.empty(blocks)
     for block in range(blocks):
         reflected = np.zeros(NR)
@@ -160,7 +160,7 @@ def yardstick_variance(blocks: int = 400, photons: int = 2000) -> tuple[float, f
 
 
 def layered_yardstick_variances(blocks: int = 400, photons: int = 500) -> tuple[np.ndarray, np.ndarray]:
-    """QUANTITIES of the three-layer sample by the scalar tracer: means (3,), and variances of one photon (3,).
+    """Return QUANTITIES of the three-layer sample by the scalar tracer: means (3,), and variances of one photon (3,).
 
     A variance between 400 blocks is known to sqrt(2 / 399), 7 %.
     """

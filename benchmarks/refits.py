@@ -1,4 +1,4 @@
-"""A fit repeated many times at once: on other photons for the bootstrap, on data drawn anew for interval coverage.
+"""Fit repeated many times at once: on other photons for the bootstrap, on data drawn anew for interval coverage.
 
 The bootstrap knows nothing of scattering orders, weights or covariances: batches are drawn with replacement, added up
 and fitted again (Efron, Annals of Statistics 7, 1979), so it checks the closed forms from outside. B batches know an
@@ -33,7 +33,7 @@ CHUNK = 100  # fits at once: a thousand Jacobians of a dozen constants do not fi
 
 
 def refitted(fit: Fit, energy: Floats, start: Floats | None = None) -> tuple[Floats, NDArray[np.bool_]]:
-    """Constants (k, p) of `fit` on other energies (k, m, n + 1), light beyond last, and whether each converged (k,).
+    """Return constants (k, p) of `fit` on other energies (k, m, n + 1), light beyond last, and convergence (k,).
 
     What counts in `fit` counts in all of them. `start` (p,) is where they begin, by default at the fit's own optimum.
     """
@@ -43,7 +43,7 @@ def refitted(fit: Fit, energy: Floats, start: Floats | None = None) -> tuple[Flo
 
 
 def whole_chunk(count: int) -> NDArray[np.intp]:
-    """Rows that fill a chunk with `count` of them: always one shape, which compiles once."""
+    """Return rows that fill a chunk with `count` of them: always one shape, which compiles once."""
     return np.arange(CHUNK) % count
 
 
@@ -55,7 +55,7 @@ def _chunk(fit: Fit, energy: Floats, start: Floats) -> tuple[Floats, NDArray[np.
 
 
 def _data(fit: Fit, energy: Floats) -> Any:
-    """What `ResidualFunction` reads, once for each of `energy` (k, m, n + 1)."""
+    """Return the data that `ResidualFunction` reads, once for each of `energy` (k, m, n + 1)."""
     data = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(energy), *np.shape(leaf))), (fit.law, fit.rings))
     return eqx.tree_at(lambda tree: (tree[1].energy, tree[1].beyond), data, (energy[..., :-1], energy[..., -1]))
 
@@ -94,7 +94,7 @@ def bootstrap(batches: Sequence[Orders], fit: Fit, number: int = 400, seed: int 
 
 
 def energies(batches: Sequence[Orders], fit: Fit) -> Floats:
-    """Energies (b, m, n + 1) of each batch on the rings of `fit`, the light beyond the last one last."""
+    """Return energies (b, m, n + 1) of each batch on the rings of `fit`, the light beyond the last one last."""
     if len(batches) < FEWEST:
         raise InputError(f"batches must be at least {FEWEST}, got {len(batches)}")
     if len({batch.photons for batch in batches}) > 1:
@@ -131,11 +131,11 @@ class Refits:
     gain: Floats
 
     def sandwich_errors(self, covariance: Covariance) -> Floats:
-        """Standard errors (k, p), each replicate's by the derivative of its own optimum."""
+        """Return standard errors (k, p), each replicate's by the derivative of its own optimum."""
         return np.sqrt(np.stack([np.diag(covariance.sandwich(one)) for one in self.gain]))
 
     def independent_errors(self, covariance: Covariance) -> Floats:
-        """The same (k, p) if each ring and albedo had noise of its own, which one run's photons do not give them."""
+        """Return errors (k, p) if each ring and albedo had noise of its own, which photons of one run do not give."""
         variance = np.sum(covariance.factor**2, axis=2).T
         rings = min(variance.shape[1], self.gain.shape[-1])
         return np.sqrt(np.einsum("kpai,ai->kp", self.gain[..., :rings] ** 2, variance[:, :rings]))
@@ -143,7 +143,7 @@ class Refits:
 
 @dataclass(frozen=True)
 class Coverage:
-    """How often intervals held the true constants.
+    """Shares of intervals that held the true constants.
 
     levels (L,) asked for; share (L, p) found; replicates behind each share; band (L, 2) where 99 of 100 honest tables
     have every one of their shares
@@ -157,7 +157,7 @@ class Coverage:
 
     @property
     def inside(self) -> NDArray[np.bool_]:
-        """(L, p) shares that lie in their band."""
+        """Whether each share lies in its band, (L, p)."""
         return (self.share >= self.band[:, :1]) & (self.share <= self.band[:, 1:])
 
     @property
@@ -180,26 +180,26 @@ def refits(fit: Fit, energy: Floats, noise: Floats) -> Refits:
 
 
 def gains(fit: Fit, parameters: Floats, energy: Floats) -> Floats:
-    """d constants / d energies (k, p, m, n + 1) at optima (k, p) of `fit` on energies (k, m, n + 1)."""
+    """Return d constants / d energies (k, p, m, n + 1) at optima (k, p) of `fit` on energies (k, m, n + 1)."""
     starts = range(0, len(parameters), CHUNK)
     return np.concatenate([_gains(fit, parameters[i : i + CHUNK], energy[i : i + CHUNK]) for i in starts])
 
 
 def coverage(names: tuple[str, ...], off: Floats, error: Floats, levels: tuple[float, ...] = LEVELS) -> Coverage:
-    """Shares of normal intervals that hold the truth: `off` (k, p) found less true, `error` (k, p) or (p,) stated."""
+    """Return shares of normal intervals that hold the truth: `off` (k, p) found less true, `error` (k, p) or (p,)."""
     within = np.abs(off)[None] <= norm.isf(0.5 - np.array(levels) / 2)[:, None, None] * error
     return counted(names, within, levels)
 
 
 def counted(names: tuple[str, ...], within: NDArray[np.bool_], levels: tuple[float, ...] = LEVELS) -> Coverage:
-    """The table of `within` (L, k, p): whether the interval of each level, replicate and constant held the truth."""
+    """Return the table of `within` (L, k, p): whether the interval of each level, replicate and constant held."""
     number = within.shape[1]
     band = np.array([binomial_band(level, number, len(levels) * len(names)) for level in levels])
     return Coverage(names, levels, within.mean(axis=1), number, band)
 
 
 def binomial_band(level: float, number: int, shares: int) -> tuple[float, float]:
-    """Shares of `number` trials between which all of `shares` independent ones lie with probability 0.99.
+    """Return shares of `number` trials between which all `shares` independent ones lie with probability 0.99.
 
     Clopper and Pearson (Biometrika 26, 1934) turned round: `level` lies in the interval of every share of the band.
     """

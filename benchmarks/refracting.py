@@ -1,4 +1,4 @@
-"""Exact light under surfaces that refract, and in stacks: how wrong it is, by what it does not share, and its seconds.
+"""Exact light under surfaces that refract, and in stacks: its error, by what it shares no code with, and seconds.
 
     python -m benchmarks.refracting                # ten minutes on two cores; --quick: a tenth of the photons
 
@@ -47,7 +47,7 @@ TURNS = 5
 
 
 def totals() -> float:
-    """Largest relative difference of A from that by the integral equation."""
+    """Return the largest relative difference of A from that by the integral equation."""
     pairs = [
         (exact.reflectance(alpha, where), exact.solve(half_space(alpha, n=where.n), where.illumination).reflectance)
         for where in SETTINGS
@@ -57,7 +57,7 @@ def totals() -> float:
 
 
 def doubled() -> float:
-    """Largest relative change of the transform at a real wave number, the total first of all, with twice the nodes."""
+    """Return the largest relative change of the transform at a real wave number, total first, with twice the nodes."""
     worst = 0.0
     with jax.enable_x64(True):
         for n in INDICES:
@@ -69,18 +69,18 @@ def doubled() -> float:
 
 
 def _transform(system: cone.System) -> NDArray[np.complex128]:
-    """R^ / alpha at alpha = 0.9 under both lights."""
+    """Return R^ / alpha at alpha = 0.9 under both lights."""
     matrix, leaving, source = map(np.asarray, system)
     return source @ np.linalg.solve(np.eye(len(matrix)) - 0.9 * matrix, leaving)
 
 
 def profile() -> float:
-    """Largest relative change of the profile with half as many nodes again."""
+    """Return the largest relative change of the profile with half as many nodes again."""
     return max(float(np.max(exact.error_estimate(RADII, ALPHAS, setting=where))) for where in SETTINGS)
 
 
 def matched() -> float:
-    """Largest relative difference of the profile at n - 1 = 1e-12 from the closed form at n = 1."""
+    """Return the largest relative difference of the profile at n - 1 = 1e-12 from the closed form at n = 1."""
     r = RADII[RADII < 5]
     pairs = [
         (exact.profile(r, ALPHAS, setting=Setting(light, n=BARELY)), exact.profile(r, ALPHAS, setting=Setting(light)))
@@ -90,7 +90,7 @@ def matched() -> float:
 
 
 def new_index() -> Floats:
-    """Seconds of 256 radii at 32 albedos under a surface that was never seen, compiled, in turns."""
+    """Return the seconds of 256 radii at 32 albedos under a surface that was never seen, compiled, in turns."""
     seconds = []
     for n in np.linspace(1.31, 1.49, TURNS + 1):
         begin = time.perf_counter()
@@ -104,7 +104,7 @@ def new_index() -> Floats:
 
 
 def derivatives() -> float:
-    """Largest relative difference of the profile's slopes by alpha, r, mfp and n from differences of fourth order."""
+    """Return the largest relative difference of the profile's slopes from differences of fourth order."""
     worst, at = 0.0, (0.9, 1.3, 1.2, 1.4)
     for light in LIGHTS:
 
@@ -122,7 +122,7 @@ def derivatives() -> float:
 
 
 def cut() -> float:
-    """Largest relative difference of the profile of a half space cut into three layers, hardly different, from it."""
+    """Return the largest relative difference of the profile of a half space cut into three nearly equal layers."""
     worst, r = 0.0, RADII
     for n in (1.0, *INDICES):
         layers = (
@@ -137,7 +137,7 @@ def cut() -> float:
 
 
 def stack() -> Floats:
-    """Seconds of `exact.solve` and 256 radii of three layers that refract, in turns."""
+    """Return the seconds of `exact.solve` and 256 radii of three layers that refract, in turns."""
     seconds = []
     for _ in range(TURNS + 1):
         begin = time.perf_counter()
@@ -147,7 +147,7 @@ def stack() -> Floats:
 
 
 def half_space_photons(photons: int) -> float:
-    """p-value of rings under n = 1.4, both lights, three albedos."""
+    """Return the p-value of rings under n = 1.4, both lights, three albedos."""
     chances = []
     for where in (Setting(light, n=1.4) for light in LIGHTS):
         run = simulate_orders(Grid.from_edges(r=EDGES), photons, seed=41, setting=where, progress=False)
@@ -159,7 +159,7 @@ def half_space_photons(photons: int) -> float:
 
 
 def stack_photons(photons: int) -> float:
-    """p-value of rings of LAYERS, both lights."""
+    """Return the p-value of rings of LAYERS, both lights."""
     grid, chances = Grid.from_edges(r=EDGES), []
     for light in LIGHTS:
         tally = simulate(LAYERS, grid, photons, seed=43, illumination=light, progress=False)
@@ -175,7 +175,7 @@ def _chance(seen: Floats, error: Floats, wanted: Floats) -> float:
 
 
 def main() -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--quick", action="store_true", help="a tenth of the photons")
     parser.add_argument("--json", type=Path, help="where to write the numbers")

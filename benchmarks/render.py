@@ -1,4 +1,4 @@
-"""What the render shows: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
+"""Renders judged: error over samples and time, the paper's Table 2 and Figure 14, bias and noise, pictures.
 
     python -m benchmarks.render errors|table2|fig14|variance|pictures|choices|refracting
                                 [--quick] [--size WxH] [--figure FILE] [--json FILE] [--reference FILE]
@@ -35,7 +35,7 @@ SIDES = re.compile(r"([1-9]\d{0,4})x([1-9]\d{0,4})")
 
 
 def errors(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """Every law over samples and over time, and two laws with every way to draw radii."""
+    """Judge every law over samples and over time, and two laws with every way to draw radii."""
     works, varied = contenders(), variants()
     samples = QUICK_SAMPLES if options.quick else SAMPLES
     seeds, turns = (QUICK_SEEDS, QUICK_TURNS) if options.quick else (SEEDS, TURNS)
@@ -53,7 +53,7 @@ def errors(context: moderngl.Context, options: argparse.Namespace) -> dict:
 
 
 def table2(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """The paper's Table 2."""
+    """Measure the paper's Table 2."""
     laws, size = contenders(), options.size or SCREEN
     works = {key: laws[key] for key in render_table2.KEYS}
     found = render_table2.timed(context, head_scene(), works, size, QUICK_TURNS if options.quick else 3)
@@ -63,14 +63,14 @@ def table2(context: moderngl.Context, options: argparse.Namespace) -> dict:
 
 
 def variance(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """Squared bias and variance of the estimator at a step edge."""
+    """Measure squared bias and variance of the estimator at a step edge."""
     found = render_variance.measured(context, QUICK_SAMPLES if options.quick else SAMPLES, 2 if options.quick else 24)
     render_variance.report(found)
     return render_variance.as_json(found)
 
 
 def pictures(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """Laws with equal samples and in equal time."""
+    """Draw laws with equal samples and in equal time."""
     titles = (
         f"{render_pictures.EQUAL} samples\neach\n\nbelow: their\ndifference from\nthe exact picture",
         f"in the time of\nhazard with\n{render_pictures.RICH} samples",
@@ -79,17 +79,17 @@ def pictures(context: moderngl.Context, options: argparse.Namespace) -> dict:
 
 
 def fig14(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """17 samples, uniform against importance."""
+    """Draw 17 samples, uniform against importance."""
     return _drawn(context, options, render_pictures.seventeen, ("the hazard law,\n17 samples",))
 
 
 def choices(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """A law for diffuse light against one for searchlights, one channel's radii against a mixture's."""
+    """Compare a law for diffuse light with one for searchlights, one channel's radii with a mixture's."""
     return _drawn(context, options, render_pictures.choices, ("the hazard law",))
 
 
 def refracting(context: moderngl.Context, options: argparse.Namespace) -> dict:
-    """Three laws of a surface that refracts: profiles, a head by each, and how far it is from the exact one."""
+    """Draw three laws of a surface that refracts: profiles, a head by each, and its error."""
     size = options.size or render_refracting.SIZE
     with render_refracting.judged_head(context, size, options.reference) as judge:
         found = render_refracting.shots(judge, 1 if options.quick else render_refracting.SEEDS)
@@ -140,7 +140,7 @@ def _png(text: str) -> Path:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("what", choices=tuple(WHAT))
     parser.add_argument("--quick", action="store_true", help="fewer samples, seeds and turns: a first look")

@@ -23,7 +23,7 @@ MEASURES = {"rmse": "RMSE / mean radiance [-]", "flip": "FLIP [-]"}
 
 @dataclass(frozen=True)
 class Measured:
-    """Of one contender: samples (n,); rmse and flip (n, seeds) [-]; milliseconds of the scatter pass (n, turns)."""
+    """Errors of one contender: samples (n,); rmse and flip (n, seeds) [-]; milliseconds of scattering (n, turns)."""
 
     samples: tuple[int, ...]
     rmse: Floats
@@ -31,7 +31,7 @@ class Measured:
     milliseconds: Floats
 
     def error(self, measure: str) -> tuple[Floats, Floats]:
-        """Mean over the seeds and its standard error, both (n,); one seed has none, and the error is 0."""
+        """Return the mean over the seeds and its standard error, both (n,); one seed has none, and the error is 0."""
         values = getattr(self, measure)
         seeds = values.shape[1]
         spread = values.std(axis=1, ddof=1) / np.sqrt(seeds) if seeds > 1 else np.zeros(len(values))
@@ -39,14 +39,14 @@ class Measured:
 
     @property
     def time(self) -> Floats:
-        """The least of the turns (n,) [ms]: what else the machine does only adds."""
+        """Least of the turns (n,) [ms]: what else the machine does only adds."""
         return self.milliseconds.min(axis=1)
 
 
 def measured(
     judge: Judged, works: Mapping[str, Contender], samples: Sequence[int], seeds: int, turns: int
 ) -> dict[str, Measured]:
-    """Errors seed by seed, then times in turns: what else the machine does hits all of them.
+    """Measure errors seed by seed, then times in turns: what else the machine does hits all of them.
 
     The separable filter draws nothing: all its seeds would be the same picture, so it has one.
     """
@@ -60,7 +60,7 @@ def measured(
 
 
 def _errors(judge: Judged, one: Contender, samples: Sequence[int], seeds: int) -> tuple[Floats, Floats]:
-    """(samples, seeds) each."""
+    """Return errors, (samples, seeds) each."""
     found = np.empty((2, len(samples), seeds))
     for row, number in enumerate(samples):
         for seed in range(seeds):
@@ -95,7 +95,7 @@ def _time_cells(one: Measured, yardstick: Measured) -> list[str]:
 
 @styled
 def draw(works: Mapping[str, Contender], found: Mapping[str, Measured], path: Path, device: str) -> None:
-    """Both measures over samples and over ms; `path` ends in .png."""
+    """Draw both measures over samples and over ms; `path` ends in .png."""
     figure = canvas(8.0)
     axes = figure.subplots(len(MEASURES), 2, sharex="col", sharey="row")
     samples = next(iter(found.values())).samples

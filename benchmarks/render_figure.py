@@ -15,7 +15,7 @@ from profilefit.report.figures.canvas import DPI
 
 
 def save(figure: Figure, path: Path, colours: int, kept: Sequence[Sequence[int]] = ()) -> None:
-    """A .png with a palette of up to 256 colours, each pixel the nearest, so that flat areas stay flat.
+    """Save a .png with a palette of up to 256 colours, each pixel the nearest, so that flat areas stay flat.
 
     kept  red, green, blue in 0 ... 255 that the palette has in any case: steps of a scale that must stay apart
     """

@@ -1,4 +1,4 @@
-"""The ways to scatter light that the render compares, and how each looks in every chart."""
+"""Techniques that the render compares, and how each looks in every chart."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ OPEN = "s"
 
 @dataclass(frozen=True)
 class Contender:
-    """A law and how its radii are drawn; of `sampling` the samples and the seed are set anew."""
+    """Law and how its radii are drawn; of `sampling` the samples and the seed are set anew."""
 
     label: str
     law: Law
@@ -33,7 +33,7 @@ class Contender:
 
     @property
     def size(self) -> float:
-        """Of a marker [points]: open ones stand around those of a law that is as good."""
+        """Size of a marker [points]: open ones stand around those of a law that is as good."""
         return 7.5 if self.marker == OPEN else 4.5
 
     @property
@@ -68,7 +68,7 @@ VARIANTS = (
 
 
 def contenders() -> dict[str, Contender]:
-    """All laws by key, and the separable filter."""
+    """Return all laws by key, and the separable filter."""
     found = {
         key: Contender(label, profilefit.load(name, constants, Setting(light)), Sampling(), colour, marker, dashes)
         for key, label, name, constants, light, colour, marker, dashes in WANTED
@@ -77,7 +77,7 @@ def contenders() -> dict[str, Contender]:
 
 
 def variants() -> dict[str, Contender]:
-    """Two laws with every way to draw radii."""
+    """Return two laws with every way to draw radii."""
     laws = contenders()
     return {
         f"{key}, {kind}, {channels}": replace(laws[key], sampling=Sampling(kind=kind, channels=channels))

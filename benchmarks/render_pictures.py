@@ -31,7 +31,7 @@ NEARLY, ROUNDS = 0.05, 8  # how equal a time is, and how often counts are mended
 
 @dataclass(frozen=True)
 class Shot:
-    """One picture with its caption; exitance (h, w, 3), milliseconds of the scatter pass."""
+    """Picture with its caption; exitance (h, w, 3), milliseconds of the scatter pass."""
 
     label: str
     exitance: Floats
@@ -41,7 +41,7 @@ class Shot:
 
 
 def shots(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) -> list[Shot]:
-    """A picture of each law with so many samples, and the least of its times, taken in turns."""
+    """Return a picture of each law with so many samples, and the least of its times, taken in turns."""
     found = []
     for (one, samples), time in zip(wanted, _least(judge, wanted, turns), strict=True):
         unit = "taps" if one.is_filter else "samples"
@@ -51,7 +51,7 @@ def shots(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) ->
 
 
 def _least(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) -> list[float]:
-    """[ms]; what else the machine does only adds, and hits all of them."""
+    """Return the least [ms]; what else the machine does only adds, and hits all of them."""
     times = [
         [judge.stage.time(one.law, judge.mfp, one.drawn(samples), repeats=1)[0] for one, samples in wanted]
         for _ in range(turns)
@@ -60,14 +60,14 @@ def _least(judge: Judged, wanted: Sequence[tuple[Contender, int]], turns: int) -
 
 
 def laws(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[list[Shot]]:
-    """Rows of shots: with equal samples, and in the time of RICH samples of the first."""
+    """Return rows of shots: with equal samples, and in the time of RICH samples of the first."""
     chosen = [works[key] for key in COLUMNS]
     equal = [(one, EQUAL) for one in chosen]
     return [shots(judge, equal, 2 * turns), shots(judge, _in_equal_time(judge, chosen, turns), 2 * turns)]
 
 
 def _in_equal_time(judge: Judged, chosen: Sequence[Contender], turns: int) -> list[tuple[Contender, int]]:
-    """Each law with as many samples as take the time of the first with RICH, to NEARLY, or the most there are."""
+    """Return each law with as many samples as take the time of the first with RICH, to NEARLY, or the most."""
     counts = np.full(len(chosen), RICH)
     for _ in range(ROUNDS):
         times = np.array(_least(judge, list(zip(chosen, counts.tolist(), strict=True)), turns))
@@ -80,14 +80,14 @@ def _in_equal_time(judge: Judged, chosen: Sequence[Contender], turns: int) -> li
 
 
 def seventeen(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[list[Shot]]:
-    """Figure 14 of Liang et al.: 17 samples, uniform against importance."""
+    """Draw figure 14 of Liang et al.: 17 samples, uniform against importance."""
     names = {"uniform": "uniform radii", "importance": "importance", "importance blue": "importance, blue noise"}
     wanted = [(replace(works["hazard"], sampling=Sampling(kind=kind), label=name), 17) for kind, name in names.items()]
     return [shots(judge, wanted, turns)]
 
 
 def choices(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[list[Shot]]:
-    """The law for diffuse light against that for searchlights; radii of the longest channel against a mixture."""
+    """Compare the law for diffuse light with that for searchlights; radii of the longest channel with a mixture."""
     mixture = replace(works["hazard"], sampling=Sampling(channels="mixture"), label="radii of a mixture")
     wanted = [
         (replace(works["hazard"], label="for diffuse light"), MOST_SAMPLES),
@@ -100,7 +100,7 @@ def choices(judge: Judged, works: Mapping[str, Contender], turns: int) -> list[l
 
 @styled
 def draw(judge: Judged, rows: Sequence[Sequence[Shot]], path: Path, titles: Sequence[str], device: str) -> None:
-    """Each row of shots with its row of differences below; the exact picture stands before. `path` ends in .png."""
+    """Draw each row of shots with its differences below; the exact picture stands before. `path` ends in .png."""
     columns = 1 + len(rows[0])
     side = 8.0 / max(columns, 4)
     figure = canvas(2 * len(rows) * (side + 0.30) + 0.35, width=side * columns + 0.1)
@@ -139,7 +139,7 @@ def _note(ax: Axes, text: str) -> None:
 
 
 def report(judge: Judged, rows: Sequence[Sequence[Shot]]) -> None:
-    """Print what the captions say."""
+    """Print the captions."""
     for row in rows:
         cells = [
             (

@@ -1,4 +1,4 @@
-"""Skin refracts: what laws made for n = 1 get wrong there, as profiles and as a head; the law in n beside them."""
+"""Skin refracts: errors of laws made for n = 1, as profiles and as a head; the law in n beside them."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ EXACT = "#BBBBBB"
 
 @dataclass(frozen=True)
 class Shot:
-    """A law with the head that it draws, (h, w, 3); errors of both, over the exact one [-].
+    """Law with the head that it draws, (h, w, 3); errors of both, over the exact one [-].
 
     profile_error  of R_d, mean over ln r and the colours shown;  error  root mean square, over the mean exitance
     """
@@ -57,14 +57,14 @@ class Shot:
 
 
 def judged_head(context: moderngl.Context, size: tuple[int, int], kept: Path | None) -> AbstractContextManager[Judged]:
-    """The head under a surface of n = 1.4 in the colour that this gives the material, with its exact answer."""
+    """Return the head under a surface of n = 1.4 in the colour of the material, with its exact answer."""
     x, y, z = (np.array(TARGET) + DISTANCE * unit(HEAD.direction)).tolist()
     scene = head_scene(MATERIAL, Camera((x, y, z), TARGET, HEIGHT), setting=SKIN)
     return judged(context, size, kept, True, scene, SCALE, SKIN)
 
 
 def shots(judge: Judged, seeds: int) -> list[Shot]:
-    """Each law asked for the same colour and the same mean free path."""
+    """Return the shot of each law, for the same colour and the same mean free path."""
     wanted = (
         ("normalized diffusion", profilefit.load("burley", "published:diffuse"), VERMILION),
         ("hazard, n = 1", profilefit.load("hazard", setting=MATCHED), GREEN),
@@ -89,13 +89,13 @@ def _profile_error(law: ProfileLaw) -> float:
 
 
 def _profile(law: ProfileLaw, r: Floats, colour: float) -> Floats:
-    """R_d [1/mfp^2] at the albedo at which the law's own half space has the colour."""
+    """Return R_d [1/mfp^2] at the albedo at which the law's own half space has the colour."""
     return np.asarray(law.profile(r, albedo_of(colour, law.setting)))
 
 
 @styled
 def draw(judge: Judged, found: Sequence[Shot], path: Path) -> None:
-    """A column a law: profiles, the head, its difference from the exact one. `path` ends in .png."""
+    """Draw a column per law: profiles, the head, its difference from the exact one. `path` ends in .png."""
     figure = canvas(7.9)
     grid = figure.add_gridspec(3, len(found), height_ratios=(1.0, 1.2, 1.2))
     top = None
@@ -132,7 +132,7 @@ def _end() -> float:
 
 
 def _profiles(ax: Axes, one: Shot, first: bool) -> None:
-    """r R_d over r: exact, and by the law."""
+    """Draw r R_d over r: exact, and by the law."""
     r = np.linspace(NEAREST, FARTHEST, 400)
     for colour in COLOURS_SHOWN:
         truth = r * np.asarray(exact.profile(r, albedo_of(colour, SKIN), setting=SKIN))
@@ -166,20 +166,20 @@ def _percent(share: float) -> str:
 
 
 def _radiance(judge: Judged, one: Shot) -> Floats:
-    """What the camera sees [light's unit / sr]: with highlights, which are the stage's own."""
+    """Return the camera's radiance [light's unit / sr]: with highlights, which are the stage's own."""
     sampling = Sampling(1)
     rest = judge.stage.render(one.law, judge.mfp, sampling) - judge.stage.scatter(one.law, judge.mfp, sampling) / np.pi
     return rest + one.exitance / np.pi
 
 
 def _difference(judge: Judged, one: Shot) -> Floats:
-    """(h, w) luminance less that of the exact picture, over its mean [-]; 0 where nothing scatters."""
+    """Return (h, w) luminance less that of the exact picture, over its mean [-]; 0 where nothing scatters."""
     mean = float((judge.truth[judge.mask] @ LUMINANCE).mean())
     return np.where(judge.mask, (one.exitance - judge.truth) @ LUMINANCE, 0.0) / mean
 
 
 def report(found: Sequence[Shot]) -> None:
-    """Print what the captions say."""
+    """Print the captions."""
     cells = [(one.title, f"{one.profile_error:.4f}", f"{one.error:.4f}") for one in found]
     show(f"Under a surface of n = {SKIN.n:g}", ("law", "R_d, mean relative error", "picture, RMSE"), cells)
 

@@ -23,13 +23,13 @@ KEYS = ("separable", "burley", "liang", "hazard", "quantile")
 
 @dataclass(frozen=True)
 class Timed:
-    """covered  share of the screen [-];  milliseconds  by passes, "scatter" or "frame", and law, (turns,)."""
+    """Milliseconds by passes, "scatter" or "frame", and law, (turns,), where a share `covered` of the screen is [-]."""
 
     covered: float
     milliseconds: dict[str, dict[str, Floats]]
 
     def ratio(self, passes: str, key: str) -> Ratio:
-        """Over the yardstick, turn by turn."""
+        """Return times over the yardstick's, turn by turn."""
         ratios = self.milliseconds[passes][key] / self.milliseconds[passes][YARDSTICK]
         return Ratio(float(np.median(ratios)), float(ratios.min()), float(ratios.max()))
 
@@ -42,7 +42,7 @@ def timed(
     turns: int,
     shares: Sequence[float] = COVERED,
 ) -> list[Timed]:
-    """All laws in turns; the scene from as near as it must be to cover each share of the screen."""
+    """Time all laws in turns; the scene is as near as it must be to cover each share of the screen."""
     return [_timed(context, covering(context, scene, share, size), works, size, turns) for share in shares]
 
 
@@ -63,7 +63,7 @@ def _timed(
 
 
 def report(title: str, works: Mapping[str, Contender], found: list[Timed]) -> None:
-    """Milliseconds, and ratios to the separable filter beside those of the paper."""
+    """Print milliseconds, and ratios to the separable filter beside those of the paper."""
     shares = [f"{100 * one.covered:.1f} %" for one in found]
     for passes in PASSES:
         rows = []

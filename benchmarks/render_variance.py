@@ -36,7 +36,7 @@ PLAIN_TRIALS = 768  # of each place, as many as 24 pictures have
 
 @dataclass(frozen=True)
 class Row:
-    """One way to gather, by samples (n,) and channel (3,): means over places of shares of A squared [-].
+    """Way to gather, by samples (n,) and channel (3,): means over places of shares of A squared [-].
 
     bias2  squared mean error, less what the noise of the mean adds, so that it may be below 0;  bias2_error  its
     standard error;  variance  of one estimate
@@ -50,7 +50,7 @@ class Row:
 
 
 def measured(context: moderngl.Context, samples: Sequence[int], seeds: int) -> list[Row]:
-    """Exact and hazard, uniform and importance, on the GPU; the plain twin of the last in float64."""
+    """Measure exact and hazard, uniform and importance, on the GPU; the plain twin of the last in float64."""
     material = translucent("skin1")
     mfp = SHORTEST * np.array(material.mfp) / min(material.mfp)
     x = np.arange(PLACES) - 0.5 * (PLACES - 1)
@@ -74,7 +74,7 @@ def measured(context: moderngl.Context, samples: Sequence[int], seeds: int) -> l
 
 
 def _on_gpu(stage: Stage, law, mfp: Floats, alpha: Sequence[float], sampling: Sampling, seeds: int) -> Floats:
-    """(3, places, estimates) shares of A."""
+    """Return (3, places, estimates) shares of A."""
     reflectance = exact.reflectance(np.array(alpha), DIFFUSE)
     columns = slice((SIZE[0] - PLACES) // 2, (SIZE[0] + PLACES) // 2)
     rows = slice((SIZE[1] - ROWS) // 2, (SIZE[1] + ROWS) // 2)
@@ -86,7 +86,7 @@ def _on_gpu(stage: Stage, law, mfp: Floats, alpha: Sequence[float], sampling: Sa
 
 
 def _plain(law: ProfileLaw, mfp: Floats, alpha: Sequence[float], x: Floats, samples: int) -> Floats:
-    """The mean of w E, radii of red: (3, places, trials)."""
+    """Return the mean of w E, radii of red: (3, places, trials)."""
     points = shifted_points(samples, PLAIN_TRIALS * len(x), 1).reshape(len(x), PLAIN_TRIALS, samples, 2)
     target, sampler = LawTarget(law), law.sampler
     own = np.asarray(sampler.sample(np.minimum(points[..., 0].ravel(), LAST_XI), alpha[0]))
@@ -106,7 +106,7 @@ def _row(label: str, samples: Sequence[int], drawn: Sequence[Floats], truth: Flo
 
 
 def parts_of(estimates: Floats, truth: Floats) -> tuple[Floats, Floats, Floats]:
-    """bias2, its standard error, variance, by channel (3,).
+    """Return bias2, its standard error and variance, by channel (3,).
 
     Of a place with the mean error m, known to s: m^2 - s^2 is right on average, its variance 4 M^2 s^2 + 2 s^4, where
     M is the true one; M^2 is taken to be m^2 - s^2, summed over the places and not below 0.

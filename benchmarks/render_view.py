@@ -1,4 +1,4 @@
-"""The picture that a render is judged by: a view of the head, the exact answer, two measures of error."""
+"""Picture that a render is judged by: a view of the head, the exact answer, two measures of error."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ REFERENCE = Path(surface_integral.__file__)  # a kept answer is that of another 
 
 @dataclass(frozen=True)
 class Judged(Judge):
-    """The view and its exact answer; truth_error is the answer's own, by `own_error`, None if not measured."""
+    """View and its exact answer; truth_error is the answer's own, by `own_error`, None if not measured."""
 
     truth_error: TruthError | None
 
     def flip(self, exitance: NDArray[np.floating]) -> float:
-        """Mean over the translucent pixels of FLIP (Andersson et al. 2020) [0, 1], seen at 67 pixels a degree."""
+        """Return the mean of FLIP over the translucent pixels (Andersson et al. 2020) [0, 1], at 67 pixels a degree."""
         pair = (np.ascontiguousarray(shown(image), np.float32) for image in (self.truth, exitance))
         difference, _, _ = flip_evaluator.evaluate(*pair, "LDR", applyMagma=False)
         return float(np.mean(difference[::-1][self.mask]))  # `shown` has row 0 at the top
@@ -55,7 +55,7 @@ def judged(
     scale: float = 1.0,
     setting: Setting = DIFFUSE,
 ) -> Iterator[Judged]:
-    """A view at a size [pixels]. The reference takes minutes: `kept` is where it lies, or will.
+    """Return a view at a size [pixels]. The reference takes minutes: `kept` is where it lies, or will.
 
     quick  leaves out the error of the reference itself;  scene  the close view, if none
     scale  mean free paths over those of the material, for a head of 1 / scale its size [-]
@@ -73,7 +73,7 @@ def judged(
 
 
 def shown(exitance: NDArray[np.floating]) -> Floats:
-    """sRGB in [0, 1] of the radiance, row 0 at the top."""
+    """Return sRGB in [0, 1] of the radiance, row 0 at the top."""
     linear = np.clip(EXPOSURE / np.pi * np.asarray(exitance, float)[::-1], 0.0, 1.0)
     return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)  # IEC 61966-2-1
 

@@ -1,4 +1,4 @@
-"""The scalar yardstick (`profilefit.studies.tradeoff.scalar`), compiled by numba, and a twin with squares."""
+"""Scalar yardstick (`profilefit.studies.tradeoff.scalar`), compiled by numba, and a twin with squares."""
 
 # ruff: noqa: NPY002 - numba compiles numpy's old generator (Mersenne Twister) into the loop; it would call the new one
 
@@ -19,7 +19,7 @@ trace = nb.njit(error_model="numpy")(scalar.trace)
 
 
 def squares(seed: int, photons: int, mu_a: float, mu_s: float, r_edges: Floats) -> tuple[Floats, Floats]:
-    """Weights and squared weights of what leaves by ring, each (rings + 1,), the last beyond the last edge."""
+    """Return weights and squared weights of what leaves by ring, each (rings + 1,), the last beyond the last edge."""
     sums = np.zeros((2, r_edges.size))
     _trace_squares(seed, photons, mu_a, mu_s, r_edges, sums)
     return sums[0], sums[1]
@@ -27,7 +27,7 @@ def squares(seed: int, photons: int, mu_a: float, mu_s: float, r_edges: Floats) 
 
 @nb.njit(error_model="numpy")  # as in C, no checks of divisors
 def _trace_squares(seed: int, photons: int, mu_a: float, mu_s: float, r_edges: Floats, sums: Floats) -> None:
-    """The same photons' walk as `trace`, with rings between any edges and with squares: slower, to learn variances."""
+    """Trace the photons of `trace`, with rings between any edges and with squares: slower, to learn variances."""
     np.random.seed(seed)
     mu_t = mu_a + mu_s
     for _ in range(photons):

@@ -1,4 +1,4 @@
-"""MCML's own algorithm for layered media, one photon at a time, compiled by numba: the yardstick for layers.
+"""Algorithm of MCML for layered media, one photon at a time, compiled by numba: the yardstick for layers.
 
 Wang, Jacques & Zheng (Comput. Methods Programs Biomed. 47, 1995), function by function: a step is drawn in mean free
 paths and what an interface cuts off is used up behind it; at an interface light reflects or passes at random, by
@@ -32,13 +32,13 @@ class Sums:
     """Weight of all photons, by bin; the last bin of r and z holds what falls beyond it too, as in MCML."""
 
     reflected: Floats
-    """Scattered or not, out of the top, (nr, na)."""
+    """Weight scattered or not, out of the top, (nr, na)."""
     transmitted: Floats
-    """Out of the bottom, (nr, na)."""
+    """Weight out of the bottom, (nr, na)."""
     absorbed_rz: Floats
-    """By ring and depth, (nr, nz); (1, 1), all in one, if that was not asked for."""
+    """Weight absorbed by ring and depth, (nr, nz); (1, 1), all in one, if that was not asked for."""
     events: int
-    """Scatterings."""
+    """Number of scatterings."""
 
 
 def trace(medium: Medium, grid: Grid, photons: int, seed: int, tally_rz: bool = True) -> Sums:
@@ -55,7 +55,7 @@ def trace(medium: Medium, grid: Grid, photons: int, seed: int, tally_rz: bool = 
 
 
 def specular(medium: Medium) -> float:
-    """Share of normally incident light that does not enter the first layer; through a first layer of glass, or not."""
+    """Return the share of normally incident light that does not enter the first layer; it may be glass."""
     first, *others = medium.layers
     above = ((medium.n_above - first.n) / (medium.n_above + first.n)) ** 2
     if first.mu_t > 0 or not others:
@@ -65,7 +65,7 @@ def specular(medium: Medium) -> float:
 
 
 def _layers(medium: Medium) -> tuple[Floats, Floats, Floats, Floats, Floats, Floats]:
-    """n with those above and below, depths of the interfaces, mu_t, absorbed share of an event, g, critical cosines."""
+    """Return n with those around, depths of the interfaces, mu_t, absorbed share of an event, g, critical cosines."""
     n = np.array([medium.n_above, *(layer.n for layer in medium.layers), medium.n_below])
     inside = n[1:-1]
     critical = np.sqrt(np.maximum(1 - np.stack([n[:-2], n[2:]]) ** 2 / inside**2, 0.0))
@@ -76,7 +76,7 @@ def _layers(medium: Medium) -> tuple[Floats, Floats, Floats, Floats, Floats, Flo
 
 @nb.njit(error_model="numpy")  # as in C, no checks of divisors
 def _fresnel(n_from: float, n_to: float, cosine: float) -> tuple[float, float]:
-    """Share reflected of unpolarised light below the critical angle, and the cosine behind the interface."""
+    """Return the share reflected of unpolarised light below the critical angle, and the cosine behind the interface."""
     if n_from == n_to:
         return 0.0, cosine
     if cosine > STRAIGHT:
@@ -89,7 +89,7 @@ def _fresnel(n_from: float, n_to: float, cosine: float) -> tuple[float, float]:
 
 @nb.njit(error_model="numpy")  # as in C, no checks of divisors
 def _scattering_cosine(g: float) -> float:
-    """Henyey-Greenstein."""
+    """Draw from Henyey and Greenstein's phase function."""
     if g == 0.0:
         return 2.0 * np.random.random() - 1.0
     ratio = (1.0 - g * g) / (1.0 - g + 2.0 * g * np.random.random())

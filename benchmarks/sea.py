@@ -1,4 +1,4 @@
-"""Under the sea: each closed form against its truth, and what a picture of them costs and is wrong by.
+"""Sea: each closed form against its truth, and what a picture of it costs and its error.
 
     python -m benchmarks.sea                               # all tables: twelve minutes on two cores
     python -m benchmarks.sea --only beam haze              # some of them, by their names
@@ -49,7 +49,7 @@ PATHS, OF_WATER = 4_000_000, 1_000_000  # of a truth
 
 @cache
 def lobes() -> tuple[tuple[float, float], ...]:
-    """Three terms fitted to Petzold's mean particle function."""
+    """Fit three terms to Petzold's mean particle function."""
     return lobes_of("petzold")
 
 
@@ -59,7 +59,7 @@ def phase(terms: tuple[tuple[float, float], ...]) -> Mixture:
 
 
 def beam() -> Rows:
-    """Largest relative error of `beam_share` within radii to 1 / c and in all the plane; of e^-ct within 0.1 / c."""
+    """Return the largest relative error of `beam_share` to 1 / c and in all the plane; of e^-ct within 0.1 / c."""
     found = []
     for name, terms in (("one term, g 0.924", ((1.0, 0.924),)), ("petzold", lobes())):
         light = trace_beam(phase(terms), DEPTHS, RADII, PHOTONS, SEED)
@@ -74,13 +74,13 @@ def beam() -> Rows:
 
 
 def fails() -> Rows:
-    """Where e^-ct is off by a tenth, as b t."""
+    """Return where e^-ct is wrong by a tenth, as b t."""
     radii = np.array([0.03, 0.1, 0.3])
     return [(omega, *failing_depth(omega, radii, lobes()).tolist()) for omega in OMEGAS]
 
 
 def blur() -> Rows:
-    """Largest error of sums of Gaussians for the water's blur, over albedos and depths, by its light."""
+    """Return the largest error of sums of Gaussians for the water's blur, over albedos and depths, by its light."""
     return [
         (count, max(water_gaussians(w, ct, lobes(), count).error for w in OMEGAS for ct in DEPTHS))
         for count in range(1, 9)
@@ -88,7 +88,7 @@ def blur() -> Rows:
 
 
 def segment() -> Rows:
-    """In float32 against float64 for ways to 4 / c: `segment_integral`, and (1 - e^-x) / x as it is printed."""
+    """Return errors of float32 for ways to 4 / c: `segment_integral`, and (1 - e^-x) / x as it is printed."""
     found, one = [], np.float32(1.0)
     for m in (1.0, 0.0, -0.9, -0.999, -0.99999, -1.0):
         s0, t0, t1 = (np.linspace(0.05, most, 40) for most in (1.5, 1.5, 1.0))
@@ -105,7 +105,7 @@ def segment() -> Rows:
 
 
 def haze() -> Rows:
-    """Radiance toward an eye by each kind, over that of paths, overhead sun, deep calm sea that mirrors nothing."""
+    """Return radiance toward an eye by each kind, over that of paths, overhead sun, deep calm sea, no mirror."""
     absorbed, scattered = (1.0 - OMEGAS[0], 1.0 - OMEGAS[1], 1.0 - OMEGAS[2]), OMEGAS
     black, dark = (0.0, 0.0, 0.0), Waves(1.0, mean=-DEEP)
     world = World(absorbed, scattered, lobes(), 1.0 + 1e-9, Waves(1.0), dark, black, 0.0, (1.0, 1.0, 1.0), black)
@@ -124,13 +124,13 @@ def haze() -> Rows:
 
 
 def shafts() -> Rows:
-    """Root mean square error over twenty view rays of lines, prisms and slices of a bundle, against quadrature."""
+    """Return root mean square errors over twenty view rays of lines, prisms and slices, against quadrature."""
     found = {(one.method, int(one.label)): one.error.value for one in tradeoff.shafts().points}
     return [(n, *(found[way, n] for way in tradeoff.SHAFTS)) for n in tradeoff.FULL.of_shafts]
 
 
 def exact() -> Rows:
-    """The reference of the splats where there is an exact solution: worst pixel, before and beyond the first fold."""
+    """Return errors of the splats' reference where there is an exact solution: worst pixel, before and after folds."""
     found: Rows = []
     for amplitude, tilt in ((0.05, 0.0), (0.15, 0.0), (0.1, 0.6)):
         steps = 2.0 * np.pi / TILE * np.array([[2.0, 0.0], [5.0, 0.0]])
@@ -143,7 +143,7 @@ def exact() -> Rows:
 
 
 def first_hits() -> Rows:
-    """Shares of rays whose hit is off by more than 1 % of the depth, over S = steepest slope times tangent."""
+    """Return shares of rays whose hit misses by over 1 % of the depth, over S = steepest slope times tangent."""
     shares = hits.wrong_shares(WAYS, STEEP)
     names = ("3 Newton steps from 1 m, as published", "from the mean plane", "Shah's iteration", *WAYS[3:])
     return [
@@ -153,7 +153,7 @@ def first_hits() -> Rows:
 
 
 def filters() -> Rows:
-    """Light that the published filter makes of nothing, as it gathers, and as it spreads."""
+    """Return light that the published filter makes of nothing, as it gathers, and as it spreads."""
     lights = [(f, caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, 2048)) for f, waves in tradeoff.seas().values()]
     return [
         (f, *(float(adaptive_filter(light, spreads).mean() / light.mean() - 1.0) for spreads in (False, True)))
@@ -162,7 +162,7 @@ def filters() -> Rows:
 
 
 def splats() -> Rows:
-    """Caustic maps of 256 x 256 pixels against 2048 x 2048 photons: error, where it is bright and dark, and cost."""
+    """Compare caustic maps of 256 x 256 pixels with 2048 x 2048 photons: error, where bright and dark, and cost."""
     with opened() as context:
         panels = tradeoff.maps(context)
     facts = ("rms", "bright", "dark", "energy")
@@ -174,7 +174,7 @@ def splats() -> Rows:
 
 
 def kinds() -> Rows:
-    """The example by each kind and number of samples, then by other maps of light; and the device."""
+    """Judge the example by each kind and number of samples, then by other maps of light; and name the device."""
     with opened() as context, bench(context, tradeoff.request(), PATHS) as found:
         points = tradeoff.view(found).points
         maps = chart.over_pixels(found, FINER) + chart.over_maps(found, SLICES)
@@ -184,7 +184,7 @@ def kinds() -> Rows:
 
 
 def waters() -> Rows:
-    """The example in water that scatters less and more."""
+    """Judge the example in water that scatters less and more."""
     with opened() as context:
         told = chart.over_water(context, tradeoff.request(), FACTORS, OF_WATER)
     return [

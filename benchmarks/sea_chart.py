@@ -1,4 +1,4 @@
-"""What each way of drawing a sea costs, and in which water each is right: over maps, pixels and scattering."""
+"""Costs of techniques for a sea, and the water in which each is accurate: over maps, pixels and scattering."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class MapPoint(NamedTuple):
 
 
 def over_maps(found: SeaBench, slices: Sequence[int]) -> list[MapPoint]:
-    """Of the request's kind, by each splat, and by numbers of maps in depths with the splat that it has."""
+    """Judge the request's kind by each splat, and by numbers of maps in depths with the splat that it has."""
     of, splats = found.request, (Splat.POINTS, Splat.FACES, Splat.CELLS)
     told: list[MapPoint] = []
     ways = [(f"{one.value}, {of.slices} slices", (one, one), of.slices) for one in splats]
@@ -41,7 +41,7 @@ def over_maps(found: SeaBench, slices: Sequence[int]) -> list[MapPoint]:
 
 
 def over_pixels(found: SeaBench, supersampling: Sequence[int]) -> list[MapPoint]:
-    """Of the request's kind, by views of a pixel along a side; time is the view's."""
+    """Judge the request's kind by views of a pixel along a side; time is the view's."""
     told = []
     for fine in supersampling:
         own = found._replace(request=replace(found.request, supersampling=fine))
@@ -53,7 +53,7 @@ def over_pixels(found: SeaBench, supersampling: Sequence[int]) -> list[MapPoint]
 def over_water(
     context: moderngl.Context, request: SeaRequest, factors: Sequence[float], paths: int
 ) -> list[tuple[float, dict[str, float]]]:
-    """Errors of each kind where the water scatters so many times as much: the largest albedo [-], and error by kind."""
+    """Return errors of each kind where the water scatters so many times as much, after the largest albedo [-]."""
     told = []
     for factor in factors:
         red, green, blue = (factor * one for one in request.b)

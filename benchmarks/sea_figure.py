@@ -19,7 +19,7 @@ LARGER = 3  # pixels of the figure that one of the picture has, along a side
 
 
 def picture(found: SeaBench, path: Path) -> None:
-    """The truth, and the scene by each kind, two beside two."""
+    """Draw the truth, and the scene by each kind, two beside two."""
     samples = found.request.sampling.samples
     truth, *ways = (
         np.kron(to_srgb(one[::-1], found.exposure), np.ones((LARGER, LARGER, 1), np.uint8))
@@ -31,7 +31,7 @@ def picture(found: SeaBench, path: Path) -> None:
 
 @styled
 def cost_figure(view: Panel, device: str, path: Path) -> None:
-    """Each kind over the time of its view, bars over the middle of the turns, samples beside the points."""
+    """Draw each kind over the time of its view, bars over the middle of the turns, samples beside the points."""
     figure = canvas(3.1, 5.0)
     ax = figure.subplots()
     for kind in KINDS:

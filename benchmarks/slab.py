@@ -1,4 +1,4 @@
-"""A second opinion on the exact step edge: paths through a slab, traced by mitsuba, beside the integral.
+"""Second opinion on the exact step edge: paths through a slab, traced by mitsuba, beside the integral.
 
     pip install mitsuba
     python -m benchmarks.slab                     # three minutes on a core; --rays 2000 for a first look
@@ -46,7 +46,7 @@ ROULETTE = 64  # scatterings until which every path lives
 
 @dataclass(frozen=True)
 class Comparison:
-    """Both answers over PIXELS strips of equal width in [-RANGE, RANGE].
+    """Answers of both over PIXELS strips of equal width in [-RANGE, RANGE].
 
     traced, standard_error, solved (pixels,)  A L averaged over a strip [-]; seconds of tracing
     """
@@ -65,17 +65,17 @@ class Comparison:
 
     @property
     def chance(self) -> float:
-        """Of a chi-square as large as this by noise alone [-]."""
+        """Probability of a chi-square as large as this by noise alone [-]."""
         return float(chi2.sf(np.sum(self.z**2), self.z.size))
 
 
 def edges(pixels: int, reach: float) -> Floats:
-    """Of the strips [mfp]."""
+    """Return the edges of the strips [mfp]."""
     return np.linspace(-reach, reach, pixels + 1)
 
 
 def solved(alpha: float, illumination: str, at: Floats) -> Floats:
-    """A L averaged over the strips between `at`, by Gauss's rule: the edge at 0 must be one of them."""
+    """Return A L averaged over the strips between `at`, by Gauss's rule: the edge at 0 must be one of them."""
     nodes, weights = np.polynomial.legendre.leggauss(8)
     setting = Setting(illumination)
     x = at[:-1, None] + 0.5 * np.diff(at)[:, None] * (nodes + 1.0)
@@ -83,7 +83,7 @@ def solved(alpha: float, illumination: str, at: Floats) -> Floats:
 
 
 def traced(alpha: float, illumination: str, at: Floats, rays: int, seed: int) -> tuple[Floats, Floats]:
-    """A L averaged over the strips, and its standard error, from so many rays a strip."""
+    """Return A L averaged over the strips, and its standard error, from so many rays a strip."""
     mitsuba.set_variant(VARIANT)
     scene, integrator = mitsuba.load_dict(_scene(alpha)), mitsuba.load_dict(_integrator())
     sampler = mitsuba.load_dict({"type": "independent"})
@@ -101,7 +101,7 @@ def traced(alpha: float, illumination: str, at: Floats, rays: int, seed: int) ->
 def compared(
     alpha: float, illumination: str, rays: int, seed: int = 1, pixels: int = PIXELS, reach: float = RANGE
 ) -> Comparison:
-    """One albedo under one light."""
+    """Compare one albedo under one light."""
     at = edges(pixels, reach)
     begin = time.perf_counter()
     mean, error = traced(alpha, illumination, at, rays, seed)
@@ -110,7 +110,7 @@ def compared(
 
 
 def downward_cosine(a: float, b: float) -> list[float]:
-    """A cosine-weighted direction into the slab."""
+    """Draw a cosine-weighted direction into the slab."""
     sine, angle = np.sqrt(a), 2.0 * np.pi * b
     return [sine * np.cos(angle), sine * np.sin(angle), -np.sqrt(1.0 - a)]
 
@@ -173,7 +173,7 @@ def report(found: Sequence[Comparison]) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--rays", type=int, default=100_000, help="of each strip")
     parser.add_argument("--seed", type=int, default=1)

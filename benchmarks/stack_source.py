@@ -1,4 +1,4 @@
-"""The shader source of the recorded stacks on the OpenGL at hand: what float32 loses, and what a stack costs.
+"""Shader source of the recorded stacks on the OpenGL at hand: what float32 loses, and what a stack costs.
 
     python -m benchmarks.stack_source        # a minute on two cores, with Mesa's rasteriser
 
@@ -53,7 +53,7 @@ void main() {{
 
 
 class Rounding(NamedTuple):
-    """The largest errors of float32: relative, of the cdf as a share [-]; once is that of light scattered once."""
+    """Largest errors of float32: relative, of the cdf as a share [-]; `once` is that of light scattered once."""
 
     profile: float
     cdf: float
@@ -62,7 +62,7 @@ class Rounding(NamedTuple):
 
 
 def rounding(context: moderngl.Context, laws: Sequence[StackLaw], media: Sequence[Medium]) -> Rounding:
-    """Of both texts of a stack, over its channels."""
+    """Return the errors of both texts of a stack, over its channels."""
     source = PROFILE.format(head="", text=stack_text(laws, name=NAME), name=NAME, type="float")
     shader, twin = _Pass(context, NAME, source, "f4"), _twin(stack_text(laws, "python", NAME))
     found = [_of_law(shader, twin, channel, law.top.mfp) for channel, law in enumerate(laws)]
@@ -95,7 +95,7 @@ def _once(context: moderngl.Context, media: Sequence[Medium]) -> float:
 
 
 def cost(context: moderngl.Context, laws: Sequence[StackLaw], works: Sequence[str] = WORKS) -> Cost:
-    """What the text of a stack costs over that of its own half space."""
+    """Return the time of the text of a stack over that of its own half space."""
     thickest = literal(float(THICKNESSES[-1]) * max(law.top.mfp for law in laws))
     # A channel that no compiler knows, or the numbers of one would be constants.
     shape = f"{NAME}_shape(floor(3.0 * fract(16.0 * start)), {thickest} * start)"
@@ -104,7 +104,7 @@ def cost(context: moderngl.Context, laws: Sequence[StackLaw], works: Sequence[st
 
 
 def rows(context: moderngl.Context, records: Sequence[StackRecord]) -> tuple[list[list[str]], list[list[str]]]:
-    """Of both tables, a row a record."""
+    """Yield the rows of both tables, one per record."""
     errors, costs = [], []
     for one in records:
         label = f"{one.name}, {len(one.stack.names)} layers, {one.setting}"
@@ -115,7 +115,7 @@ def rows(context: moderngl.Context, records: Sequence[StackRecord]) -> tuple[lis
 
 
 def _held(values: Floats) -> Floats:
-    """As a float32 holds them."""
+    """Return numbers as a float32 holds them."""
     return values.astype(np.float32).astype(np.float64)
 
 
@@ -124,7 +124,7 @@ def _worst(found: Floats, right: Floats) -> float:
 
 
 def _twin(text: str) -> dict[str, Any]:
-    """The functions of a text in float64."""
+    """Return the functions of a text in float64."""
     names: dict[str, Any] = {}
     exec(compile(text, "stack.py", "exec"), names)
     return names

@@ -1,4 +1,4 @@
-"""How wrong the law of a stack is: twelve stacks at thicknesses that were not fitted, and random ones at their own.
+"""Errors of the law of a stack: twelve stacks at thicknesses that were not fitted, and random ones at their own.
 
     python -m benchmarks.stacks               # twenty minutes on two cores
     python -m benchmarks.stacks --random 20   # ten minutes: 2 to 4 layers, seeded
@@ -58,7 +58,7 @@ OVER = {"milk on marble": (1.3, "skimmilk", 1.0, "marble"), "marble on potato": 
 
 
 class Error(NamedTuple):
-    """rel, and of the half space of the first layer alone; ks; relative error of A; [-]"""
+    """Errors rel, and of the half space of the first layer alone; ks; relative error of A; [-]."""
 
     rel: float
     alone: float
@@ -67,7 +67,7 @@ class Error(NamedTuple):
 
 
 def stacks(channel: int) -> dict[str, Medium]:
-    """The four, in one colour."""
+    """Return the four stacks in one colour."""
     made = {
         name: Medium(tuple(Layer(n, mu_a[channel], mu_s[channel], 0.0, d) for mu_s, mu_a, d in layers))
         for name, (n, layers) in STACKS.items()
@@ -79,7 +79,7 @@ def stacks(channel: int) -> dict[str, Medium]:
 
 
 def random_stack(number: int) -> Medium:
-    """2 to 4 layers, n 1 to 1.5, alpha .3 to .999 even in ln(1 - alpha), .1 to 3 mean free paths thick."""
+    """Draw 2 to 4 layers, n 1 to 1.5, alpha .3 to .999 even in ln(1 - alpha), .1 to 3 mean free paths thick."""
     random = np.random.default_rng(100 + number)
     count, n, layers = int(random.integers(2, 5)), float(random.uniform(1.0, 1.5)), []
     for place in range(count):
@@ -90,7 +90,7 @@ def random_stack(number: int) -> Medium:
 
 
 def error(law, medium: Medium, light: str) -> Error:
-    """Of a law, under the first layer of this medium."""
+    """Return the errors of a law, under the first layer of this medium."""
     true, first = exact.solve(medium, light), medium.layers[0]
     setting = Setting(light, n=first.n / medium.n_above)
     r = np.geomspace(0.01 * first.mfp, 300.0 * max(layer.mfp for layer in medium.layers), RADII)
@@ -107,12 +107,12 @@ def error(law, medium: Medium, light: str) -> Error:
 
 
 def forward(medium: Medium, g: float) -> Medium:
-    """The same reduced scattering, forward."""
+    """Return the medium of equal reduced scattering that scatters forward."""
     return replace(medium, layers=tuple(replace(layer, mu_s=layer.mu_s / (1.0 - g), g=g) for layer in medium.layers))
 
 
 def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> tuple[tuple[str, ...], Error]:
-    """Of a law with g, at its own thickness, against so many photons; in place of `alone` the similar stack's rel."""
+    """Judge a law with g, at its own thickness, against so many photons; `alone` is the similar stack's rel."""
     begin = time.perf_counter()
     law, own = stack_law(forward(medium, g), light), forward(medium, g)
     seconds = time.perf_counter() - begin
@@ -128,7 +128,7 @@ def traced_row(name: str, light: str, medium: Medium, g: float, count: int) -> t
 
 
 def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], list[float]]:
-    """rel of sums of 1 to 8 Gaussians, of rings even in ln r."""
+    """Return rel of sums of 1 to 8 Gaussians, of rings even in ln r."""
     of = gaussians.sum_light(medium, light)
     found = [np.asarray(gaussians.fitted([of], count).residuals) / of.weight for count in range(1, MOST + 1)]
     rel = [float(np.mean(np.abs(one))) for one in found]
@@ -138,7 +138,7 @@ def sums_row(name: str, light: str, medium: Medium) -> tuple[tuple[str, ...], li
 def row(
     name: str, light: str, medium: Medium, thicknesses: tuple[float, ...]
 ) -> tuple[tuple[str, ...], list[Error], Error]:
-    """Cells, errors at some thicknesses, and the error at its own."""
+    """Return cells, errors at some thicknesses, and the error at its own."""
     begin = time.perf_counter()
     law = stack_law(medium, light)
     seconds = time.perf_counter() - begin

@@ -66,7 +66,7 @@ WANTED = {
 
 @dataclass(frozen=True)
 class Row:
-    """One way to gather, at each albedo of ALPHAS.
+    """Way to gather, at each albedo of ALPHAS.
 
     bias  largest |L_law - L_exact| / A [-], none where the profile is exact
     noise  by kind of points, over that of the exact quantile [-]
@@ -78,19 +78,19 @@ class Row:
 
 
 def bias(law: ProfileLaw, alpha: float) -> float:
-    """Largest |L_law - L_exact| / A within REACH of the edge."""
+    """Return the largest |L_law - L_exact| / A within REACH of the edge."""
     return float(
         np.max(np.abs(step_response(PLACES, alpha, law=law) - step_response(PLACES, alpha, setting=law.setting)))
     )
 
 
 def noise(gather: EdgeGather, points: Floats, alpha: float, setting: Setting) -> float:
-    """Root mean square of one estimate against the exact answer, over NOISY_PLACES and trials, as a share of A."""
+    """Return the root mean square of one estimate against the exact answer, over places and trials, as a share of A."""
     return float(np.sqrt(np.mean(edge_estimate(gather, points, NOISY_PLACES, alpha, setting).rmse ** 2)))
 
 
 def measured(illumination: str, samples: int, trials: int, seed: int) -> tuple[dict[str, Floats], list[Row], list[str]]:
-    """The exact quantile's own noise by kind of points, all rows, and a line for each law that cannot be had."""
+    """Return the exact quantile's own noise by kind of points, all rows, and a line for each law that is missing."""
     setting = Setting(illumination)
     points = {kind: draw(samples, trials, seed) for kind, draw in POINTS.items()}
 
@@ -136,7 +136,7 @@ def report(illumination: str, samples: int, floor: dict[str, Floats], rows: Sequ
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--samples", type=int, default=64)
     parser.add_argument("--trials", type=int, default=4096, help="estimates at each place")

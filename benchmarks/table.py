@@ -19,7 +19,7 @@ Rows = list[tuple[str | float, ...]]
 
 
 class Listed(NamedTuple):
-    """A table: its title, its columns with the form of their numbers, and what makes its rows."""
+    """Table: its title, its columns with the form of their numbers, and what makes its rows."""
 
     title: str
     columns: dict[str, str]
@@ -27,7 +27,7 @@ class Listed(NamedTuple):
 
 
 def parser_of(doc: str | None, tables: Mapping[str, Listed]) -> ArgumentParser:
-    """--only some of the tables, and --json FILE."""
+    """Return a parser of --only some of the tables, and --json FILE."""
     parser = ArgumentParser(description=doc, formatter_class=RawDescriptionHelpFormatter)
     parser.add_argument("--only", nargs="+", choices=tables, metavar="TABLE", help=f"some of {', '.join(tables)}")
     parser.add_argument("--json", type=Path, metavar="FILE", help="the same in numbers, too")

@@ -1,4 +1,4 @@
-"""How fast the tracer is, over scalar yardsticks, in one run.
+"""Speed of the tracer, over scalar yardsticks, in one run.
 
     python benchmarks/tracer.py [--quick] [--only NAME ...] [--json FILE]
 
@@ -42,7 +42,7 @@ HALF_SPACES = ("half space", "half space, r-z")
 
 @dataclass
 class Report:
-    """Lines to print, and the same for --json."""
+    """Lines to print, and their content for --json."""
 
     sizes: problems.Sizes
     turns: int
@@ -60,13 +60,13 @@ class Report:
         self.console.print(f"[bold]{title}[/bold]", table, "", highlight=False, sep="\n")
 
     def judge(self, what: str, at_least: float, aim: float | None, ratio: Ratio) -> None:
-        """A line of the last table."""
+        """Return a line of the last table."""
         self.numbers[what] = {"median": ratio.median, "least": ratio.least, "most": ratio.most}
         self.verdicts.append((what, f"{at_least:g} x", f"{aim:g} x" if aim else "", str(ratio)))
 
 
 def speed(report: Report) -> None:
-    """Rates on one core, and their ratios."""
+    """Measure rates on one core, and their ratios."""
     rates = stopwatch.take_turns(problems.works(report.sizes), report.turns)
     scalar_events = problems.yardstick_events()
     order_events = problems.order_events(problems.orders(report.sizes.orders, 1))
@@ -124,7 +124,7 @@ def _speed_row(name: str, rates: Rates, events: float | None) -> tuple[str, ...]
 
 
 def efficiency(report: Report) -> None:
-    """Answers compared, and variance times time: equal speed at a larger variance would be no gain."""
+    """Compare answers, and variance times time: equal speed at a larger variance would be no gain."""
     rates = stopwatch.take_turns(
         {name: work for name, work in problems.works(report.sizes).items() if name in _EFFICIENCY}, report.turns
     )
@@ -165,7 +165,7 @@ def _efficiency_row(
 
 
 def cores(report: Report) -> None:
-    """Two threads, and two processes with half the work each, over one pinned worker."""
+    """Time two threads, and two processes with half the work each, over one pinned worker."""
     if len(ALL_CORES) < 2 or not PINNED:
         report.console.print("two workers: needs two cores, and a system that pins processes\n")
         return
@@ -196,7 +196,7 @@ def _time(runs: list[tuple[Worker, int, int]]) -> float:
 
 
 def time_to_accuracy(report: Report) -> None:
-    """1 % in each of 100 rings, at 32 albedos."""
+    """Return the time to 1 % in each of 100 rings, at 32 albedos."""
     photons = 8 * report.sizes.orders
     rates = stopwatch.take_turns({"orders": lambda seed: problems.orders(report.sizes.orders, seed).photons}, 3)
     run = problems.orders(photons, seed=77)
@@ -248,7 +248,7 @@ def _whole(need: accuracy.Need) -> int:
 
 
 def memory(report: Report) -> None:
-    """Peak resident memory of a process for each item: Python, jax, compiler and all."""
+    """Return the peak resident memory of a process for each item: Python, jax, compiler and all."""
     sizes = report.sizes
     photons = {"orders": sizes.orders, "yardstick": sizes.yardstick}
     peaks = {}
@@ -261,7 +261,7 @@ def memory(report: Report) -> None:
 
 
 def on_gpu(report: Report) -> None:
-    """The order-resolved run where jax sees a GPU."""
+    """Time the order-resolved run where jax sees a GPU."""
     found = gpu.measure(32 * report.sizes.orders)
     if found is None:
         report.console.print("GPU: jax sees none here\n")

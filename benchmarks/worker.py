@@ -18,7 +18,7 @@ ITEMS = ("orders", "half space", "half space, r-z", "three layers", "three layer
 
 
 class Worker:
-    """The other end of a process that runs one item on some cores."""
+    """End here of a process that runs one item on some cores."""
 
     def __init__(self, item: str, cores: list[int]) -> None:
         command = [sys.executable, __file__, ",".join(map(str, cores)), item]
@@ -39,11 +39,11 @@ class Worker:
         self._say(f"run {photons} {seed} {threads}")
 
     def seconds(self) -> float:
-        """Wait for the run that was begun; how long it took [s]."""
+        """Wait for the run that was begun; return how long it took [s]."""
         return float(self._line())
 
     def memory(self) -> float:
-        """Peak of the resident memory [bytes]."""
+        """Return the peak of the resident memory [bytes]."""
         self._say("memory")
         return float(self._line())
 
@@ -61,7 +61,7 @@ class Worker:
 
 
 def peak_memory(item: str, photons: int, core: int) -> float:
-    """Peak resident memory of a process that imports, compiles and runs one item [bytes]."""
+    """Return the peak resident memory of a process that imports, compiles and runs one item [bytes]."""
     with Worker(item, [core]) as worker:
         worker.start(photons, 1, 1)
         worker.seconds()
@@ -83,7 +83,7 @@ def serve(item: str) -> None:
 
 
 def _peak_memory_here() -> float:
-    """Peak of this process alone [bytes]: on Linux, getrusage would tell the parent's where that was larger."""
+    """Return the peak of this process alone [bytes]: on Linux, getrusage gives the parent's where that is larger."""
     try:
         status = Path("/proc/self/status").read_text(encoding="utf-8")
     except OSError:  # no Linux; macOS counts in bytes

@@ -46,5 +46,5 @@ __all__ = [
 
 
 def __dir__() -> list[str]:
-    """What an interactive shell completes: names that were not used yet, too."""
+    """Return the names that an interactive shell completes, unused ones included."""
     return [*globals(), *__all__]

@@ -13,7 +13,7 @@ CHANNELS = ("red", "green", "blue")
 
 @dataclass(frozen=True)
 class Material:
-    """scattering  sigma_s' of red, green, blue [1/mm]; absorption  sigma_a of the same [1/mm]."""
+    """Material with sigma_s' (`scattering`) and sigma_a (`absorption`) of red, green and blue [1/mm]."""
 
     name: str
     scattering: tuple[float, float, float]

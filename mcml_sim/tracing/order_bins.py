@@ -83,7 +83,7 @@ class OrderBins:
 
     @cached_property
     def roulette_weights(self) -> NDArray[np.int64]:
-        """What one photon of each bin counts for, int64 (bins,)."""
+        """Photons that one photon of each bin counts for, int64 (bins,)."""
         return self.roulette_weight(self.last_orders)
 
     def roulette_weight(self, order: ArrayLike) -> NDArray[np.int64]:

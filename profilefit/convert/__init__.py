@@ -1,4 +1,4 @@
-"""One medium in everybody's units: mean free paths, falloff lengths, coefficients, and what each renderer takes.
+"""Units of a medium: mean free paths, falloff lengths, coefficients, and what each renderer takes.
 
 The hub is `Optical(alpha, mfp, g)`, a medium without its surface: alpha and mfp are the reduced ones. A colour is a
 function of alpha, n and g alone, and every length is mfp times a function of alpha and g, so each converts to and from

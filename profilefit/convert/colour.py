@@ -58,7 +58,7 @@ def _alpha(reflectance: float, white: float, illumination: str, n: float, g: flo
 
 
 def _setting(illumination: str, n: float, g: float) -> Setting:
-    """Setting of a medium that scatters by g; isotropic where n = 1, by similarity."""
+    """Return the setting of a medium that scatters by g; isotropic where n = 1, by similarity."""
     given = Setting(illumination, n, g)
     return Setting(illumination, n) if n == 1.0 else given
 

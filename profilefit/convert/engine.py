@@ -1,4 +1,4 @@
-"""What to type into a renderer's fields for a medium: a colour and a length, by product, version and method.
+"""Fields of a renderer for a medium: a colour and a length, by product, version and method.
 
 Most engines turn the typed colour into an albedo by a map of their own, so that the number to type is the map's inverse
 at the medium's alpha, and not its A. Engines that blur with a profile multiply by the colour: for these it is A under

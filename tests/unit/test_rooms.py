@@ -2,6 +2,7 @@
 
 import ast
 import graphlib
+import re
 from collections.abc import Iterable, Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -226,3 +227,70 @@ def test_a_command_imports_under_its_guard_and_nothing_else_does(tmp_path, folde
         "def f():\n    with interruptible(__name__):\n        import jax\n    if f:\n        import scipy\n"
     )
     assert inner_imports(path) == [f"{path}:{line}" for line in refused]
+
+
+# Beginnings that say nothing without a neighbour. Rooms join this list as their docstrings are written anew.
+ELLIPTICAL = re.compile(r"(What|Of|That|The same|Where|By|How|Those|As|Which|Who|Its|Their|Them|They|It)\b")
+HELD = (
+    *("mcml_sim", "benchmarks", "profilefit/convert", "profilefit/errors.py", "profilefit/materials.py"),
+    *("profilefit/recipes/workers.py", "profilefit/__init__.py", "profilefit/__main__.py"),
+)
+
+
+def elliptical(path: Path) -> list[str]:
+    """Return file:line of docstrings, those of attributes included, that begin with an elliptical phrase."""
+    return [
+        f"{path}:{node.lineno}"
+        for node in ast.walk(parsed(path))
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+        if ELLIPTICAL.match(node.value.value)
+    ]
+
+
+@pytest.mark.parametrize("place", HELD)
+def test_a_docstring_can_be_read_alone(place):
+    files = sorted((ROOT / place).rglob("*.py")) or [ROOT / place]
+    assert [found for path in files for found in elliptical(path)] == []
+
+
+def test_elliptical_docstrings_are_seen(tmp_path):
+    """Negative control: a module, a class, an attribute and a function."""
+    path = tmp_path / "bad.py"
+    path.write_text('"""What."""\nclass A:\n    """Of B."""\n    a: int\n    """By b."""\ndef f():\n    """Offer."""\n')
+    assert sorted(elliptical(path)) == [f"{path}:{line}" for line in (1, 3, 5)]
+
+
+# Pools of processes are the executor's, in one place; benchmarks have some of their own.
+POOLS = {"multiprocessing", "concurrent.futures.process"}
+POOL_HOME = "profilefit.recipes.workers"
+
+
+def makes_processes(tree: ast.AST, module: str, is_package: bool) -> bool:
+    """Return whether a module imports what starts or pools processes."""
+    names = set(imported_names(tree, module, is_package))
+    return "concurrent.futures.ProcessPoolExecutor" in names or any(
+        name == pool or name.startswith(f"{pool}.") for name in names for pool in POOLS
+    )
+
+
+def test_one_pool_of_processes():
+    homes = {
+        module
+        for package in PACKAGES
+        for module, path in modules(ROOT, package).items()
+        if makes_processes(parsed(path), module, path.name == "__init__.py")
+    }
+    assert homes == {POOL_HOME}
+
+
+@pytest.mark.parametrize(
+    ("text", "makes"),
+    [
+        ("from concurrent.futures import ThreadPoolExecutor", False),
+        ("from concurrent.futures import ProcessPoolExecutor", True),
+        ("import multiprocessing.pool", True),
+        ("from multiprocessing import Process", True),
+    ],
+)
+def test_pools_of_processes_are_seen(text, makes):
+    assert makes_processes(ast.parse(text), "bad", False) == makes
