@@ -25,7 +25,7 @@ from profilefit.studies.tradeoff.laws import FULL, MANY, PARTS, QUICK, Contender
 
 
 def as_cells(row: ContenderResult) -> tuple[str, ...]:
-    """Return the the row of the table of costs."""
+    """Return the row of the table of costs."""
     profile, sampler = row.contender.constants
     return (
         row.contender.name,
@@ -42,7 +42,7 @@ def _few(counted: FunctionCounts) -> str:
 
 
 def as_errors(row: ContenderResult) -> tuple[str, ...]:
-    """Return the the row of the table of errors."""
+    """Return the row of the table of errors."""
     return row.contender.name, *(f"{value:.2g}" for e in (row.rel, row.ks) for value in (e.mean(), e.max()))
 
 

@@ -33,10 +33,6 @@ add_version(app, "mcml_sim")
 add(app, run)
 
 
-def _stopped() -> str:
-    return "stopped; the finished batches are kept, the same command resumes"
-
-
 def _remedied(text: str) -> str:
     """Return the text of a library error, with remedies of the command line."""
     for theirs, ours in REMEDIES.items():
@@ -51,7 +47,12 @@ def _hint() -> str:
 
 
 PROGRAM = Program(
-    "mcml-sim", app, (ClusterError, InputError, OutputError, StoreError), _stopped, hint=_hint, remedied=_remedied
+    "mcml-sim",
+    app,
+    (ClusterError, InputError, OutputError, StoreError),
+    lambda: "stopped; the finished batches are kept, the same command resumes",
+    hint=_hint,
+    remedied=_remedied,
 )
 
 

@@ -14,7 +14,7 @@ import jax
 import jax.numpy as jnp
 import numpy as np
 
-from mcml_sim.exact import table, tables, transform
+from mcml_sim.exact import table, transform
 from mcml_sim.exact.compiled import jit
 from mcml_sim.exact.transform import STANDARD, Rule, Transform
 from mcml_sim.media.arrays import Floats
@@ -68,8 +68,8 @@ def forget() -> None:
 def surface(setting: Setting, rule: Rule = STANDARD) -> Surface:
     """Return the surface for `solve`; makes a table where there is none."""
     if is_traced(setting.n):
-        return tables.traced_table(jnp.asarray(setting.n), rule)
-    return None if setting.n == 1.0 else tables.table(float(setting.n), rule)
+        return table.traced_table(jnp.asarray(setting.n), rule)
+    return None if setting.n == 1.0 else table.kept_table(float(setting.n), rule)
 
 
 def solve(alpha: jax.Array, of: Surface, illumination: str, rule: Rule = STANDARD) -> Transform:

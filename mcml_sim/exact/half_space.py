@@ -185,20 +185,16 @@ def _checked(name: str, value: Any) -> Any:
     """Return a float64 array: of numpy, with InputError for what is out of range, or of jax, with nan for it."""
     what, low, high = ARGUMENTS[name]
     if isinstance(value, jax.Array):
-        _require_double(name, value)
+        on = jnp.result_type(float) == np.float64
+        if not (on and value.dtype == np.float64):
+            got = f"{value.dtype}" + ("" if on else " outside of it")
+            raise InputError(f"{name} must be a float64 array within jax.enable_x64(True), got {got}")
         return jnp.where((value >= low) & (value <= high), value, jnp.nan)
     numbers = checked_numbers(name, value, what)
     outside = ~((numbers >= low) & (numbers <= high))
     if np.any(outside):
         raise InputError(f"{name} must be {what}, got {float(numbers[outside].flat[0])}")
     return numbers
-
-
-def _require_double(name: str, value: jax.Array) -> None:
-    on = jnp.result_type(float) == np.float64
-    if not (on and value.dtype == np.float64):
-        got = f"{value.dtype}" + ("" if on else " outside of it")
-        raise InputError(f"{name} must be a float64 array within jax.enable_x64(True), got {got}")
 
 
 def _scalar_or_array(values: Any) -> Any:

@@ -104,18 +104,16 @@ def transform_density(setting: Setting) -> tuple[Floats, Floats]:
     n, phase = setting.n, setting.scattering
     critical = critical_rate(setting)
     if setting.illumination == "searchlight":
-        f = _searchlight(critical, n, phase)
+        k = critical + BEYOND_CRITICAL
+        above = (BEYOND_CRITICAL + (critical - 1)) * (k + 1)  # k^2 - 1
+        mu = above / (k * k + 1)
+        solid_angle = 2 * np.pi * 4 * k / (k * k + 1) ** 2
+        f = solid_angle * phase.pdf(-mu) * _passes(mu, n) * above / (2 * k * k)
+    elif n == 1:
+        f = _diffuse_matched(phase)
     else:
-        f = _diffuse_matched(phase) if n == 1 else _diffuse(critical, n, phase)
+        f = np.array([_diffuse_at(beyond, critical, n, phase) for beyond in BEYOND_CRITICAL])
     return critical + BEYOND_CRITICAL, f * K_STEP * BEYOND_CRITICAL
-
-
-def _searchlight(critical: float, n: float, phase: Phase) -> Floats:
-    k = critical + BEYOND_CRITICAL
-    above = (BEYOND_CRITICAL + (critical - 1)) * (k + 1)  # k^2 - 1
-    mu = above / (k * k + 1)
-    solid_angle = 2 * np.pi * 4 * k / (k * k + 1) ** 2
-    return solid_angle * phase.pdf(-mu) * _passes(mu, n) * above / (2 * k * k)
 
 
 def _diffuse_matched(phase: Phase) -> Floats:
@@ -126,10 +124,6 @@ def _diffuse_matched(phase: Phase) -> Floats:
     both = above + flat  # k^2 - eta^2
     integrand = above * flat / both**2 * phase.pdf(1 - 2 * above / both)
     return 4 * np.pi / k[:, 0] * (integrand @ weights)
-
-
-def _diffuse(critical: float, n: float, phase: Phase) -> Floats:
-    return np.array([_diffuse_at(beyond, critical, n, phase) for beyond in BEYOND_CRITICAL])
 
 
 def _diffuse_at(beyond: float, critical: float, n: float, phase: Phase) -> float:

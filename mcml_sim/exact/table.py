@@ -4,8 +4,9 @@
 i kappa, the closer the farther r is, and kappa is the albedo's own. So albedos go by groups of kappa, each with a line
 from i b to 8 e^{i pi/4}, in panels that grow, of Gauss's nodes. From there one ray serves all, where R^ is its first
 orders of scattering, a polynomial in alpha. On a line R^(k) / alpha is a polynomial in w = sqrt(1 - alpha arctan(k)/k):
-the singularity where k = i kappa is where w = 0, in which alpha is analytic. `made` finds the polynomials, once for an
-n, from albedos that put w on Chebyshev's nodes, and `transform` reads them off at an albedo.
+the singularity where k = i kappa is where w = 0, in which alpha is analytic. `new_table` finds the polynomials, once
+for an n, from albedos that put w on Chebyshev's nodes, and `transform` reads them off at an albedo. A table takes
+seconds and is a megabyte: it is kept in memory and in the user's cache folder, where the next process finds it.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import astuple
 from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
@@ -28,6 +30,7 @@ from mcml_sim.exact.dispersion import dispersion
 from mcml_sim.exact.single_scattering import entered
 from mcml_sim.exact.special_functions import square_root
 from mcml_sim.exact.transform import NO_LIGHT, Rule, Transform
+from mcml_sim.files.kept import kept
 from mcml_sim.media.arrays import Floats
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 
@@ -47,6 +50,8 @@ MIDDLE_NODES, LAST_NODES = (5 / 3, 4 / 3), (5 / 2, 16 / 9)
 ORDERS = 18  # of scattering along the ray: the next has (pi / 16)^18 of the light
 ORIGIN = 1e-6 * DIRECTION  # stands for k = 0
 CHUNK = 16  # wave numbers at once
+LEAST = 1.0 + 1e-9  # n of the least surface that refracts
+VERSION = 2  # of what `new_table` puts into a table; a file of another version, or number of nodes, has another name
 
 
 class Table(NamedTuple):
@@ -66,7 +71,11 @@ class _Contour(NamedTuple):
 def transform(table: Table, alpha: jax.Array, light: int, rule: Rule) -> Transform:
     """Return the transform of one albedo, a float64 scalar in [0, 1]; `light`: 0 searchlight, 1 diffuse."""
     group = _group(alpha)
-    k, dk = _whole_contour(group, rule)
+    lines, ray = _lines(rule.line), _ray(rule.line)
+    k, dk = (
+        jnp.append(jnp.stack([getattr(line, name) for line in lines])[group], getattr(ray, name))
+        for name in _Contour._fields
+    )
     own = jnp.asarray(table.lines)[light, group]
     values = _sum(own[:-1], _variable(alpha, group, k[: own.shape[0] - 1]))
     beyond = jnp.asarray(table.ray)[light] @ (alpha ** np.arange(ORDERS))
@@ -83,12 +92,6 @@ def total(table: Table, alpha: jax.Array, light: int) -> jax.Array:
 
 def _group(alpha: jax.Array) -> jax.Array:
     return jnp.searchsorted(ALPHAS[1:-1], jax.lax.stop_gradient(alpha))
-
-
-def _whole_contour(group: jax.Array, rule: Rule) -> tuple[jax.Array, jax.Array]:
-    lines, ray = _lines(rule.line), _ray(rule.line)
-    k, dk = (jnp.stack([getattr(line, name) for line in lines])[group] for name in _Contour._fields)
-    return jnp.append(k, ray.k), jnp.append(dk, ray.dk)
 
 
 def _variable(alpha: jax.Array, group: jax.Array | int, k: jax.Array) -> jax.Array:
@@ -129,7 +132,7 @@ def _total_of(w: jax.Array, coefficients: jax.Array, group: jax.Array) -> jax.Ar
     return _sum(coefficients, ((2.0 * w - first - last) / (first - last)).astype(complex)).real
 
 
-def made(n: float, rule: Rule, slope: bool = False) -> Table:
+def new_table(n: float, rule: Rule, slope: bool = False) -> Table:
     """Return the table of one n > 1, or its derivative by n, in seconds."""
     with jax.enable_x64(True), jax.core.eval_context():
         lines = np.stack([_line(n, group, line, rule, slope) for group, line in enumerate(_lines(rule.line))], axis=1)
@@ -138,7 +141,7 @@ def made(n: float, rule: Rule, slope: bool = False) -> Table:
         last = np.abs(ray) > MIDDLE
         sizes = _sizes(rule, MIDDLE_NODES), _sizes(rule, LAST_NODES)
         parts = [
-            _in_chunks(partial(_orders, n, sizes=size, slope=slope), part)
+            _in_chunks(lambda k, size=size: np.moveaxis(np.asarray(_series(n, k, *size, slope)), 0, 1), part)
             for part, size in zip((ray[~last], ray[last]), sizes, strict=True)
         ]
     if not slope:  # what enters comes out again where nothing is absorbed, z = -1
@@ -205,10 +208,6 @@ def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: 
         within = albedo * np.einsum("mx,mxl->lm", adjoint @ matrix_by_n, solution)
         found.append(source_by_n @ adjoint.T + np.einsum("x,mxl->lm", leaving_by_n, solution) + within)
     return np.stack(found, axis=1) / np.pi
-
-
-def _orders(n: float, k: Complexes, sizes: tuple[int, int], slope: bool) -> Complexes:
-    return np.moveaxis(np.asarray(_series(n, k, *sizes, slope)), 0, 1)
 
 
 def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Complexes:
@@ -279,3 +278,38 @@ def _panels(edges: Floats, nodes: int) -> tuple[Floats, Floats]:
     t, weights = np.polynomial.legendre.leggauss(nodes)
     half = 0.5 * np.diff(edges)[:, None]
     return (edges[:-1, None] + half * (t + 1.0)).ravel(), (half * weights).ravel()
+
+
+@lru_cache(maxsize=16)
+def kept_table(n: float, rule: Rule, slope: bool = False) -> Table:
+    """Return the table of one n > 1, or its derivative by n, from where it is kept."""
+
+    def make() -> dict[str, Floats]:
+        parts = new_table(n, rule, slope)._asdict().items()
+        return {name: np.ascontiguousarray(part, dtype=complex)[..., None].view(float) for name, part in parts}
+
+    nodes, kind = "-".join(map(str, astuple(rule)[3:])), "-slope" if slope else ""
+    found = kept(f"half-space-n{n!r}-{nodes}{kind}-v{VERSION}", Table._fields, make)
+    return Table(*(found[name].view(complex)[..., 0] for name in Table._fields))
+
+
+@partial(jax.custom_jvp, nondiff_argnums=(1,))
+def traced_table(n: jax.Array, rule: Rule) -> Table:
+    """Return the table of an n that may be traced, n >= 1; nan below. At n = 1 it is that of LEAST."""
+    return _called(n, rule, False)
+
+
+@traced_table.defjvp
+def _traced_table_jvp(rule: Rule, primals: tuple, tangents: tuple) -> tuple[Table, Table]:
+    slopes = _called(primals[0], rule, True)
+    return traced_table(primals[0], rule), jax.tree.map(lambda slope: slope * tangents[0], slopes)
+
+
+def _called(n: jax.Array, rule: Rule, slope: bool) -> Table:
+    def found(n: Any) -> Table:
+        whole = kept_table(max(float(n), LEAST), rule, slope)
+        return whole if n >= 1 else jax.tree.map(lambda part: np.full_like(part, np.nan), whole)
+
+    if isinstance(n, jax.core.Tracer):
+        return jax.pure_callback(found, shapes(rule), n, vmap_method="sequential")
+    return jax.tree.map(jnp.asarray, found(n))

@@ -54,7 +54,11 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
     ValueError says in one line what is wrong with the file.
     """
     try:
-        with zipfile.ZipFile(io.BytesIO(_zip_file(content))) as archive:
+        if not zipfile.is_zipfile(io.BytesIO(content)):
+            raise ValueError("not a whole .npz file")
+        if content.count(ENTRY) > MOST_MEMBERS:
+            raise ValueError(f"more than {MOST_MEMBERS} arrays")
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
             members = _members(archive, wanted)
             sizes = [
                 _checked_size(archive, name, member, (wanted or {}).get(name), name in text)
@@ -65,14 +69,6 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
             return {name: _array(archive, member) for name, member in members.items()}
     except DAMAGED as error:
         raise ValueError((str(error) or type(error).__name__).splitlines()[0][:LONGEST_REASON]) from None
-
-
-def _zip_file(content: bytes) -> bytes:
-    if not zipfile.is_zipfile(io.BytesIO(content)):
-        raise ValueError("not a whole .npz file")
-    if content.count(ENTRY) > MOST_MEMBERS:
-        raise ValueError(f"more than {MOST_MEMBERS} arrays")
-    return content
 
 
 def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfile.ZipInfo]:

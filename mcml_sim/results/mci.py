@@ -165,12 +165,13 @@ class Lines:
             self._number += 1
             if self._number > MAX_LINES:
                 raise self.error(expected, f"more than {MAX_LINES} lines before it")
-            wanted = count + optional
-            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=wanted + 1)
-            if len(words) > wanted and _is_number(words[wanted]):
-                raise self.error(f"{expected} alone", f"{wanted + _numbers(words[wanted:])} values")
+            most = count + optional
+            words = CONTROL.sub("", line.partition("#")[0]).split(maxsplit=most + 1)
+            if len(words) > most and _is_number(words[most]):
+                numbers = itertools.takewhile(_is_number, " ".join(words[most:]).split())
+                raise self.error(f"{expected} alone", f"{most + sum(1 for _ in numbers)} values")
             if len(words) >= count:
-                return [self._text(word) for word in words[:wanted]]
+                return [self._text(word) for word in words[:most]]
             if words:
                 raise self.error(f"{count} values, {expected}", f"{len(words)}: {shown(' '.join(words))}")
         raise self.error(expected, "the end of the file")
@@ -224,7 +225,12 @@ def read_run(lines: Lines, taken: set[str]) -> Run:
     dz, dr = (lines.decimal(f"{name} in cm", word, LENGTHS) for name, word in zip(("dz", "dr"), words, strict=True))
     words = lines.take(3, "nz, nr and na")
     nz, nr, na = _bins(lines, dict(zip(("nz", "nr", "na"), words, strict=True)))
-    return Run(output, form, photons, dz, dr, nz, nr, na, _medium(lines))
+    (word,) = lines.take(1, "the number of layers")
+    number = lines.whole("the number of layers", word, MAX_LAYERS)
+    n_above = _index(lines, "n above the layers")
+    layers = tuple(_layer(lines, at, number) for at in range(1, number + 1))
+    medium = Medium(layers, n_above, _index(lines, "n below the layers"))
+    return Run(output, form, photons, dz, dr, nz, nr, na, medium)
 
 
 def _bins(lines: Lines, words: dict[str, str], decimal: bool = False) -> tuple[int, int, int]:
@@ -353,14 +359,6 @@ def _output(lines: Lines, taken: set[str], name: str, *form: str) -> tuple[str, 
     return name, "B" if form and form[0][0] in "bB" else "A"
 
 
-def _medium(lines: Lines) -> Medium:
-    (word,) = lines.take(1, "the number of layers")
-    number = lines.whole("the number of layers", word, MAX_LAYERS)
-    n_above = _index(lines, "n above the layers")
-    layers = tuple(_layer(lines, at, number) for at in range(1, number + 1))
-    return Medium(layers, n_above, _index(lines, "n below the layers"))
-
-
 def _index(lines: Lines, name: str) -> float:
     (word,) = lines.take(1, name)
     return lines.decimal(name, word, INDICES)
@@ -402,11 +400,6 @@ def _checked(name: str, content: bytes) -> bytes:
 
 def _is_number(word: str) -> bool:
     return bool(DECIMAL.fullmatch(word) or INFINITE.fullmatch(word))
-
-
-def _numbers(words: list[str]) -> int:
-    """Return how many numbers there are before the first other word."""
-    return sum(1 for _ in itertools.takewhile(_is_number, " ".join(words).split()))
 
 
 def shown(word: str) -> str:

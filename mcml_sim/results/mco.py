@@ -132,10 +132,10 @@ def _sections(tally: Tally, name: str) -> Iterator[str]:
 
 
 def _parameters(tally: Tally, bins: _Bins, name: str) -> str:
-    layers = "".join(
-        "\t".join(map(_number, (one.n, one.mu_a, one.mu_s, one.g, _finite(one.thickness)))) + f"\t# layer {at}\n"
-        for at, one in enumerate(tally.medium.layers, start=1)
-    )
+    layers = ""
+    for at, layer in enumerate(tally.medium.layers, start=1):
+        thickness = ENDLESS if math.isinf(layer.thickness) else layer.thickness
+        layers += "\t".join(map(_number, (layer.n, layer.mu_a, layer.mu_s, layer.g, thickness))) + f"\t# layer {at}\n"
     word = "".join(letter if letter.isprintable() and letter not in " #" else "_" for letter in name)
     return (
         "InParm \t\t\t# Input parameters. cm is used.\n"
@@ -199,10 +199,6 @@ def _even_width(name: str, edges: Floats) -> float:
             f"grid must have {name} of equal width for an .mco, got widths from {widths.min():g} to {widths.max():g}"
         )
     return width
-
-
-def _finite(thickness: float) -> float:
-    return ENDLESS if math.isinf(thickness) else thickness
 
 
 def _number(value: float) -> str:

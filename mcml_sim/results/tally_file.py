@@ -81,12 +81,12 @@ def results_bytes(tally: Tally) -> bytes:
         "photons": tally.photons,
         "seed": tally.seed,
         "cut": tally.cut,
-        "medium": {**asdict(tally.medium), "layers": [_told(layer) for layer in tally.medium.layers]},
+        "medium": {**asdict(tally.medium), "layers": [_as_object(layer) for layer in tally.medium.layers]},
     }
     if tally.illumination != "searchlight":  # which files said nothing of when there was no other
         header[LIGHT] = tally.illumination
     edges = {"r_edges": tally.grid.r_edges, "z_edges": tally.grid.z_edges, "a_edges": tally.grid.a_edges}
-    arrays = {name: one for name, one in edges.items() if one is not None}
+    arrays = {name: values for name, values in edges.items() if values is not None}
     for name in tally.quantities:
         estimate = tally.quantity(name)
         parts = (estimate.value, estimate.standard_error, estimate.effective_samples)
@@ -120,9 +120,9 @@ def parse_results(content: bytes, name: str) -> Results:
 def _results(content: bytes) -> Results:
     """Return the results; the header is read first, which says how large all else is. ValueError in one line."""
     first = read_npz(content, MOST_FIRST, {"header": (), **dict.fromkeys(EDGES)}, text=["header"])
-    told = parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True)
-    light = told.pop(LIGHT, "searchlight") if isinstance(told, dict) else None
-    header = _table("header", told, HEADER)
+    head = parse_json(str(_needed(first, "header")).encode(), MOST_FIRST, infinite=True)
+    light = head.pop(LIGHT, "searchlight") if isinstance(head, dict) else None
+    header = _table("header", head, HEADER)
     require_illumination(light)
     if type(header["format"]) is not int or header["format"] != FORMAT:
         raise ValueError(f"format {shown(header['format'])}, not {FORMAT}")
@@ -134,8 +134,8 @@ def _results(content: bytes) -> Results:
     if not (is_number(cut) and 0 <= cut <= 1):
         raise ValueError(f"cut must be a share of the light, got {shown(cut)}")
     sizes = shapes(grid, len(medium.layers))
-    wanted = {name + end: size for name, size in sizes.items() for end in ENDS}
-    arrays = read_npz(content, sum(MOST_BEFORE + WORD * math.prod(size) for size in wanted.values()), wanted)
+    parts = {name + end: size for name, size in sizes.items() for end in ENDS}
+    arrays = read_npz(content, sum(MOST_BEFORE + WORD * math.prod(size) for size in parts.values()), parts)
     return Results(
         medium=medium,
         grid=grid,
@@ -156,16 +156,16 @@ def _medium(value: object) -> Medium:
     return Medium(tuple(_layer(f"layer {at}", layer) for at, layer in enumerate(layers, start=1)), **table)
 
 
-def _told(layer: Layer) -> dict[str, Any]:
+def _as_object(layer: Layer) -> dict[str, Any]:
     """Return a layer; its phase function only where that is not Henyey and Greenstein's, as files always did."""
-    told = {field.name: getattr(layer, field.name) for field in fields(Layer) if field.name != PHASE}
-    return told if layer.phase is None else {**told, PHASE: as_table(layer.phase)}
+    values = {field.name: getattr(layer, field.name) for field in fields(Layer) if field.name != PHASE}
+    return values if layer.phase is None else {**values, PHASE: as_table(layer.phase)}
 
 
 def _layer(name: str, value: object) -> Layer:
-    told = dict(value) if isinstance(value, dict) else value
-    phase = told.pop(PHASE) if isinstance(told, dict) and PHASE in told else None
-    return Layer(**_table(name, told, LAYER), phase=None if phase is None else from_table(phase))
+    values = dict(value) if isinstance(value, dict) else value
+    phase = values.pop(PHASE) if isinstance(values, dict) and PHASE in values else None
+    return Layer(**_table(name, values, LAYER), phase=None if phase is None else from_table(phase))
 
 
 def _grid(arrays: Mapping[str, NDArray]) -> Grid:

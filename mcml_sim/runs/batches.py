@@ -99,7 +99,8 @@ class _Fold(Generic[R]):
                 result = self._early.pop(self._added)
                 self._sum = result if self._sum is None else self._sum + result
                 self._added += 1
-                self._stopped = _is_look(self._added) and self._enough is not None and self._enough(self._sum)
+                is_look = self._added >= FIRST_LOOK and self._added & (self._added - 1) == 0  # 8, 16, 32, ...
+                self._stopped = is_look and self._enough is not None and self._enough(self._sum)
             self._turn.notify_all()
 
     def stop(self) -> None:
@@ -113,11 +114,6 @@ class _Fold(Generic[R]):
         if self._sum is None:
             raise RuntimeError("no batch was run")
         return self._sum
-
-
-def _is_look(batches: int) -> bool:
-    """Return True after 8, 16, 32, ... batches."""
-    return batches >= FIRST_LOOK and batches & (batches - 1) == 0
 
 
 class _Run(Generic[R]):

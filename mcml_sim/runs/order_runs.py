@@ -107,7 +107,8 @@ def _checked_run(grid: Grid, photons: int, seed: int, setting: Setting) -> tuple
 
 
 def _store(folder: Path, grid: Grid, seed: int, setting: Setting) -> Store[Counts]:
-    return Store(folder, _made_by(grid, seed, setting), partial(Counts.from_arrays, shape=_shape(grid, setting)))
+    shape = grid.rings + 1, order_bins.bins_of(setting).last_orders.size
+    return Store(folder, _made_by(grid, seed, setting), partial(Counts.from_arrays, shape=shape))
 
 
 def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
@@ -125,7 +126,3 @@ def _made_by(grid: Grid, seed: int, setting: Setting) -> dict[str, object]:
         "last_exact_order": order_bins.LAST_EXACT,
         "order_bins_per_octave": order_bins.BINS_PER_OCTAVE,
     }
-
-
-def _shape(grid: Grid, setting: Setting) -> tuple[int, int]:
-    return grid.rings + 1, order_bins.bins_of(setting).last_orders.size

@@ -61,7 +61,14 @@ def simulate(
     key = checked_whole("seed", seed, lowest=0)
     threads, folder = checked_workers(workers, scheduler), checked_folder(store)
     kernel, made_by = _kernel(medium, illumination), _made_by(medium, grid, key, illumination)
-    enough = None if precision is None else _enough(precision, medium, grid, key, illumination)
+    goal = precision if isinstance(precision, Precision | None) else Precision(precision)
+    if goal is not None:
+        require_quantity(goal.quantity, grid)
+
+    def is_enough(sums: Deposits) -> bool:
+        tally = Tally(medium, grid, sums.started, key, sums, illumination)
+        return goal is not None and goal.is_reached(tally.quantity(goal.quantity))
+
     # The kernel of a matched half space traces beams only, and takes no light.
     light = {} if illumination == "searchlight" else {"illumination": illumination}
     read = partial(Deposits.from_arrays, shapes=deposits.shapes(grid, len(medium.layers)))
@@ -73,7 +80,7 @@ def simulate(
         store=None if folder is None else Store(folder, made_by, read),
         progress=progress,
         scheduler=scheduler,
-        enough=enough,
+        enough=None if goal is None else is_enough,
     )
     return Tally(medium, grid, sums.started, key, sums, illumination)
 
@@ -91,24 +98,6 @@ def require_store(folder: Path, medium: Medium, grid: Grid, seed: int) -> None:
 def is_store_of(folder: Path, medium: Medium, grid: Grid, seed: int) -> bool:
     """Return whether the batches in that folder are of such a run, by whatever version and on whatever machine."""
     return _made_by(medium, grid, seed, "searchlight").items() <= (manifest(folder) or {}).items()
-
-
-class _Enough:
-    """Test whether a run's sums so far are as precise as requested."""
-
-    def __init__(self, precision: Precision, medium: Medium, grid: Grid, seed: int, illumination: str) -> None:
-        self._precision, self._medium, self._grid, self._seed = precision, medium, grid, seed
-        self._illumination = illumination
-
-    def __call__(self, sums: Deposits) -> bool:
-        tally = Tally(self._medium, self._grid, sums.started, self._seed, sums, self._illumination)
-        return self._precision.is_reached(tally.quantity(self._precision.quantity))
-
-
-def _enough(precision: float | Precision, medium: Medium, grid: Grid, seed: int, illumination: str) -> _Enough:
-    wanted = precision if isinstance(precision, Precision) else Precision(precision)
-    require_quantity(wanted.quantity, grid)
-    return _Enough(wanted, medium, grid, seed, illumination)
 
 
 def _kernel(medium: Medium, illumination: str) -> ModuleType:

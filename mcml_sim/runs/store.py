@@ -81,7 +81,17 @@ class Store(Generic[R]):
         self._made_by = {**made_by, **maker()}
         self._digest = _digest(self._made_by)
         self._read = read
-        self._open()
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            self._sweep()
+        except OSError as error:
+            raise StoreError(f"cannot use {self.folder} as a store: {reason_of(error)}") from error
+        require_ours(self.folder, self._made_by)
+        path, contents = self.folder / MANIFEST, json.dumps(self._made_by, indent=1).encode()
+        with contextlib.suppress(OSError, ValueError):  # else it is written anew
+            if _read(path, MAX_MANIFEST) == contents:
+                return
+        self._write(path, contents)
 
     def load(self, batch: int) -> R | None:
         """Return the batch as far as it was traced, or None; also with a DamagedBatch warning if it cannot be read."""
@@ -108,17 +118,6 @@ class Store(Generic[R]):
     def _path(self, batch: int) -> Path:
         # 1e13 photons in batches of 2^17 are 8 digits of batches: names sort as their numbers do.
         return self.folder / f"batch-{batch:08d}.npz"
-
-    def _open(self) -> None:
-        try:
-            self.folder.mkdir(parents=True, exist_ok=True)
-            self._sweep()
-        except OSError as error:
-            raise StoreError(f"cannot use {self.folder} as a store: {reason_of(error)}") from error
-        require_ours(self.folder, self._made_by)
-        path, contents = self.folder / MANIFEST, json.dumps(self._made_by, indent=1).encode()
-        if not _holds(path, contents):
-            self._write(path, contents)
 
     def _sweep(self) -> None:
         for name in filter(HALF_WRITTEN.fullmatch, os.listdir(self.folder)):
@@ -185,13 +184,6 @@ def _read(path: Path, most: int) -> bytes:
     if len(content) > most:
         raise ValueError(f"more than {most} bytes")
     return content
-
-
-def _holds(path: Path, contents: bytes) -> bool:
-    try:
-        return _read(path, MAX_MANIFEST) == contents
-    except (OSError, ValueError):
-        return False
 
 
 def _sealed(arrays: Mapping[str, NDArray]) -> bytes:

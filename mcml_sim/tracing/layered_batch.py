@@ -101,7 +101,9 @@ def trace_batch(
     first = 1 if diffuse or medium.layers[0].mu_t > 0 else 2
     if first > len(medium.layers):
         return _all_ballistic(grid, photons)
-    unit = _unit(medium)
+    # Lengths are in the shortest free path, or in the whole thickness where all is clear.
+    mu_t = max(layer.mu_t for layer in medium.layers)
+    unit = 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
     bins, shape = _bins(medium, grid, unit, photons, lanes or pool.lanes())
     key = jnp.asarray(rng.batch_key(seed, batch))
     entry = jnp.asarray(half_space_event.entry_cosines(light) if diffuse else np.zeros(0, np.float32))
@@ -159,7 +161,9 @@ State = tuple[LayeredLanes, Array, Array]
 def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelShape, state: State) -> State:
     """Return the lanes after flights, what they leave behind, the step across interfaces, and roulette."""
     lanes, by_layer, by_cell = state
-    here, group = layered_event.optics(stack, lanes.layer), _group(lanes, bins, shape.groups)
+    here = layered_event.optics(stack, lanes.layer)
+    group = lanes.photon.astype(jnp.float32) * bins.groups_per_photon
+    group = jnp.minimum(group, shape.groups - 1).astype(jnp.int32)
 
     def flight(number: Array, state: tuple[LayeredLanes, Array, Array]) -> tuple[LayeredLanes, Array, Array]:
         lanes, absorbed, by_cell = state
@@ -183,11 +187,6 @@ def _turn(go: Array, key: Array, stack: Stack, bins: LayeredBins, shape: KernelS
         )
     lanes = layered_event.settle(go, key, stack, lanes, lanes.event + FLIGHTS)
     return lanes._replace(event=lanes.event + EVENTS_PER_TURN, absorbed=absorbed), by_layer, by_cell
-
-
-def _group(lanes: LayeredLanes, bins: LayeredBins, parts: int) -> Array:
-    """Return the group of each photon, int32."""
-    return jnp.minimum(lanes.photon.astype(jnp.float32) * bins.groups_per_photon, parts - 1).astype(jnp.int32)
 
 
 def _cell(bins: LayeredBins, place: Array, down: Array, top: Array, group: Array, left: Array) -> tuple[Array, Array]:
@@ -254,38 +253,30 @@ def _summed(results: PhotonFates) -> Array:
     return jnp.stack([quantities.sum(axis=1), jnp.sum(quantities * quantities, axis=1)], axis=1)
 
 
-def _unit(medium: Medium) -> float:
-    """Return a length of the medium's own: its shortest free path, or its thickness if it is all clear."""
-    mu_t = max(layer.mu_t for layer in medium.layers)
-    return 1 / mu_t if mu_t else sum(layer.thickness for layer in medium.layers)
-
-
 def _bins(medium: Medium, grid: Grid, unit: float, photons: int, lanes: int) -> tuple[LayeredBins, KernelShape]:
     parts = groups(grid, photons, GROUPS)
     z_edges = grid.z_edges if grid.z_edges is not None else np.array([0.0, 1.0])
     # The angles' lower edges.
     cosines = np.cos(grid.a_edges[:-1]) if grid.a_edges is not None else np.zeros(0)
+    most = max(layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in medium.layers)
+    # Binary digits of sums after the point.
+    bits = SUM_BITS + max(0, math.floor(-math.log2(most)) - EVENT_BITS) if most else SUM_BITS
     with jax.enable_x64(True):
         bins = LayeredBins(
             axis(grid.r_edges, unit),
             axis(z_edges, unit),
             jnp.asarray(cosines, jnp.float32),
             jnp.float32(parts / photons),
-            jnp.float64(2.0 ** _sum_bits(medium)),
+            jnp.float64(2.0**bits),
         )
     return bins, KernelShape(parts, grid.depths > 0, lanes)
-
-
-def _sum_bits(medium: Medium) -> int:
-    """Return how many binary digits after the point sums have."""
-    most = max(layer.mu_a / layer.mu_t if layer.mu_t else 0.0 for layer in medium.layers)
-    return SUM_BITS + max(0, math.floor(-math.log2(most)) - EVENT_BITS) if most else SUM_BITS
 
 
 def _deposits(exits: Floats, sums: Floats, by_layer: Floats, by_cell: Floats, photons: int, grid: Grid) -> Deposits:
     *absorbed, total, accounted, ballistic, cut = sums
     if by_layer.size:
-        absorbed = [_with_squares(values, photons) for values in by_layer.T]
+        # The sum of squares by photon has the variance of the groups' spread.
+        absorbed = [(part.sum(), float(_variance(part)) + part.sum() ** 2 / photons) for part in by_layer.T]
     in_layers = np.array([*absorbed, total])
     rz = by_cell.reshape(-1, grid.rings + 1, grid.depths + 1) if grid.depths else np.zeros((1, 0, 0))
     z = rz.sum(axis=1)
@@ -313,12 +304,6 @@ def _variance(parts: Floats) -> Floats:
     """Return the variance of the sum of independent, equally distributed groups, by spread: (groups, ...) -> (...)."""
     number = len(parts)
     return number * parts.var(axis=0, ddof=1) if number > 1 else np.full(parts.shape[1:], np.inf)
-
-
-def _with_squares(parts: Floats, photons: int) -> tuple[float, float]:
-    """Return the sum, and the sum of squares by photon that has the variance of the groups' spread."""
-    total = parts.sum()
-    return total, float(_variance(parts)) + total**2 / photons
 
 
 def _all_ballistic(grid: Grid, photons: int) -> Deposits:

@@ -225,11 +225,14 @@ def settle(go: Array, key: Array, stack: Stack, lanes: LayeredLanes, event: Arra
     z = jnp.where(outcome.real > 0, 0, pick(stack.thickness, layer))
     bend = _renormalising(lanes, layers) * jnp.where(outcome.imag > 0, outcome.imag, 1)
     weight = jnp.abs(lanes.weight)
+    # Photons that one which survived roulette stands for.
+    odds = jnp.where(weight < THRESHOLD, jnp.float32(256 / CHANCE_IN_256), 1)
+    odds = odds * jnp.where(is_late(event), jnp.float32(2), 1)
     return lanes._replace(
         place=lanes.place + lax.complex(path * lanes.heading.real, path * lanes.heading.imag),
         down=lax.complex(jnp.where(waits, z, lanes.down.real), outcome.real),
         heading=lax.complex(lanes.heading.real * bend, lanes.heading.imag * bend),
-        weight=jnp.where(inside(layer, layers), weight * _odds(weight, event), -weight),
+        weight=jnp.where(inside(layer, layers), weight * odds, -weight),
         layer=layer,
     )
 
@@ -304,12 +307,6 @@ def _next_layer(layers: Array, lanes: LayeredLanes, event: Array, outcome: Array
     stays = inside(layer, layers)
     stops = jnp.where(stays & (event >= MAX_EVENTS), CUT, layer)
     return jnp.where(stays & (outcome.imag < 0), ROULETTED, stops).astype(jnp.int32)
-
-
-def _odds(weight: Array, event: Array) -> Array:
-    """Return how many photons one that survived roulette stands for."""
-    small = jnp.where(weight < THRESHOLD, jnp.float32(256 / CHANCE_IN_256), 1)
-    return small * jnp.where(is_late(event), jnp.float32(2), 1)
 
 
 def is_late(event: Array) -> Array:

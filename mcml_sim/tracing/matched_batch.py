@@ -95,7 +95,10 @@ def trace_batch(medium: Medium, grid: Grid, seed: int, batch: int, photons: int,
     """
     (layer,) = medium.layers
     lanes = lanes or pool.lanes()
-    values, bins = weights(layer.alpha), _bins(grid, layer.mfp)
+    values = weights(layer.alpha)
+    z = None if grid.z_edges is None else axis(grid.z_edges, layer.mfp)
+    between: NDArray | list[float] = [] if grid.a_edges is None else np.cos(grid.a_edges[-2:0:-1])
+    bins = MatchedBins(axis(grid.r_edges, layer.mfp), z, jnp.asarray(between, jnp.float32))
     key, number, stops = jnp.asarray(rng.batch_key(seed, batch)), jnp.int32(photons), jnp.asarray(values.stops)
     if grid.depths:
         with jax.enable_x64(True):
@@ -126,12 +129,6 @@ class Visits(NamedTuple):
     rz_variance: Array
     z: Array
     z_variance: Array
-
-
-def _bins(grid: Grid, mfp: float) -> MatchedBins:
-    z = None if grid.z_edges is None else axis(grid.z_edges, mfp)
-    between: NDArray | list[float] = [] if grid.a_edges is None else np.cos(grid.a_edges[-2:0:-1])
-    return MatchedBins(axis(grid.r_edges, mfp), z, jnp.asarray(between, jnp.float32))
 
 
 @partial(jax.jit, static_argnames=("parts", "lanes"), compiler_options=pool.COMPILER_OPTIONS)

@@ -32,7 +32,9 @@ def reflectance_of(alpha: ArrayLike, illumination: str, n: float = 1.0, g: float
 
     alpha is the reduced albedo [-], n >= 1 the index of the medium over that outside, g the mean cosine of scattering.
     """
-    setting = _setting(illumination, n, g)
+    setting = Setting(illumination, n, g)
+    if n == 1.0:
+        setting = Setting(illumination)  # by similarity
     return np.asarray(exact.reflectance(unreduced(np.asarray(alpha, float), setting.g), setting), float)
 
 
@@ -55,12 +57,6 @@ def _alpha(reflectance: float, white: float, illumination: str, n: float, g: flo
     if reflectance < MIDDLE:
         return float(brentq(excess, 0.0, 1.0, xtol=1e-300, rtol=TIGHTEST))
     return 1.0 - float(brentq(lambda s: excess(1.0 - s * s), 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST)) ** 2
-
-
-def _setting(illumination: str, n: float, g: float) -> Setting:
-    """Return the setting of a medium that scatters by g; isotropic where n = 1, by similarity."""
-    given = Setting(illumination, n, g)
-    return Setting(illumination, n) if n == 1.0 else given
 
 
 def reflectance_by_cosine(alpha: ArrayLike, cosine: ArrayLike) -> Floats:

@@ -77,13 +77,13 @@ def wrenninge_colour(alpha: Floats, g: float = 0.0) -> Floats:
     """Return the colour [-] that Wrenninge et al. map to this reduced albedo; van de Hulst's where g < 0, as Cycles."""
     if g < 0.0:
         return van_de_hulst_colour(alpha)
-    return np.vectorize(partial(_wrenninge_colour, g=g), otypes=[float])(unreduced(alpha, g))
 
+    def colour(albedo: float) -> float:
+        if albedo <= 0.0 or wrenninge_alpha(1.0, g) <= albedo:
+            return float(albedo > 0.0)
+        return float(brentq(lambda c: wrenninge_alpha(c, g) - albedo, 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST))
 
-def _wrenninge_colour(alpha: float, g: float) -> float:
-    if alpha <= 0.0 or wrenninge_alpha(1.0, g) <= alpha:
-        return float(alpha > 0.0)
-    return float(brentq(lambda c: wrenninge_alpha(c, g) - alpha, 0.0, 1.0, xtol=LEAST_ROOT, rtol=TIGHTEST))
+    return np.vectorize(colour, otypes=[float])(unreduced(alpha, g))
 
 
 def van_de_hulst_colour(alpha: Floats) -> Floats:

@@ -101,8 +101,9 @@ def stack(medium: Medium, k: float, rule: Nodes) -> Depths:
     tau_tops = np.cumsum([0.0, *(layer.mu_t * layer.thickness if layer.mu_t else 0.0 for layer in layers)])
     z_ends, tau_ends, scatters = _panels(layers, tops, tau_tops, k)
     s, d_s = gauss(rule.depth)
-    at = np.stack([1 - _crowded(s), _crowded(s)], axis=1)
-    length = np.diff(z_ends, axis=0)[0][:, None] * (d_s * _crowding(s))
+    x, d_x = _crowded(s)
+    at = np.stack([1 - x, x], axis=1)
+    length = np.diff(z_ends, axis=0)[0][:, None] * (d_s * d_x)
     mu_s, mu_a = np.reshape([(layer.mu_s, layer.mu_a) for layer in scatters], (-1, 2)).T[:, :, None]
     return Depths(
         z=(at @ z_ends).T.ravel(),
@@ -178,16 +179,10 @@ def gauss(nodes: int) -> tuple[Floats, Floats]:
     return (1 + x) / 2, weight / 2
 
 
-def _crowded(s: Floats) -> Floats:
-    """Return s on [0, 1] drawn towards both ends (Kress, Numer. Math. 58, 1990)."""
+def _crowded(s: Floats) -> tuple[Floats, Floats]:
+    """Return x on [0, 1], drawn from s towards both ends (Kress, Numer. Math. 58, 1990), and dx/ds."""
     up, down = s**GRADING, (1 - s) ** GRADING
-    return up / (up + down)
-
-
-def _crowding(s: Floats) -> Floats:
-    """Return the derivative of `_crowded`."""
-    up, down = s**GRADING, (1 - s) ** GRADING
-    return GRADING * (s * (1 - s)) ** (GRADING - 1) / (up + down) ** 2
+    return up / (up + down), GRADING * (s * (1 - s)) ** (GRADING - 1) / (up + down) ** 2
 
 
 class Near(NamedTuple):
@@ -205,7 +200,7 @@ class Near(NamedTuple):
 def near_node(nodes: int) -> Near:
     """Return the rule from each node to both ends, in x, not s: K is a logarithm times what is smooth in x."""
     share, d_share = double_exponential()
-    x = _crowded(gauss(nodes)[0])[:, None, None]
+    x = _crowded(gauss(nodes)[0])[0][:, None, None]
     side = np.concatenate([-x, 1 - x], axis=1)
     at, length = (x + side * share).reshape(nodes, -1), np.abs(side)
     return Near((length * share).reshape(nodes, -1), (length * d_share).reshape(nodes, -1), _through(at, nodes))

@@ -89,11 +89,6 @@ def _direct_far(a: Floats, b: Floats) -> Floats:
     return 0.5 * v * total
 
 
-def _out_freely(optical: Floats, height: Floats, k: float) -> Floats:
-    """Return X without surfaces."""
-    return 0.5 * np.exp(-np.hypot(optical, k * height)) - optical * direct(optical, height, k)
-
-
 def solve(here: Depths, k: float, rule: Nodes) -> Field:
     """Solve for phi, phi_0 and X at wave number k [1/length]. Both illuminations share all steps but the last."""
     if not here.panels:
@@ -104,8 +99,9 @@ def solve(here: Depths, k: float, rule: Nodes) -> Field:
     up = at_once + _out_later(here, slants)
     down = 0 * up
     if here.height < np.inf:
-        turned, slants_turned = _upside_down(here), _slants_upside_down(slants)
-        down = _out_at_once(turned, slants_turned, k, rule) + _out_later(turned, slants_turned)
+        turned = here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
+        slanted = slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
+        down = _out_at_once(turned, slanted, k, rule) + _out_later(turned, slanted)
     unscattered = {"searchlight": beam(here, here.tau), "diffuse": 4 * here.above**2 * up}
     matrix = np.eye(here.z.size) - _scattered(here, slants, k)
     phi = np.linalg.solve(matrix, np.column_stack(list(unscattered.values())))
@@ -126,7 +122,7 @@ def normal_reflectances(here: Depths) -> tuple[float, float]:
 
 
 def _scattered(here: Depths, slants: Slants, k: float) -> Floats:
-    """Return the the integral operator on fluences at the nodes, (N, N)."""
+    """Return the integral operator on fluences at the nodes, (N, N)."""
     matrix = _by_panel(here, k)
     for mirror in _mirrors(here):
         matrix += _by_panel(here, k, mirror)
@@ -245,7 +241,7 @@ def _out_at_once(here: Depths, slants: Slants, k: float, rule: Nodes) -> Floats:
         light = np.exp(-np.multiply.outer(np.sqrt(1 + t * t).real, tau)) * j0(k * np.multiply.outer(t.real, z))
         out += (0.5 * d_mu * passes / np.sqrt(1 + t * t)).real @ light
         if matched:
-            out += _out_freely(tau, z, k)
+            out += 0.5 * np.exp(-np.hypot(tau, k * z)) - tau * direct(tau, z, k)  # X without surfaces
     ray = slice(slants.cones, None)
     a, b, weight = slants.a[ray], slants.b[ray], slants.weight[ray] * slants.mu[ray]
     out += ((weight * (1 - a - matched)) @ slants.from_top[ray]).real
@@ -260,14 +256,6 @@ def _out_later(here: Depths, slants: Slants) -> Floats:
     passes = slants.weight * slants.mu * (1 - a) * a * b * whole**2 / (1 - a * b * whole**2)
     out = (passes @ slants.from_top).real
     return out + ((passes * b * whole) @ slants.to_bottom).real if here.height < np.inf else out
-
-
-def _upside_down(here: Depths) -> Depths:
-    return here._replace(z=here.height - here.z, tau=here.optical - here.tau, above=here.below, below=here.above)
-
-
-def _slants_upside_down(slants: Slants) -> Slants:
-    return slants._replace(a=slants.b, b=slants.a, from_top=slants.to_bottom, to_bottom=slants.from_top)
 
 
 def thrown_back(here: Depths, k: float, illumination: str, rule: Nodes) -> float:
