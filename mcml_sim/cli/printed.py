@@ -81,10 +81,10 @@ def precision_reached(estimate: Estimate, goal: Precision, photons: int) -> str:
             f"{goal.quantity}: {goal.relative_error:g} not reached; some bins hold too few photons to predict how many "
             "would reach it"
         )
-    found = float(np.max(error / value))
-    needed = photons * (found / goal.relative_error) ** 2
+    reached = float(np.max(error / value))
+    needed = photons * (reached / goal.relative_error) ** 2
     return (
-        f"{goal.quantity}: relative standard error {found:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
+        f"{goal.quantity}: relative standard error {reached:.2g}, not {goal.relative_error:g}; about {needed:.2g} "
         "photons in all would reach it, and these are kept: request more --photons"
     )
 
@@ -120,7 +120,9 @@ def summary(job: Job, kept: Results, goal: Precision | None) -> dict[str, Any]:
         "seed": kept.seed,
         "version": kept.version,
         "cut": kept.cut,
-        "estimates": {name: {"value": one.value, "standard_error": one.standard_error} for name, one in shares.items()},
+        "estimates": {
+            name: {"value": share.value, "standard_error": share.standard_error} for name, share in shares.items()
+        },
     }
     if goal is not None:
         reached = goal.is_reached(kept.estimates[goal.quantity])

@@ -42,16 +42,16 @@ class FirstScreen(TyperGroup):
             for at, (_, name, help_text) in enumerate(group):
                 shown = "" if at else title
                 console.print(Text.assemble((f"{shown:{titles}}", "dim"), (f"{name:{names}}", "bold cyan"), help_text))
-        options = [one.opts[0] for one in self.get_params(ctx) if one.opts[0] not in NOT_SHOWN]
+        options = [option.opts[0] for option in self.get_params(ctx) if option.opts[0] not in NOT_SHOWN]
         console.print(Text.assemble((f"{'Options':{titles}}", "dim"), ", ".join(options)))
         console.print(Text(f"More, with examples: {ctx.command_path} COMMAND --help", style="dim"))
 
     def _commands(self, ctx: typer.Context) -> list[tuple[str, str, str]]:
         """Return group, name and short help of each subcommand."""
-        found = [self.commands[name] for name in self.list_commands(ctx)]
+        commands = {name: self.commands[name] for name in self.list_commands(ctx)}
         return [
-            (getattr(one, "rich_help_panel", None) or "Commands", one.name or "", one.get_short_help_str(200))
-            for one in found
+            (getattr(command, "rich_help_panel", None) or "Commands", name, command.get_short_help_str(200))
+            for name, command in commands.items()
         ]
 
 
@@ -63,7 +63,8 @@ def add(
 ) -> None:
     """Add a subcommand; the examples at the end of its docstring come last in its --help, below the options."""
     help_text, _, examples = inspect.cleandoc(command.__doc__ or "").partition("\n\b\n")
-    paragraphs = [" ".join(one.split()) for one in help_text.split("\n\n")]  # rich would keep the source's line breaks
+    # Rich would keep the source's line breaks.
+    paragraphs = [" ".join(paragraph.split()) for paragraph in help_text.split("\n\n")]
     epilog = f"\b\n{examples}"
     app.command(cls=kind, help="\n\n".join(paragraphs), epilog=epilog, rich_help_panel=panel)(command)
 
@@ -132,16 +133,16 @@ class Program:
     def main(self) -> None:
         """Run a subcommand; whatever the user can mend is one line on stderr and exit status 2."""
         mend_streams()
-        found: list[Warning | str] = []
+        caught: list[Warning | str] = []
         with warnings.catch_warnings():
             warnings.filterwarnings("error", category=RuntimeWarning)  # of arithmetic: such numbers make no answer
             warnings.simplefilter("always", Notice)
-            warnings.showwarning = lambda message, *_: found.append(message)
+            warnings.showwarning = lambda message, *_: caught.append(message)
             status = self._status()
             if status == INTERRUPTED:
                 self.say(self.stopped())
             # Warnings of libraries are not shown; and an error is one line.
-            notices = dict.fromkeys(str(one) for one in found if isinstance(one, Notice))
+            notices = dict.fromkeys(str(warning) for warning in caught if isinstance(warning, Notice))
             for text in notices if status in ANSWERS else ():
                 self.say(text)
         sys.exit(status)

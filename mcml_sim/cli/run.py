@@ -122,21 +122,21 @@ def run(
         progress=False if quiet else None,
     )
     jobs = input_runs.jobs(file, runs, number, out, options)
-    if not quiet and any(one.limit for one in runs):
+    if not quiet and any(planned.limit for planned in runs):
         warnings.warn(f"{file}: time limits end no run: each traces all its photons", Notice, stacklevel=2)
     console = Console(highlight=False, soft_wrap=True, quiet=quiet or as_json)
-    found = []
+    summaries = []
     with contextlib.nullcontext() if scheduler is None else without_logs():  # dask's are tracebacks of many lines
         for at, job in enumerate(jobs, start=1):
             console.print(f"run {at} of {len(jobs)}: {job.mco}", markup=False)
             done = input_runs.done(job, options)
-            found.append(printed.summary(job, done.results, options.goal))
+            summaries.append(printed.summary(job, done.results, options.goal))
             for line in printed.lines(job, done, options):
                 console.print(f"  {line}", markup=False)
     if options.goal is not None:
         console.print(REPEATS, markup=False)
     if as_json:
-        print_json({"runs": found})
+        print_json({"runs": summaries})
 
 
 def _whole(name: str, text: str, lowest: int, highest: int | None = None) -> int:

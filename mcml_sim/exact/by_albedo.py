@@ -35,7 +35,7 @@ Surface = table.Table | None
 
 def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = STANDARD) -> Any:
     """Return the kernel on x broadcast against alpha, float64 arrays; a jax array if one of them or n is."""
-    if any(isinstance(one, jax.Array) for one in (x, alpha, setting.n)):
+    if any(isinstance(value, jax.Array) for value in (x, alpha, setting.n)):
         return _traced(kernel, jnp.asarray(x), jnp.asarray(alpha), surface(setting, rule), setting.illumination, rule)
     x, alpha = np.broadcast_arrays(x, alpha)
     out = np.empty(x.shape)
@@ -53,7 +53,7 @@ def by_alpha(kernel: Kernel, x: Any, alpha: Any, setting: Setting, rule: Rule = 
 
 def elementwise(function: Each, alpha: Any, of: Surface = None) -> Any:
     """Return `function` of each albedo by itself, a float64 array."""
-    if any(isinstance(one, jax.Array) for one in (alpha, *jax.tree.leaves(of))):
+    if any(isinstance(leaf, jax.Array) for leaf in (alpha, *jax.tree.leaves(of))):
         return _traced_each(function, jnp.asarray(alpha), of)
     with jax.enable_x64(True), jax.core.eval_context():
         parts = [_each(function, block, of) for block in blocks(alpha.ravel())]
@@ -117,17 +117,17 @@ def _traced(kernel: Kernel, x: jax.Array, alpha: jax.Array, of: Surface, illumin
     transforms = _map(lambda a: solve(a, of, illumination, rule), albedos, at_once=1)
     owner = np.broadcast_to(np.arange(albedos.size).reshape(alpha.shape), shape).ravel()
 
-    def one(pair: tuple[jax.Array, jax.Array]) -> jax.Array:
+    def of_pair(pair: tuple[jax.Array, jax.Array]) -> jax.Array:
         own, at = pair
         value = kernel(jax.tree.map(lambda leaf: leaf[own], transforms), albedos[own], at)
         return jnp.where(jnp.isnan(at + albedos[own]), jnp.nan, value)
 
-    return _map(one, (jnp.asarray(owner), jnp.broadcast_to(x, shape).ravel()), at_once=BLOCK).reshape(shape)
+    return _map(of_pair, (jnp.asarray(owner), jnp.broadcast_to(x, shape).ravel()), at_once=BLOCK).reshape(shape)
 
 
 @partial(jit, static_argnums=0)
 def _traced_each(function: Each, alpha: jax.Array, of: Surface) -> jax.Array:
-    return _map(lambda one: function(one, of), alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
+    return _map(lambda albedo: function(albedo, of), alpha.ravel(), at_once=BLOCK).reshape(alpha.shape)
 
 
 def _map(function: Callable, arguments: Any, at_once: int) -> Any:

@@ -114,7 +114,7 @@ def _mean_over_azimuth(
     cone = _cone(n, jnp.abs(k), angles)
     middle = _between_singularities(*jax.lax.stop_gradient((n, k, turn * both)))
     nearest = jnp.argmin(jnp.abs(middle[..., None] - SLOPES), axis=-1)
-    mu, sine, weight = (one[nearest] for one in cone)
+    mu, sine, weight = (part[nearest] for part in cone)
     depth = 1.0 + 1j * (turn * both)[..., None] * mu
     across = 1j * k * sine
     # The first factor winds from the fourth quadrant to the third, the second from the second to the fourth.
@@ -171,12 +171,12 @@ def _y_nodes(n: jax.Array, k: jax.Array, count: int) -> tuple[jax.Array, jax.Arr
     def halve(_: int, between: tuple[jax.Array, jax.Array]) -> tuple[jax.Array, jax.Array]:
         low, high = between
         middle = 0.5 * (low + high)
-        below = variable(scale * jnp.sinh(middle)) < wanted
+        below = variable(scale * jnp.sinh(middle)) < levels
         return jnp.where(below, middle, low), jnp.where(below, high, middle)
 
     last = FARTHEST_X * (1.0 + k)
     step = variable(last) / count
-    wanted = step * (np.arange(count) + 0.5)
+    levels = step * (np.arange(count) + 0.5)
     top = jnp.full(count, jnp.arcsinh(last / scale))
     low, high = jax.lax.fori_loop(0, BISECTIONS, halve, (jnp.zeros(count), top))
     y = scale * jnp.sinh(0.5 * (low + high))

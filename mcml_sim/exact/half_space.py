@@ -83,7 +83,7 @@ def quantile(xi: Numbers, alpha: Numbers, mfp: Numbers = 1.0, setting: Setting =
     share, albedo, length = _all_checked(xi=xi, alpha=alpha, mfp=mfp)
     if not setting.is_isotropic:
         values = forwards.quantile(share, albedo, setting)
-    elif any(isinstance(one, jax.Array) for one in (share, albedo, setting.n)):
+    elif any(isinstance(value, jax.Array) for value in (share, albedo, setting.n)):
         # A number must stay one: as an array it would be an n to differentiate by, and 1 no longer be told from 1 + 0.
         n, known = (setting.n, None) if is_traced(setting.n) else (None, setting.n)
         values = _radius_within(share, albedo, n, known, setting.illumination)

@@ -111,8 +111,8 @@ def square_root(z: jax.Array) -> jax.Array:
     """Return the principal root of z != 0."""
     larger = jnp.sqrt(0.5 * (jnp.sqrt(z.real**2 + z.imag**2) + jnp.abs(z.real)))
     smaller = 0.5 * z.imag / larger
-    right = z.real >= 0.0
-    real, imag = jnp.where(right, larger, jnp.abs(smaller)), jnp.where(right, smaller, jnp.copysign(larger, z.imag))
+    ahead = z.real >= 0.0
+    real, imag = jnp.where(ahead, larger, jnp.abs(smaller)), jnp.where(ahead, smaller, jnp.copysign(larger, z.imag))
     return jax.lax.complex(real, imag)
 
 

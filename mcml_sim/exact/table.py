@@ -106,10 +106,10 @@ def _root(alpha: jax.Array, k: Any) -> jax.Array:
 
 def _sum(coefficients: jax.Array, z: jax.Array) -> jax.Array:
     """Sum Chebyshev polynomials by Clenshaw's recurrence: (..., degree) and (...)."""
-    one, two = jnp.zeros_like(z), jnp.zeros_like(z)
+    last, two = jnp.zeros_like(z), jnp.zeros_like(z)
     for index in range(coefficients.shape[-1] - 1, 0, -1):
-        one, two = 2.0 * z * one - two + coefficients[..., index], one
-    return z * one - two + coefficients[..., 0]
+        last, two = 2.0 * z * last - two + coefficients[..., index], last
+    return z * last - two + coefficients[..., 0]
 
 
 @jax.custom_jvp
@@ -123,7 +123,7 @@ def _total_jvp(primals: tuple, tangents: tuple) -> tuple[jax.Array, jax.Array]:
     """Differentiate A / alpha: infinite at alpha = 1."""
     alpha, coefficients, group = primals
     w = jnp.sqrt(1.0 - alpha)
-    value, slope = jax.jvp(lambda one: _total_of(one, coefficients, group), (w,), (jnp.ones_like(w),))
+    value, slope = jax.jvp(lambda root: _total_of(root, coefficients, group), (w,), (jnp.ones_like(w),))
     return value, slope * (-0.5 / w) * tangents[0] + _total_of(w, tangents[1], group)
 
 
@@ -155,7 +155,7 @@ def shapes(rule: Rule) -> Table:
     """Return the shapes of a table's arrays, as jax.ShapeDtypeStruct."""
     lines, ray = _lines(rule.line), _ray(rule.line)
     shape = (2, len(lines), lines[0].k.size + 1, rule.degree), (2, ray.k.size, ORDERS)
-    made_of: Any = [jax.ShapeDtypeStruct(one, np.complex128) for one in shape]
+    made_of: Any = [jax.ShapeDtypeStruct(size, np.complex128) for size in shape]
     return Table(*made_of)
 
 
@@ -169,8 +169,8 @@ def _line(n: float, group: int, line: _Contour, rule: Rule, slope: bool) -> Comp
         alpha = (1.0 - w * w) / (1.0 - np.asarray(_root(jnp.ones(()), part))[:, None] ** 2)
         return _resolvents(n, part, alpha, rule.depth, rule.angles, slope)
 
-    found = _polynomials(_in_chunks(values, own))
-    return np.pad(found, ((0, 0), (0, line.k.size - own.size), (0, 0)), mode="edge")
+    coefficients = _polynomials(_in_chunks(values, own))
+    return np.pad(coefficients, ((0, 0), (0, line.k.size - own.size), (0, 0)), mode="edge")
 
 
 def _totals(n: float, rule: Rule, slope: bool) -> Complexes:
@@ -188,26 +188,26 @@ def _nodes(degree: int) -> Floats:
 def _polynomials(values: Complexes) -> Complexes:
     """Return coefficients of Chebyshev polynomials from values on their nodes, the last axis of both."""
     degree = values.shape[-1]
-    found: Complexes = 2.0 / degree * values @ np.cos(np.outer(np.arccos(_nodes(degree)), np.arange(degree)))
-    found[..., 0] *= 0.5
-    return found
+    coefficients: Complexes = 2.0 / degree * values @ np.cos(np.outer(np.arccos(_nodes(degree)), np.arange(degree)))
+    coefficients[..., 0] *= 0.5
+    return coefficients
 
 
 def _resolvents(n: float, k: Complexes, alpha: Complexes, x_nodes: int, angles: int, slope: bool) -> Complexes:
     """Return R^(k) / alpha for albedos (k, m), complex by the nodes in w, or its derivative by n: (2, k, m)."""
     here, change = ([np.asarray(part) for part in system] for system in _systems(n, k, x_nodes, angles, slope))
-    found = []
+    transforms = []
     for albedo, matrix, leaving, source, *by_n in zip(alpha, *here, *change, strict=True):
         resolvents = np.eye(x_nodes) - albedo[:, None, None] * matrix
         adjoint = np.linalg.solve(resolvents, leaving[None, :, None])[..., 0]
         if not slope:
-            found.append(source @ adjoint.T)
+            transforms.append(source @ adjoint.T)
             continue
         matrix_by_n, leaving_by_n, source_by_n = by_n
         solution = np.linalg.solve(resolvents, source.T[None])  # (m, x, 2)
         within = albedo * np.einsum("mx,mxl->lm", adjoint @ matrix_by_n, solution)
-        found.append(source_by_n @ adjoint.T + np.einsum("x,mxl->lm", leaving_by_n, solution) + within)
-    return np.stack(found, axis=1) / np.pi
+        transforms.append(source_by_n @ adjoint.T + np.einsum("x,mxl->lm", leaving_by_n, solution) + within)
+    return np.stack(transforms, axis=1) / np.pi
 
 
 def _in_chunks(function: Callable[[Complexes], Complexes], k: Complexes) -> Complexes:
@@ -229,7 +229,7 @@ def _systems(
     """Return systems and, if asked for, their derivatives by n."""
 
     def at(n: jax.Array) -> cone.System:
-        return jax.vmap(lambda one: cone.system(n, one, x_nodes, angles))(k)
+        return jax.vmap(lambda wave: cone.system(n, wave, x_nodes, angles))(k)
 
     return jax.jvp(at, (n,), (1.0,)) if slope else (at(n), ())
 
@@ -239,7 +239,7 @@ def _series(n: Any, k: jax.Array, x_nodes: int, angles: int, slope: bool) -> jax
     """Return the transform of each order of scattering, or its derivative by n: (k, 2, orders)."""
 
     def at(n: jax.Array) -> jax.Array:
-        return jax.vmap(lambda one: cone.series(n, one, ORDERS, x_nodes, angles))(k)
+        return jax.vmap(lambda wave: cone.series(n, wave, ORDERS, x_nodes, angles))(k)
 
     return jax.jvp(at, (n,), (1.0,))[1] if slope else at(n)
 
@@ -289,8 +289,8 @@ def kept_table(n: float, rule: Rule, slope: bool = False) -> Table:
         return {name: np.ascontiguousarray(part, dtype=complex)[..., None].view(float) for name, part in parts}
 
     nodes, kind = "-".join(map(str, astuple(rule)[3:])), "-slope" if slope else ""
-    found = kept(f"half-space-n{n!r}-{nodes}{kind}-v{VERSION}", Table._fields, make)
-    return Table(*(found[name].view(complex)[..., 0] for name in Table._fields))
+    arrays = kept(f"half-space-n{n!r}-{nodes}{kind}-v{VERSION}", Table._fields, make)
+    return Table(*(arrays[name].view(complex)[..., 0] for name in Table._fields))
 
 
 @partial(jax.custom_jvp, nondiff_argnums=(1,))
@@ -306,10 +306,10 @@ def _traced_table_jvp(rule: Rule, primals: tuple, tangents: tuple) -> tuple[Tabl
 
 
 def _called(n: jax.Array, rule: Rule, slope: bool) -> Table:
-    def found(n: Any) -> Table:
+    def look_up(n: Any) -> Table:
         whole = kept_table(max(float(n), LEAST), rule, slope)
         return whole if n >= 1 else jax.tree.map(lambda part: np.full_like(part, np.nan), whole)
 
     if isinstance(n, jax.core.Tracer):
-        return jax.pure_callback(found, shapes(rule), n, vmap_method="sequential")
-    return jax.tree.map(jnp.asarray, found(n))
+        return jax.pure_callback(look_up, shapes(rule), n, vmap_method="sequential")
+    return jax.tree.map(jnp.asarray, look_up(n))

@@ -49,10 +49,10 @@ def _read(content: bytes, wanted: Collection[str]) -> Arrays:
     arrays = read_npz(content, MOST_BYTES, text=("sha256",))
     if not {"sha256", *wanted} <= arrays.keys():
         raise ValueError("an array is missing")
-    found = {name: arrays[name] for name in wanted}
-    if str(arrays["sha256"]) != _digest(found):
+    chosen = {name: arrays[name] for name in wanted}
+    if str(arrays["sha256"]) != _digest(chosen):
         raise ValueError("its numbers are not those that were written")
-    return found
+    return chosen
 
 
 def _content(arrays: Arrays) -> bytes:

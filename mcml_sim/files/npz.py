@@ -73,19 +73,19 @@ def read_npz(content: bytes, most: int, wanted: Shapes | None = None, text: Coll
 
 def _members(archive: zipfile.ZipFile, wanted: Shapes | None) -> dict[str, zipfile.ZipInfo]:
     """Return the wanted members by the name of their array."""
-    found: dict[str, zipfile.ZipInfo] = {}
+    members: dict[str, zipfile.ZipInfo] = {}
     for member in archive.infolist():
         name = member.filename.removesuffix(SUFFIX)
         if name == member.filename or (wanted is not None and name not in wanted):
             continue
-        if name in found:
+        if name in members:
             raise ValueError(f"two arrays are named {_shown(name)}")
         if member.flag_bits & ENCRYPTED:
             raise ValueError(f"{_shown(name)} is encrypted")
         if member.compress_type not in METHODS:
             raise ValueError(f"{_shown(name)} is packed in a way that numpy does not use")
-        found[name] = member
-    return found
+        members[name] = member
+    return members
 
 
 def _checked_size(
@@ -97,16 +97,16 @@ def _checked_size(
     if head is None or int.from_bytes(head["length"], "little") != len(head["text"]):
         raise ValueError(f"{_shown(name)} is no array of numbers or text as numpy writes it")
     lengths = [part.strip() for part in head["shape"].decode().rstrip(" ,").split(",")] if head["shape"] else []
-    if len(lengths) > MOST_AXES or not all(re.fullmatch(rf"\d{{1,{LONGEST_NUMBER}}}", one) for one in lengths):
+    if len(lengths) > MOST_AXES or not all(re.fullmatch(rf"\d{{1,{LONGEST_NUMBER}}}", length) for length in lengths):
         raise ValueError(f"{_shown(name)} has a shape that no array has")
-    found, dtype = tuple(map(int, lengths)), np.dtype(head["dtype"].decode())
-    if is_text and (dtype.kind != "U" or found != ()):
-        raise ValueError(f"{_shown(name)} must be one text, got {dtype} of shape {found}")
+    got, dtype = tuple(map(int, lengths)), np.dtype(head["dtype"].decode())
+    if is_text and (dtype.kind != "U" or got != ()):
+        raise ValueError(f"{_shown(name)} must be one text, got {dtype} of shape {got}")
     if not is_text and (dtype.kind == "U" or dtype.itemsize > WIDEST):
         raise ValueError(f"{_shown(name)} must be real numbers, got {dtype}")
-    if shape is not None and found != shape:
-        raise ValueError(f"{_shown(name)} must have the shape {shape}, got {found}")
-    claimed = math.prod(found) * dtype.itemsize
+    if shape is not None and got != shape:
+        raise ValueError(f"{_shown(name)} must have the shape {shape}, got {got}")
+    claimed = math.prod(got) * dtype.itemsize
     if member.file_size != head.end() + claimed:
         raise ValueError(f"{_shown(name)} claims {claimed} bytes, and has {member.file_size - head.end()}")
     return member.file_size

@@ -71,7 +71,7 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
         raise ValueError(f"{name}, which is no number")
 
     try:
-        found = json.loads(
+        value = json.loads(
             text,
             parse_float=lambda literal: _number(text, literal),
             parse_int=whole,
@@ -80,7 +80,7 @@ def parse_json(content: bytes, most: int = MOST_JSON, infinite: bool = False) ->
         )
     except RecursionError:
         raise ValueError(_too_deep()) from None
-    return _checked(found)
+    return _checked(value)
 
 
 def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
@@ -90,17 +90,17 @@ def parse_toml(content: bytes, most: int = MOST_TOML) -> dict[str, Any]:
         raise ValueError(_too_deep())
     long = LONG_NUMBER.search(text)
     try:
-        found = tomllib.loads(text, parse_float=lambda literal: _number(text, literal))
+        value = tomllib.loads(text, parse_float=lambda literal: _number(text, literal))
     except RecursionError:
         raise ValueError(_too_deep()) from None
     except ValueError as error:
         if long is None or not str(error).startswith("Exceeds the limit"):
             raise
         raise _too_long(text, long[0]) from None
-    _checked(found)
-    if long is not None and _has_long(found):
+    _checked(value)
+    if long is not None and _has_long(value):
         raise _too_long(text, long[0])
-    return found
+    return value
 
 
 def _text(content: bytes, most: int) -> str:
@@ -132,23 +132,23 @@ def _place(text: str, literal: str) -> str:
 def _has_long(value: Any) -> bool:
     """Return whether a whole number somewhere inside has more digits than floating point holds."""
     if isinstance(value, dict | list):
-        return any(_has_long(one) for one in (value.values() if isinstance(value, dict) else value))
+        return any(_has_long(inner) for inner in (value.values() if isinstance(value, dict) else value))
     return isinstance(value, int) and abs(value) >= 10**MOST_DIGITS
 
 
 def _object(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-    found = dict(pairs)
-    if len(found) < len(pairs):
+    table = dict(pairs)
+    if len(table) < len(pairs):
         twice, _ = Counter(name for name, _ in pairs).most_common(1)[0]
         raise ValueError(f"the key {_short(repr(twice))} twice in one object")
-    return found
+    return table
 
 
 def _checked(value: Any) -> Any:
     """Return a parsed value; ValueError if it nests too deep, or has half a character."""
     level = [value]
     for _ in range(MOST_LEVELS + 1):
-        level = [inner for one in level for inner in _inside(one)]
+        level = [inner for outer in level for inner in _inside(outer)]
         if not level:
             return value
     raise ValueError(_too_deep())

@@ -57,9 +57,9 @@ def checked_numbers(name: str, value: object, accepted: str) -> Floats:
 def require_one_shape(**arrays: Any) -> None:
     """Raise InputError unless the arguments broadcast to one shape."""
     try:
-        np.broadcast_shapes(*(np.shape(one) for one in arrays.values()))
+        np.broadcast_shapes(*(np.shape(array) for array in arrays.values()))
     except ValueError:
-        got = ", ".join(f"{name} {np.shape(one)}" for name, one in arrays.items())
+        got = ", ".join(f"{name} {np.shape(array)}" for name, array in arrays.items())
         raise InputError(f"the shapes of the arguments must broadcast to one, got {got}") from None
 
 

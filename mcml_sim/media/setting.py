@@ -70,8 +70,8 @@ class Setting:
 
     def as_table(self) -> dict[str, Any]:
         """Return the setting for files; `phase` only where it is not Henyey and Greenstein's."""
-        told = {"illumination": self.illumination, "n": self.n, "g": self.g}
-        return told if self.phase is None else {**told, "phase": phases.as_table(self.phase)}
+        table = {"illumination": self.illumination, "n": self.n, "g": self.g}
+        return table if self.phase is None else {**table, "phase": phases.as_table(self.phase)}
 
     @classmethod
     def of(cls, content: Mapping[str, Any]) -> Setting:

@@ -216,9 +216,9 @@ class Lines:
         return self.decimal(name, word, COEFFICIENTS, or_else="0 or ")
 
 
-def read_run(lines: Lines, taken: set[str]) -> Run:
-    """Return the run of the next lines; `taken` are the output files of those before it."""
-    output, form = _output(lines, taken, *lines.take(1, OUTPUT, optional=1))
+def read_run(lines: Lines, outputs: set[str]) -> Run:
+    """Return the run of the next lines; `outputs` are the output files of those before it."""
+    output, form = _output(lines, outputs, *lines.take(1, OUTPUT, optional=1))
     (word,) = lines.take(1, "the number of photons")
     photons = lines.whole("the number of photons", word, MAX_PHOTONS)
     words = lines.take(2, "dz and dr")
@@ -253,34 +253,34 @@ class Optics(NamedTuple):
 
 def read_media(lines: Lines) -> dict[str, Optics]:
     """Return the media that the next lines of a file of MCML 2 define, up to `end`."""
-    found: dict[str, Optics] = {}
+    media: dict[str, Optics] = {}
     while True:
         name, *words = lines.take(1, "a medium, its n, mu_a, mu_s and g, or end", optional=4)
         if name == "end":
-            return found
-        if len(words) < 4 or len(found) == MOST_MEDIA:
+            return media
+        if len(words) < 4 or len(media) == MOST_MEDIA:
             raise lines.error(f"a medium's name, n, mu_a, mu_s and g, {MOST_MEDIA} media at most", shown(name))
-        if name in found:
+        if name in media:
             raise lines.error("each medium once", f"{shown(name)} again")
         if len(name) > MAX_NAME:
             raise lines.error(f"a medium's name of at most {MAX_NAME} characters", shown(name))
         of = f"of {shown(name)}"
         mu_s = lines.coefficient(f"mu_s {of} in 1/cm", words[2])
         n, g = lines.decimal(f"n {of}", words[0], INDICES), require_g(lines, of, words[3], mu_s)
-        found[name] = Optics(n, lines.coefficient(f"mu_a {of} in 1/cm", words[1]), mu_s, g)
+        media[name] = Optics(n, lines.coefficient(f"mu_a {of} in 1/cm", words[1]), mu_s, g)
 
 
 def _runs_of_2(lines: Lines, media: dict[str, Optics]) -> Iterator[Run]:
-    taken: set[str] = set()
+    outputs: set[str] = set()
     while True:
         name, *form = lines.take(1, f"{OUTPUT}, or end", optional=1)
         if name == "end":
-            if not taken:
+            if not outputs:
                 raise lines.error(OUTPUT, "'end'")
             return
-        if len(taken) == MAX_RUNS:
+        if len(outputs) == MAX_RUNS:
             raise lines.error("end", f"more than {MAX_RUNS} runs")
-        yield read_run_2(lines, media, *_output(lines, taken, name, *form), scored=())
+        yield read_run_2(lines, media, *_output(lines, outputs, name, *form), scored=())
 
 
 def read_run_2(lines: Lines, media: dict[str, Optics], output: str, form: str, scored: tuple[str, ...]) -> Run:
@@ -316,46 +316,46 @@ def _require_scored(lines: Lines, needed: tuple[str, ...]) -> None:
     while words[-1] == "\\":
         words[-1:] = lines.take(1, "what is scored", optional=20)
     names = {word.upper() for word in words}
-    for one in needed:
-        if one.upper() not in names:
-            raise lines.error(f"{one} among what was scored", shown(" ".join(words)))
-    known = {one.upper() for one in SCORED}
+    for name in needed:
+        if name.upper() not in names:
+            raise lines.error(f"{name} among what was scored", shown(" ".join(words)))
+    known = {name.upper() for name in SCORED}
     for word in () if needed else words:
         if word.upper() not in known:
             raise lines.error(f"quantities of {', '.join(SCORED)}, none resolved in time", shown(word))
 
 
 def _medium_of_2(lines: Lines, media: dict[str, Optics]) -> Medium:
-    found: list[tuple[Optics, str]] = []
+    rows: list[tuple[Optics, str]] = []
     while True:
         name, *thickness = lines.take(1, "a layer's medium and thickness, or end", optional=1)
         if name == "end":
             break
-        if name not in media or len(found) == MAX_LAYERS + 2:
+        if name not in media or len(rows) == MAX_LAYERS + 2:
             raise lines.error(f"one of the media {', '.join(media)[:MAX_NAME]}", shown(name))
-        found.append((media[name], thickness[0] if thickness else ""))
-    if len(found) < 3 or not all(word for _, word in found[1:-1]):
-        raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(found)} lines")
+        rows.append((media[name], thickness[0] if thickness else ""))
+    if len(rows) < 3 or not all(word for _, word in rows[1:-1]):
+        raise lines.error("a medium above, layers with their thickness, and a medium below", f"{len(rows)} lines")
     layers: list[Layer] = []
-    for at, (optics, word) in enumerate(found[1:-1], start=1):
-        of, endless = f"of layer {at} of {len(found) - 2}", INFINITE.fullmatch(word) and at == len(found) - 2
+    for at, (optics, word) in enumerate(rows[1:-1], start=1):
+        of, endless = f"of layer {at} of {len(rows) - 2}", INFINITE.fullmatch(word) and at == len(rows) - 2
         if endless and optics.mu_a == optics.mu_s == 0:
             raise lines.error(f"mu_a or mu_s {of} above 0 where it has no end", "0 and 0")
         thick = math.inf if endless else lines.decimal(f"thickness {of} in cm", word, LENGTHS)
         layers.append(Layer(*optics, thickness=thick))
-    return Medium(tuple(layers), found[0][0].n, found[-1][0].n)
+    return Medium(tuple(layers), rows[0][0].n, rows[-1][0].n)
 
 
-def _output(lines: Lines, taken: set[str], name: str, *form: str) -> tuple[str, str]:
+def _output(lines: Lines, outputs: set[str], name: str, *form: str) -> tuple[str, str]:
     """Return name and format. As in V1, no format is A, and of a longer word such as ASCII the first letter counts."""
     if len(name) > MAX_NAME or not name.isprintable():
         raise lines.error(f"the name of an output file, at most {MAX_NAME} printable characters", shown(name))
     if form and not FORMAT.fullmatch(form[0]):
         raise lines.error("A or B after the name (a name holds no spaces)", shown(form[0]))
     same = posixpath.normpath(name)
-    if same in taken:
+    if same in outputs:
         raise lines.error("an output file that no other run has", shown(name))
-    taken.add(same)
+    outputs.add(same)
     return name, "B" if form and form[0][0] in "bB" else "A"
 
 

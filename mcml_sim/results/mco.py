@@ -47,11 +47,11 @@ def write_mco(tally: Tally | Name, path: Name | Tally) -> None:
     them. An infinite thickness becomes 1E+08 cm. Two arguments in the other order are taken as well. InputError on
     anything else; OutputError if the file cannot be written.
     """
-    found, name = (path, tally) if isinstance(path, Tally) else (tally, path)
-    if not isinstance(found, Tally):
-        raise InputError(f"tally must be what simulate gave, got {reprlib.repr(found)}")
+    given, name = (path, tally) if isinstance(path, Tally) else (tally, path)
+    if not isinstance(given, Tally):
+        raise InputError(f"tally must be what simulate gave, got {reprlib.repr(given)}")
     file = checked_path(name)
-    write_whole(file, mco_text(found, file.name))
+    write_whole(file, mco_text(given, file.name))
 
 
 def mco_text(tally: Tally, name: str) -> str:

@@ -141,8 +141,8 @@ class Orders:
 
     def _from_weights(self, counts: NDArray[np.int64], weights: Floats, exact: Floats) -> Estimate:
         """Return the estimate from `exact`, light scattered once, and the counted photons scattered more often."""
-        again = estimate.estimate(counts[:, 1:], self.entered * weights[..., 1:], self.photons)
-        return replace(again, value=again.value + exact)
+        later = estimate.estimate(counts[:, 1:], self.entered * weights[..., 1:], self.photons)
+        return replace(later, value=later.value + exact)
 
     def _of_row(self, counts: NDArray[np.int64], share: float, alpha: ArrayLike) -> Estimate:
         """Return the estimate from one row of counts, in the shape of alpha."""

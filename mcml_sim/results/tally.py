@@ -43,9 +43,9 @@ def quantities(grid: Grid) -> tuple[str, ...]:
 def shapes(grid: Grid, layers: int) -> dict[str, tuple[int, ...]]:
     """Return the shape of every estimate that a grid resolves, in a medium of so many layers."""
     bins = {"r": grid.rings, "z": grid.depths, "a": grid.angles}
-    found = {name: name.rpartition("_")[2] for name in quantities(grid)}
-    axes = {name: tuple(bins[axis] for axis in end) for name, end in found.items() if set(end) <= set(bins)}
-    return {name: axes.get(name, (layers,) if name in BY_LAYER else ()) for name in found}
+    ends = {name: name.rpartition("_")[2] for name in quantities(grid)}
+    axes = {name: tuple(bins[axis] for axis in end) for name, end in ends.items() if set(end) <= set(bins)}
+    return {name: axes.get(name, (layers,) if name in BY_LAYER else ()) for name in ends}
 
 
 @dataclass(frozen=True)

@@ -44,8 +44,8 @@ class Compiling:
     def seconds(self) -> float:
         """Time in which anything was compiled [s]; what overlaps counts once."""
         total, end = 0.0, float("-inf")
-        for begun, ended in sorted(self._spans):
-            total += max(ended - max(begun, end), 0.0)
+        for begin, ended in sorted(self._spans):
+            total += max(ended - max(begin, end), 0.0)
             end = max(end, ended)
         return total
 
@@ -131,23 +131,23 @@ def jobs(file: Path, runs: tuple[Run, ...], photons: int | None, folder: Path | 
     `photons` are for each run in place of the file's, `folder` is in place of the current one. InputError,
     OutputError or StoreError where a run could not keep its results: better now than hours later.
     """
-    seeds = [(one.seed or 0) if options.seed is None else options.seed for one in runs]
-    found = [
-        Job(one, photons or one.photons, seed, *_outputs(one, folder)) for one, seed in zip(runs, seeds, strict=True)
+    seeds = [(run.seed or 0) if options.seed is None else options.seed for run in runs]
+    planned = [
+        Job(run, photons or run.photons, seed, *_outputs(run, folder)) for run, seed in zip(runs, seeds, strict=True)
     ]
-    _require_room(file, found, options)
-    return found
+    _require_room(file, planned, options)
+    return planned
 
 
 def done(job: Job, options: RunOptions) -> Done:
     """Do a run, unless the same was done before, and keep its results."""
     kept = _finished(job, options)
-    found = _traced(job, options) if kept is None else Done(kept)
-    kept = found.results
+    finished = _traced(job, options) if kept is None else Done(kept)
+    kept = finished.results
     is_enough = options.goal is None or options.goal.is_reached(kept.estimates[options.goal.quantity])
     if is_enough and not job.is_part_of_more:  # else the photons at hand would save a longer run theirs
         discard(job.store)
-    return found
+    return finished
 
 
 def _traced(job: Job, options: RunOptions) -> Done:
@@ -190,7 +190,7 @@ def _outputs(run: Run, folder: Path | None) -> tuple[Path, Path, Path]:
 
 
 def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
-    taken = {file.resolve(): f"the input file {file}"}
+    owners = {file.resolve(): f"the input file {file}"}
     for job in jobs:
         if options.goal is not None and options.goal.quantity not in (names := quantities(job.run.grid)):
             raise InputError(f"quantity must be one of {', '.join(names)}, got {options.goal.quantity!r}")
@@ -198,9 +198,9 @@ def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
             require_target(path)
         for path in (job.mco, job.npz, job.store):
             place = path.resolve()
-            if place in taken:
-                raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {taken[place]}")
-            taken[place] = job.run.output
+            if place in owners:
+                raise InputError(f"cannot write {path} for {job.run.output}: it belongs to {owners[place]}")
+            owners[place] = job.run.output
         _require_ours(job)
         job.is_in_the_way()
     room = ROOM + BYTES * sum(job.run.cells for job in jobs if not job.npz.exists())
@@ -211,23 +211,23 @@ def _require_room(file: Path, jobs: list[Job], options: RunOptions) -> None:
 
 def _require_ours(job: Job) -> None:
     """Raise InputError where a file or a folder that is to be replaced is no output of a run."""
-    found = None
+    reason = None
     if job.mco.is_file() and job.mco.stat().st_size and not begins_mco(job.mco):
-        found = f"{job.mco} is there already, and no output of MCML"
+        reason = f"{job.mco} is there already, and no output of MCML"
     elif job.npz.exists() and not (job.npz.is_file() and (not job.npz.stat().st_size or _results(job.npz))):
-        found = f"{job.npz} is there already, and no results of mcml_sim"
+        reason = f"{job.npz} is there already, and no results of mcml_sim"
     elif names := strange(job.store):
-        found = f"{job.store} is there already, and holds {names[0]}, which is no batch of photons"
-    if found is not None:
-        raise InputError(f"{found}: it is not replaced, {ELSEWHERE}")
+        reason = f"{job.store} is there already, and holds {names[0]}, which is no batch of photons"
+    if reason is not None:
+        raise InputError(f"{reason}: it is not replaced, {ELSEWHERE}")
 
 
 def _finished(job: Job, options: RunOptions) -> Results | None:
     """Return the run's results, if its files are there and of this very run."""
-    found = _results(job.npz)
-    if found is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
+    results = _results(job.npz)
+    if results is None or not job.mco.is_file() or made_by(job.seed).encode() not in read_whole(job.mco, HEAD_BYTES):
         return None
-    if (found.medium, found.grid, found.seed, found.version) != (
+    if (results.medium, results.grid, results.seed, results.version) != (
         job.run.medium,
         job.run.grid,
         job.seed,
@@ -235,8 +235,8 @@ def _finished(job: Job, options: RunOptions) -> Results | None:
     ):
         return None
     goal = options.goal
-    is_enough = goal is not None and found.photons < job.photons and goal.is_reached(found.estimates[goal.quantity])
-    return found if is_enough or found.photons == job.photons else None
+    is_enough = goal is not None and results.photons < job.photons and goal.is_reached(results.estimates[goal.quantity])
+    return results if is_enough or results.photons == job.photons else None
 
 
 def _results(path: Path) -> Results | None:

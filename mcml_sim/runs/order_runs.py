@@ -90,8 +90,8 @@ def trace_share(
     kept, traced = _store(folder, grid, key, setting), 0
     for batch in range(first, -(-number // orders_batch.BATCH_PHOTONS), parts):
         size = min(orders_batch.BATCH_PHOTONS, number - batch * orders_batch.BATCH_PHOTONS)
-        found = kept.load(batch)
-        if found is None or found.started < size:
+        stored = kept.load(batch)
+        if stored is None or stored.started < size:
             kept.save(batch, orders_batch.trace_batch(grid, key, batch, size, setting=setting))
             traced += 1
     return traced

@@ -139,15 +139,15 @@ def require_ours(folder: Path, made_by: dict[str, object]) -> None:
         raise StoreError(f"cannot use {folder} as a store: it is there already, and no folder")
     if not batches(folder):  # it is of a run that ended before its first
         return
-    found = manifest(folder)
-    if found is None:
+    there = manifest(folder)
+    if there is None:
         return
     # The kind of run is compared first, since it explains other differences.
-    for name in sorted(here.keys() | found.keys(), key=lambda name: (name != "kind", name)):
-        if found.get(name) != here.get(name):
-            one, other = _apart(found.get(name), here.get(name))
+    for name in sorted(here.keys() | there.keys(), key=lambda name: (name != "kind", name)):
+        if there.get(name) != here.get(name):
+            theirs, ours = _apart(there.get(name), here.get(name))
             raise StoreError(
-                f"{folder} was made by another run: {name} is {one} there, {other} here; "
+                f"{folder} was made by another run: {name} is {theirs} there, {ours} here; "
                 f"{ELSEWHERE}, or delete it if that run is over"
             )
 
@@ -209,14 +209,14 @@ def manifest(folder: Path) -> dict[str, object] | None:
     """Return the manifest of a folder of batches, None if there is none; StoreError if that is damaged."""
     path = folder / MANIFEST
     try:
-        found = parse_json(_read(path, MAX_MANIFEST), MAX_MANIFEST, infinite=True)
+        content = parse_json(_read(path, MAX_MANIFEST), MAX_MANIFEST, infinite=True)
     except FileNotFoundError:
         return None
     except (OSError, ValueError) as error:
         raise _damaged(path, reason_of(error)) from None
-    if not isinstance(found, dict):
+    if not isinstance(content, dict):
         raise _damaged(path, "not an object")
-    return found
+    return content
 
 
 def _damaged(path: Path, reason: str) -> StoreError:
@@ -247,9 +247,9 @@ def _digest(made_by: dict[str, object]) -> str:
     return hashlib.sha256(json.dumps(made_by, sort_keys=True).encode()).hexdigest()
 
 
-def _apart(one: object, other: object) -> tuple[str, str]:
+def _apart(theirs: object, ours: object) -> tuple[str, str]:
     """Return two values, long ones from shortly before where they differ."""
-    there, here = json.dumps(one), json.dumps(other)
+    there, here = json.dumps(theirs), json.dumps(ours)
     if max(len(there), len(here)) <= LONGEST_SHOWN:
         return there, here
     differ = (at for at, (a, b) in enumerate(zip(there, here, strict=False)) if a != b)

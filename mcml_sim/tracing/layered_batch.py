@@ -108,8 +108,8 @@ def trace_batch(
     key = jnp.asarray(rng.batch_key(seed, batch))
     entry = jnp.asarray(half_space_event.entry_cosines(light) if diffuse else np.zeros(0, np.float32))
     with jax.enable_x64(True):
-        found = trace(key, jnp.int32(photons), jnp.int32(first), entry, layered_event.stack(medium, unit), bins, shape)
-    exits, sums, *tables = (np.asarray(part) for part in found)
+        traced = trace(key, jnp.int32(photons), jnp.int32(first), entry, layered_event.stack(medium, unit), bins, shape)
+    exits, sums, *tables = (np.asarray(part) for part in traced)
     by_layer, by_cell = (table / float(bins.per_weight) for table in tables)
     return _deposits(exits, sums, by_layer.reshape(shape.groups, -1), by_cell, photons, grid)
 

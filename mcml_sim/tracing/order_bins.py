@@ -106,8 +106,8 @@ class OrderBins:
 
     def _each(self, alpha: Floats, power: Callable[[float], NDArray]) -> Floats:
         """Return the mean per bin of a power of one albedo after the other: the orders of all would fill the memory."""
-        found: Floats = np.stack([self.mean(power(one)) for one in np.ravel(alpha)])
-        return found.reshape(*np.shape(alpha), -1)
+        means: Floats = np.stack([self.mean(power(albedo)) for albedo in np.ravel(alpha)])
+        return means.reshape(*np.shape(alpha), -1)
 
 
 def bins_of(setting: Setting) -> OrderBins:

@@ -52,11 +52,11 @@ def trace_batch(
     else:
         ends = trace(key, number, stops, half_space_event.half_space(setting), lanes)
     edges, columns = jnp.asarray(rounded_up(grid.r_edges)), jnp.asarray(_columns(bins))
-    found = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
+    cells = np.asarray(histogram(ends, edges, columns, bins.last_orders.size + 2)).astype(np.int64)
     counts = Counts(
-        exits=found[:, :-2],
-        rouletted=int(found[:, -2].sum()),
-        cut=int(found[:, -1].sum()),
+        exits=cells[:, :-2],
+        rouletted=int(cells[:, -2].sum()),
+        cut=int(cells[:, -1].sum()),
         started=photons,
     )
     counts.require_closed()

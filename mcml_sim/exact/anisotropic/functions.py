@@ -50,7 +50,7 @@ def quantile(xi: Any, alpha: Any, setting: Setting) -> Any:
 def _called(function: Any, own: ExactLight, x: Any, alpha: Any) -> Any:
     """Call a function of jax arrays at once; of numpy's a block at a time, so that no shape of them compiles anew."""
     own = own.unlabelled
-    if any(isinstance(one, jax.Array) for one in (x, alpha)):
+    if any(isinstance(value, jax.Array) for value in (x, alpha)):
         x, alpha = jnp.broadcast_arrays(x, alpha)
         values = _each(function, own, x.ravel(), alpha.ravel())
         return jnp.where(jnp.isnan(x + alpha), jnp.nan, values.reshape(x.shape))

@@ -57,8 +57,8 @@ def _generators(degree: int) -> tuple[NDArray, NDArray]:
     for ell in range(size):
         m = np.arange(ell)
         step = 0.5 * np.sqrt((ell - m) * (ell + m + 1)) * np.where(m == 0, np.sqrt(2.0), 1.0)
-        found = np.linalg.eigh(1j * (np.diag(step, -1) - np.diag(step, 1)))
-        turns[ell, : ell + 1], vectors[ell, : ell + 1, : ell + 1] = found
+        pair = np.linalg.eigh(1j * (np.diag(step, -1) - np.diag(step, 1)))
+        turns[ell, : ell + 1], vectors[ell, : ell + 1, : ell + 1] = pair
     return turns, vectors
 
 

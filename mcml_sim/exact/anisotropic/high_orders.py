@@ -80,18 +80,18 @@ def decay_rate(alpha: float, g: float, degree: int = 400) -> float:
 def decay_rates(reduced: Floats, g: float) -> Floats:
     """Return kappa of reduced albedos [1/l*]."""
     alpha = unreduced(reduced, g)
-    return np.array([decay_rate(one, g) for one in alpha]) / (1.0 - alpha * g)
+    return np.array([decay_rate(albedo, g) for albedo in alpha]) / (1.0 - alpha * g)
 
 
 def lines(alphas: Floats, g: float) -> list[tuple[Contour, NDArray[np.intp]]]:
     """Return the lines of all albedos (m,) below 1, each with the indices of its own."""
     kappas = np.array([decay_rate(alpha, g) for alpha in alphas])
-    found = []
+    groups = []
     for high, low in pairwise(KAPPAS):
         own = np.flatnonzero((kappas <= high) & (kappas > low))
         if own.size:
-            found.append((Contour(*_contour(kappas[own].min()), alphas[own]), own))
-    return found
+            groups.append((Contour(*_contour(kappas[own].min()), alphas[own]), own))
+    return groups
 
 
 def _contour(kappa: float) -> tuple[Complexes, Complexes]:
@@ -117,11 +117,11 @@ def transforms(n: float, g: float, beyond: int, k: Complexes, alpha: Floats, rul
         at_once = min(CHUNK, k.size)
         full = np.pad(k, (0, -k.size % at_once), mode="edge").reshape(-1, at_once)
         for part in full:
-            nodes = np.array([systems.depth_nodes(one, rule.per_panel) for one in part])
-            found = _solved(
+            nodes = np.array([systems.depth_nodes(wave, rule.per_panel) for wave in part])
+            solved = _solved(
                 moments, jnp.asarray(part), nodes[:, 0], nodes[:, 1], jnp.asarray(alpha), of, beyond, rule.steps
             )
-            parts.append(np.asarray(found))
+            parts.append(np.asarray(solved))
         both = np.concatenate(parts, axis=1)[:, : k.size]
     return both * np.array([entered(Setting(n=n)), n**2 / np.pi])[:, None, None]
 
@@ -153,7 +153,7 @@ def _resolved(of: systems.HarmonicSystem, alpha: Array, beyond: int, steps: int)
     """
     late = jax.lax.fori_loop(0, beyond, lambda _, v: systems.applied(of, v), of.leaving)
 
-    def one(alpha: Array) -> Array:
+    def at_albedo(alpha: Array) -> Array:
         inverse = systems.inverse_of_flights(of, alpha)
 
         def spread(v: Array) -> Array:
@@ -166,13 +166,13 @@ def _resolved(of: systems.HarmonicSystem, alpha: Array, beyond: int, steps: int)
         u = spread(late - alpha * systems.returned(of, y))
         return alpha ** (beyond + 1) * jnp.stack([jnp.sum(of.source * u), jnp.sum(of.leaving * u)])
 
-    return jax.lax.map(one, alpha).T
+    return jax.lax.map(at_albedo, alpha).T
 
 
-def _solution(operator: Callable[[Array], Array], right: Array, steps: int) -> Array:
-    """Solve operator y = right by Arnoldi's method (full orthogonalisation, Saad 1981)."""
-    size = jnp.linalg.norm(right)
-    basis = jnp.zeros((steps + 1, right.size), complex).at[0].set(right / size)
+def _solution(operator: Callable[[Array], Array], source: Array, steps: int) -> Array:
+    """Solve operator y = source by Arnoldi's method (full orthogonalisation, Saad 1981)."""
+    size = jnp.linalg.norm(source)
+    basis = jnp.zeros((steps + 1, source.size), complex).at[0].set(source / size)
     small = jnp.zeros((steps + 1, steps), complex)
 
     def step(j: Array, state: tuple[Array, Array]) -> tuple[Array, Array]:
@@ -180,10 +180,10 @@ def _solution(operator: Callable[[Array], Array], right: Array, steps: int) -> A
         w = operator(basis[j])
         once = basis.conj() @ w
         w = w - once @ basis
-        again = basis.conj() @ w  # what rounding left
-        w = w - again @ basis
+        correction = basis.conj() @ w  # what rounding left
+        w = w - correction @ basis
         rest = jnp.linalg.norm(w)
-        small = small.at[:, j].set((once + again).at[j + 1].set(rest))
+        small = small.at[:, j].set((once + correction).at[j + 1].set(rest))
         return basis.at[j + 1].set(w / jnp.maximum(rest, 1e-200)), small
 
     basis, small = jax.lax.fori_loop(0, steps, step, (basis, small))
@@ -197,8 +197,8 @@ def ring_density(line: Contour, values: Complexes, x: Floats) -> tuple[Floats, F
     """
     k, dk, finer = _refined(line, values)
     waves = hankel1(0, np.multiply.outer(x, k)) * (k * dk)
-    found: Floats = (waves @ finer).real
-    return x[:, None] * found, np.abs(found) / (np.abs(waves) @ np.abs(finer))
+    sums: Floats = (waves @ finer).real
+    return x[:, None] * sums, np.abs(sums) / (np.abs(waves) @ np.abs(finer))
 
 
 def _refined(line: Contour, values: Complexes) -> tuple[Complexes, Complexes, Complexes]:
@@ -209,5 +209,5 @@ def _refined(line: Contour, values: Complexes) -> tuple[Complexes, Complexes, Co
                     for at, t in enumerate(coarse)], axis=1)  # fmt: skip
     dk = (line.dk.reshape(-1, NODES) / weight)[:, :1] * fine_weight
     panels = values.reshape(*values.shape[:-2], -1, NODES, values.shape[-1])
-    found = (way @ panels).reshape(*values.shape[:-2], -1, values.shape[-1])
-    return (line.k.reshape(-1, NODES) @ way.T).ravel(), dk.ravel(), found
+    finer = (way @ panels).reshape(*values.shape[:-2], -1, values.shape[-1])
+    return (line.k.reshape(-1, NODES) @ way.T).ravel(), dk.ravel(), finer

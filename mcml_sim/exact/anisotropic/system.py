@@ -91,7 +91,7 @@ def directions(n: float, degree: int) -> Directions:
     mu, sine = np.sqrt(1.0 - (1.0 - outside**2) / n**2), np.sqrt(1.0 - outside**2) / n
     passed = (1.0 - fresnel.fresnel(n, 1.0, mu)[0]) * outside / n**2 * 0.5 * weight  # mu T dmu
     phi = np.tile(np.pi * (np.arange(count) + 0.5) / count, OUTSIDE)
-    mu, sine, passed = (np.repeat(one, count) for one in (mu, sine, passed * 2.0 * np.pi / count))
+    mu, sine, passed = (np.repeat(part, count) for part in (mu, sine, passed * 2.0 * np.pi / count))
     waves = harmonics.harmonics(degree, mu, phi).reshape(mu.size, -1)
     even, odd = _pairs(degree)
     return Directions(mu, sine * np.cos(phi), waves[:, even], waves[:, odd], passed)

@@ -102,10 +102,10 @@ def _polynomial(nodes: Floats, at: float) -> Floats:
 def _table() -> SplinedLight:
     """Return the table of all lights, n and g: (2, n, g, ...)."""
     arrays = read_npz(read_whole(FILE, MOST_BYTES), MOST_BYTES, text=("sha256",))
-    found = SplinedLight(*(arrays[name].astype(float) for name in SplinedLight._fields))
-    if str(arrays["sha256"]) != digest(found):
+    lights = SplinedLight(*(arrays[name].astype(float) for name in SplinedLight._fields))
+    if str(arrays["sha256"]) != digest(lights):
         raise InputError(f"{FILE} is damaged: its numbers are not those that were written; install mcml_sim again")
-    return found
+    return lights
 
 
 def digest(table: SplinedLight) -> str:

@@ -97,8 +97,8 @@ class FournierForand(Phase):
         xp, nu = namespace(self.n, self.mu, u), self._nu
         half = 0.5 * u
         log = xp.log(xp.where(u > 0, half * self._largest, 1.0))
-        one = xp.where(log == 0, 1.0, xp.expm1(log))
-        main = xp.where(log == 0, 1 + nu - half * nu, (xp.expm1((nu + 1) * log) - xp.expm1(nu * log) * half) / one)
+        rise = xp.where(log == 0, 1.0, xp.expm1(log))
+        main = xp.where(log == 0, 1 + nu - half * nu, (xp.expm1((nu + 1) * log) - xp.expm1(nu * log) * half) / rise)
         return xp.where(u > 0, main * xp.exp(-nu * log), 0.0) + self._back * (1 - u) * u * (2 - u) / 8
 
 

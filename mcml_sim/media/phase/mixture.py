@@ -77,16 +77,16 @@ class Mixture(Phase):
     def deflection(self, v: Any) -> tuple[Any, Any]:
         """Return 1 - c and 1 + c [-] of the term that owns xi = (1 + v) / 2."""
         xp = namespace(v, *self.weights)
-        begin, found = -1.0, (0.0 * v, 0.0 * v)
+        begin, sample = -1.0, (0.0 * v, 0.0 * v)
         for weight, phase in zip(self.weights, self.phases, strict=True):
             end = begin + 2.0 * weight
             # An empty share would be stretched by a division by zero; nothing is drawn from it.
             width = xp.where(weight > 0, end - begin, 1.0)
             own = phase.deflection(xp.clip((2.0 * v - (begin + end)) / width, -1.0, 1.0))
             is_own = (v >= begin) & (weight > 0)
-            found = xp.where(is_own, own[0], found[0]), xp.where(is_own, own[1], found[1])
+            sample = xp.where(is_own, own[0], sample[0]), xp.where(is_own, own[1], sample[1])
             begin = end
-        return found
+        return sample
 
     def moment(self, l: int) -> Any:  # noqa: E741 - the field's letter
         """Return the mean of the terms' Legendre moments of order l [-]."""

@@ -114,8 +114,8 @@ class Pieces(NamedTuple):
         xp = namespace(value, ends)
         if xp is np:
             return np.minimum(np.searchsorted(ends, value), len(self.end) - 1)
-        found = jnp.searchsorted(ends, value, method="scan_unrolled")
-        return jnp.minimum(found, len(self.end) - 1)
+        number = jnp.searchsorted(ends, value, method="scan_unrolled")
+        return jnp.minimum(number, len(self.end) - 1)
 
     def _within(self, u: Any, number: Any) -> Any:
         """Return the integral of the density from a piece's point of reference to u."""

@@ -32,14 +32,14 @@ def settle(of: Any) -> None:
     """
     if not isinstance(of.phase, Phase):
         raise InputError(f"phase must be a phase function of mcml_sim.phase, got {shown(of.phase)}")
-    found = of.phase.simplest
-    object.__setattr__(of, "g", float(found.mean_cosine))
-    object.__setattr__(of, "phase", None if isinstance(found, HenyeyGreenstein | Isotropic) else found)
+    phase = of.phase.simplest
+    object.__setattr__(of, "g", float(phase.mean_cosine))
+    object.__setattr__(of, "phase", None if isinstance(phase, HenyeyGreenstein | Isotropic) else phase)
 
 
 def as_table(phase: Phase) -> dict[str, Any]:
     """Return the kind of a phase function, and the arguments of its constructor: numbers, lists, and such tables."""
-    kind = next(name for name, one in KINDS.items() if type(phase) is one)
+    kind = next(name for name, known in KINDS.items() if type(phase) is known)
     return {"kind": kind, **{name: _plain(getattr(phase, name)) for name in _arguments(type(phase))}}
 
 
@@ -52,13 +52,13 @@ def from_table(table: object, deepest: int = DEEPEST) -> Phase:
         raise InputError(f"kind of a phase function must be one of {', '.join(KINDS)}, got {shown(kind)}")
     if kind == "mixture" and deepest == 0:
         raise InputError(f"a mixture must hold mixtures of at most {DEEPEST} levels, got more")
-    wanted = _arguments(KINDS[kind])
-    if set(table) != {"kind", *wanted}:
+    names = _arguments(KINDS[kind])
+    if set(table) != {"kind", *names}:
         got = ", ".join(map(str, sorted(set(table) - {"kind"}))) or "nothing"
-        raise InputError(f"a phase function of kind {kind} must have {', '.join(wanted) or 'nothing else'}, got {got}")
-    given = {name: table[name] for name in wanted}
+        raise InputError(f"a phase function of kind {kind} must have {', '.join(names) or 'nothing else'}, got {got}")
+    given = {name: table[name] for name in names}
     if kind == "mixture" and isinstance(given["phases"], list | tuple):
-        given["phases"] = [from_table(one, deepest - 1) for one in given["phases"]]
+        given["phases"] = [from_table(term, deepest - 1) for term in given["phases"]]
     return KINDS[kind](**given)
 
 
@@ -69,4 +69,4 @@ def _arguments(kind: type[Phase]) -> list[str]:
 def _plain(value: Any) -> Any:
     if isinstance(value, Phase):
         return as_table(value)
-    return [_plain(one) for one in value] if isinstance(value, tuple) else float(value)
+    return [_plain(item) for item in value] if isinstance(value, tuple) else float(value)
