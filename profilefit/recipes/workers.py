@@ -10,19 +10,19 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import tempfile
 import threading
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import ExitStack, contextmanager, suppress
-from itertools import islice
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.queues import SimpleQueue
 from types import TracebackType
-from typing import Any, Self, TypeVar
+from typing import Any, Self, TypeVar, cast
 
 CACHE = "JAX_COMPILATION_CACHE_DIR"  # read by JAX when a process starts
 SHARED = {  # programs worth keeping: of any size, that took some time
@@ -59,6 +59,8 @@ class Workers:
             self._left.enter_context(_sharing_programs())
             self._pool = ProcessPoolExecutor(self._processes, context, _begin, (watched, shares))
             self._left.callback(self._pool.shutdown, cancel_futures=True)
+            if sys.version_info < (3, 11, 5):  # else a job that is on its way to nobody is waited for (CPython 94777)
+                self._left.callback(cast("Any", self._pool)._call_queue._reader.close)
             self._left.callback(held.close)  # first of all: by this the processes end
         return self
 
@@ -73,21 +75,13 @@ class Workers:
         if not self._processes:
             yield from ((number, task(job)) for number, job in enumerate(jobs))
             return
-        waiting, running = enumerate(jobs), dict[Future[tuple[Done, list[Warning | str]]], int]()
         try:
-            while True:
-                # No more at once than processes: a job that is being written into a pipe which nobody reads any more
-                # would hold up the end, before Python 3.11.5.
-                for number, job in islice(waiting, self._processes - len(running)):
-                    running[self._pool.submit(_done, task, job)] = number
-                if not running:
-                    return
-                for future in wait(running, return_when=FIRST_COMPLETED).done:
-                    number = running.pop(future)
-                    result, warned = future.result()
-                    for warning in warned:
-                        warnings.warn(warning, stacklevel=2)
-                    yield number, result
+            numbers = {self._pool.submit(_done, task, job): number for number, job in enumerate(jobs)}
+            for future in as_completed(numbers):
+                result, warned = future.result()
+                for warning in warned:
+                    warnings.warn(warning, stacklevel=2)
+                yield numbers[future], result
         except BrokenProcessPool:
             reason = "a process that fitted was ended from outside, for want of memory, say"
             raise ChildProcessError(reason) from None

@@ -29,8 +29,8 @@ if __name__ == "__main__":
 """
 
 
-# Sleeps, so that no process does two of two jobs, and gives the number of its process.
-NUMBER = "__import__('time').sleep(0.2) or __import__('os').getpid()"
+# Sleeps, so that no process does all the jobs, and gives something of its own.
+OF_PROCESS = "__import__('time').sleep(0.2) or __import__('os').%s"
 
 
 @pytest.mark.parametrize("processes", [0, 1, 2, 3])
@@ -39,7 +39,7 @@ def test_every_job_is_done_once_whatever_the_processes(processes):
         assert dict(workers.each(math.factorial, range(8))) == dict(enumerate(map(math.factorial, range(8))))
         assert list(workers.each(operator.neg, [5])) == [(0, -5)]
         assert list(workers.each(operator.neg, [])) == []
-        numbers = {number for _, number in workers.each(eval, [NUMBER] * 2 * processes)}
+        numbers = {number for _, number in workers.each(eval, [OF_PROCESS % "getpid()"] * 2 * processes)}
         assert len(numbers) == processes
         assert (os.getpid() in numbers) == (processes == 1)
     assert not any(map(_is_alive, numbers - {os.getpid()}))
@@ -112,7 +112,8 @@ def two_cores():
 @pytest.mark.usefixtures("two_cores")
 def test_each_process_has_cores_of_its_own():
     with Workers(2) as workers:
-        first, second = (found for _, found in workers.each(os.sched_getaffinity, [0, 0]))
+        shares = workers.each(eval, [OF_PROCESS % "sched_getaffinity(0)"] * 4)
+        first, second = {frozenset(share) for _, share in shares}
     assert first.isdisjoint(second)
     assert first | second <= os.sched_getaffinity(0)
     assert len(first) < cores()
