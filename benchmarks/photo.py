@@ -152,7 +152,7 @@ def exposures(
     return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
 
 
-def as_read(one: simulated.Taken, source: str) -> Exposure:
+def as_read(one: simulated.SimulatedExposure, source: str) -> Exposure:
     """As a raw file of it would be read."""
     return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
 

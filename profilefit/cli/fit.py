@@ -19,7 +19,7 @@ from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
-    from profilefit.measured import Answer, Known
+    from profilefit.measured import Known, MediumPosterior
     from profilefit.measured.oblique import Oblique
 
 FAILED = 1  # exit status
@@ -169,7 +169,7 @@ def fit(
     else:
         points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
         model = "exact light" if law == options.EXACT else f"law {law}"
-        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.found.question.law.setting}")
+        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.fit.spec.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
 
@@ -219,7 +219,7 @@ def _range(text: str) -> tuple[float, float]:
     return low, high
 
 
-def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
+def _write(result: MediumPosterior, body: dict[str, Any], out: Path, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.text_file import as_json
@@ -231,7 +231,7 @@ def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None
     notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
 
 
-def _show(result: Answer, title: str) -> None:
+def _show(result: MediumPosterior, title: str) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import screen, show
         from profilefit.report.tables.fit_tables import fit_lines, fit_tables

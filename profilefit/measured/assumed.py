@@ -54,22 +54,22 @@ class BeamWidth:
         return self.chance < NOTICED
 
 
-def beam_width(found: MediumFit) -> BeamWidth | None:
+def beam_width(fit: MediumFit) -> BeamWidth | None:
     """None where a beam is given, or where the fit has no errors to compare with."""
-    if found.question.instrument.beam is not None or not found.minimum.converged:
+    if fit.spec.instrument.beam is not None or not fit.minimum.converged:
         return None
-    plain = found.plain or found
+    plain = fit.plain or fit
     fits = _under_widths(plain.problem, plain.minimum)
     best = _best(fits)
-    if found.plain is not None and best > 0 and (lack := _lack(found.plain, best, fits[best])) is not None:
+    if fit.plain is not None and best > 0 and (lack := _lack(fit.plain, best, fits[best])) is not None:
         problem = replace(plain.problem, noise=replace(plain.problem.noise, lack=lack))
-        fits = _under_widths(problem, descended(problem, plain.point, plain.question.free))
+        fits = _under_widths(problem, descended(problem, plain.point, plain.spec.free))
         best = _best(fits)
     fall = max(_cost(fits[0.0]) - _cost(fits[best]), 0.0)
     chance = 0.5 * float(stats.chi2.sf(fall, 1)) if fall > 0 else 1.0
-    if found.plain is not None:
-        fits = _under_widths(found.problem, found.minimum)
-    return BeamWidth(best, fall, chance, *_telling(found, {w: fits[w] for w in _widths(found.problem)}))
+    if fit.plain is not None:
+        fits = _under_widths(fit.problem, fit.minimum)
+    return BeamWidth(best, fall, chance, *_telling(fit, {w: fits[w] for w in _widths(fit.problem)}))
 
 
 def _widths(problem: Problem) -> list[float]:
@@ -98,9 +98,9 @@ def _best(fits: dict[float, Minimum]) -> float:
 
 def _lack(plain: MediumFit, w: float, there: Minimum) -> Floats | None:
     """Covariance of the lack of fit that the best width leaves; None if it leaves none."""
-    known = {} if plain.open is None else plain.open.mean
-    question = replace(plain.question, ranges={**plain.question.ranges, "beam": (0.0, 0.5 * float(plain.data.r[-1]))})
-    problem = replace(plain.problem, question=question).under({"beam": w})
+    known = {} if plain.range_marginal is None else plain.range_marginal.mean
+    spec = replace(plain.spec, ranges={**plain.spec.ranges, "beam": (0.0, 0.5 * float(plain.data.r[-1]))})
+    problem = replace(plain.problem, spec=spec).under({"beam": w})
     return replace(plain, problem=problem, minimum=there).lack_of_fit({**known, "beam": w})
 
 
@@ -116,14 +116,14 @@ class Tissue:
     rise: float
 
 
-def as_tissue(found: MediumFit) -> Tissue | None:
+def as_tissue(fit: MediumFit) -> Tissue | None:
     """None where n and g are told, where a law is fitted, or where the fit has no errors to compare with."""
-    question = found.question
-    there = Setting.of(question.law.setting.as_table() | {name: TISSUE[name] for name in question.assumed})
-    if not (question.assumed and there.is_solved and isinstance(question.law, ExactLight) and found.minimum.converged):
+    spec = fit.spec
+    there = Setting.of(spec.law.setting.as_table() | {name: TISSUE[name] for name in spec.assumed})
+    if not (spec.assumed and there.is_solved and isinstance(spec.law, ExactLight) and fit.minimum.converged):
         return None
-    plain = found.plain or found
-    problem = replace(plain.problem, question=replace(question, law=exact_light(there)))
+    plain = fit.plain or fit
+    problem = replace(plain.problem, spec=replace(spec, law=exact_light(there)))
     try:
         end = descended_from(problem, plain.point)
     except InputError:  # a total reflectance is held that such a medium has not
@@ -133,19 +133,19 @@ def as_tissue(found: MediumFit) -> Tissue | None:
 
 
 def _under(problem: Problem, w: float, start: Minimum) -> Minimum:
-    instrument = replace(problem.question.instrument, beam=Gaussian(w))
-    there = replace(problem, question=replace(problem.question, instrument=instrument))
-    return descended(there, start.point, problem.question.free)
+    instrument = replace(problem.spec.instrument, beam=Gaussian(w))
+    there = replace(problem, spec=replace(problem.spec, instrument=instrument))
+    return descended(there, start.point, problem.spec.free)
 
 
 def _cost(one: Minimum) -> float:
     return one.cost if np.isfinite(one.cost) else np.inf
 
 
-def _telling(found: MediumFit, fits: dict[float, Minimum]) -> tuple[float | None, str]:
+def _telling(fit: MediumFit, fits: dict[float, Minimum]) -> tuple[float | None, str]:
     """The least width that moves a quantity by its standard error, and the quantity."""
-    here = found.values
-    errors = {name: error for name, error in found.errors(found.likely).items() if error > 0 and name != "A"}
+    here = fit.values
+    errors = {name: error for name, error in fit.errors(fit.total_covariance).items() if error > 0 and name != "A"}
     for w, one in fits.items():
         values = model.quantities(one.point[None], np.zeros(1))  # A, which alpha has already, is not looked at
         moved = {name: abs(float(values[name][0]) - here[name]) / error for name, error in errors.items()}

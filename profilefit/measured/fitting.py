@@ -15,11 +15,11 @@ from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
 from profilefit.measured import law_error, model
 from profilefit.measured.data import Measured, require_workable
-from profilefit.measured.misfit import Misfit, alone, gaussianised, lack_of_fit, misfit
+from profilefit.measured.misfit import Misfit, gaussianised, lack_of_fit, misfit, own_degrees_of_freedom
 from profilefit.measured.model import Model, alpha_of
 from profilefit.measured.noise import Noise, noise
-from profilefit.measured.problem import Question
-from profilefit.measured.ranges import Opened, opened, slopes_by_ranges
+from profilefit.measured.problem import FitSpec
+from profilefit.measured.ranges import RangeMarginal, marginalise, slopes_by_ranges
 from profilefit.measured.replicates import widening
 from profilefit.measured.solving import Minimum, Problem, are_apart, descended, descended_from, minimised
 
@@ -54,7 +54,7 @@ class MediumFit:
     rel: float | None
     widening: float = 1.0
     rivals: tuple[Minimum, ...] = ()
-    open: Opened | None = None
+    range_marginal: RangeMarginal | None = None
     plain: MediumFit | None = None
 
     @property
@@ -62,8 +62,8 @@ class MediumFit:
         return self.problem.data
 
     @property
-    def question(self) -> Question:
-        return self.problem.question
+    def spec(self) -> FitSpec:
+        return self.problem.spec
 
     @property
     def point(self) -> Floats:
@@ -86,8 +86,8 @@ class MediumFit:
     @cached_property
     def values(self) -> dict[str, float]:
         """A, alpha, l, mu_s', mu_a, scale."""
-        found = model.quantities(self.point[None], self.predicted[0][-1:])
-        return {name: float(value[0]) for name, value in found.items()}
+        fit = model.quantities(self.point[None], self.predicted[0][-1:])
+        return {name: float(value[0]) for name, value in fit.items()}
 
     @cached_property
     def gradients(self) -> dict[str, Floats]:
@@ -96,14 +96,14 @@ class MediumFit:
     @property
     def jacobian(self) -> Floats:
         """Derivatives (m, p) of the residuals by the free coordinates."""
-        return self.minimum.jacobian[:, list(self.question.free)]
+        return self.minimum.jacobian[:, list(self.spec.free)]
 
     @cached_property
     def gain(self) -> Floats:
         """(3, m) how the coordinates follow errors of the rows, in standard errors."""
         full = np.zeros((3, self.minimum.residuals.size))
         if np.all(np.isfinite(self.jacobian)):  # else the fit has failed and has no errors
-            full[list(self.question.free)] = np.linalg.pinv(self.jacobian)
+            full[list(self.spec.free)] = np.linalg.pinv(self.jacobian)
         return full
 
     @property
@@ -114,7 +114,7 @@ class MediumFit:
         return self.gain @ rows @ self.gain.T
 
     @property
-    def likely(self) -> Floats:
+    def total_covariance(self) -> Floats:
         """Covariance (3, 3) of the coordinates: errors of the data, of the law and by lack of fit, and open ranges."""
         return self.conditional + self.of_ranges
 
@@ -126,7 +126,7 @@ class MediumFit:
     @property
     def of_ranges(self) -> Floats:
         """Covariance (3, 3) of the coordinates from what is open of ranges."""
-        return np.zeros((3, 3)) if self.open is None else self.open.covariance
+        return np.zeros((3, 3)) if self.range_marginal is None else self.range_marginal.covariance
 
     @cached_property
     def law_rows(self) -> Floats:
@@ -150,7 +150,7 @@ class MediumFit:
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
         """(n,) rows farther out than the radii that `rel` covers."""
-        if isinstance(self.question.law, ExactLight):
+        if isinstance(self.spec.law, ExactLight):
             return np.zeros(self.rows, bool)
         return self.problem.model.shares(self.point, self.data.inner) > law_error.WITHIN
 
@@ -180,7 +180,7 @@ class MediumFit:
     def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
         """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
 
-        values  those of the question's ranges. These take up residuals as the free coordinates do, and so hide a lack
+        values  those of the spec's ranges. These take up residuals as the free coordinates do, and so hide a lack
                 of fit: one that the residuals allow is then presumed
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
@@ -197,7 +197,7 @@ class MediumFit:
         """Residuals (m,), their derivatives, and covariances of the law's error and of relative errors 1 in waves.
 
         All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
-        Derivatives are by the free coordinates and, where `values` of them are given, by the question's ranges.
+        Derivatives are by the free coordinates and, where `values` of them are given, by the spec's ranges.
         """
         times = np.ones(self.minimum.residuals.size)
         times[: self.rows] = np.sqrt(self.widening)
@@ -205,10 +205,10 @@ class MediumFit:
         problem = replace(self.problem, noise=own)
         rows, slopes = problem.residuals(self.point)
         rows, both = times * rows, np.outer(times, times)
-        rows[: self.rows] = gaussianised(rows[: self.rows], alone(self.data.freedom, self.data.pooled))
+        rows[: self.rows] = gaussianised(rows[: self.rows], own_degrees_of_freedom(self.data.freedom, self.data.pooled))
         size = np.outer(self.light, self.light)
         shapes = [both * self._rows_of(size * law_error.waves(self.data.r, length), own) for length in lengths]
-        slopes = slopes[:, list(self.question.free)]
+        slopes = slopes[:, list(self.spec.free)]
         if values:
             slopes = np.column_stack([slopes, slopes_by_ranges(problem, values, self.point)])
         return rows, times[:, None] * slopes, both * self._law_rows(own), np.array(shapes)
@@ -228,93 +228,93 @@ class MediumFit:
         return model.errors(self.gradients, covariance)
 
 
-def fitted(data: Measured, question: Question, source: law_error.Origin | None = None) -> MediumFit:
+def fitted(data: Measured, spec: FitSpec, source: law_error.Origin | None = None) -> MediumFit:
     """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
 
     source  the record that the law's constants came from, which knows how far it is from the truth
     InputError if there are not more rows than free coordinates, or if the data are beyond `require_workable`.
     """
     require_own_process()
-    free = len(question.free)
+    free = len(spec.free)
     if data.value.size <= free:
         raise InputError(f"{data.source}: expected more than {free} rows, one more than is free, got {data.value.size}")
     require_workable(data)
     wider = widening(data.freedom, free)
-    each = [law_error.relative_error(question.law, alpha, source) or 0.0 for alpha in SEARCHED]
+    each = [law_error.relative_error(spec.law, alpha, source) or 0.0 for alpha in SEARCHED]
     model = law_error.covariance(data, max(each), np.zeros(data.value.size, bool))
-    problem = Problem(data, question, noise(data, widening=wider, model=model))
+    problem = Problem(data, spec, noise(data, widening=wider, model=model))
     minimum = first = minimised(problem)
-    found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
+    fit = MediumFit(problem, minimum, source, _rel(spec, minimum, source), wider)
     rounds = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
-    found = _allowing_for_lack(_settled(found, rounds), rounds)
-    return replace(found, rivals=_rivals(found, first.others))
+    fit = _allowing_for_lack(_settled(fit, rounds), rounds)
+    return replace(fit, rivals=_rivals(fit, first.others))
 
 
-def _settled(found: MediumFit, rounds: int) -> MediumFit:
+def _settled(fit: MediumFit, rounds: int) -> MediumFit:
     """Fit again with the errors that the fit's own light has, so many times, then with what is open of ranges."""
     for _ in range(rounds):
-        found = _reweighted(found)
-    if found.question.ranges:
-        left = opened(found.problem, found.minimum, None if found.open is None else found.open.mean)
-        found = replace(found, open=left)
+        fit = _reweighted(fit)
+    if fit.spec.ranges:
+        left = marginalise(fit.problem, fit.minimum, None if fit.range_marginal is None else fit.range_marginal.mean)
+        fit = replace(fit, range_marginal=left)
         if left is not None:
-            found = replace(found, problem=found.problem.under(left.mean), minimum=left.there)
-            found = _reweighted(found) if rounds else found
-    return found
+            fit = replace(fit, problem=fit.problem.under(left.mean), minimum=left.there)
+            fit = _reweighted(fit) if rounds else fit
+    return fit
 
 
-def _allowing_for_lack(found: MediumFit, rounds: int) -> MediumFit:
+def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
     """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none.
 
     Wider errors let the search out of a local minimum; where this leads to a better fit, all begins again from there.
     """
-    wider = found
+    wider = fit
     for _ in range(LACK_ROUNDS):
-        values = {} if found.open is None else found.open.mean
-        lack = found.lack_of_fit(values) if _ended(found) else None
+        values = {} if fit.range_marginal is None else fit.range_marginal.mean
+        lack = fit.lack_of_fit(values) if _ended(fit) else None
         if lack is None:
-            return found
-        problem = replace(found.problem, noise=replace(found.problem.noise, lack=lack))
-        wider = _settled(replace(found, problem=problem, plain=found), 1)
+            return fit
+        problem = replace(fit.problem, noise=replace(fit.problem.noise, lack=lack))
+        wider = _settled(replace(fit, problem=problem, plain=fit), 1)
         if not _ended(wider):
-            return found
-        back = replace(wider.problem, noise=found.problem.noise)
+            return fit
+        back = replace(wider.problem, noise=fit.problem.noise)
         there = descended_from(back, wider.point)
-        if not there.cost < BETTER * found.minimum.cost:
+        if not there.cost < BETTER * fit.minimum.cost:
             break
-        found = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)
+        fit = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)
     return wider
 
 
-def _ended(found: MediumFit) -> bool:
-    return found.minimum.converged or found.minimum.at_edge
+def _ended(fit: MediumFit) -> bool:
+    return fit.minimum.converged or fit.minimum.at_edge
 
 
-def _reweighted(found: MediumFit) -> MediumFit:
+def _reweighted(fit: MediumFit) -> MediumFit:
     """The same with the errors that its own light has; as it was where this is not finite."""
-    light, data = found.problem.model.linearised(found.point, found.data.inner, found.data.outer)[0][:-1], found.data
+    light, data = fit.problem.model.linearised(fit.point, fit.data.inner, fit.data.outer)[0][:-1], fit.data
     if not np.all(np.isfinite(light)):
-        return found
+        return fit
     expected = np.maximum(light, LEAST_EXPECTED * data.value)
-    model = law_error.covariance(data, found.rel, found.beyond)
-    weights = noise(data, expected, found.widening, model, found.problem.noise.lack)
-    problem = replace(found.problem, noise=weights)
-    minimum = descended(problem, found.point, found.question.free)
-    return replace(found, problem=problem, minimum=minimum, rel=_rel(found.question, minimum, found.source))
+    model = law_error.covariance(data, fit.rel, fit.beyond)
+    weights = noise(data, expected, fit.widening, model, fit.problem.noise.lack)
+    problem = replace(fit.problem, noise=weights)
+    minimum = descended(problem, fit.point, fit.spec.free)
+    return replace(fit, problem=problem, minimum=minimum, rel=_rel(fit.spec, minimum, fit.source))
 
 
-def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:
+def _rivals(fit: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:
     """Of other minima of the search those that fit as well within the interval's level, under the final errors."""
     rivals: list[Minimum] = []
     for one in others:
-        if one.cost > found.minimum.cost + FAR:
+        if one.cost > fit.minimum.cost + FAR:
             continue
-        there = descended_from(found.problem, one.point)
-        near = there.cost - found.minimum.cost < found.quantile**2
-        if near and all(are_apart(there, other) for other in (found.minimum, *rivals)):
+        there = descended_from(fit.problem, one.point)
+        near = there.cost - fit.minimum.cost < fit.quantile**2
+        if near and all(are_apart(there, other) for other in (fit.minimum, *rivals)):
             rivals.append(there)
     return tuple(rivals)
 
 
-def _rel(question: Question, minimum: Minimum, source: law_error.Origin | None) -> float | None:
-    return law_error.relative_error(question.law, float(alpha_of(minimum.point[0])), source)
+def _rel(spec: FitSpec, minimum: Minimum, source: law_error.Origin | None) -> float | None:
+    return law_error.relative_error(spec.law, float(alpha_of(minimum.point[0])), source)

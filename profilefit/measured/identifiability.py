@@ -58,38 +58,38 @@ class Identifiability:
         return not self.all_identified and abs(self.correlation) > TRADING
 
 
-def identifiability(found: MediumFit) -> Identifiability:
+def identifiability(fit: MediumFit) -> Identifiability:
     """Identifiability by profile likelihood: chi-square as one coordinate is moved and the others are fitted again."""
-    intervals = tuple(_interval(found, at) for at in found.question.free)
-    relative = relative_errors(found, found.likely)
-    if found.minimum.at_edge:  # mu_a is anything down to, or up to, where alpha ends
+    intervals = tuple(_interval(fit, at) for at in fit.spec.free)
+    relative = relative_errors(fit, fit.total_covariance)
+    if fit.minimum.at_edge:  # mu_a is anything down to, or up to, where alpha ends
         relative["mu_a"] = np.inf
     loose = {name: value for name, value in relative.items() if not value < LOOSE}
-    pair, correlation = _pair(found)
+    pair, correlation = _pair(fit)
     return Identifiability(intervals, loose, pair, correlation)
 
 
-def relative_errors(found: MediumFit, covariance: Floats) -> dict[str, float]:
+def relative_errors(fit: MediumFit, covariance: Floats) -> dict[str, float]:
     """Standard errors of mu_s', mu_a and a free scale over themselves [-]."""
-    errors = found.errors(covariance)
-    names = [name for name in STRENGTHS if name != "scale" or "scale" not in found.question.held]
-    return {name: errors[name] / max(abs(found.values[name]), np.finfo(float).tiny) for name in names}
+    errors = fit.errors(covariance)
+    names = [name for name in STRENGTHS if name != "scale" or "scale" not in fit.spec.held]
+    return {name: errors[name] / max(abs(fit.values[name]), np.finfo(float).tiny) for name in names}
 
 
-def _pair(found: MediumFit) -> tuple[tuple[str, str] | None, float]:
-    free = list(found.question.free)
+def _pair(fit: MediumFit) -> tuple[tuple[str, str] | None, float]:
+    free = list(fit.spec.free)
     if len(free) < 2:
         return None, 0.0
-    joint = found.likely[np.ix_(free, free)]
+    joint = fit.total_covariance[np.ix_(free, free)]
     spread = np.sqrt(np.maximum(np.diag(joint), np.finfo(float).tiny))
     upper = np.triu(joint / np.outer(spread, spread), 1)
     i, j = np.unravel_index(np.argmax(np.abs(upper)), upper.shape)
     return (NAMES[free[i]], NAMES[free[j]]), float(upper[i, j])
 
 
-def _interval(found: MediumFit, at: int) -> Interval:
+def _interval(fit: MediumFit, at: int) -> Interval:
     """Both ends of the profile likelihood in coordinate `at`."""
-    ends = [_end(found, at, side) for side in (-1.0, 1.0)]
+    ends = [_end(fit, at, side) for side in (-1.0, 1.0)]
     values = [float(alpha_of(x)) if at == U else float(np.exp(x)) for x, _ in ends]
     opened = [is_open for _, is_open in ends]
     if at == U:  # alpha falls as u rises
@@ -97,26 +97,26 @@ def _interval(found: MediumFit, at: int) -> Interval:
     return Interval(NAMES[at], values[0], values[1], opened[0], opened[1])
 
 
-def _end(found: MediumFit, at: int, side: float) -> tuple[float, bool]:
+def _end(fit: MediumFit, at: int, side: float) -> tuple[float, bool]:
     """Where chi-square has risen by the square of the quantile, 3.84 of known errors, and whether it never does.
 
     It never does where alpha cannot be distinguished from 0 or 1.
     """
-    best, others = found.minimum, tuple(one for one in found.question.free if one != at)
+    best, others = fit.minimum, tuple(one for one in fit.spec.free if one != at)
     limit = side * FARTHEST_U if at == U else best.point[at] + side * FARTHEST_LN
     last = [best.point]
 
     def rise(x: float) -> float:
         start = last[-1].copy()
         start[at] = x
-        there = descended(found.problem, start, others)
+        there = descended(fit.problem, start, others)
         last.append(there.point)
         return there.cost - best.cost - threshold
 
     # What is open of ranges widens an interval in the ratio of the errors.
-    variance = max(float(found.conditional[at, at]), np.finfo(float).tiny)
-    threshold = found.quantile**2 * (1.0 + float(found.of_ranges[at, at]) / variance)
-    step = max(float(np.sqrt(found.likely[at, at])), 1e-6)
+    variance = max(float(fit.conditional[at, at]), np.finfo(float).tiny)
+    threshold = fit.quantile**2 * (1.0 + float(fit.of_ranges[at, at]) / variance)
+    step = max(float(np.sqrt(fit.total_covariance[at, at])), 1e-6)
     inside = outside = best.point[at]
     for _ in range(STRIDES):
         outside = best.point[at] + side * min(step, side * (limit - best.point[at]))

@@ -23,7 +23,7 @@ from profilefit.errors import InputError
 from profilefit.fitting import solver
 from profilefit.measured.data import Measured, require_workable
 from profilefit.measured.instrument import Instrument
-from profilefit.measured.misfit import DETECTED, alone, gaussianised, scatter_chance
+from profilefit.measured.misfit import DETECTED, gaussianised, own_degrees_of_freedom, scatter_chance
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Known
@@ -201,7 +201,7 @@ def _judged(
     rows = _residuals(light, weights, done.parameters, held, known)
     data, count = light.data, light.data.value.size
     times = math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
-    rows[:count] = gaussianised(times * rows[:count], alone(data.freedom, data.pooled))
+    rows[:count] = gaussianised(times * rows[:count], own_degrees_of_freedom(data.freedom, data.pooled))
     chi2, freedom = float(rows @ rows), rows.size - len(names)
     chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0

@@ -162,7 +162,7 @@ def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
     return LARGEST if excess(LARGEST) > 0 else float(brentq(excess, 0.0, LARGEST, xtol=1e-8))
 
 
-def alone(freedom: Floats, pooled: float) -> Floats:
+def own_degrees_of_freedom(freedom: Floats, pooled: float) -> Floats:
     """Degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d each, add up."""
     own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
     return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)

@@ -46,7 +46,7 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Advice:
+class DesignRanking:
     """The least certain quantity with its relative error, and the best candidate of each kind, best first."""
 
     name: str
@@ -54,60 +54,60 @@ class Advice:
     candidates: tuple[Candidate, ...]
 
 
-def advised(found: MediumFit) -> Advice:
+def rank_designs(fit: MediumFit) -> DesignRanking:
     """Rank additional measurements by the largest relative error that would remain."""
-    now = relative_errors(found, found.likely)
+    now = relative_errors(fit, fit.total_covariance)
     name = max(now, key=lambda one: now[one])
     best: dict[str, Candidate] = {}
-    for one in [*_points(found), *_others(found)]:
+    for one in [*_points(fit), *_others(fit)]:
         if one.kind not in best or one.worst[1] < best[one.kind].worst[1]:
             best[one.kind] = one
-    return Advice(name, now[name], tuple(sorted(best.values(), key=lambda one: one.worst[1])))
+    return DesignRanking(name, now[name], tuple(sorted(best.values(), key=lambda one: one.worst[1])))
 
 
-def _points(found: MediumFit) -> list[Candidate]:
+def _points(fit: MediumFit) -> list[Candidate]:
     """One more point or ring anywhere, as precise as the data are, in the median."""
-    data, model = found.data, found.problem.model
+    data, model = fit.data, fit.problem.model
     width = float(np.median((data.outer - data.inner) / (data.outer + data.inner)))
-    r = found.values["l"] * np.geomspace(NEAREST, FARTHEST, RADII)
-    r = r[model.shares(found.point, r * (1.0 + width)) < WITHIN]
+    r = fit.values["l"] * np.geomspace(NEAREST, FARTHEST, RADII)
+    r = r[model.shares(fit.point, r * (1.0 + width)) < WITHIN]
     inner, outer = r * (1.0 - width), r * (1.0 + width)
-    light, slopes = model.linearised(found.point, inner, outer)
+    light, slopes = model.linearised(fit.point, inner, outer)
     errors = data.relative_error * light[:-1]
     rows = zip(inner, outer, light[:-1], errors, slopes[:-1], strict=True)
-    return [_candidate(found, "point", float(a), float(b), float(v), float(e), slope) for a, b, v, e, slope in rows]
+    return [_candidate(fit, "point", float(a), float(b), float(v), float(e), slope) for a, b, v, e, slope in rows]
 
 
-def _others(found: MediumFit) -> list[Candidate]:
-    (*_, reflectance), slopes = found.predicted[0], found.predicted[1]
-    scale = found.values["scale"]
-    four = relative_errors(found, _repeated(found))
+def _others(fit: MediumFit) -> list[Candidate]:
+    (*_, reflectance), slopes = fit.predicted[0], fit.predicted[1]
+    scale = fit.values["scale"]
+    four = relative_errors(fit, _repeated(fit))
     out = [Candidate("repeats", np.nan, np.nan, float(REPEATS), np.nan, four)]
-    if found.question.total is None and found.data.medium is None:  # a simulation states it already
+    if fit.spec.total is None and fit.data.medium is None:  # a simulation states it already
         error = REFERENCE_ERROR * reflectance
-        out.append(_candidate(found, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
-    if SCALE in found.question.free and found.question.scale is None:
+        out.append(_candidate(fit, "reflectance", np.nan, np.nan, float(reflectance), error, slopes[-1]))
+    if SCALE in fit.spec.free and fit.spec.scale is None:
         slope = scale * np.eye(len(NAMES))[SCALE]
-        out.append(_candidate(found, "scale", np.nan, np.nan, scale, REFERENCE_ERROR * scale, slope))
+        out.append(_candidate(fit, "scale", np.nan, np.nan, scale, REFERENCE_ERROR * scale, slope))
     return out
 
 
-def _repeated(found: MediumFit) -> Floats:
+def _repeated(fit: MediumFit) -> Floats:
     """Covariance of the coordinates where the data's errors are those of REPEATS profiles, and the others stay."""
-    stay = found.law_rows + found.lack_rows
+    stay = fit.law_rows + fit.lack_rows
     rows = stay + (np.eye(len(stay)) - stay) / REPEATS
-    return _covariance(found, np.linalg.solve(np.linalg.cholesky(rows), found.jacobian))
+    return _covariance(fit, np.linalg.solve(np.linalg.cholesky(rows), fit.jacobian))
 
 
 def _candidate(
-    found: MediumFit, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
+    fit: MediumFit, kind: str, inner: float, outer: float, value: float, error: float, slope: Floats
 ) -> Candidate:
-    joint = _covariance(found, np.vstack([found.jacobian, slope[list(found.question.free)] / error]))
-    return Candidate(kind, inner, outer, value, error, relative_errors(found, joint))
+    joint = _covariance(fit, np.vstack([fit.jacobian, slope[list(fit.spec.free)] / error]))
+    return Candidate(kind, inner, outer, value, error, relative_errors(fit, joint))
 
 
-def _covariance(found: MediumFit, jacobian: Floats) -> Floats:
+def _covariance(fit: MediumFit, jacobian: Floats) -> Floats:
     """Covariance (3, 3) of the coordinates from derivatives (m, p) by the free ones, and by what ranges leave open."""
-    free, joint = list(found.question.free), np.zeros((len(NAMES), len(NAMES)))
+    free, joint = list(fit.spec.free), np.zeros((len(NAMES), len(NAMES)))
     joint[np.ix_(free, free)] = covariance(jacobian)
-    return joint + found.of_ranges
+    return joint + fit.of_ranges

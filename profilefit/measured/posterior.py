@@ -36,12 +36,12 @@ FALL = 15.0  # of ln density from its top, beyond which a ridge is not followed
 class Node:
     """The best of p free coordinates where the first has a value."""
 
-    found: MediumFit
+    fit: MediumFit
     there: Minimum
 
     @property
     def first(self) -> float:
-        return float(self.there.point[self.found.question.free[0]])
+        return float(self.there.point[self.fit.spec.free[0]])
 
     @property
     def others(self) -> Floats:
@@ -51,7 +51,7 @@ class Node:
     @property
     def slope(self) -> Floats:
         """Derivatives (p - 1,) of the others by the first."""
-        way = self.there.jacobian[:, self.found.question.free[0]]
+        way = self.there.jacobian[:, self.fit.spec.free[0]]
         return np.asarray(-self.root @ self.root.T @ self._ways.T @ way, float)
 
     @cached_property
@@ -63,15 +63,15 @@ class Node:
     @cached_property
     def log(self) -> float:
         """ln density of the first, up to a constant, the others integrated over as a normal; -inf where not finite."""
-        free, rise = self.found.question.free, self.there.cost - self.found.minimum.cost
+        free, rise = self.fit.spec.free, self.there.cost - self.fit.minimum.cost
         if not (np.isfinite(rise) and np.all(np.isfinite(self._ways))):
             return -np.inf
-        log = likelihood(np.array(rise), len(free), self.found.data.pooled) + np.sum(np.log(np.diag(self.root)))
+        log = likelihood(np.array(rise), len(free), self.fit.data.pooled) + np.sum(np.log(np.diag(self.root)))
         return float(log + log_prior(np.array(self.first)) if U in free else log)
 
     @property
     def _others(self) -> list[int]:
-        return list(self.found.question.free[1:])
+        return list(self.fit.spec.free[1:])
 
     @property
     def _ways(self) -> Floats:
@@ -82,8 +82,8 @@ class Node:
         """The same where the first has another value."""
         start = self.there.point.copy()
         start[self._others] += self.slope * (first - self.first)
-        start[self.found.question.free[0]] = first
-        return replace(self, there=descended(self.found.problem, start, tuple(self._others)))
+        start[self.fit.spec.free[0]] = first
+        return replace(self, there=descended(self.fit.problem, start, tuple(self._others)))
 
 
 @dataclass(frozen=True)
@@ -122,11 +122,11 @@ class Ridge:
         return mean, float(share @ (self.first - mean) ** 2)
 
 
-def ridge(found: MediumFit) -> Ridge:
+def ridge(fit: MediumFit) -> Ridge:
     """That of a fit: its first free coordinate is moved to either side, and the others are fitted again."""
-    first, best = found.question.free[0], Node(found, found.minimum)
+    first, best = fit.spec.free[0], Node(fit, fit.minimum)
     ends = np.array([-1.0, 1.0]) * (FARTHEST_U + ROOM) if first == U else best.first + np.array([-1, 1]) * FARTHEST_LN
-    error = float(np.sqrt(found.conditional[first, first])) or WIDEST
+    error = float(np.sqrt(fit.conditional[first, first])) or WIDEST
     nodes = [best]
     for side in (-1.0, 1.0):
         last, step = best, side * STRIDE * min(error, WIDEST)
@@ -140,19 +140,19 @@ def ridge(found: MediumFit) -> Ridge:
     return Ridge(tuple(sorted(nodes, key=lambda one: one.first)))
 
 
-def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
+def posterior(fit: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
     """Posterior of the free coordinates of a fit, by emcee: samples (k, p)."""
-    free, best, along = list(found.question.free), found.point, ridge(found)
+    free, best, along = list(fit.spec.free), fit.point, ridge(fit)
     reach = np.full(best.size, FARTHEST_LN)
 
     def log_density(straight: Floats) -> Floats:
         samples, volume = along.bent(straight)
-        full = points(found, samples)
+        full = points(fit, samples)
         inside = np.all(np.abs(full - best)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
             np.abs(full[:, U]) < FARTHEST_U + ROOM
         )
-        rise = found.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach)) - found.minimum.cost
-        value = likelihood(rise, len(free), found.data.pooled) + volume
+        rise = fit.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach)) - fit.minimum.cost
+        value = likelihood(rise, len(free), fit.data.pooled) + volume
         if U in free:
             value = value + log_prior(full[:, U])
         return np.where(inside & np.isfinite(value), value, -np.inf)
@@ -165,8 +165,8 @@ def posterior(found: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Wa
     return replace(walked, samples=samples, log_density=walked.log_density - volume)
 
 
-def points(found: MediumFit, samples: Floats) -> Floats:
+def points(fit: MediumFit, samples: Floats) -> Floats:
     """The coordinates (k, 3) of samples (k, p) of the free ones."""
-    full = np.repeat(found.point[None], len(samples), axis=0)
-    full[:, list(found.question.free)] = samples
+    full = np.repeat(fit.point[None], len(samples), axis=0)
+    full[:, list(fit.spec.free)] = samples
     return full

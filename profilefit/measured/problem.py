@@ -33,7 +33,7 @@ class Known:
 
 
 @dataclass(frozen=True)
-class Question:
+class FitSpec:
     """What to fit: exact light or a law, by the albedo, the transport mean free path and the scale of the values.
 
     instrument  the beam, and what a row is averaged over
@@ -70,7 +70,7 @@ class Question:
                 point[NAMES.index(name)] = np.log(value)
         return point
 
-    def under(self, values: Mapping[str, float]) -> Question:
+    def under(self, values: Mapping[str, float]) -> FitSpec:
         """The same where those of the ranges have these values."""
         setting = Setting.of(self.law.setting.as_table() | {name: values[name] for name in MEDIUM if name in values})
         seen = replace(self.instrument, beam=Gaussian(values["beam"])) if "beam" in values else self.instrument

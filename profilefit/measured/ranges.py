@@ -35,7 +35,7 @@ DRAWS, SEED = 4000, 0
 
 
 @dataclass(frozen=True)
-class Opened:
+class RangeMarginal:
     """What is left open of ranges.
 
     mean     of each, by name, and error the standard deviation about it
@@ -55,12 +55,12 @@ class Opened:
         return found
 
 
-def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None = None) -> Opened | None:
+def marginalise(problem: Problem, start: Minimum, known: Mapping[str, float] | None = None) -> RangeMarginal | None:
     """Find what the data leave open of a problem's ranges; None where the fit has no errors anywhere in them.
 
     known  values of the ranges where `start` is a fit, which may be the best
     """
-    whole = dict(problem.question.ranges)
+    whole = dict(problem.spec.ranges)
     rough = [_scaled(leggauss(COARSE)[0], ends) for ends in whole.values()]
     fits = _fits(problem, tuple(whole), rough, start) + ([] if known is None else [(start, dict(known))])
     first, *others = sorted(fits, key=lambda one: _cost(one[0]))[: STARTS if known is None else AGAIN]
@@ -88,10 +88,10 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
         theta[:, U] = np.exp(theta[:, U])  # sqrt(1 - alpha), near enough: it ends at 0 where the data allow no other
         theta, log = between @ theta, between @ log
         theta[:, U] = np.log(np.maximum(theta[:, U], np.exp(WHITE)))
-        log += likelihood(between @ rise, len(problem.question.free), problem.data.pooled)
+        log += likelihood(between @ rise, len(problem.spec.free), problem.data.pooled)
         places = [_scaled(_middles(PLACES[name]), ends) for name, ends in ranges.items()]
     else:
-        log += likelihood(rise, len(problem.question.free), problem.data.pooled)
+        log += likelihood(rise, len(problem.spec.free), problem.data.pooled)
         log += np.log(_product([leggauss(NODES[name])[1] for name in ranges]))
         places = nodes
     share = np.exp(log - log.max())
@@ -102,21 +102,21 @@ def opened(problem: Problem, start: Minimum, known: Mapping[str, float] | None =
     errors = dict(zip(ranges, map(float, np.sqrt(share @ (at - mean) ** 2)), strict=True))
     drawn = theta[np.random.default_rng(SEED).choice(share.size, DRAWS, p=share)]
     there = fitted_under(problem, means, start)
-    return Opened(means, errors, there, drawn - there.point)
+    return RangeMarginal(means, errors, there, drawn - there.point)
 
 
 def slopes_by_ranges(problem: Problem, values: Mapping[str, float], point: Floats) -> Floats:
-    """Derivatives (m, k) of the residuals at a point (3,) by the question's k ranges, where these have `values`."""
-    low, high = np.array(list(problem.question.ranges.values())).T
-    at = np.array([values[name] for name in problem.question.ranges])
-    theta = point[list(problem.question.free)]
+    """Derivatives (m, k) of the residuals at a point (3,) by the spec's k ranges, where these have `values`."""
+    low, high = np.array(list(problem.spec.ranges.values())).T
+    at = np.array([values[name] for name in problem.spec.ranges])
+    theta = point[list(problem.spec.free)]
     return differences(lambda moved: _residuals(problem, theta, moved)[0], STEP * (high - low), high)(at)[1]
 
 
 def _residuals(problem: Problem, theta: Floats, values: Floats) -> tuple[Floats, Floats]:
     """Residuals (m,) where the free coordinates (p,) and the ranges (k,) have these values; derivatives (m, p)."""
-    there = problem.under(dict(zip(problem.question.ranges, map(float, values), strict=True)))
-    point, free = there.question.base, list(problem.question.free)
+    there = problem.under(dict(zip(problem.spec.ranges, map(float, values), strict=True)))
+    point, free = there.spec.base, list(problem.spec.free)
     point[free] = theta
     rows, slopes = there.residuals(point)
     return rows, slopes[:, free]
@@ -146,7 +146,7 @@ def _fits(
 
 def _box(problem: Problem, start: Minimum, values: dict[str, float]) -> tuple[Minimum, dict[str, tuple[float, float]]]:
     """The best fit within the ranges, and what of them is within REACH of it; begun at the fit under some values."""
-    free, ranges = list(problem.question.free), problem.question.ranges
+    free, ranges = list(problem.spec.free), problem.spec.ranges
     low, high = np.array(list(ranges.values())).T
 
     def at(x: Floats) -> tuple[Floats, Floats]:
@@ -191,7 +191,7 @@ def _log_volumes(problem: Problem, fits: Sequence[Minimum]) -> Floats:
     Residuals are linear in s = e^u, in which the prior is flat and ends at s = 0 (alpha = 1), near which it is
     sqrt(1 - alpha): what lies beyond that end is cut off.
     """
-    free = list(problem.question.free)
+    free = list(problem.spec.free)
     found = np.full(len(fits), -np.inf)
     for at, one in enumerate(fits):
         slopes = one.jacobian[:, free]

@@ -26,7 +26,7 @@ LEAST_RISE = 1e-6  # of ln |mean|, which a trend is taken over
 
 
 @dataclass(frozen=True, eq=False)
-class Steadied:
+class ModeratedVariance:
     """Means of replicates.
 
     value, sigma    (n,) means and their standard errors
@@ -40,7 +40,7 @@ class Steadied:
     pooled: float
 
 
-def moderated_variances(samples: Floats) -> Steadied:
+def moderated_variances(samples: Floats) -> ModeratedVariance:
     """Mean and standard error of each row, from samples (n, k), k >= 3.
 
     The trend is a straight line of ln variance over ln |mean|: gain noise (slope 2), counts (1) and a floor (0) alike.
@@ -51,7 +51,7 @@ def moderated_variances(samples: Floats) -> Steadied:
     usable = variance > 0
     pooled = trend_freedom(int(np.count_nonzero(usable)), own)
     if np.count_nonzero(usable) < FEWEST:
-        return Steadied(mean, np.sqrt(variance / count), np.full(mean.size, own), pooled)
+        return ModeratedVariance(mean, np.sqrt(variance / count), np.full(mean.size, own), pooled)
     # ln s^2 of own degrees of freedom lies below ln sigma^2 by this much, on average.
     level = np.log(variance[usable]) - digamma(own / 2) + np.log(own / 2)
     height = np.log(np.maximum(np.abs(mean), np.abs(mean).max() * 1e-12))
@@ -65,7 +65,7 @@ def moderated_variances(samples: Floats) -> Steadied:
     with np.errstate(over="ignore"):  # of a row far outside of the others, which do not inform it then
         centre = np.exp(trend + digamma(prior / 2) - np.log(prior / 2))
     both = (prior * centre + own * variance) / (prior + own)
-    return Steadied(mean, np.sqrt(both / count), np.full(mean.size, min(prior, pooled) + own), pooled)
+    return ModeratedVariance(mean, np.sqrt(both / count), np.full(mean.size, min(prior, pooled) + own), pooled)
 
 
 def trend_freedom(rows: int, own: float) -> float:

@@ -16,7 +16,7 @@ from profilefit.measured.data import Measured
 from profilefit.measured.fitting import LEVEL, MediumFit
 from profilefit.measured.identifiability import Identifiability, Interval, identifiability
 from profilefit.measured.model import NAMES, U, u_of
-from profilefit.measured.optimal_design import Advice, advised
+from profilefit.measured.optimal_design import DesignRanking, rank_designs
 from profilefit.measured.posterior import points, posterior
 from profilefit.measured.solving import Minimum, descended
 from profilefit.recipes import record
@@ -28,7 +28,7 @@ GREY = 0.9  # albedo assumed for the advice where the data do not bound it at al
 
 
 @dataclass(frozen=True)
-class Answer:
+class MediumPosterior:
     """A judged fit: how identifiable its quantities are, the most informative additional measurements, the chain.
 
     The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded. `width` is
@@ -43,9 +43,9 @@ class Answer:
     includes the law's own error.
     """
 
-    found: MediumFit
+    fit: MediumFit
     identifiability: Identifiability | None
-    advice: Advice | None
+    advice: DesignRanking | None
     walk: Walk | None
     width: BeamWidth | None = None
     tissue: Tissue | None = None
@@ -59,13 +59,13 @@ class Answer:
         """
         if self.walk is None:
             return {}
-        if self.found.plain is None or not self.identified:
+        if self.fit.plain is None or not self.identified:
             return self._quantities(self._sampled)
-        found, free = self.found, list(self.found.question.free)
-        whole, data = (one[np.ix_(free, free)] for one in (found.likely, found.likely - found.of_misfit))
+        fit, free = self.fit, list(self.fit.spec.free)
+        whole, data = (one[np.ix_(free, free)] for one in (fit.total_covariance, fit.total_covariance - fit.of_misfit))
         nearer = np.linalg.cholesky(data) @ np.linalg.inv(np.linalg.cholesky(whole))
         moved = self._sampled.copy()
-        moved[:, free] = found.point[free] + (moved[:, free] - found.point[free]) @ nearer.T
+        moved[:, free] = fit.point[free] + (moved[:, free] - fit.point[free]) @ nearer.T
         return self._quantities(moved)
 
     @cached_property
@@ -74,21 +74,21 @@ class Answer:
 
         Empty at an end, and where neither the law's error nor a lack of fit is known.
         """
-        if self.walk is None or not self.identified or (self.found.plain is None and self.found.rel is None):
+        if self.walk is None or not self.identified or (self.fit.plain is None and self.fit.rel is None):
             return {}
-        return self.draws if self.found.plain is None else self._quantities(self._sampled)
+        return self.draws if self.fit.plain is None else self._quantities(self._sampled)
 
     @cached_property
     def _sampled(self) -> Floats:
         """Posterior draws (k, 3) of the coordinates: those of the chain, each moved by what is open of ranges."""
         if self.walk is None:
             return np.zeros((0, len(NAMES)))
-        sampled = points(self.found, self.walk.samples)
-        return sampled if self.found.open is None else sampled + self.found.open.offsets[: len(sampled)]
+        sampled = points(self.fit, self.walk.samples)
+        return sampled if self.fit.range_marginal is None else sampled + self.fit.range_marginal.offsets[: len(sampled)]
 
     def _quantities(self, points: Floats) -> dict[str, Floats]:
-        data = self.found.data
-        reflectance = self.found.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
+        data = self.fit.data
+        reflectance = self.fit.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
         return model.quantities(points, reflectance)
 
     @property
@@ -99,13 +99,13 @@ class Answer:
     @property
     def moving(self) -> tuple[str, ...]:
         """The quantities that depend on the free coordinates."""
-        return tuple(name for name, one in self.found.gradients.items() if np.any(one[list(self.found.question.free)]))
+        return tuple(name for name, one in self.fit.gradients.items() if np.any(one[list(self.fit.spec.free)]))
 
     @property
     def identified(self) -> tuple[str, ...]:
         """Those with symmetric errors: none where an end of a range is not excluded, or where the fit failed."""
         opened = self.identifiability is None or any(one.is_open for one in self._intervals)
-        return () if opened or not self.found.minimum.converged else self.moving
+        return () if opened or not self.fit.minimum.converged else self.moving
 
     def ends(self, name: str) -> tuple[bool, bool]:
         """Whether the data fail to exclude the lowest and the highest possible value of a quantity: (low, high)."""
@@ -120,7 +120,7 @@ class Answer:
 
     def value(self, name: str) -> float | None:
         """The best value: of what was held, or has an error or an interval, and lies inside; else None."""
-        value = self.found.values[name]
+        value = self.fit.values[name]
         if name not in self.moving:
             return value
         intervals = [one for one in (self.interval(name), self.whole_interval(name)) if one is not None]
@@ -136,8 +136,8 @@ class Answer:
         """
         if name in self.draws and name in self.moving:
             return self._middle(name, self.draws[name])
-        found = [one for one in self._intervals if one.name == name]
-        return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
+        fit = [one for one in self._intervals if one.name == name]
+        return _closed(fit[0].low, fit[0].high, self.ends(name)) if fit and name in self.moving else None
 
     def whole_interval(self, name: str) -> Ends | None:
         """95 % by all errors: statistical, model, and lack of fit if allowed for; None where these are unknown."""
@@ -156,42 +156,42 @@ def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
     return None if all(opened) else (None if opened[0] else low, None if opened[1] else high)
 
 
-def judged(found: MediumFit, seed: int = 0, walk: bool = True) -> Answer:
+def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:
     """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate.
 
     Where an intermediate number is not finite, that is the fit's result, and nothing else is reported.
     """
-    if not (found.minimum.converged or found.minimum.at_edge):
-        return Answer(found, None, None, None)
+    if not (fit.minimum.converged or fit.minimum.at_edge):
+        return MediumPosterior(fit, None, None, None)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _judged_finite(found, seed, walk)
+            return _judged_finite(fit, seed, walk)
     except (FloatingPointError, np.linalg.LinAlgError):
-        return Answer(replace(found, minimum=replace(found.minimum, result=BEYOND)), None, None, None)
+        return MediumPosterior(replace(fit, minimum=replace(fit.minimum, result=BEYOND)), None, None, None)
 
 
-def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
-    judgement = identifiability(found)
+def _judged_finite(fit: MediumFit, seed: int, walk: bool) -> MediumPosterior:
+    judgement = identifiability(fit)
     # The prior ends at alpha = 1; with any other open end the posterior is unbounded.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
-    walked = posterior(found, seed) if walk and found.question.free and not endless else None
-    width = None if found.data.medium is not None else beam_width(found)
-    result = Answer(found, judgement, advised(_inside(found, judgement)), walked, width, as_tissue(found))
-    _ = found.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
+    walked = posterior(fit, seed) if walk and fit.spec.free and not endless else None
+    width = None if fit.data.medium is not None else beam_width(fit)
+    result = MediumPosterior(fit, judgement, rank_designs(_inside(fit, judgement)), walked, width, as_tissue(fit))
+    _ = fit.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
     return result
 
 
-def _inside(found: MediumFit, judgement: Identifiability) -> MediumFit:
+def _inside(fit: MediumFit, judgement: Identifiability) -> MediumFit:
     """A fit at an edge, moved to the other end of alpha's interval: at the edge no measurement seems to help."""
-    if not found.minimum.at_edge:
-        return found
+    if not fit.minimum.at_edge:
+        return fit
     (alpha,) = [one for one in judgement.intervals if one.name == "alpha"]
-    start = found.point.copy()
+    start = fit.point.copy()
     start[U] = u_of(
         next((x for x, is_open in ((alpha.low, alpha.open_low), (alpha.high, alpha.open_high)) if not is_open), GREY)
     )
-    others = tuple(at for at in found.question.free if at != U)
-    return replace(found, minimum=descended(found.problem, start, others))
+    others = tuple(at for at in fit.spec.free if at != U)
+    return replace(fit, minimum=descended(fit.problem, start, others))
 
 
 def known_medium(data: Measured) -> dict[str, float]:
@@ -202,20 +202,20 @@ def known_medium(data: Measured) -> dict[str, float]:
     return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
 
 
-def rival_values(found: MediumFit, rival: Minimum) -> dict[str, float]:
+def rival_values(fit: MediumFit, rival: Minimum) -> dict[str, float]:
     """The quantities at another minimum."""
-    data = found.data
-    reflectance = found.problem.model.predicted(rival.point[None], data.inner[:1], data.outer[:1])[:, -1]
+    data = fit.data
+    reflectance = fit.problem.model.predicted(rival.point[None], data.inner[:1], data.outer[:1])[:, -1]
     return {name: float(value[0]) for name, value in model.quantities(rival.point[None], reflectance).items()}
 
 
-def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
+def content(result: MediumPosterior, law: str, constants: str) -> dict[str, Any]:
     """Everything, as JSON content; model errors are null where they are not known.
 
     Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
     """
-    found = result.found
-    data, question = found.data, found.question
+    fit = result.fit
+    data, spec = fit.data, fit.spec
     body = {
         "data": {
             "file": data.source,
@@ -229,7 +229,7 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
             "inner": data.inner,
             "outer": data.outer,
             "value": data.value,
-            "sigma": found.sigma,
+            "sigma": fit.sigma,
             "freedom": data.freedom if np.isfinite(data.pooled) else None,
             "pooled_freedom": data.pooled if np.isfinite(data.pooled) else None,
             "photons": data.photons if np.isfinite(data.photons) else None,
@@ -237,74 +237,76 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
         "law": {
             "name": law,
             "constants": constants,
-            "setting": question.law.setting,
-            "record": None if found.source is None else found.source.path.name,
-            "record_sha256": None if found.source is None else found.source.digest,
-            "rel": found.rel,
+            "setting": spec.law.setting,
+            "record": None if fit.source is None else fit.source.path.name,
+            "record_sha256": None if fit.source is None else fit.source.digest,
+            "rel": fit.rel,
         },
-        "beam": None if question.instrument.beam is None else question.instrument.beam.words,
-        "fibre": question.instrument.fibre,
-        "ranges": question.ranges,
-        "of_ranges": None if found.open is None else {"mean": found.open.mean, "error": found.open.error},
-        "free": [NAMES[at] for at in question.free],
-        "held": question.held,
-        "known": {"A": question.total, "scale": question.scale, "oblique": question.oblique},
-        "result": found.minimum.result,
-        "steps": found.minimum.steps,
-        "widening": found.widening,
-        "quantile_95": found.quantile,
+        "beam": None if spec.instrument.beam is None else spec.instrument.beam.words,
+        "fibre": spec.instrument.fibre,
+        "ranges": spec.ranges,
+        "of_ranges": None
+        if fit.range_marginal is None
+        else {"mean": fit.range_marginal.mean, "error": fit.range_marginal.error},
+        "free": [NAMES[at] for at in spec.free],
+        "held": spec.held,
+        "known": {"A": spec.total, "scale": spec.scale, "oblique": spec.oblique},
+        "result": fit.minimum.result,
+        "steps": fit.minimum.steps,
+        "widening": fit.widening,
+        "quantile_95": fit.quantile,
         "quantities": _quantities(result),
         "correlation": _correlation(result),
-        "light": found.light,
-        "residuals": found.minimum.residuals,
+        "light": fit.light,
+        "residuals": fit.minimum.residuals,
         "versions": record.versions(),
     }
     if result.identifiability is not None and result.advice is not None:
         body["misfit"] = {
-            **vars(found.misfit),
-            "detected": found.misfit.detected,
-            "within_law": found.misfit.within_law,
-            "allowed_for": found.plain is not None,
+            **vars(fit.misfit),
+            "detected": fit.misfit.detected,
+            "within_law": fit.misfit.within_law,
+            "allowed_for": fit.plain is not None,
         }
         body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
         body["advice"] = result.advice
         body["beam_width"] = result.width
         body["tissue"] = result.tissue
-        body["rivals"] = [rival_values(found, one) | {"chi2": one.cost} for one in found.rivals]
-        body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
+        body["rivals"] = [rival_values(fit, one) | {"chi2": one.cost} for one in fit.rivals]
+        body["rows_beyond_99.5_percent"] = int(fit.beyond.sum())
     if result.walk is not None:
         body["posterior"] = {k: v for k, v in vars(result.walk).items() if k not in ("samples", "log_density")}
     plain: dict[str, Any] = record.plain(body)
     return plain
 
 
-def _quantities(result: Answer) -> dict[str, Any]:
-    found = result.found
+def _quantities(result: MediumPosterior) -> dict[str, Any]:
+    fit = result.fit
     kinds: dict[str, Floats | None] = {
-        "statistical": found.statistical if result.identified else None,
-        "law": found.of_law if result.identified and found.rel is not None else None,
+        "statistical": fit.statistical if result.identified else None,
+        "law": fit.of_law if result.identified and fit.rel is not None else None,
     }
     if result.identifiability is not None:
-        kinds["misfit"] = found.of_misfit if result.identified else None
-    errors = {kind: found.errors(one) if one is not None else {} for kind, one in kinds.items()}
-    truth = known_medium(found.data)
+        kinds["misfit"] = fit.of_misfit if result.identified else None
+    errors = {kind: fit.errors(one) if one is not None else {} for kind, one in kinds.items()}
+    truth = known_medium(fit.data)
     return {
         name: {
             "value": result.value(name),
             "at_edge": any(result.ends(name)),
-            "unit": model.unit_of(name, found.data.unit),
+            "unit": model.unit_of(name, fit.data.unit),
             **{f"{kind}_error": one.get(name) if name in result.identified else None for kind, one in errors.items()},
             "interval_95_data": result.interval(name),
             "interval_95_total": result.whole_interval(name),
             "of_file": truth.get(name),
         }
-        for name in found.values
+        for name in fit.values
     }
 
 
-def _correlation(result: Answer) -> dict[str, Any]:
+def _correlation(result: MediumPosterior) -> dict[str, Any]:
     names = result.identified
     if not names:
         return {}
-    joint = model.correlation(result.found.gradients, result.found.statistical, names)
+    joint = model.correlation(result.fit.gradients, result.fit.statistical, names)
     return {"names": names, "matrix": joint}

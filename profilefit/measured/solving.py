@@ -16,7 +16,7 @@ from profilefit.fitting import solver
 from profilefit.measured.data import Measured
 from profilefit.measured.model import LENGTH, NAMES, SCALE, Model, U, u_of
 from profilefit.measured.noise import Noise
-from profilefit.measured.problem import Question
+from profilefit.measured.problem import FitSpec
 
 Floats = NDArray[np.float64]
 # Far below any error that data leave a coordinate, well above what rounding of the profile does to it.
@@ -42,29 +42,29 @@ AT_BLACK = "alpha runs to 0: these data show no multiple scattering; check unit 
 
 @dataclass(frozen=True)
 class Problem:
-    """Data and a question, as residuals. noise is what weighs the rows: the errors of the data or better."""
+    """Data and a spec, as residuals. noise is what weighs the rows: the errors of the data or better."""
 
     data: Measured
-    question: Question
+    spec: FitSpec
     noise: Noise
 
     @cached_property
     def model(self) -> Model:
-        return Model(self.question.law, self.question.instrument)
+        return Model(self.spec.law, self.spec.instrument)
 
     def residuals(self, point: Floats) -> tuple[Floats, Floats]:
         """Residuals in standard errors (m,) and their derivatives (m, 3): the n rows, then what else is known."""
         light, slope = self.model.linearised(point, self.data.inner, self.data.outer)
         rows, slopes = self.noise.whitened(light[:-1] - self.data.value), self.noise.whitened(slope[:-1])
-        if (total := self.question.total) is not None:
+        if (total := self.spec.total) is not None:
             rows = np.append(rows, (light[-1] - total.value) / total.error)
             slopes = np.vstack([slopes, slope[-1:] / total.error])
-        if (known := self.question.scale) is not None:
+        if (known := self.spec.scale) is not None:
             scale = np.exp(point[SCALE])
             rows = np.append(rows, (scale - known.value) / known.error)
             slopes = np.vstack([slopes, scale / known.error * np.eye(len(NAMES))[SCALE]])
-        if (oblique := self.question.oblique) is not None:
-            off, slope = oblique.residuals(self.question.law.setting, point[None])
+        if (oblique := self.spec.oblique) is not None:
+            off, slope = oblique.residuals(self.spec.law.setting, point[None])
             rows, slopes = np.append(rows, off), np.vstack([slopes, slope])
         return rows, slopes
 
@@ -73,17 +73,17 @@ class Problem:
         light = self.model.predicted(points, self.data.inner, self.data.outer)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is no start
             cost = np.sum(self.noise.whitened((light[:, :-1] - self.data.value).T) ** 2, axis=0)
-        if (total := self.question.total) is not None:
+        if (total := self.spec.total) is not None:
             cost += ((light[:, -1] - total.value) / total.error) ** 2
-        if (known := self.question.scale) is not None:
+        if (known := self.spec.scale) is not None:
             cost += ((np.exp(points[:, SCALE]) - known.value) / known.error) ** 2
-        if (oblique := self.question.oblique) is not None:
-            cost += oblique.residuals(self.question.law.setting, points)[0] ** 2
+        if (oblique := self.spec.oblique) is not None:
+            cost += oblique.residuals(self.spec.law.setting, points)[0] ** 2
         return cost
 
     def under(self, values: Mapping[str, float]) -> Problem:
-        """The same where those of the question's ranges have these values."""
-        return replace(self, question=self.question.under(values))
+        """The same where those of the spec's ranges have these values."""
+        return replace(self, spec=self.spec.under(values))
 
     @property
     def lengths(self) -> tuple[float, float]:
@@ -100,12 +100,12 @@ class Problem:
     @cached_property
     def starts(self) -> Floats:
         """(k, 3) the best points of a coarse search, no two neighbours."""
-        held = self.question.base
-        u = [held[U]] if U not in self.question.free else [u_of(alpha) for alpha in ALBEDOS]
+        held = self.spec.base
+        u = [held[U]] if U not in self.spec.free else [u_of(alpha) for alpha in ALBEDOS]
         lengths = np.linspace(*self.lengths, LENGTHS)
-        ln_l = [held[LENGTH]] if LENGTH not in self.question.free else lengths
+        ln_l = [held[LENGTH]] if LENGTH not in self.spec.free else lengths
         points = np.array([[a, b, held[SCALE]] for a in u for b in ln_l])
-        if SCALE in self.question.free:
+        if SCALE in self.spec.free:
             points[:, SCALE] = np.log(self._best_scales(points))
         places = np.array([[i, j] for i in range(len(u)) for j in range(len(ln_l))])
         return points[best_apart(places, self.costs(points))]
@@ -152,7 +152,7 @@ def best_apart(places: Floats, costs: Floats) -> list[int]:
 
 def minimised(problem: Problem) -> Minimum:
     """The lowest of the minima that several starts lead to, and the others."""
-    return lowest(descended(problem, start, problem.question.free) for start in problem.starts)
+    return lowest(descended(problem, start, problem.spec.free) for start in problem.starts)
 
 
 def lowest(ends: Iterable[Minimum]) -> Minimum:
@@ -199,8 +199,8 @@ def descended(problem: Problem, start: Floats, free: tuple[int, ...]) -> Minimum
 
 
 def descended_from(problem: Problem, start: Floats) -> Minimum:
-    """The minimum below `start` (3,) of another question: what is held is where this one has it."""
-    point, free = problem.question.base, problem.question.free
+    """The minimum below `start` (3,) of another spec: what is held is where this one has it."""
+    point, free = problem.spec.base, problem.spec.free
     point[list(free)] = start[list(free)]
     return descended(problem, point, free)
 

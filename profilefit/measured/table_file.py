@@ -27,7 +27,7 @@ import numpy as np
 from profilefit.errors import InputError
 from profilefit.measured.data import Fact, Floats, Measured
 from profilefit.measured.lengths import UNITS, area_unit, checked_unit, factor
-from profilefit.measured.replicates import FEWEST, Steadied, moderated_variances
+from profilefit.measured.replicates import FEWEST, ModeratedVariance, moderated_variances
 
 MAX_BYTES = 2**22  # far beyond any profile, near enough that a wrong file fails at once
 MOST_LINES = 20_000  # a fit takes five hundred rows of them
@@ -324,7 +324,7 @@ def _radii(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Flo
     return inner, outer
 
 
-def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Floats]) -> tuple[Steadied, str]:
+def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Floats]) -> tuple[ModeratedVariance, str]:
     """Values with their standard errors, and in words what the errors are."""
     if header.replicates:
         samples = np.stack([numbers[name] for name in header.replicates], axis=1)
@@ -334,7 +334,7 @@ def _values(path: Path, header: _Header, rows: list[_Row], numbers: dict[str, Fl
         named = header.replicates[0]
     else:
         _require_light(path, numbers["value"])
-        found = Steadied(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
+        found = ModeratedVariance(numbers["value"], numbers["sigma"], np.full(len(rows), np.inf), np.inf)
         named, errors = "sigma", "as given"
     for row, one in zip(rows, found.sigma, strict=True):
         if not 0 < one < np.inf and header.replicates:

@@ -17,9 +17,9 @@ from profilefit.measured.law_error import origin
 from profilefit.measured.model import Light
 from profilefit.measured.oblique import Oblique
 from profilefit.measured.premises import Premises, premises
-from profilefit.measured.problem import Known, Question, held_albedo
+from profilefit.measured.problem import FitSpec, Known, held_albedo
 from profilefit.measured.reading import read
-from profilefit.measured.result import Answer, judged
+from profilefit.measured.result import MediumPosterior, judged
 from profilefit.recipes import catalogue
 
 HOLDABLE = ("alpha", "A", "l")
@@ -37,7 +37,7 @@ def fit(
     walk: bool = True,
     folder: Path | None = None,
     oblique: Oblique | None = None,
-) -> Answer:
+) -> MediumPosterior:
     """Fit a medium to a measured or simulated profile, and judge the fit.
 
     data       a file (see `reading.read`), or what was read from one, for instance `within` some radii
@@ -51,7 +51,7 @@ def fit(
     folder     of the records, by default the ones shipped
     oblique    the centre of a circle of the same medium's light, where a beam fell in aslant
 
-    InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is an Answer that says so.
+    InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is returned with its reason.
     """
     measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
     records = folder or catalogue.fits_folder()
@@ -65,10 +65,10 @@ def fit(
     measured = _noted(measured, where, told.notes)
     chosen = _light(law, constants, where, records)
     known = scale if isinstance(scale, Known) else None
-    question = Question(
+    spec = FitSpec(
         chosen, _held(chosen, held or {}, scale), total, known, oblique, told.instrument, told.ranges, told.assumed
     )
-    return judged(fitted(measured, question, origin(law, constants, chosen.setting, records)), seed, walk)
+    return judged(fitted(measured, spec, origin(law, constants, chosen.setting, records)), seed, walk)
 
 
 def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:

@@ -27,7 +27,7 @@ from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
-from profilefit.measured.photo.simulated import CHANNELS, SpotCamera, SpotOptics, Taken
+from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
 from profilefit.recipes.toml_tables import Table, Tables
 
@@ -144,7 +144,7 @@ def _far(camera: SpotCamera) -> float:
     return 1.2 * camera.pitch * float(np.hypot(*camera.sides))
 
 
-def brackets(setup: Setup) -> dict[str, list[Taken]]:
+def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
@@ -197,7 +197,7 @@ def room(setup: Setup) -> float:
     return ROOM + scenes * setup.exposures * 2 * math.prod(setup.camera.sides)
 
 
-def as_dng(one: Taken) -> bytes:
+def as_dng(one: SimulatedExposure) -> bytes:
     """A raw file of Adobe's format."""
     tifffile = library("tifffile")
     codes = tuple(CFA[colour] for row in one.pattern for colour in row)

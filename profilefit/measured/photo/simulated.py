@@ -103,7 +103,7 @@ class SpotCamera:
 
 
 @dataclass(frozen=True)
-class Taken:
+class SimulatedExposure:
     """An exposure. `seconds` are those that the camera states, which need not be those that it took."""
 
     counts: Counts
@@ -199,7 +199,7 @@ def taken(
     electrons: float,
     times: Mapping[float, float],
     seed: int,
-) -> list[Taken]:
+) -> list[SimulatedExposure]:
     """A bracket of exposures.
 
     radial     radii [mm], out to the corners, and light (n,) [1/mm^2] by channel
@@ -222,7 +222,7 @@ def taken(
             expected[at] = np.maximum(CubicSpline(*radial[PATTERN[row][column]])(r[at]), 0.0)
     expected *= np.float32(electrons) * sees
     return [
-        Taken(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)
+        SimulatedExposure(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)
         for stated, real in times.items()
     ]
 

@@ -84,7 +84,7 @@ def test_an_option_in_place_of_a_fact_is_noted(stated):
     assert premises(data, told={"n": "1.33", "g": "0.9"}, names={"n": "--n"}).notes == (
         "the file's n is '1.4' (line 1), fitted with --n 1.33",
     )
-    found = fit(data, setting=premises(data, told={"n": "1.33"}), walk=False).found.data.notes
+    found = fit(data, setting=premises(data, told={"n": "1.33"}), walk=False).fit.data.notes
     assert found == ("the file's n is '1.4' (line 1), fitted with n 1.33",)
     converted = read(Path(data.source), unit="cm")
     assert converted.notes == ("the file's unit is 'mm' (line 3), read with `unit` cm",)
