@@ -28,13 +28,11 @@ from benchmarks.render_figure import save
 from mcml_sim import Setting
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N
 from profilefit.measured import model
-from profilefit.measured.assumed import beam_width
-from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
+from profilefit.measured.identifiability import beam_width
+from profilefit.measured.instrument import PENCIL, Gaussian, Instrument
+from profilefit.measured.model import Model, exact_light, u_of
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import FitSpec
 from profilefit.measured.result import MediumPosterior, judged

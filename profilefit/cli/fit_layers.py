@@ -66,7 +66,7 @@ def _medium(file: Path, unit: str) -> Medium:
         from dataclasses import replace
 
         from mcml_sim.files.text_file import read_toml
-        from profilefit.measured.lengths import factor
+        from profilefit.measured.data import factor
         from profilefit.recipes.stack.file import read_layers
 
     stack = read_layers(file, read_toml(file))

@@ -32,7 +32,7 @@ from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, followed
-from profilefit.fitting.gaussian_process import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
+from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST

@@ -10,7 +10,7 @@ A failure is a result, not an exception: `Solution.result` is "converged" or sta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -57,6 +57,8 @@ STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: be
 SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
 OPTIONS = {"jac": "bwd"}  # optimistix keeps the Jacobian as an array, not as a program
 NO_TAGS: frozenset[object] = frozenset()
+APART = 0.05  # in a parameter of size 1: minima nearer to each other than that are one
+STARTS = 4  # the best of a coarse search, no two neighbours, that are followed to their minimum
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Solution:
     steps       number of points at which the residuals were evaluated
     result      "converged", or what failed and what to try next
     at_bound    (p,) True for each parameter that a bound holds
+    others      other minima that a search from several starts found, the lowest first
     """
 
     parameters: Floats
@@ -76,6 +79,7 @@ class Solution:
     steps: int
     result: str
     at_bound: NDArray[np.bool_] | None = None
+    others: tuple[Solution, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -88,7 +92,7 @@ class Solution:
 
     @property
     def covariance(self) -> Floats:
-        """(J'J)^-1 (p, p), of residuals in standard errors; times `variance` for residuals of unknown size."""
+        """Covariance (J'J)^-1 (p, p) for residuals in standard errors; times `variance` for others."""
         return covariance(self.jacobian)
 
     @property
@@ -111,7 +115,7 @@ def _squares(values: Floats) -> float:
 
 
 def covariance(jacobian: Floats) -> Floats:
-    """(J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
+    """Return (J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
 
     The singular values of J itself, columns of unit length, give it: products would lose half of the digits. Directions
     beyond rounding get the error of rounding, which is large but finite. Infinite where derivatives are not finite.
@@ -122,8 +126,7 @@ def covariance(jacobian: Floats) -> Floats:
     size = np.maximum(size, np.finfo(float).tiny ** 0.25)
     _, singular, ways = np.linalg.svd(jacobian / size, full_matrices=False)
     scaled = ways / np.maximum(singular, np.finfo(float).eps * singular[0])[:, None]
-    found: Floats = (scaled.T @ scaled) / np.outer(size, size)
-    return found
+    return np.asarray((scaled.T @ scaled) / np.outer(size, size), float)
 
 
 def least_squares(
@@ -173,6 +176,35 @@ def solve_batch(
         scale = None if scales is None else np.asarray(scales)[row]
         found.append(least_squares(residual, begin, item, worth=worth, scale=scale))
     return tuple(found)
+
+
+def best_apart(places: NDArray[np.int_], costs: Floats) -> list[int]:
+    """Return the rows of a coarse search where descents start: the cheapest, no two of them neighbours.
+
+    Args:
+        places: (m, 2) whole numbers, where each row lies in the search's grid.
+        costs: (m,) sum of squares of each.
+    """
+    chosen: list[int] = []
+    for at in np.argsort(costs):
+        if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
+            chosen.append(int(at))
+    return chosen[:STARTS]
+
+
+def lowest(ends: Iterable[Solution], compared: int | None = None) -> Solution:
+    """Return the solution of lowest cost, converged or not, with the other minima; `compared` as of `are_apart`."""
+    first, *others = sorted(ends, key=lambda one: (not np.isfinite(one.cost), one.cost))
+    apart: list[Solution] = []
+    for one in others:
+        if np.isfinite(one.cost) and all(are_apart(one, other, compared) for other in (first, *apart)):
+            apart.append(one)
+    return replace(first, others=tuple(apart))
+
+
+def are_apart(one: Solution, other: Solution, compared: int | None = None) -> bool:
+    """Return whether two solutions are two minima: one of the first `compared` parameters differs by over `APART`."""
+    return bool(np.max(np.abs(one.parameters - other.parameters)[:compared]) > APART)
 
 
 @filter_jit

@@ -21,13 +21,13 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting import solver
-from profilefit.measured.data import Measured, require_workable
+from profilefit.fitting.misfit import DETECTED, gaussianised, own_degrees_of_freedom, scatter_chance
+from profilefit.measured.data import Measured, require_workable, widening
+from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.instrument import Instrument
-from profilefit.measured.misfit import DETECTED, gaussianised, own_degrees_of_freedom, scatter_chance
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Known
-from profilefit.measured.replicates import widening
 
 Floats = NDArray[np.float64]
 NAME = re.compile(r"(d|mu_a|mu_s)([1-9][0-9]?)")
@@ -39,7 +39,6 @@ REACH = math.log(300.0)  # how far ln of a quantity may go from where it starts
 TOLERANCE, MOST_STEPS = 1e-4, 20
 GAIN = 1e-3  # of chi-square, that another step must gain
 ROUNDS = 2  # of weights: those of counts come from the fit
-LOOSE = 0.5  # relative error from which a quantity is not identified
 NAMED = 0.1  # exponents below it are left out of a product's name
 
 

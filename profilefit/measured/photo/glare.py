@@ -23,8 +23,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipe, ellipk
 
-from profilefit.measured.beam import Floats, Gaussian
-from profilefit.measured.instrument import Instrument
+from profilefit.measured.instrument import Floats, Gaussian, Instrument
 from profilefit.measured.photo.rings import SpotRings, over_rings
 
 FARTHER = 5.0  # of the last ring, from where halos still bring light

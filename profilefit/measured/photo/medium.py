@@ -20,24 +20,14 @@ from scipy import stats
 from scipy.linalg import block_diag, solve_triangular
 
 from mcml_sim.exact.light import ExactLight
-from profilefit.fitting.solver import CONVERGED, covariance, solve
-from profilefit.measured import law_error, model
-from profilefit.measured.misfit import DETECTED
+from profilefit.fitting.misfit import DETECTED, waves
+from profilefit.fitting.solver import CONVERGED, Solution, best_apart, covariance, lowest, solve
+from profilefit.measured import model
 from profilefit.measured.model import Model, u_of
+from profilefit.measured.noise import WAVE
 from profilefit.measured.photo.glare import ring_means, ring_weights
 from profilefit.measured.photo.rings import SpotRings
-from profilefit.measured.problem import Known
-from profilefit.measured.solving import (
-    ALBEDOS,
-    BLACK,
-    FARTHEST_LN,
-    FARTHEST_U,
-    LENGTHS,
-    WHITE,
-    Minimum,
-    best_apart,
-    lowest,
-)
+from profilefit.measured.problem import ALBEDOS, BLACK, FARTHEST_LN, FARTHEST_U, LENGTHS, WHITE, Known
 
 Floats = NDArray[np.float64]
 MEDIUM = ("mu_s'", "mu_a")
@@ -242,7 +232,7 @@ class Shot:
 
     def _covariance(self, one: SpotRings) -> Floats:
         size = UNEVEN * one.value
-        smooth = law_error.waves(one.r) * np.outer(size, size)
+        smooth = waves(one.r, WAVE) * np.outer(size, size)
         return one.covariance + smooth + np.diag((1e-4 * one.value) ** 2 + (1e-9 * self.size) ** 2)
 
     def residuals(self, x: Floats) -> tuple[Floats, Floats]:
@@ -393,14 +383,14 @@ class PhotoFit:
 
 def fitted(shot: Shot) -> PhotoFit:
     """Fit a shot by least squares: the lowest minimum that a search finds, and its rivals."""
-    found = lowest(_descended(shot, start) for start in shot.starts)
+    found = lowest((_descended(shot, start) for start in shot.starts), compared=len(model.NAMES))
     first, *others = (_ended(shot, one) for one in (found, *found.others))
     within = RIVAL * first.widening**2
     rivals = tuple(one for one in others if one.chi2 - first.chi2 < within and not first.holds(one.values))
     return replace(first, rivals=rivals, result=RIVALLED if rivals and first.converged else first.result)
 
 
-def _descended(shot: Shot, start: Floats) -> Minimum:
+def _descended(shot: Shot, start: Floats) -> Solution:
     """End of damped least squares within bounds, from a start."""
     longest = np.full(start.size, np.inf)
     longest[:4], longest[start.size - len(shot.cards) :] = FARTHEST, FARTHEST
@@ -409,12 +399,12 @@ def _descended(shot: Shot, start: Floats) -> Minimum:
         if done.converged:
             break
         start = done.parameters
-    return Minimum(**vars(done))
+    return done
 
 
-def _ended(shot: Shot, done: Minimum) -> PhotoFit:
+def _ended(shot: Shot, done: Solution) -> PhotoFit:
     """A descent's end as a fit, whose verdict says where there is no medium."""
-    (u, ln_l), (low, high) = done.point[:2], (one[1] for one in shot.bounds)
+    (u, ln_l), (low, high) = done.parameters[:2], (one[1] for one in shot.bounds)
     result = done.result
     if u > BLACK:
         result = AT_BLACK
@@ -424,7 +414,9 @@ def _ended(shot: Shot, done: Minimum) -> PhotoFit:
         result = RAN_AWAY
     elif not done.converged:
         result = UNENDED
-    return PhotoFit(shot, done.point, done.covariance, done.cost, done.residuals.size - done.point.size, result)
+    return PhotoFit(
+        shot, done.parameters, done.covariance, done.cost, done.residuals.size - done.parameters.size, result
+    )
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
-from profilefit.measured.lengths import length
+from profilefit.measured.data import length
 from profilefit.measured.photo.exposure import Exposure, Plane, library
 
 Floats = NDArray[np.float64]

@@ -21,8 +21,7 @@ from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
 from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
-from profilefit.measured.model import u_of
+from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
@@ -223,7 +222,7 @@ def _ratio(seconds: float) -> tuple[int, int]:
     return round(seconds * below), below
 
 
-def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     """Errors of mu_s' and mu_a by Fisher's information, by colour: without cards, with either, with both.
 
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
@@ -235,14 +234,14 @@ def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
     return {
         label: {
-            colour: _told(setup, mu_s, mu_a, cards)
+            colour: _bounds(setup, mu_s, mu_a, cards)
             for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
         }
         for label, cards in of.items()
     }
 
 
-def _told(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
+def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
     pixel, core = setup.camera.pitch, setup.optics.sigma
     edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))

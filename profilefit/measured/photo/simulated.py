@@ -28,7 +28,7 @@ from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.runs.simulation import simulate
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 from profilefit.measured.photo import bracket, medium, rings
 from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
 from profilefit.measured.photo.exposure import COLOURS, GREY, Exposure, read

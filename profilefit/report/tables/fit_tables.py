@@ -9,12 +9,11 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.identifiability import relative_errors
-from profilefit.measured.misfit import DETECTED
+from profilefit.measured.identifiability import REFERENCE_ERROR, REPEATS, Candidate, relative_errors
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.oblique import NEAR
-from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
 from profilefit.measured.result import MediumPosterior, known_medium, rival_values
 from profilefit.report.tables.cells import (
     ABSENT,
@@ -130,7 +129,7 @@ def _advice_table(result: MediumPosterior) -> RenderableType:
         "least certain quantity": [advice.name, *(one.worst[0] for one in advice.candidates)],
         "± statistical, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
     }
-    place = "at the far end of the interval of alpha" if result.fit.minimum.at_edge else "at the fitted values"
+    place = "at the far end of the interval of alpha" if result.fit.at_edge else "at the fitted values"
     caption = f"predicted {place}, best first; a value is given the median relative error of the data"
     left = "additional measurement", "least certain quantity"
     return column_table("Most informative additional measurement", columns, caption, left)
@@ -158,7 +157,7 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
     if result.identifiability is None:
         yield f"the fit failed: {fit.minimum.result}"
         return
-    if fit.minimum.at_edge:
+    if fit.at_edge:
         yield f"AT AN EDGE: {fit.minimum.result}"
     if np.isfinite(fit.data.pooled):
         yield from _estimated(result)

@@ -5,14 +5,11 @@ import pytest
 
 from benchmarks import own_data
 from mcml_sim import Setting
-from profilefit.measured.assumed import beam_width
-from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.identifiability import identifiability
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
+from profilefit.measured.identifiability import beam_width, identifiability
+from profilefit.measured.instrument import PENCIL, Gaussian, Instrument
+from profilefit.measured.model import Model, exact_light, u_of
 from profilefit.measured.problem import FitSpec
 
 LIGHT = exact_light(Setting())

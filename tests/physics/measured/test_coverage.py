@@ -10,19 +10,15 @@ from scipy.special import expit
 
 from benchmarks import own_data
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
-from profilefit.measured.beam import Gaussian
-from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.data import Measured, moderated_variances
 from profilefit.measured.fitting import fitted
 from profilefit.measured.identifiability import identifiability
-from profilefit.measured.instrument import Instrument
-from profilefit.measured.law_error import origin
-from profilefit.measured.model import U
-from profilefit.measured.posterior import posterior, ridge
+from profilefit.measured.instrument import Gaussian, Instrument
+from profilefit.measured.model import U, exact_light
+from profilefit.measured.noise import origin
 from profilefit.measured.problem import FitSpec
 from profilefit.measured.reading import read
-from profilefit.measured.replicates import moderated_variances
-from profilefit.measured.result import MediumPosterior, judged
+from profilefit.measured.result import MediumPosterior, judged, moved, posterior, ridge
 from profilefit.recipes import catalogue
 
 pytestmark = pytest.mark.slow
@@ -57,9 +53,9 @@ def band(share, count):
 def replicates():
     """Fits to light of the law itself with 2 % noise."""
     generator, light = np.random.default_rng(5), LAW.profile(R, ALPHA, MFP)
-    spec = FitSpec(LAW, {"scale": 1.0})
+    spec = FitSpec(LAW, {"scale": 1.0}, source=source())
     draws = light * (1 + 0.02 * generator.standard_normal((REPLICATES, R.size)))
-    return [fitted(points(one, 0.02 * light), spec, source()) for one in draws]
+    return [fitted(points(one, 0.02 * light), spec) for one in draws]
 
 
 def covered(replicates, level, wider=1.0):
@@ -103,7 +99,7 @@ def test_replicates_are_not_accused_and_cover(count, uneven):
         size = 0.01 * np.sqrt(count) * np.exp(uneven * generator.standard_normal((R.size, 1)))
         one = moderated_variances(light[:, None] * (1 + size * generator.standard_normal((R.size, count))))
         data = points(one.value, one.sigma, one.freedom, pooled=one.pooled)
-        found.append(fitted(data, FitSpec(LAW, {"scale": 1.0}), source()))
+        found.append(fitted(data, FitSpec(LAW, {"scale": 1.0}, source=source())))
     low, high = band(0.95, REPLICATES)
     assert all(low <= held <= high for held in covered(found, 0.95).values())
     assert sum(one.misfit.detected for one in found) <= 3
@@ -123,7 +119,7 @@ def test_the_laws_own_error_is_what_moves_a_fit():
             for low, high in ((0.1, 0.99), (0.5, 0.99), (0.1, 0.9)):
                 r = np.geomspace(*exact.quantile([low, high], alpha), 16)
                 light = np.asarray(exact.profile(r, alpha))
-                found = fitted(points(light, 0.01 * light, r=r), FitSpec(law, {"scale": 1.0}), known)
+                found = fitted(points(light, 0.01 * light, r=r), FitSpec(law, {"scale": 1.0}, source=known))
                 errors = found.errors(found.of_law)
                 shifts.append(
                     [(found.values["alpha"] - alpha) / errors["alpha"], (found.values["l"] - 1) / errors["l"]]
@@ -143,13 +139,13 @@ def test_errors_of_simulations_are_the_scatter_of_seeds(tmp_path):
     for seed in range(60):
         tally = simulate(medium, grid, 2**14, seed=seed, progress=False)
         write_results(tally, tmp_path / "a.npz")
-        found.append(fitted(read(tmp_path / "a.npz"), FitSpec(LAW, {"scale": 1.0}), source()))
+        found.append(fitted(read(tmp_path / "a.npz"), FitSpec(LAW, {"scale": 1.0}, source=source())))
     assert all(one.minimum.converged for one in found)
     for name, too_wide in (("alpha", 1.5), ("l", 1.0)):
         scatter = np.std([one.values[name] for one in found], ddof=1)
         stated = np.median([one.errors(one.statistical)[name] for one in found])
         assert stated / scatter == pytest.approx(1.0, abs=0.23), name
-        shared = [fitted(replace(one.data, photons=np.inf), one.spec, source()) for one in found[:5]]
+        shared = [fitted(replace(one.data, photons=np.inf), one.spec) for one in found[:5]]
         assert np.median([one.errors(one.statistical)[name] for one in shared]) > too_wide * scatter, "negative control"
 
 
@@ -189,7 +185,7 @@ def test_a_chain_walks_the_whole_of_a_bent_ridge():
     z = np.stack(np.meshgrid(*[np.linspace(-4.5, 4.5, 19)] * 2), axis=-1).reshape(-1, 2)
     log = []
     for first in u:
-        node = min(along.nodes, key=lambda one: abs(one.first - first)).moved(first)
+        node = moved(found, min(along.nodes, key=lambda one: abs(one.first - first)), first)
         others = node.others + z @ node.root.T
         costs = found.problem.costs(np.column_stack([np.full(len(z), first), others])) - found.minimum.cost
         log.append(np.logaddexp.reduce(-0.5 * costs) + np.sum(np.log(np.diag(node.root))))
@@ -252,12 +248,12 @@ def test_a_white_medium_has_an_upper_limit_of_absorption():
     """No absorption at all: in half of the replicates alpha runs to 1, and mu_a has an upper limit and no value."""
     light = np.asarray(exact.profile(R, 1.0, MFP)) * (1 + 0.02 * np.random.default_rng(3).standard_normal(R.size))
     for part in (light, 1.03 * light):
-        result = judged(fitted(points(part, 0.02 * light), FitSpec(LAW, {"scale": 1.0}), source()))
+        result = judged(fitted(points(part, 0.02 * light), FitSpec(LAW, {"scale": 1.0}, source=source())))
         assert result.walk is not None
         low, high = result.interval("mu_a")
         assert low is None
         assert 0 < high < 2e-3, "per mm: a five-hundredth of mu_s'"
-    assert result.fit.minimum.at_edge
+    assert result.fit.at_edge
     assert result.identified == ()
     assert [result.value(name) for name in ("A", "alpha", "mu_a")] == [None] * 3
     assert result.value("l") == pytest.approx(MFP, rel=0.05)
@@ -276,7 +272,7 @@ def test_limits_at_the_white_end_cover(alpha):
     generator, held, stated, too_low = np.random.default_rng(11), 0, 0, 0
     for _ in range(count):
         value = light * (1 + 0.02 * generator.standard_normal(R.size))
-        found = fitted(points(value, 0.02 * light), FitSpec(LAW, {"scale": 1.0}), None)
+        found = fitted(points(value, 0.02 * light), FitSpec(LAW, {"scale": 1.0}))
         result = MediumPosterior(found, identifiability(found), None, posterior(found, max_steps=1000))
         truth, limit = (1 - alpha) / MFP, np.quantile(result.draws["mu_a"], 0.95)
         held += truth <= limit

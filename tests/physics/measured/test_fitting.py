@@ -13,15 +13,12 @@ from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import MediumFit, fitted
-from profilefit.measured.identifiability import identifiability, relative_errors
-from profilefit.measured.law_error import BEYOND, RMS, WAVE, origin, relative_error
+from profilefit.measured.identifiability import identifiability, rank_designs, relative_errors
 from profilefit.measured.model import Model, u_of
-from profilefit.measured.optimal_design import rank_designs
-from profilefit.measured.posterior import posterior
-from profilefit.measured.problem import FitSpec, Known
+from profilefit.measured.noise import BEYOND, RMS, WAVE, origin, relative_error
+from profilefit.measured.problem import FARTHEST_LN, LONGEST, FitSpec, Known
 from profilefit.measured.reading import read
-from profilefit.measured.result import MediumPosterior, judged
-from profilefit.measured.solving import FARTHEST_LN, LONGEST
+from profilefit.measured.result import MediumPosterior, judged, posterior
 from profilefit.recipes import catalogue
 
 DATA = Path(__file__).parents[3] / "examples"
@@ -50,7 +47,7 @@ def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
 
 def fit(data, total=None, scale_error=None, **held) -> MediumFit:
     known = None if scale_error is None else Known(1.0, scale_error)
-    return fitted(data, FitSpec(LAW, held, total, known), SOURCE)
+    return fitted(data, FitSpec(LAW, held, total, known, source=SOURCE))
 
 
 @pytest.fixture(scope="module")
@@ -203,7 +200,7 @@ def test_no_value_lies_outside_its_own_interval():
     at_edge = given = 0
     for seed in range(5):
         found = small(np.random.default_rng(seed))
-        if not (found.minimum.converged or found.minimum.at_edge):
+        if not (found.minimum.converged or found.at_edge):
             continue
         judgement = identifiability(found)
         endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
@@ -233,14 +230,14 @@ def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled
     assert best.kind == "reflectance"
     assert best.worst[1] < advice.now / 4
 
-    taken = fitted(unscaled.data, replace(unscaled.spec, total=Known(TOTAL, best.error)), SOURCE)
+    taken = fitted(unscaled.data, replace(unscaled.spec, total=Known(TOTAL, best.error)))
     real = relative_errors(taken, taken.total_covariance)
     assert real == pytest.approx(best.relative, rel=0.02)
 
     point = found["point"]
     value = light(np.array([point.inner]), np.array([point.outer]), 3.0)[0]
     assert value == pytest.approx(point.value, rel=1e-5)
-    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.spec, SOURCE)
+    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.spec)
     assert relative_errors(with_point, with_point.total_covariance) == pytest.approx(point.relative, rel=0.02)
     assert max(point.relative.values()) > max(real.values())
     four = fit(rings(error=0.01, scale=3.0))

@@ -9,7 +9,7 @@ from mcml_sim import Layer, Medium, Setting
 from mcml_sim.exact.anisotropic import table
 from profilefit.measured import fit
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 from profilefit.measured.premises import Premises
 from profilefit.report.tables.fit_tables import fit_lines
 from tests.fixtures import slow

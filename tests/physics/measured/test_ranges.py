@@ -8,14 +8,12 @@ import pytest
 from benchmarks import own_data
 from mcml_sim import Setting
 from profilefit.measured import model
-from profilefit.measured.assumed import as_tissue
-from profilefit.measured.beam import Gaussian
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import Instrument
+from profilefit.measured.identifiability import as_tissue
+from profilefit.measured.instrument import Gaussian, Instrument
+from profilefit.measured.model import exact_light
 from profilefit.measured.noise import noise
-from profilefit.measured.problem import FitSpec, Known, held_albedo
-from profilefit.measured.solving import Problem, descended
+from profilefit.measured.problem import FitSpec, Known, Problem, descended, held_albedo
 from tests.fixtures import slow
 
 ONE = own_data.TISSUE
@@ -45,17 +43,17 @@ def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
     g = ends[0] + (ends[1] - ends[0]) * (np.arange(60) + 0.5) / 60
     fits, start = [], found.minimum
     for value in g:
-        start = descended(found.problem.under({"g": float(value)}), start.point, spec.free)
+        start = descended(found.problem.under({"g": float(value)}), start.parameters, spec.free)
         fits.append(start)
     volumes = [np.linalg.slogdet(one.jacobian[:, :2].T @ one.jacobian[:, :2])[1] for one in fits]
-    s = np.array([np.sqrt(1.0 - model.alpha_of(one.point[0])) for one in fits])
+    s = np.array([np.sqrt(1.0 - model.alpha_of(one.parameters[0])) for one in fits])
     log = -0.5 * (np.array([one.cost for one in fits]) + volumes) + np.log(s * (1.0 - s))
     share = np.exp(log - log.max())
     share /= share.sum()
     mean = share @ g
     assert found.range_marginal.mean["g"] == pytest.approx(mean, abs=0.02 * found.range_marginal.error["g"])
     assert found.range_marginal.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
-    points = np.array([one.point[:2] for one in fits])
+    points = np.array([one.parameters[:2] for one in fits])
     off = points - share @ points
     np.testing.assert_allclose(
         np.diag(np.cov(found.range_marginal.offsets[:, :2].T)), np.diag((share[:, None] * off).T @ off), rtol=0.1
@@ -91,7 +89,7 @@ def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     """No table is made for each n that is tried, and between those that are made light is the same."""
     spec, n = FitSpec(exact_light(Setting(n=own)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
     exactly = replace(spec, law=exact_light(Setting(n=n)), ranges={})
-    monkeypatch.setattr("profilefit.measured.exact_light.kept", lambda *_: pytest.fail("a table is made"))
+    monkeypatch.setattr("profilefit.measured.model.kept", lambda *_: pytest.fail("a table is made"))
     assert fitted(measured, spec).open.error["n"] > 0
     light, right = (
         Problem(measured, one, noise(measured)).model.predicted(np.array([[-3.0, 0.0, 0.0]]), *EDGES)
@@ -145,7 +143,7 @@ def test_ranges_of_data_without_absorption_leave_the_limit():
     data = own_data.rows(white, np.random.default_rng(4))
     data = replace(data, value=1.15 * data.value * (data.r / data.r[0]) ** 0.1)
     found = fitted(data, FitSpec(exact_light(white.setting), own_data.SCALE, ranges={"g": (0.75, 0.85)}))
-    assert found.minimum.at_edge
+    assert found.at_edge
     assert found.values["alpha"] > 0.999
 
 

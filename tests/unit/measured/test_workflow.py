@@ -10,7 +10,7 @@ from mcml_sim import Setting, half_space
 from profilefit.errors import InputError, SettingError
 from profilefit.measured import Known, fit, read
 from profilefit.measured.fitting import fitted
-from profilefit.measured.law_error import origin
+from profilefit.measured.noise import origin
 from profilefit.measured.problem import FitSpec
 from profilefit.recipes.catalogue import fits_folder
 
@@ -30,7 +30,7 @@ def test_it_reads_files():
 
 def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
-    parts = fitted(near, FitSpec(law, {"scale": 1.0}), origin("hazard", "regenerated", Setting(), fits_folder()))
+    parts = fitted(near, FitSpec(law, {"scale": 1.0}, source=origin("hazard", "regenerated", Setting(), fits_folder())))
     result = fit(near, "hazard", walk=False)
     assert result.fit.values == parts.values
     assert result.walk is None

@@ -1,4 +1,4 @@
-"""Goodness of fit: whether one layer under one law explains the data, and if not, how large the misfit is.
+"""Misfit of a fit: whether errors as stated explain the residuals, and if not, the Gaussian process that they show.
 
 The residuals R of n rows, in standard errors, are projected onto what the p fitted coordinates cannot take up: n - p
 numbers z whose covariance is known, S = N^T (1 + B) N, B being the law's own error. Two tests are made of them:
@@ -11,8 +11,10 @@ Errors made from replicates share the error of their trend: with `pooled` degree
 F, and the waves' draws are divided likewise. Both p-values are combined by Sidak's rule. The misfit is the relative
 error, row by row, that brings chi-square to n - p.
 
-`lack_of_fit` estimates which error of the model would leave such residuals: a Gaussian process of relative standard
-deviation d and of some correlation along ln r, by the likelihood of z under S + d^2 D (restricted likelihood, REML).
+Which error of the model would leave such residuals is a question to a restricted likelihood (REML), that of what the
+fitted constants cannot take up. `lack_of_fit` sums over relative standard deviations d and some correlations along
+ln r, by the likelihood of z under S + d^2 D. `likeliest` finds amplitude and lengths of a process over two coordinates,
+with Matern's covariance (nu = 3/2) along each.
 """
 
 from __future__ import annotations
@@ -22,9 +24,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy import special, stats
+from scipy.linalg import solve_triangular
+from scipy.linalg.lapack import dpotri
 from scipy.optimize import brentq
 
-from profilefit.measured.solving import likelihood
+from profilefit.fitting.solver import minimise
 
 Floats = NDArray[np.float64]
 DETECTED = 1e-3  # p-value below which a misfit counts as one
@@ -34,11 +38,16 @@ LARGEST = 1e3  # relative error beyond which a misfit is no longer measured
 # Relative errors d of a lack of fit that are tried, over that of a row: how many, the least, and the largest, or as
 # many times the root mean square of the residuals.
 SIZES, LEAST, MOST, TIMES = 20, 0.05, 20.0, 4.0
+NUGGET = 1e-3  # of the amplitude's square, left to each ring alone: without it the finest scale decides on the largest
+MAX_STEPS = 300
+TOLERANCE = 1e-3  # of the likelihood's slope by ln of amplitude and lengths: a hundredth of what data resolve
+FARTHEST = 12.0  # of ln amplitude from that of the residuals
+STEP = 1e-3  # in ln of amplitude and lengths, between gradients that make a curvature
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """How well a fit explains its data.
+    """Goodness of fit.
 
     chi2, freedom    by the data's errors alone; chance its p-value
     scatter, waves   p-values where data and law have the errors stated; joined that of both
@@ -75,11 +84,17 @@ def misfit(
     uneven: Floats | None = None,
     pooled: float = np.inf,
 ) -> Misfit:
-    """Judge residuals (m,) of a fit with derivatives (m, p), the first `rows` of them along r.
+    """Judge residuals of a fit; all arguments are in standard errors.
 
-    law    (m, m) covariance of the law's own error, shape (m, m) that of a relative error 1 in waves, uneven (m, m)
-           that of one which differs from row to row (by default, shape without its correlations); all in errors
-    pooled degrees of freedom of what the rows' errors share
+    Args:
+        residuals: (m,), the first `rows` of them along r.
+        jacobian: (m, p) their derivatives.
+        law: (m, m) covariance of the law's own error.
+        shape: (m, m) that of a relative error 1 in waves.
+        rows: how many lie along r.
+        uneven: (m, m) that of a relative error 1 which differs from row to row; by default, shape without its
+            correlations.
+        pooled: degrees of freedom of what the rows' errors share.
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     z = free.T @ residuals
@@ -108,8 +123,8 @@ def lack_of_fit(
     """Estimate the relative variances (k,) of errors of these shapes (k, m, m), of which the residuals show the sum.
 
     The prior is flat in ln d and among the shapes; a variance is the posterior's mean of d^2 times the shape's share.
-    Arguments are those of `misfit`. The second value is ln of how many times likelier z is with such errors, over the
-    prior, than without any; -inf where there is nothing to estimate.
+    Other arguments are those of `misfit`. The second value is ln of how many times likelier z is with such errors than
+    without any, over the prior; -inf where there is nothing to estimate.
     """
     free = np.linalg.qr(jacobian, mode="complete")[0][:, jacobian.shape[1] :]
     root = np.linalg.cholesky(np.eye(free.shape[1]) + free.T @ law @ free)
@@ -131,14 +146,14 @@ def lack_of_fit(
 
 
 def scatter_chance(square: float, freedom: int, pooled: float) -> float:
-    """p-value of a chi-square whose errors share a scale of `pooled` degrees of freedom."""
+    """Return the p-value of a chi-square whose errors share a scale of `pooled` degrees of freedom."""
     if np.isinf(pooled):
         return float(stats.chi2.sf(square, freedom))
     return float(stats.f.sf(square / freedom, freedom, pooled))
 
 
 def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float = np.inf, seed: int = 0) -> float:
-    """p-value of the score z^T S^-1 D S^-1 z under the covariance S = `own` of z."""
+    """Return the p-value of the score z^T S^-1 D S^-1 z under the covariance S = `own` of z."""
     there = np.linalg.solve(own, z)
     root = np.linalg.cholesky(own)
     inner = np.linalg.solve(root, np.linalg.solve(root, shape).T)
@@ -152,7 +167,7 @@ def wave_chance(z: Floats, own: Floats, shape: Floats, pooled: float = np.inf, s
 
 
 def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
-    """The relative error d for which z^T (S + d^2 D)^-1 z is its degrees of freedom; 0 if it is less at d = 0."""
+    """Return the relative error d for which z^T (S + d^2 D)^-1 z is its degrees of freedom; 0 if d = 0 gives less."""
 
     def excess(d: float) -> float:
         return float(z @ np.linalg.solve(own + d**2 * relative, z)) - z.size
@@ -163,15 +178,108 @@ def amplitude(z: Floats, own: Floats, relative: Floats) -> float:
 
 
 def own_degrees_of_freedom(freedom: Floats, pooled: float) -> Floats:
-    """Degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d each, add up."""
+    """Return degrees of freedom (n,) of what each row's error has for itself: errors of ln variance, 2 / d, add up."""
     own = np.where(np.isfinite(freedom), 1.0 / freedom, 0.0) - 1.0 / pooled
     return np.where(own > 0, 1.0 / np.where(own > 0, own, 1.0), np.inf)
 
 
 def gaussianised(residuals: Floats, freedom: Floats) -> Floats:
-    """Residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
+    """Return residuals over errors of few degrees of freedom, which are Student's, as normal ones of equal chance."""
     size = np.abs(residuals)
     tail = stats.t.logsf(size, freedom)
     # Where Student's tail has no float left, so many degrees of freedom are behind it that it is a normal one.
     few = np.isfinite(freedom) & np.isfinite(tail)
     return np.sign(residuals) * np.where(few, -special.ndtri_exp(np.where(few, tail, 0.0)), size)
+
+
+def likelihood(rise: Floats, free: int, pooled: float) -> Floats:
+    """Return ln likelihood (m,) where chi-square has risen by `rise` (m,).
+
+    It is a normal one, or Student's in `free` coordinates where errors share a scale of `pooled` degrees of freedom.
+    """
+    if np.isinf(pooled):
+        return -0.5 * rise
+    return -0.5 * (pooled + free) * np.log1p(np.maximum(rise, 0.0) / pooled)
+
+
+def waves(r: Floats, length: float) -> Floats:
+    """Return correlations (n, n) of an error in smooth waves along ln r, of this length [ln r]; 0: independent rows."""
+    return np.asarray(np.exp(-0.5 * _in_lengths(r, length) ** 2), float)
+
+
+def rough_waves(r: Floats, length: float) -> Floats:
+    """Return correlations (n, n) of an error of this length along ln r with which rows are weighed; 0: independent.
+
+    With those of `waves`, which are smooth, neighbouring rows would be trusted for what they say beside the error.
+    """
+    return np.asarray(np.exp(-_in_lengths(r, length)), float)
+
+
+def _in_lengths(r: Floats, length: float) -> Floats:
+    distance = apart(np.log(r), np.log(r))
+    return distance / length if length else np.where(np.eye(r.size) > 0, 0.0, np.inf)
+
+
+def apart(one: Floats, other: Floats) -> Floats:
+    """Return distances (k, l) of numbers, or of points in a plane or in space."""
+    between = one[:, None] - other
+    return np.abs(between) if one.ndim == 1 else np.linalg.norm(between, axis=-1)
+
+
+def kernel(x: Floats, length: float) -> Floats:
+    """Return correlations (k, k) between places."""
+    return matern(apart(x, x) / length)
+
+
+def matern(distance: Floats) -> Floats:
+    """Return the correlation at distances in units of the length."""
+    scaled = np.sqrt(3.0) * distance
+    return (1.0 + scaled) * np.exp(-scaled)
+
+
+def _bent(distance: Floats) -> Floats:
+    """Return d `matern` / d ln length."""
+    scaled = np.sqrt(3.0) * distance
+    return scaled**2 * np.exp(-scaled)
+
+
+def _loss(theta: Floats, apart_u, apart_s, y, slope, noise) -> tuple[float, Floats]:
+    """Return minus the restricted log likelihood at ln of amplitude and lengths, and its gradient (3,)."""
+    square, far_u, far_s = np.exp(2.0 * theta[0]), apart_u * np.exp(-theta[1]), apart_s * np.exp(-theta[2])
+    along_u, along_s = matern(far_u), matern(far_s)
+    kernel = square * (along_u * along_s + NUGGET * np.eye(y.size))
+    value, by_covariance = _restricted(kernel + noise, y, slope)
+    parts = 2.0 * kernel, square * _bent(far_u) * along_s, square * along_u * _bent(far_s)
+    return value, np.array([np.vdot(by_covariance, part) for part in parts])
+
+
+def _restricted(covariance: Floats, y: Floats, slope: Floats) -> tuple[float, Floats]:
+    """Return minus the log likelihood of `y` but for `slope` times anything, and its derivatives by `covariance`.
+
+    Patterson and Thompson's (3).
+    """
+    root = np.linalg.cholesky(covariance)
+    lower = np.tril(dpotri(root, lower=1)[0])  # of the inverse: a third of what solving for it takes
+    across, triangle = np.linalg.qr(solve_triangular(root, slope, lower=True))
+    seen = solve_triangular(root, across, lower=True, trans=1)
+    inverse = lower + np.tril(lower, -1).T - seen @ seen.T  # of what `slope` leaves
+    rest = inverse @ y
+    logs = np.sum(np.log(np.diag(root))) + np.sum(np.log(np.abs(np.diag(triangle))))
+    return float(logs + 0.5 * (y @ rest)), 0.5 * (inverse - np.outer(rest, rest))
+
+
+def likeliest(begin: Floats, limits: Floats, args) -> tuple[Floats, Floats, float, bool]:
+    """Return theta, the curvature of the loss there, the gain over noise alone, and whether it converged.
+
+    A length at a limit is held there: it has no curvature.
+    """
+    theta, loss, converged = minimise(
+        lambda x: _loss(x, *args), begin, (limits[:, 0], limits[:, 1]), TOLERANCE, MAX_STEPS
+    )
+    around = [[_loss(theta + sign * STEP * axis, *args)[1] for sign in (1, -1)] for axis in np.eye(3)]
+    curved = np.array([(after - before) / (2.0 * STEP) for after, before in around])
+    free = (limits[:, 0] < theta) & (theta < limits[:, 1])
+    _, _, y, slope, noise = args
+    floor = np.diag(np.where(np.diag(noise) > 0, 0.0, 1.0))
+    gain = _restricted(noise + floor, y, slope)[0] - loss
+    return theta, 0.5 * (curved + curved.T) * np.outer(free, free), gain, converged
