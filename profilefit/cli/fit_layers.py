@@ -61,7 +61,7 @@ def fit_of_layers(
 
 
 def _medium(file: Path, unit: str) -> Medium:
-    """The stack of a file, in the data's unit of length."""
+    """Return the stack of a file, in the data's unit of length."""
     with interruptible(__name__):
         from dataclasses import replace
 

@@ -24,7 +24,7 @@ class SeveralFiles(TyperCommand):
     """A command some of whose options take every file that follows, as a shell writes out card-*.dng."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """With the option before each of its files."""
+        """Parse with the option before each of its files."""
         written: list[str] = []
         option: str | None = None
         for at, one in enumerate(args):

@@ -315,7 +315,7 @@ def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
 
 
 def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: Floats, slope: Floats) -> Floats:
-    """A damped step (p,) within bounds: parameters that pass one end there, and the others are solved for again."""
+    """Return a damped step (p,) within bounds: parameters that pass one end there, and the others follow."""
     free = np.ones(step.size, bool)
     while np.any(out := free & ((step < room[0]) | (step > room[1]))):
         step, free = np.clip(step, *room), free & ~out
@@ -326,7 +326,7 @@ def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: F
 
 
 def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> NDArray[np.bool_]:
-    """True for each parameter (p,) that is at a bound and that descent would move beyond it."""
+    """Return whether each parameter (p,) is at a bound that descent would pass."""
     with np.errstate(over="ignore", invalid="ignore"):  # a point that is no answer may be far out
         uphill = jacobian.T @ values
     return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
@@ -376,7 +376,7 @@ def _step(solver: Any, size: int, rows: tuple[int, ...]) -> tuple[Callable[..., 
 
 
 def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any, y: Floats) -> tuple[Any, ...]:
-    """The point (p,) after value and slope at `at` are known, the next proposal (p,), its damping, and the state."""
+    """Return the point (p,) after value and slope at `at`, the next proposal (p,), its damping, and the state."""
     with jax.enable_x64(True):
         step, first = _step(solver, y.size, value.shape)
         here, proposed, damping, state = step(at, value, slope, first if state is None else state, y)

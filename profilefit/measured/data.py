@@ -151,7 +151,7 @@ class Measured:
         return self.chosen(keep, note)
 
     def chosen(self, keep: NDArray[np.bool_], note: str = "") -> Measured:
-        """The rows where `keep` (n,) is true."""
+        """Return the rows where `keep` (n,) is true."""
         fields = ("inner", "outer", "value", "sigma", "freedom")
         rows: dict[str, Any] = {name: getattr(self, name)[keep] for name in fields}
         return replace(self, **rows, notes=(*self.notes, *([note] if note else [])))
@@ -259,7 +259,7 @@ def _freedom(spread: float) -> float:
 
 
 def checked_unit(name: str, unit: str) -> str:
-    """A unit of length that is known; InputError names what `name` was given."""
+    """Return a unit of length that is known; InputError names what `name` was given."""
     if unit in UNITS:
         return unit
     raise InputError(f"{name} must be a unit of length ({', '.join(UNITS)}), got {shown(unit)}")
@@ -284,12 +284,12 @@ def length(name: str, text: str, unit: str, accepted: str = "a length > 0 such a
 
 
 def factor(source: str, target: str) -> float:
-    """How many `target` a `source` is."""
+    """Return how many `target` a `source` is."""
     return UNITS[source] / UNITS[target]
 
 
 def area_unit(text: str) -> str | None:
-    """The unit of length in 1/mm^2, 1/mm², 1/mm2, mm^-2 or mm⁻²; None if the text is no such thing."""
+    """Return the unit of length in 1/mm^2, 1/mm², 1/mm2, mm^-2 or mm⁻²; None if the text is no such thing."""
     match = PER_AREA.fullmatch(text.strip())
     unit = (match["over"] or match["power"]) if match else None
     return unit if unit in UNITS else None

@@ -61,7 +61,7 @@ class Irradiance(Protocol):
 
     @property
     def words(self) -> str:
-        """What it is, for messages, without a unit."""
+        """Description for messages, without a unit."""
 
     def nodes(self, d: Floats) -> Nodes:
         """Radii rho and weights K drho, (..., J) each, for distances d from the axis of any shape."""
@@ -136,7 +136,7 @@ class Profiled:
         return np.unique(np.concatenate([[0.0], octaves, self.r[steep], self.r[steep + 1]]))
 
     def _around(self, d: Floats, rho: Floats) -> Floats:
-        """The mean of b over circles, panel by panel of the distance s from the axis: no circle steps over a beam."""
+        """Return the mean of b over circles, panel by panel of the distance s from the axis: none steps over a beam."""
         nearest, across = np.abs(d - rho)[..., None], (4.0 * d * rho)[..., None]
         s = np.maximum(self._edges, nearest)
         with np.errstate(divide="ignore", invalid="ignore"):  # circles about the axis, or of no radius
@@ -207,7 +207,7 @@ def _number(cell: str) -> float:
 
 
 def _panels(low: Floats, high: Floats) -> Nodes:
-    """Of PANELS equal panels, the first of them graded towards its lower end."""
+    """Return nodes of PANELS equal panels, the first of them graded towards its lower end."""
     edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
     first, d_first = _graded(low, edges[..., 1])
     rest, d_rest = _between(edges[..., 1:])
@@ -215,7 +215,7 @@ def _panels(low: Floats, high: Floats) -> Nodes:
 
 
 def _between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
-    """Of the panels between edges (..., k) that rise, some of them without width."""
+    """Return nodes of the panels between edges (..., k) that rise, some of them without width."""
     half, middle = 0.5 * np.diff(edges)[..., None], 0.5 * (edges[..., 1:] + edges[..., :-1])[..., None]
     flat = (*edges.shape[:-1], -1)
     return (middle + half * panel[0]).reshape(flat), (half * panel[1]).reshape(flat)
@@ -236,7 +236,7 @@ def _grades() -> Nodes:
 
 @dataclass(frozen=True)
 class Instrument:
-    """How the light of a row is gathered.
+    """Beam and fibre that gather the light of a row.
 
     beam   None of a pencil beam
     fibre  radius of the fibre's core that a point is averaged over [unit of r], which may cover the axis; 0 of a point
@@ -253,7 +253,7 @@ class Instrument:
         return self.gathered(*self._distances(inner, outer), farthest)
 
     def gathered(self, d: Floats, mean: Floats, farthest: float = 0.0) -> Nodes:
-        """Like `nodes`, of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
+        """Return `nodes` of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
             return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)
@@ -284,7 +284,7 @@ PENCIL = Instrument()
 
 
 def _shared(each: Iterable[Nodes], farthest: float) -> Nodes:
-    """The nodes and weights of all rows on common nodes, as many for any beam."""
+    """Return the nodes and weights of all rows on common nodes, as many for any beam."""
     rows = list(each)
     grain = max(farthest, *(float(rho.max()) for rho, _ in rows)) / GRAINS
     weights = np.zeros((len(rows), COUNT))
@@ -299,6 +299,6 @@ def _shared(each: Iterable[Nodes], farthest: float) -> Nodes:
 
 
 def _straight(grains: Floats) -> Floats:
-    """t of a radius > 0 in grains."""
+    """Return t of a radius > 0 in grains."""
     found: Floats = grains + np.log(-np.expm1(-grains))
     return found

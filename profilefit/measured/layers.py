@@ -44,7 +44,7 @@ NAMED = 0.1  # exponents below it are left out of a product's name
 
 @dataclass(frozen=True)
 class LayersFit:
-    """What was found; lengths in the unit of the data.
+    """Fit of layers; lengths in the unit of the data.
 
     names     of the free quantities; scale last where it is free
     values    (p,); errors (p,) their relative standard errors, with the misfit; correlation (p, p) of their logarithms
@@ -76,7 +76,7 @@ class LayersFit:
 
     @property
     def loose(self) -> tuple[str, ...]:
-        """What these data do not identify."""
+        """Quantities that these data do not identify."""
         return tuple(name for name, error in zip(self.names, self.errors, strict=True) if not error < LOOSE)
 
     def product(self, at: int) -> str:
@@ -125,7 +125,7 @@ def fit_layers(
 
 
 def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
-    """That of the layers; InputError where a table states another, or what is open is more than the layers."""
+    """Return the layers' setting; InputError where a table states another, or more is open than layers."""
     for name in told.ranges:
         of = f"{data.source}:{data.stated[name].line}: " if name in data.stated else ""
         what = "width" if name == "beam" else "number"

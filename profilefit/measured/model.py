@@ -101,7 +101,7 @@ class Model:
         return self._in_flocks(points, *self._nodes(inner, outer))[:, np.append(np.arange(inner.size), -1)]
 
     def _in_flocks(self, points: Floats, *nodes: Array | Floats) -> Floats:
-        """Sums over radii, and A, (m, n + 1) at points (m, 3)."""
+        """Return sums over radii, and A, (m, n + 1) at points (m, 3)."""
         flocks = -(-len(points) // FLOCK)
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
         light = [np.asarray(_predicted(self.traced, flock, *nodes)) for flock in np.split(filled, flocks)]
@@ -112,17 +112,17 @@ class Model:
         return np.concatenate([np.asarray(_shares(self.traced, point, one)) for one in blocks(r, BLOCK)])[: r.size]
 
     def _nodes(self, inner: Floats, outer: Floats) -> tuple[Array, Array]:
-        """Those of the rows, and of more like the last up to a multiple of BLOCK."""
+        """Return nodes of the rows, and of more like the last up to a multiple of BLOCK."""
         return _nodes(self.instrument, inner.tobytes(), outer.tobytes())
 
 
 def alpha_of(u) -> Floats:
-    """alpha [-] at the coordinate u, to rounding also where it is small."""
+    """Return alpha [-] at the coordinate u, to rounding also where it is small."""
     return expit(-np.asarray(u, float)) * (1.0 + expit(np.asarray(u, float)))
 
 
 def u_of(alpha: float) -> float:
-    """The coordinate u of an albedo in (0, 1)."""
+    """Return the coordinate u of an albedo in (0, 1)."""
     s = np.sqrt(1.0 - alpha)
     return float(np.log(s) - np.log(alpha / (1.0 + s)))
 
@@ -185,7 +185,7 @@ def quantities(points: Floats, reflectance: Floats) -> dict[str, Floats]:
 
 
 def slopes(point: Floats, reflectance_slope: Floats) -> dict[str, Floats]:
-    """The derivatives (3,) of each quantity by the coordinates; of A they are given."""
+    """Return the derivatives (3,) of each quantity by the coordinates; of A they are given."""
     s = float(1.0 / (1.0 + np.exp(-point[U])))
     alpha, length = float(alpha_of(point[U])), float(np.exp(point[LENGTH]))
     steep = 2.0 * s**2 * (1.0 - s)  # of 1 - alpha by u
@@ -201,7 +201,7 @@ def slopes(point: Floats, reflectance_slope: Floats) -> dict[str, Floats]:
 
 
 def errors(gradients: dict[str, Floats], covariance: Floats) -> dict[str, float]:
-    """Standard error of each quantity, from the covariance (3, 3) of the coordinates."""
+    """Return standard error of each quantity, from the covariance (3, 3) of the coordinates."""
     return {name: math.sqrt(max(float(row @ covariance @ row), 0.0)) for name, row in gradients.items()}
 
 
@@ -215,7 +215,7 @@ def correlation(gradients: dict[str, Floats], covariance: Floats, names: tuple[s
 
 
 def unit_of(name: str, unit: str) -> str:
-    """The unit of a quantity where lengths are in `unit`."""
+    """Return the unit of a quantity where lengths are in `unit`."""
     if POWERS[name] == 0:
         return ""
     return (unit or "unit of r") if POWERS[name] > 0 else f"1/{unit or 'unit of r'}"
@@ -223,7 +223,7 @@ def unit_of(name: str, unit: str) -> str:
 
 @lru_cache(maxsize=64)
 def exact_light(setting: Setting) -> ExactLight:
-    """Of a half space that `mcml_sim.exact` solves; SettingError of another. Seconds where g = 0, the first time."""
+    """Return exact light of a semi-infinite medium; SettingError of one not solved. Seconds at first, if g = 0."""
     require_solved(setting)
     if not setting.is_isotropic:
         return _filled(table.light(setting))
@@ -234,14 +234,14 @@ def exact_light(setting: Setting) -> ExactLight:
 
 
 def light_at_hand(setting: Setting) -> ExactLight:
-    """The same of one of many settings that a search tries: that of the table, to 3e-4, where it has these n."""
+    """Return exact light of one of many settings that a search tries: by the table, to 3e-4, where it has these n."""
     if setting.is_isotropic and FORWARD_N[0] <= setting.n <= FORWARD_N[1]:
         return _filled(table.light(setting))
     return exact_light(setting)
 
 
 def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
-    """The spline of f, kappa and A / alpha in Chebyshev polynomials of s."""
+    """Return the spline of f, kappa and A / alpha in Chebyshev polynomials of s."""
     s = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(DEGREES))
     alpha = 1.0 - s**2
     log = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP)

@@ -55,8 +55,10 @@ class BayerPlane:
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """A photograph. sides are columns and rows of the whole; seconds, iso and aperture (an f-number) None where the
-    file does not state them."""
+    """Photograph of so many columns and rows (`sides`).
+
+    seconds, iso and aperture (an f-number) are None where the file does not state them
+    """
 
     source: str
     planes: tuple[BayerPlane, ...]
@@ -124,7 +126,7 @@ def of_sensor(
     white: float,
     seconds: float | None,
 ) -> Exposure:
-    """From what a sensor of a Bayer pattern counted (rows, columns); colours and black levels by row and column."""
+    """Return the exposure of a Bayer sensor's counts (rows, columns); colours and black levels by row and column."""
     rows, columns = counts.shape[0] // 2 * 2, counts.shape[1] // 2 * 2  # planes of as many pixels each
     planes = tuple(
         BayerPlane(
@@ -139,7 +141,7 @@ def of_sensor(
 
 
 def _plain(path: Path, kind: str) -> Exposure:
-    """A picture of one or three values a pixel."""
+    """Return a picture of one or three values a pixel."""
     values = _decoded(path, kind)
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3):
@@ -239,7 +241,7 @@ def library(name: str) -> Any:
 
 
 def _refused(path: Path, kind: str, error: Exception) -> InputError:
-    """In a library's words, where none of ours say it already."""
+    """Return an error in a library's words, where none of ours say it already."""
     if isinstance(error, InputError):
         return error
     return InputError(f"{path}: cannot be read as {kind}: {_first_line(error)}")

@@ -1,4 +1,4 @@
-"""What beam and lens make of a point of light, and rings of a medium seen so.
+"""Point spread of beam and lens, and rings of a medium seen under it.
 
 A point is spread over a core, a Gaussian of standard deviation sigma (the beam, its 1/e^2 radius being 2 sigma, and
 what a lens blurs), and over halos, h_a(r) = 3 a^3 / (2 pi (r^2 + a^2)^{5/2}), whose transform is (1 + ka) e^{-ka}:
@@ -44,7 +44,7 @@ class RingWeights(NamedTuple):
 
 
 def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> RingWeights:
-    """Of a core and halos; the core's weights lie on cubics between those of sigmas APART."""
+    """Return weights of a core and halos; the core's lie on cubics between those of sigmas APART."""
     place = float(np.log(sigma)) / APART
     first = int(np.floor(place)) - 1
     share = POLYNOMIALS @ (place - first) ** np.arange(4.0)
@@ -58,7 +58,7 @@ def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> Ring
 
 
 def _blur(sigma: float, halos: Sequence[float]) -> Floats:
-    """Of each halo by the core; where that is no small part of it, as much as the second order gives."""
+    """Return the blur of each halo by the core; where that is no small part of it, what the second order gives."""
     return np.minimum(sigma, 0.5 * np.array(halos))
 
 

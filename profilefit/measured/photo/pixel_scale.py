@@ -57,7 +57,7 @@ class PixelScale:
 
 
 def pixel_scale(option: str, text: str, shots: Sequence[Exposure], unit: str = "mm") -> PixelScale:
-    """From words; InputError names the option and what it takes."""
+    """Return the scale of a text; InputError names the option and what it takes."""
     if match := PER_PIXEL.fullmatch(text):
         size = length(option, match["length"], unit)
         return PixelScale(np.diag([size, size, 1.0]), f"{size:g} {unit} a pixel, as told")

@@ -57,7 +57,7 @@ SCATTER = 0.003  # of a ring, by speckle and noise
 
 @dataclass(frozen=True)
 class Setup:
-    """What is photographed, and how.
+    """Medium, beam, lens and camera of a simulation.
 
     photons  that are traced for each colour; 0: light is exact
     late     relative error of stated times
@@ -170,7 +170,7 @@ def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
 
 
 def written(setup: Setup, out: Path) -> list[Path]:
-    """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
+    """Write the photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
 
     InputError where another camera's lie under these names, or where any lie that are not of this setup, which SPOT-*
     would name too.
@@ -197,7 +197,7 @@ def room(setup: Setup) -> float:
 
 
 def as_dng(one: SimulatedExposure) -> bytes:
-    """A raw file of Adobe's format."""
+    """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
     codes = tuple(CFA[colour] for row in one.pattern for colour in row)
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)

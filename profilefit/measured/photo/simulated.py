@@ -46,7 +46,7 @@ SPILLS = 200  # pixels along a column that an overfull one may reach
 
 @dataclass(frozen=True)
 class SpotOptics:
-    """Of beam and lens; lengths in mm.
+    """Beam and lens; lengths in mm.
 
     beam     1/e^2 radius; core standard deviation of the lens's blur
     surface  share of the light that the surface scatters; glare that in the halo, width its a, falling its b
@@ -64,7 +64,7 @@ class SpotOptics:
         return float(np.hypot(0.5 * self.beam, self.core))
 
     def transform(self, k: Floats) -> Floats:
-        """Of beam and lens, at k [1/mm]."""
+        """Return the transform of beam and lens at k [1/mm]."""
         order = self.falling - 1.0
         x = np.maximum(k * self.width, 1e-12)
         halo = 2.0 * (0.5 * x) ** order * kv(order, x) / gamma(order)
@@ -132,12 +132,12 @@ def card(optics: SpotOptics, r: Floats) -> Floats:
 
 
 def transform(alpha: float, length: float, setting: Setting, k: Floats) -> Floats:
-    """int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
+    """Return int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
     return _transform(alpha, length, setting, k.tobytes())
 
 
 def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
-    """The same of traced photons, whose light is even over a ring."""
+    """Return the Hankel transform of traced rings, taken as constant within a ring."""
     layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
     edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
     tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
@@ -171,7 +171,7 @@ def require_resolved(length: float, optics: SpotOptics, far: float) -> None:
 
 
 def _waves(optics: SpotOptics, far: float) -> tuple[Floats, Floats]:
-    """k [1/mm] and their weights, for light out to `far` [mm]."""
+    """Return k [1/mm] and their weights, for light out to `far` [mm]."""
     return _panels(_turned(np.linspace(0.0, CUT / optics.sigma, PANELS + 1), far))
 
 
@@ -200,7 +200,7 @@ def taken(
     times: Mapping[float, float],
     seed: int,
 ) -> list[SimulatedExposure]:
-    """A bracket of exposures.
+    """Simulate a bracket of exposures.
 
     radial     radii [mm], out to the corners, and light (n,) [1/mm^2] by channel
     electrons  a second where light is 1 [1/mm^2]; times: seconds that it took, by those that the camera states
@@ -228,13 +228,13 @@ def taken(
 
 
 def radii(farthest: float, optics: SpotOptics) -> Floats:
-    """Where a picture's light is found, from the axis out to `farthest` [mm]."""
+    """Return radii at which a picture's light is computed, from the axis out to `farthest` [mm]."""
     near = 0.02 * optics.sigma
     return np.append(0.0, np.geomspace(near, farthest, RADII))
 
 
 def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Of mean 1, of the camera's contrast, in grains."""
+    """Draw speckle of mean 1, of the camera's contrast, in grains."""
     if camera.speckle == 0:
         return np.ones((1, 1), np.float32)
     noise = gaussian_filter(rng.standard_normal(camera.sides[::-1], dtype=np.float32), camera.grain, mode="wrap")
@@ -243,7 +243,7 @@ def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32
 
 
 def _recorded(expected: NDArray[np.float32], camera: SpotCamera, rng: np.random.Generator) -> Counts:
-    """Counts of so many expected electrons."""
+    """Draw counts of so many expected electrons."""
     # A Poisson number of more than a hundred is a normal one to a percent of its error.
     many = expected.copy()
     many += np.sqrt(expected) * rng.standard_normal(expected.shape, dtype=np.float32)
@@ -255,7 +255,7 @@ def _recorded(expected: NDArray[np.float32], camera: SpotCamera, rng: np.random.
 
 
 def _spill(electrons: NDArray[np.float32], well: float) -> None:
-    """What is too much for a pixel goes to its neighbours in the column, half up and half down."""
+    """Move what is too much for a pixel to its neighbours in the column, half up and half down."""
     for _ in range(SPILLS):
         over = electrons > well
         if not over.any():

@@ -1,4 +1,4 @@
-"""From photographs to the media behind a spot, colour by colour."""
+"""Media behind a spot from photographs, colour by colour."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Bracket:
 
     @property
     def seconds(self) -> Known | None:
-        """Of the longest exposure: the mean of what all state, and the error that their scatter says."""
+        """Time of the longest exposure: the mean of what all state, and the error that their scatter says."""
         off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said])
         if off.size == 0:
             return None
@@ -64,7 +64,7 @@ class Bracket:
 
 @dataclass(frozen=True, eq=False)
 class Photo:
-    """What was seen, and the fit of each colour."""
+    """Merged brackets, and the fit of each colour."""
 
     shot: Bracket
     cards: tuple[Bracket, ...]
@@ -160,7 +160,7 @@ def _require_count(paths: Sequence[Path]) -> None:
 
 
 def _require_alike(one: Exposure, other: Exposure) -> None:
-    """As many pixels, of the same filters, taken alike but for the time, where that is stated."""
+    """Require as many pixels, of the same filters, ISO and aperture, where these are stated."""
     for expected, got in zip(_kind(other), _kind(one), strict=True):
         if None not in (expected, got) and expected != got:
             raise InputError(f"{one.source}: expected {expected} as {other.source} has, got {got}")
@@ -229,7 +229,7 @@ def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
 
 
 def carded(card: Bracket, colour: str, size: PixelScale, reflectance: Known | None, seen: Bracket) -> Card:
-    """A card beside the spot that was `seen`; what their times leave open is in the error of its reflectance."""
+    """Return a card beside the spot that was `seen`; its reflectance's error has what their times leave open."""
     own, other = card.seconds, seen.seconds
     if reflectance is not None and own is not None and other is not None:
         relative = np.hypot.reduce([one.error / one.value for one in (reflectance, own, other)])
