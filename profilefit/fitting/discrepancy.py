@@ -36,6 +36,7 @@ from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeli
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.fitting.solver import unit_columns
 from profilefit.laws.base import OF_MAPS
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.surface import surface_of
@@ -157,7 +158,9 @@ def of_residuals(data: Residuals) -> Discrepancy:
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = likeliest(begin, limits, (apart(u, u), apart(s, s), y, _unit(slope), noise))
+    found, curved, worth, converged = likeliest(
+        begin, limits, (apart(u, u), apart(s, s), y, unit_columns(slope), noise)
+    )
     amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
@@ -279,12 +282,6 @@ def _flat(data: Residuals):
     full = np.where(g[:, None] == g, noise[g[:, None], a[:, None], a], 0.0)
     full += LEFT_OUT * np.diag(np.diag(full))
     return data.u[g], data.s[a], data.table[a, g], data.slope[a, g], full
-
-
-def _unit(slope: Floats) -> Floats:
-    """Return a matrix with columns of unit length."""
-    length = np.linalg.norm(slope, axis=0)
-    return slope / np.where(length > 0, length, 1.0)
 
 
 def _scales(x: Floats) -> Floats:

@@ -180,11 +180,13 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     atom = float(sum(_mass(low, high) for low, high, _ in shape.flats))
     beyond = edge_light(target, alpha, edge)
     mean = float(share @ weight)
+    # The density's only jumps and infinities are at the levels.
+    fine, dx = _rule(np.unique(np.concatenate([shape.levels, shape.levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
     xi = np.linspace(0.0, LAST_SHARE, BATCH)
     return {
         "alpha": alpha,
         "inversion_error": float(np.max(np.abs(drawn_by(sampler, xi, alpha, target) - xi))),
-        "missing": 1.0 - atom - _integral(own, shape.levels),
+        "missing": 1.0 - atom - float(dx @ own(fine)),
         "atom": atom,
         "bias": mean - 1.0,
         "edge_bias": float(share @ (weight * lit)) / beyond - 1.0,
@@ -311,12 +313,6 @@ def _rule(breaks: Floats) -> tuple[Floats, Floats]:
     t = low + width * np.sin(angle) ** 2
     dt = width * np.sin(2.0 * angle) * 0.25 * np.pi * weights
     return t.ravel(), dt.ravel()
-
-
-def _integral(density: Callable[[Floats], Floats], levels: Floats) -> float:
-    """Integrate a density whose only jumps and infinities are at `levels`."""
-    x, dx = _rule(np.unique(np.concatenate([levels, levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
-    return float(dx @ density(x))
 
 
 def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:

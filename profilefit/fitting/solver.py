@@ -105,8 +105,7 @@ class Solution:
         """Condition number of the Jacobian, columns of unit length: above 1e7 constants trade against each other."""
         if not np.all(np.isfinite(self.jacobian)):
             return float("inf")
-        lengths = np.linalg.norm(self.jacobian, axis=0)
-        return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
+        return float(np.linalg.cond(unit_columns(self.jacobian)))
 
 
 def _squares(values: Floats) -> float:
@@ -401,7 +400,9 @@ def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, s
 
 
 def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: float) -> str:
-    steepness, size = _steepness(values, jacobian), float(np.linalg.norm(values))
+    # The largest cosine between the residuals and a column of the Jacobian is 0 at an optimum.
+    steepness = float(np.max(np.abs(unit_columns(jacobian).T @ unit_columns(values)), initial=0.0))
+    size = float(np.linalg.norm(values))
     if not ended and steepness > ORTHOGONAL:
         return f"no convergence in {most} steps: constants trade against each other; fix one or widen the range"
     if steepness > STALLED and size > NO_MISFIT and (steepness * size) ** 2 > gain:
@@ -409,13 +410,8 @@ def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: flo
     return CONVERGED
 
 
-def _steepness(values: Floats, jacobian: Floats) -> float:
-    """Largest cosine between the residuals and a column of the Jacobian: 0 at an optimum."""
-    return float(np.max(np.abs(_unit(jacobian).T @ _unit(values)), initial=0.0))
-
-
-def _unit(columns: Floats) -> Floats:
-    """Columns of length 1, or 0; the largest number is divided by first, since squares of small ones would be 0."""
+def unit_columns(columns: Floats) -> Floats:
+    """Return columns of length 1, or 0; by the largest number first, since squares of small ones would be 0."""
     for size in (lambda c: np.max(np.abs(c), axis=0), lambda c: np.linalg.norm(c, axis=0)):
         columns = columns / np.where(size(columns) > 0, size(columns), 1.0)
     return columns

@@ -144,8 +144,7 @@ class Profiled:
         turn = np.where(across > 0, turn, np.linspace(0.0, np.pi, s.shape[-1]))
         nodes, weights = _between(turn, AROUND)
         far = np.sqrt(nearest**2 + across * np.sin(0.5 * nodes) ** 2)
-        found: Floats = np.sum(weights * np.interp(far, self.r, self.value, right=0.0), axis=-1) / np.pi
-        return found
+        return np.asarray(np.sum(weights * np.interp(far, self.r, self.value, right=0.0), axis=-1) / np.pi, float)
 
 
 def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
@@ -289,16 +288,11 @@ def _shared(each: Iterable[Nodes], farthest: float) -> Nodes:
     grain = max(farthest, *(float(rho.max()) for rho, _ in rows)) / GRAINS
     weights = np.zeros((len(rows), COUNT))
     for row, (rho, weight) in enumerate(rows):
-        at = (np.maximum(_straight(rho / grain), FIRST).ravel() - FIRST) / STEP
+        straight = rho / grain + np.log(-np.expm1(-rho / grain))  # t
+        at = (np.maximum(straight, FIRST).ravel() - FIRST) / STEP
         first = np.clip(np.floor(at).astype(int) - STENCIL // 2 + 1, 0, COUNT - STENCIL)
         for one in range(STENCIL):
             others = [other for other in range(STENCIL) if other != one]
             basis = np.prod([(at - first - other) / (one - other) for other in others], axis=0)
             weights[row] += np.bincount(first + one, weight.ravel() * basis, COUNT)
     return grain * np.logaddexp(0.0, FIRST + STEP * np.arange(COUNT)), weights
-
-
-def _straight(grains: Floats) -> Floats:
-    """Return t of a radius > 0 in grains."""
-    found: Floats = grains + np.log(-np.expm1(-grains))
-    return found

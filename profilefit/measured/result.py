@@ -315,7 +315,8 @@ def content(result: MediumPosterior) -> dict[str, Any]:
     Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
     """
     fit = result.fit
-    data, spec = fit.data, fit.spec
+    data, spec, names = fit.data, fit.spec, result.identified
+    joint = model.correlation(fit.gradients, fit.statistical, names) if names else None
     body = {
         "data": {
             "file": data.source,
@@ -356,7 +357,7 @@ def content(result: MediumPosterior) -> dict[str, Any]:
         "widening": fit.widening,
         "quantile_95": fit.quantile,
         "quantities": _quantities(result),
-        "correlation": _correlation(result),
+        "correlation": {"names": names, "matrix": joint} if names else {},
         "light": fit.light,
         "residuals": fit.minimum.residuals,
         "versions": record.versions(),
@@ -402,11 +403,3 @@ def _quantities(result: MediumPosterior) -> dict[str, Any]:
         }
         for name in fit.values
     }
-
-
-def _correlation(result: MediumPosterior) -> dict[str, Any]:
-    names = result.identified
-    if not names:
-        return {}
-    joint = model.correlation(result.fit.gradients, result.fit.statistical, names)
-    return {"names": names, "matrix": joint}

@@ -112,8 +112,7 @@ def shares(light: Floats, relative: Floats, own: Sensor, most: Floats) -> Floats
     steps = np.maximum(np.multiply.outer(light, relative), 0.0)
     weight = np.where(steps < most, relative**2 / (steps / own.gain + own.read**2), 0.0)
     total = weight.sum(axis=1, keepdims=True)
-    found: Floats = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
-    return found
+    return np.asarray(np.divide(weight, total, out=np.zeros_like(weight), where=total > 0), float)
 
 
 def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:

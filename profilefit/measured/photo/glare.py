@@ -107,5 +107,4 @@ def halo(a: float, d: Floats, rho: Floats) -> Floats:
     whole, cross = d * d + rho * rho + a * a, 2.0 * d * rho
     m, less, more = 2.0 * cross / (whole + cross), whole - cross, whole + cross
     e, k = ellipe(m), ellipk(m)
-    found: Floats = 2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more))
-    return found
+    return np.asarray(2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more)), float)

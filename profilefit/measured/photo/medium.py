@@ -227,8 +227,7 @@ class Shot:
         """Matrix that turns errors of the rows into independent ones of size 1: the inverse of their lower root."""
         blocks = [self._covariance(one) for one in (self.medium, *(card.rings for card in self.cards))]
         root = np.linalg.cholesky(block_diag(*blocks))
-        found: Floats = solve_triangular(root, np.eye(len(root)), lower=True)
-        return found
+        return np.asarray(solve_triangular(root, np.eye(len(root)), lower=True), float)
 
     def _covariance(self, one: SpotRings) -> Floats:
         size = UNEVEN * one.value

@@ -96,5 +96,4 @@ def _preview(shot: Exposure) -> NDArray[np.uint8]:
     """Eight bits of the first green or only plane."""
     counts = next((one for one in shot.planes if one.colour == "green"), shot.planes[0]).counts
     most = max(float(np.percentile(counts, BRIGHT)), 1e-9)
-    found: NDArray[np.uint8] = (255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0))).astype(np.uint8)
-    return found
+    return np.asarray(255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0)), np.uint8)

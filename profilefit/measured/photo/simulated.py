@@ -68,8 +68,7 @@ class SpotOptics:
         order = self.falling - 1.0
         x = np.maximum(k * self.width, 1e-12)
         halo = 2.0 * (0.5 * x) ** order * kv(order, x) / gamma(order)
-        found: Floats = np.exp(-0.5 * (k * self.sigma) ** 2) * (1.0 - self.glare + self.glare * halo)
-        return found
+        return np.asarray(np.exp(-0.5 * (k * self.sigma) ** 2) * (1.0 - self.glare + self.glare * halo), float)
 
 
 @dataclass(frozen=True)
@@ -142,8 +141,7 @@ def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: in
     edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
     tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
     disc = 2.0 * np.pi * edges * j1(np.multiply.outer(np.maximum(k, 1e-12), edges)) / np.maximum(k, 1e-12)[:, None]
-    found: Floats = np.diff(disc, axis=1) @ tally.reflectance_r.value
-    return found
+    return np.asarray(np.diff(disc, axis=1) @ tally.reflectance_r.value, float)
 
 
 @lru_cache(maxsize=8)
@@ -179,8 +177,7 @@ def _turned(edges: Floats, rate: float) -> Floats:
     """Edges of panels, cut where J_0 turns by more than TURN between them: by `rate` a unit."""
     pieces = np.ceil(np.diff(edges) * rate / TURN).clip(1.0)
     at = np.append(0.0, np.cumsum(pieces))
-    found: Floats = np.interp(np.arange(at[-1] + 1.0), at, edges)
-    return found
+    return np.asarray(np.interp(np.arange(at[-1] + 1.0), at, edges), float)
 
 
 def _inverse(transformed: Floats, k: Floats, weight: Floats, r: Floats) -> Floats:

@@ -150,7 +150,10 @@ def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]
     found: list[Exposure] = []
     for path in paths:
         found.append(read(path))
-        _require_alike(found[-1], like or found[0])
+        own, other = found[-1], like or found[0]
+        for expected, got in zip(_kind(other), _kind(own), strict=True):
+            if None not in (expected, got) and expected != got:
+                raise InputError(f"{own.source}: expected {expected} as {other.source} has, got {got}")
     return found
 
 
@@ -159,14 +162,8 @@ def _require_count(paths: Sequence[Path]) -> None:
         raise InputError(f"photographs must be 1 to {MOST_SHOTS} exposures of one bracket, got {len(paths)}")
 
 
-def _require_alike(one: Exposure, other: Exposure) -> None:
-    """Require as many pixels, of the same filters, ISO and aperture, where these are stated."""
-    for expected, got in zip(_kind(other), _kind(one), strict=True):
-        if None not in (expected, got) and expected != got:
-            raise InputError(f"{one.source}: expected {expected} as {other.source} has, got {got}")
-
-
 def _kind(one: Exposure) -> tuple[str | None, ...]:
+    """Return pixels, filters, ISO and aperture in words, None where a file does not state them."""
     return (
         f"{one.sides[0]} x {one.sides[1]} pixels",
         f"planes {', '.join(plane.colour for plane in one.planes)}",
@@ -184,8 +181,7 @@ def _level(paths: Sequence[Path], like: Exposure) -> Floats:
     for path in paths:  # one at a time: they are as large as photographs
         (frame,) = _read([path], like)
         means.append([float(plane.counts.mean(dtype=float)) for plane in frame.planes])
-    found: Floats = np.mean(means, axis=0)
-    return found
+    return np.asarray(np.mean(means, axis=0), float)
 
 
 def _darkened(one: Exposure, level: Floats) -> Exposure:
