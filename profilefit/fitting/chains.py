@@ -109,22 +109,23 @@ class Node:
     log: float
 
     @classmethod
-    def of(cls, there: Solution, free: Sequence[int], log: float) -> Node:
+    def of(cls, there: Solution, free: Sequence[int], log_density: Callable[[Floats], Floats]) -> Node:
         """Return the node of a fit of the others.
 
         Args:
             there: the fit, whose residuals are in standard errors.
             free: places of the p parameters among those of the fit, the first one first.
-            log: ln density there, up to a constant.
+            log_density: ln density there, up to a constant, for ln of the volume of the others' errors.
         """
         first, others = free[0], list(free[1:])
         ways, point = there.jacobian[:, others], there.parameters
-        if not (np.isfinite(log) and np.all(np.isfinite(ways))):
+        if not (np.isfinite(there.cost) and np.all(np.isfinite(ways))):
             return cls(float(point[first]), point[others], 0.0 * point[others], np.eye(len(others)), -np.inf)
         r = np.linalg.qr(np.vstack([ways, np.eye(len(others)) / WIDEST]), mode="r")
         root = np.asarray(np.linalg.inv(np.sign(np.diag(r))[:, None] * r), float)
         slope = np.asarray(-root @ root.T @ ways.T @ there.jacobian[:, first], float)
-        return cls(float(point[first]), point[others], slope, root, float(log + np.sum(np.log(np.diag(root)))))
+        log = float(log_density(np.sum(np.log(np.diag(root)))))
+        return cls(float(point[first]), point[others], slope, root, log)
 
 
 @dataclass(frozen=True)
@@ -219,7 +220,7 @@ class Walk:
 
 
 def sample(
-    log_density: Callable[[Floats], Floats],
+    log_density: Callable[[Floats, Floats], Floats],
     along: Ridge,
     walkers: int,
     seed: int,
@@ -231,7 +232,8 @@ def sample(
     """Sample a density by walkers in the straight coordinates of a ridge.
 
     Args:
-        log_density: of points (m, p), (m,), vectorised; -inf where there is none.
+        log_density: of points (m, p), (m,), vectorised; -inf where there is none. Its second argument, to be added, is
+            ln of the volume (m,) that straight coordinates have there.
         along: the ridge.
         walkers: how many.
         seed: of starts and proposals.
@@ -244,7 +246,7 @@ def sample(
 
     def straight_density(straight: Floats) -> Floats:
         points, volume = along.bent(straight)
-        return log_density(points) + volume
+        return log_density(points, volume)
 
     centre, covariance = along.moments
     start = np.random.default_rng(seed).multivariate_normal(centre, covariance, walkers)
@@ -371,11 +373,11 @@ def posterior(
     density, size = _Density.of(fit, kind, covariance), len(fit.free)
     walkers = max(4 * size, 32)
 
-    def log_density(points: Floats) -> Floats:
+    def log_density(points: Floats, volume: Floats) -> Floats:
         block = walkers // 4  # which the moves ask for; all of them, or half of them, would compile anew
         full = np.pad(points, ((0, -len(points) % block), (0, 0)), mode="edge").reshape(-1, block, size)
         with jax.enable_x64(True):
-            return np.concatenate([np.asarray(density(jnp.asarray(part))) for part in full])[: len(points)]
+            return np.concatenate([np.asarray(density(jnp.asarray(part))) for part in full])[: len(points)] + volume
 
     along = Ridge.normal(fit.solution.parameters, covariance)
     chain = sample(log_density, along, walkers, seed, max_steps, KEPT, PILOT, moves)

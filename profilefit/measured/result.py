@@ -244,20 +244,20 @@ def posterior(fit: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk
     """Sample the posterior of a fit's free coordinates, by emcee along the fit's ridge: samples (k, p)."""
     best, reach = fit.point, np.full(fit.point.size, FARTHEST_LN)
 
-    def log_density(samples: Floats) -> Floats:
+    def log_density(samples: Floats, volume: Floats) -> Floats:
         full = points(fit, samples)
         inside = np.all(np.abs(full - best)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
             np.abs(full[:, U]) < FARTHEST_U + ROOM
         )
         costs = fit.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach))
-        value = _log_density(fit, costs, full[:, U])
+        value = _log_density(fit, costs, full[:, U], volume)
         return np.where(inside & np.isfinite(value), value, -np.inf)
 
     return sample(log_density, ridge(fit), WALKERS, seed, max_steps, KEPT)
 
 
-def _log_density(fit: MediumFit, costs: Floats, u: Floats) -> Floats:
-    value = likelihood(costs - fit.minimum.cost, len(fit.spec.free), fit.data.pooled)
+def _log_density(fit: MediumFit, costs: Floats, u: Floats, volume: Floats) -> Floats:
+    value = likelihood(costs - fit.minimum.cost, len(fit.spec.free), fit.data.pooled) + volume
     return value + log_prior(u) if U in fit.spec.free else value
 
 
@@ -278,8 +278,8 @@ def moved(fit: MediumFit, near: Node, first: float) -> Node:
 
 
 def _node(fit: MediumFit, there: Solution) -> Node:
-    log = _log_density(fit, np.array(there.cost), np.array(there.parameters[U]))
-    return Node.of(there, fit.spec.free, float(log))
+    density = partial(_log_density, fit, np.array(there.cost), np.array(there.parameters[U]))
+    return Node.of(there, fit.spec.free, density)
 
 
 def points(fit: MediumFit, samples: Floats) -> Floats:
