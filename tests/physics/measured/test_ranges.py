@@ -90,7 +90,7 @@ def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     spec, n = FitSpec(exact_light(Setting(n=own)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
     exactly = replace(spec, law=exact_light(Setting(n=n)), ranges={})
     monkeypatch.setattr("profilefit.measured.model.kept", lambda *_: pytest.fail("a table is made"))
-    assert fitted(measured, spec).open.error["n"] > 0
+    assert fitted(measured, spec).range_marginal.error["n"] > 0
     light, right = (
         Problem(measured, one, noise(measured)).model.predicted(np.array([[-3.0, 0.0, 0.0]]), *EDGES)
         for one in (spec.under({"n": n}), exactly)

@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from profilefit.fitting.misfit import gaussianised, own_degrees_of_freedom, scatter_chance
+from profilefit.fitting.misfit import gaussianised, likelihood, own_degrees_of_freedom, scatter_chance
 from profilefit.measured.data import moderated_variances, trend_freedom, widening
-from profilefit.measured.problem import likelihood
 
 ROWS, COUNT = 40, 3
 
