@@ -28,16 +28,14 @@ from benchmarks.render_figure import save
 from mcml_sim import Setting
 from mcml_sim.media.setting import FORWARD_G, FORWARD_N
 from profilefit.measured import model
-from profilefit.measured.assumed import beam_width
-from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
+from profilefit.measured.identifiability import beam_width
+from profilefit.measured.instrument import PENCIL, Gaussian, Instrument
+from profilefit.measured.model import Model, exact_light, u_of
 from profilefit.measured.premises import Premises
-from profilefit.measured.problem import Question
-from profilefit.measured.result import Answer, judged
+from profilefit.measured.problem import FitSpec
+from profilefit.measured.result import MediumPosterior, judged
 from profilefit.report.figures.canvas import BLUE, GREEN, ORANGE, VERMILION, WIDTH, canvas, plain_log, styled
 
 Floats = NDArray[np.float64]
@@ -99,17 +97,17 @@ def covered(opened: bool, at: int) -> list[tuple[bool, bool, float]]:
     rng = np.random.default_rng([1, at])
     one = drawn(rng)
     data, premises = rows(one, rng), _premises(one, opened)
-    answer = judged(fitted(data, _question(premises)))
+    answer = judged(fitted(data, _spec(premises)))
     bound = _fisher(one, data, premises.instrument, premises.ranges)
     found, truth = [], _truth(one)
     for name in NAMES:
         low, high = _ends(answer, name) or (np.nan, np.nan)
-        ratio = (high - low) / 3.92 / answer.found.values[name]
+        ratio = (high - low) / 3.92 / answer.fit.values[name]
         found.append((bool(low < truth[name] < high), bool(ratio < 0.5), float(ratio / bound[name])))
     return found
 
 
-def _ends(answer: Answer, name: str) -> tuple[float, float] | None:
+def _ends(answer: MediumPosterior, name: str) -> tuple[float, float] | None:
     """Return the ends of the interval that has two."""
     low, high = answer.whole_interval(name) or answer.interval(name) or (None, None)
     return None if low is None or high is None else (low, high)
@@ -134,15 +132,15 @@ def _premises(one: Medium, opened: bool) -> Premises:
     return Premises(Setting(n=float(np.mean(OPEN["n"])), g=float(np.mean(OPEN["g"]))), ranges=OPEN)
 
 
-def _question(premises: Premises) -> Question:
-    return Question(exact_light(premises.setting), SCALE, instrument=premises.instrument, ranges=premises.ranges)
+def _spec(premises: Premises) -> FitSpec:
+    return FitSpec(exact_light(premises.setting), SCALE, instrument=premises.instrument, ranges=premises.ranges)
 
 
 def _fisher(
     one: Medium, data: Measured, seen: Instrument, ranges: Mapping[str, tuple[float, float]]
 ) -> dict[str, float]:
     """Return relative errors that no unbiased estimate undercuts; a range is normal with the range's variance."""
-    truth, point = Question(exact_light(one.setting), SCALE, instrument=seen), _point(one)
+    truth, point = FitSpec(exact_light(one.setting), SCALE, instrument=seen), _point(one)
     light, slopes = Model(truth.law, seen).linearised(point, data.inner, data.outer)
     rows = np.diag(data.sigma**2)
     for name, (low, high) in ranges.items():
@@ -214,22 +212,22 @@ def beamed(at: int) -> Beamed:
     edges, known = BEAM_EDGES[rng.uniform(0.0, 4.0) * w <= BEAM_EDGES], SCALE if at % 2 else {}
     seen = Instrument(Gaussian(w))
     data = rows(one, rng, seen, edges)
-    given = judged(fitted(data, Question(light, known, instrument=seen)))
+    given = judged(fitted(data, FitSpec(light, known, instrument=seen)))
     held = _holds(given, one)
-    answered = held is not None and not given.found.rivals
-    blind = judged(fitted(data, Question(light, known)))
+    answered = held is not None and not given.fit.rivals
+    blind = judged(fitted(data, FitSpec(light, known)))
     inside, width = _holds(blind, one), blind.width
     wrong = inside is not None and not all(inside)
-    noticed = blind.found.misfit.detected or (width is not None and width.noticed)
+    noticed = blind.fit.misfit.detected or (width is not None and width.noticed)
     told = width is not None and width.telling is not None and width.telling < w
-    of_pencil = beam_width(fitted(rows(one, rng, PENCIL, edges), Question(light, known)))
+    of_pencil = beam_width(fitted(rows(one, rng, PENCIL, edges), FitSpec(light, known)))
     return Beamed(
         held if answered else None, answered, wrong, noticed or told if wrong else None, noticed if wrong else None,
         None if of_pencil is None else of_pencil.noticed,
     )  # fmt: skip
 
 
-def _holds(answer: Answer, one: Medium) -> tuple[bool, ...] | None:
+def _holds(answer: MediumPosterior, one: Medium) -> tuple[bool, ...] | None:
     """Return whether the intervals hold the truth; None where a quantity has none with two ends."""
     inside = []
     for name in NAMES:
@@ -277,7 +275,7 @@ def distorted(known: str, at: int, noise: tuple[float, float] = (0.003, 0.01), *
     middles = {name: float(np.mean(ends)) for name, ends in ranges.items()}
     setting = Setting(n=middles.get("n", one.setting.n), g=middles.get("g", one.setting.g))
     instrument = Instrument(Gaussian(middles["beam"])) if "beam" in ranges else seen
-    answer = judged(fitted(data, Question(exact_light(setting), SCALE, instrument=instrument, ranges=ranges)))
+    answer = judged(fitted(data, FitSpec(exact_light(setting), SCALE, instrument=instrument, ranges=ranges)))
     width = answer.width
     light = Model(exact_light(one.setting)).predicted(_point(one)[None], EDGES[:1], EDGES[1:2])
     truth = {**_truth(one), "A": float(light[0, -1])}

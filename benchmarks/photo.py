@@ -34,11 +34,10 @@ from numpy.typing import NDArray
 from mcml_sim import Setting
 from mcml_sim.files.whole_file import write_whole
 from profilefit.errors import InputError
-from profilefit.measured import law_error
-from profilefit.measured.exact_light import exact_light
+from profilefit.fitting.misfit import DETECTED, waves
 from profilefit.measured.identifiability import LOOSE
-from profilefit.measured.misfit import DETECTED
-from profilefit.measured.model import u_of
+from profilefit.measured.model import exact_light, u_of
+from profilefit.measured.noise import WAVE
 from profilefit.measured.photo import medium, simulated, workflow
 from profilefit.measured.photo.exposure import BayerPlane, Exposure, of_sensor
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
@@ -140,7 +139,7 @@ def exposures(
 ) -> list[Exposure]:
     """Return a bracket, its times off by LATE; its light, of all channels or by channel, off by a correlated 1 %."""
     by_channel = light if isinstance(light, Mapping) else {"": light}
-    smooth = law_error.waves(np.maximum(radii, 0.1)) + 1e-9 * np.eye(radii.size)
+    smooth = waves(np.maximum(radii, 0.1), WAVE) + 1e-9 * np.eye(radii.size)
     root = medium.UNEVEN * np.linalg.cholesky(smooth)
     wavy = {name: (radii, one * (1.0 + root @ rng.standard_normal(radii.size))) for name, one in by_channel.items()}
     brightest = max(float(one[0]) for one in by_channel.values())
@@ -152,7 +151,7 @@ def exposures(
     return [as_read(one, f"exposure {at + 1}") for at, one in enumerate(taken)]
 
 
-def as_read(one: simulated.Taken, source: str) -> Exposure:
+def as_read(one: simulated.SimulatedExposure, source: str) -> Exposure:
     """Return a bracket as a raw file of it would be read."""
     return of_sensor(source, one.counts, one.pattern, [[one.black] * 2] * 2, one.white, one.seconds)
 

@@ -19,7 +19,7 @@ from profilefit.errors import InputError, SettingError
 from profilefit.laws import PROFILES
 
 if TYPE_CHECKING:
-    from profilefit.measured import Answer, Known
+    from profilefit.measured import Known, MediumPosterior
     from profilefit.measured.oblique import Oblique
 
 FAILED = 1  # exit status
@@ -125,10 +125,10 @@ def fit(
         from mcml_sim.cli.screen import print_json
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
-        from profilefit.measured import fit as fitted
         from profilefit.measured import read
-        from profilefit.measured.premises import premises
-        from profilefit.measured.result import content
+        from profilefit.measured.fitting import fitted
+        from profilefit.measured.premises import premises, specified
+        from profilefit.measured.result import content, judged
 
     if kind not in KINDS:
         raise InputError(f"--kind must be {PROFILE} or {PHASE}, got {kind!r}")
@@ -142,12 +142,12 @@ def fit(
     folder = records_folder(fits, quiet)
     measured = read(data, unit, scale == FREE, colour)
     measured = measured.within(_radius("--r-min", r_min, measured.unit), _radius("--r-max", r_max, measured.unit))
-    told = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
-    where = premises(measured, law, told, {name: f"--{name}" for name in told})
+    given = {"light": light, "n": n, "g": g, "beam": beam, "fibre": fibre}
+    where = premises(measured, law, given, {name: f"--{name}" for name in given})
     held = _held(fix or [], measured.unit)
     known = None if total is None else _total(total)
     factor = _scale(scale)
-    slanted = None if oblique is None else _oblique(oblique, measured.unit)
+    oblique_centre = None if oblique is None else _oblique(oblique, measured.unit)
     if layers is not None:
         options.require_left_out(context, OF_HALF_SPACE, "--layers say what is fitted")
         fit_of_layers(measured, layers, free or "", where, factor, out, as_json, quiet)
@@ -158,10 +158,11 @@ def fit(
         require_folder(out, "fit.json", *FIGURES)
     try:
         with working("fitting", quiet):
-            result = fitted(measured, law, constants, where, held, known, factor, seed, folder=folder, oblique=slanted)
+            spec = specified(measured, law, constants, where, held, known, factor, folder, oblique_centre)
+            result = judged(fitted(measured, spec), seed)
     except SettingError as error:
         raise SettingError(f"{error}; --n, --g and --light choose one of these") from None
-    body = options.in_options(content(result, law, constants))
+    body = options.in_options(content(result))
     if out is not None:
         _write(result, body, out, quiet)
     if as_json:
@@ -169,7 +170,7 @@ def fit(
     else:
         points = f"{measured.value.size} {'annuli' if measured.rings else 'points'}"
         model = "exact light" if law == options.EXACT else f"law {law}"
-        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.found.question.law.setting}")
+        _show(result, f"{one_line(data.name)}: {points}, {model}, {result.fit.spec.law.setting}")
     if result.identifiability is None:
         raise typer.Exit(FAILED)
 
@@ -177,7 +178,7 @@ def fit(
 def _of_phase(
     context: typer.Context, data: Path, angles: str | None, out: Path | None, as_json: bool, quiet: bool
 ) -> None:
-    """Every form of a phase function, in a table."""
+    """Fit every form of a phase function to a table, print and write."""
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes, print_json, screen, show
         from mcml_sim.files.text_file import as_json as json_text
@@ -188,8 +189,8 @@ def _of_phase(
         from profilefit.recipes.phases.record import content, fits_of, table_of
         from profilefit.report.tables.phase_table import phase_tables, premise_lines
 
-    taken = {"data", "kind", "angles", "out", "as_json", "quiet"}
-    options.require_left_out(context, (name for name in context.params if name not in taken), f"--kind is {PHASE}")
+    accepted = {"data", "kind", "angles", "out", "as_json", "quiet"}
+    options.require_left_out(context, (name for name in context.params if name not in accepted), f"--kind is {PHASE}")
     table = read_phase(table_of(str(data)) or data)
     if out is not None:
         require_folder(out, "fit.json")
@@ -219,7 +220,7 @@ def _range(text: str) -> tuple[float, float]:
     return low, high
 
 
-def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None:
+def _write(result: MediumPosterior, body: dict[str, Any], out: Path, quiet: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import notes
         from mcml_sim.files.text_file import as_json
@@ -231,7 +232,7 @@ def _write(result: Answer, body: dict[str, Any], out: Path, quiet: bool) -> None
     notes(quiet).print(f"wrote fit.json and {len(figures)} figures into {out}", markup=False)
 
 
-def _show(result: Answer, title: str) -> None:
+def _show(result: MediumPosterior, title: str) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import screen, show
         from profilefit.report.tables.fit_tables import fit_lines, fit_tables
@@ -244,16 +245,16 @@ def _show(result: Answer, title: str) -> None:
 
 def _radius(option: str, text: str | None, unit: str) -> float | None:
     with interruptible(__name__):
-        from profilefit.measured.lengths import length
+        from profilefit.measured.data import length
 
     return None if text is None else length(option, text, unit)
 
 
 def _held(fix: list[str], unit: str) -> dict[str, float]:
-    """What `--fix` holds: alpha or A, and l."""
+    """Return what `--fix` holds: alpha or A, and l."""
     with interruptible(__name__):
         from mcml_sim.media.checks import shown
-        from profilefit.measured.lengths import length
+        from profilefit.measured.data import length
 
     held: dict[str, float] = {}
     for text in fix:
@@ -270,7 +271,7 @@ def _held(fix: list[str], unit: str) -> dict[str, float]:
 
 
 def _scale(text: str) -> float | Known | None:
-    """The value of `--scale`: None if free, a number, or one with its error."""
+    """Return the value of `--scale`: None if free, a number, or one with its error."""
     if text == FREE:
         return None
     known = _known("--scale", text)
@@ -290,7 +291,7 @@ def _total(text: str) -> Known:
 def _oblique(text: str, unit: str) -> Oblique:
     with interruptible(__name__):
         from mcml_sim.media.checks import shown
-        from profilefit.measured.lengths import length
+        from profilefit.measured.data import length
         from profilefit.measured.oblique import Oblique
 
     angle, r, shift = text.split(":") if text.count(":") == 2 else ("", "", "")
@@ -306,7 +307,7 @@ def _oblique(text: str, unit: str) -> Oblique:
 
 
 def _known(option: str, text: str) -> Known:
-    """A number > 0, with or without an error."""
+    """Return a number > 0, with or without an error."""
     with interruptible(__name__):
         from mcml_sim.media.checks import shown
         from profilefit.measured import Known

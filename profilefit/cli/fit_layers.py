@@ -61,12 +61,12 @@ def fit_of_layers(
 
 
 def _medium(file: Path, unit: str) -> Medium:
-    """The stack of a file, in the data's unit of length."""
+    """Return the stack of a file, in the data's unit of length."""
     with interruptible(__name__):
         from dataclasses import replace
 
         from mcml_sim.files.text_file import read_toml
-        from profilefit.measured.lengths import factor
+        from profilefit.measured.data import factor
         from profilefit.recipes.stack.file import read_layers
 
     stack = read_layers(file, read_toml(file))

@@ -24,7 +24,7 @@ class SeveralFiles(TyperCommand):
     """A command some of whose options take every file that follows, as a shell writes out card-*.dng."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """With the option before each of its files."""
+        """Parse with the option before each of its files."""
         written: list[str] = []
         option: str | None = None
         for at, one in enumerate(args):
@@ -91,8 +91,8 @@ def photo(
         from profilefit.report.tables.photo_tables import photo_content, photo_lines, photo_tables
 
     if simulate is not None:
-        taken = {"simulate", "out", "as_json", "quiet", "shots"}
-        require_left_out(context, (name for name in context.params if name not in taken), "photographs are simulated")
+        used = {"simulate", "out", "as_json", "quiet", "shots"}
+        require_left_out(context, (name for name in context.params if name not in used), "photographs are simulated")
         _simulate(simulate, shots or [], out, as_json, quiet)
         return
     if not shots:
@@ -146,7 +146,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
         from mcml_sim.cli.screen import notes, print_json, screen, show
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import working
-        from profilefit.measured.photo.setup import read_setup, room, told, written
+        from profilefit.measured.photo.setup import fisher_bounds, read_setup, room, written
         from profilefit.report.tables.photo_tables import setup_tables
 
     if shots:
@@ -156,7 +156,7 @@ def _simulate(file: Path, shots: list[Path], out: Path | None, as_json: bool, qu
     setup = read_setup(file)
     require_folder(out, room=room(setup))
     with working("simulating", quiet):
-        bounds = told(setup)
+        bounds = fisher_bounds(setup)
         files = written(setup, out)
     notes(quiet).print(f"wrote {len(files)} photographs into {out}", markup=False)
     if as_json:
@@ -171,8 +171,8 @@ def _known(option: str, text: str, lengths: bool = False) -> Known:
         from mcml_sim.media.checks import shown
         from profilefit.cli.fit import WITH_ERROR
         from profilefit.measured import Known
-        from profilefit.measured.beam import BY_FWHM, FWHM
-        from profilefit.measured.lengths import length
+        from profilefit.measured.data import length
+        from profilefit.measured.instrument import BY_FWHM, FWHM
 
     is_fwhm = lengths and text.strip().lower().startswith(FWHM)
     match = WITH_ERROR.fullmatch(text.strip()[len(FWHM) if is_fwhm else 0 :])

@@ -87,7 +87,7 @@ class LawWithErrors:
         return self.objective in OF_MAPS
 
     def statistical_error(self, slope: Floats) -> Floats:
-        """Of quantities whose derivatives are `slope` (k, p)."""
+        """Return statistical errors (k,) of quantities whose derivatives are `slope` (k, p)."""
         if self.statistical is None:
             return np.full(len(slope), np.nan)
         return np.sqrt(np.einsum("kp,pq,kq->k", slope, self.statistical, slope))
@@ -123,7 +123,7 @@ class AtAlbedo:
 
     @cached_property
     def covariance(self) -> Floats:
-        """Of the error of ring energies (n, n) that the model makes."""
+        """Covariance (n, n) of the model's error in ring energies."""
         off, n = self.known.off, EDGES.size - 1
         if off is None:
             return np.full((n, n), np.nan)
@@ -200,8 +200,10 @@ def reflectance(known: LawWithErrors, alpha: ArrayLike) -> Quantity:
 
 
 def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_WITHIN) -> float:
-    """Root mean square of law/data - 1 of the radius of `share`, over the albedos of `profiles` that hold it [-]; of
-    those of the law's setting, where profiles are of several."""
+    """Return the root mean square of law/data - 1 of the radius of `share` [-], over the albedos that hold it.
+
+    Where profiles are of several settings, those of the law's setting count.
+    """
     off = []
     settings = profiles.settings or (known.law.setting,) * profiles.alpha.size
     for alpha, cdf, setting in zip(profiles.alpha, profiles.cdf, settings, strict=True):
@@ -212,7 +214,7 @@ def tail_error(known: LawWithErrors, profiles: Profiles, share: float = ENERGY_W
 
 
 def summary(known: LawWithErrors, profiles: Profiles) -> dict[str, Any]:
-    """What a record says of A, or of the radius that holds 99.5 % of the energy, at a few albedos."""
+    """Return a record's table of A, or of the radius that holds 99.5 % of the energy, at a few albedos."""
     if known.is_map:
         return {"alpha": SHOWN, "quantity": "reflectance", **vars(reflectance(known, SHOWN))}
     found = radius(known, SHOWN)

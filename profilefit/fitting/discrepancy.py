@@ -32,10 +32,11 @@ from mcml_sim.exact.compiled import filter_jit
 from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.estimate import Fit, ResidualFunction, followed
-from profilefit.fitting.gaussian_process import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
+from profilefit.fitting.misfit import FARTHEST, MAX_STEPS, apart, kernel, likeliest, matern
 from profilefit.fitting.objectives import Rings
 from profilefit.fitting.profiles import Profiles
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.fitting.solver import unit_columns
 from profilefit.laws.base import OF_MAPS
 from profilefit.laws.liang import QUANTILES
 from profilefit.laws.surface import surface_of
@@ -80,11 +81,11 @@ class Discrepancy:
     influence: Floats
 
     def content(self) -> dict[str, Any]:
-        """What a record says of it."""
+        """Return the facts that a record states."""
         return {name: getattr(self, name) for name in FACTS}
 
     def arrays(self) -> dict[str, Floats]:
-        """What a record keeps beside it, for `read`."""
+        """Return the arrays that a record keeps, for `read`."""
         return {f"discrepancy_{name}": getattr(self, name) for name in KEPT}
 
     def law_covariance(self, u: Floats, s: Floats, slope: Floats) -> Floats:
@@ -98,7 +99,7 @@ class Discrepancy:
         return self.amplitude**2 * own - followed - followed.T + slope @ self.covariance @ slope.T
 
     def places(self, alpha: Floats, setting: Setting) -> Floats:
-        """Where albedos (k,) of a setting lie in s."""
+        """Return places in s of albedos (k,) of a setting."""
         return _placed(alpha, [setting] * len(alpha), 1 if self.s.ndim == 1 else self.s.shape[1])
 
     def _kernel(self, one: Floats, other: Floats, length: float) -> Floats:
@@ -112,7 +113,7 @@ KEPT = ("u", "s", "influence")
 
 
 def read(content: Mapping[str, Any], arrays: Mapping[str, Floats]) -> Discrepancy | None:
-    """The discrepancy of a record; None where it has none, as records before this had, or where its fit failed."""
+    """Return a record's discrepancy; None where it has none, as old records, or where its fit failed."""
     facts = content.get("discrepancy")
     if not facts or facts["amplitude"] is None or "discrepancy_u" not in arrays:
         return None
@@ -142,7 +143,7 @@ class Residuals:
 
 
 def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
-    """The process behind the residuals of `fit` to `profiles`, and the error that it leaves in the constants."""
+    """Estimate the process behind the residuals of a fit to profiles, and its effect on the constants."""
     size = len(fit.free)
     if not fit.solution.converged:
         why, none, unknown = f"no fit: {fit.result}", np.zeros(0), np.full((size, size), np.nan)
@@ -152,12 +153,14 @@ def discrepancy(fit: Fit, profiles: Profiles) -> Discrepancy:
 
 
 def of_residuals(data: Residuals) -> Discrepancy:
-    """The process that makes these residuals likeliest, and not smaller than they are."""
+    """Estimate the process that makes residuals likeliest, and not smaller than they are."""
     u, s, y, slope, noise = _flat(data)
     lengths = np.log(np.stack([_scales(data.u), _scales(data.s)]))
     begin = np.array([np.log(max(np.sqrt(np.mean(y**2)), 1e-12)), *lengths.mean(axis=1)])
     limits = np.vstack([begin[0] + np.array([-FARTHEST, FARTHEST]), lengths])
-    found, curved, worth, converged = likeliest(begin, limits, (apart(u, u), apart(s, s), y, _unit(slope), noise))
+    found, curved, worth, converged = likeliest(
+        begin, limits, (apart(u, u), apart(s, s), y, unit_columns(slope), noise)
+    )
     amplitude, length_u, length_s = map(float, np.exp(found))
     gain = worth if np.any(noise) else np.inf
     kernel_u, kernel_s = kernel(data.u, length_u), kernel(data.s, length_s)
@@ -185,7 +188,7 @@ def _as_large(one: Discrepancy, left: Floats, squares: float) -> Discrepancy:
 
 
 def residuals(fit: Fit, profiles: Profiles) -> Residuals:
-    """What `discrepancy` looks at: rings from 0.01 mfp to 99.5 % of the energy that the fit used, in groups."""
+    """Return residuals of groups of rings that the fit used, from 0.01 mfp to 99.5 % of the energy."""
     problem, rings = ResidualFunction(fit.objective, fit.free), fit.rings
     gain = followed(*fit.second_derivatives)
     energy, slope = predicted(problem, fit.law, rings)
@@ -210,7 +213,7 @@ def residuals(fit: Fit, profiles: Profiles) -> Residuals:
 
 
 def unit_energy(objective: str, energy: Floats, alpha: Floats, r_edges: Floats) -> Floats:
-    """What counts as 1 of delta (m, n): the ring's own `energy`, or that of the source limit of r R_d."""
+    """Return the unit of delta (m, n): the ring's own `energy`, or that of the source limit of r R_d."""
     return 0.5 * alpha[:, None] * np.diff(r_edges) if objective == "radial" else energy
 
 
@@ -223,7 +226,7 @@ def predicted(problem: ResidualFunction, law: Any, rings: Rings) -> tuple[Floats
 
 
 def _one_ring(profiles: Profiles, energy: Floats, slope: Floats, gain: Floats, live: Live) -> Residuals:
-    """The same for a map between alpha and A, which sees all light as one ring."""
+    """Return residuals of a map between alpha and A, which sees all light as one ring."""
     total, m = profiles.reflectance[:, None], profiles.alpha.size
     whole = (gain * np.column_stack([profiles.energy, profiles.beyond])).sum(axis=2, keepdims=True)
     noise = np.zeros((1, m, 1))
@@ -241,7 +244,7 @@ def _s(profiles: Profiles) -> Floats:
 
 
 def _placed(alpha: Floats, settings: Sequence[Setting], size: int) -> Floats:
-    """In s, of so many numbers."""
+    """Return places in s, of so many numbers each."""
     s = np.sqrt(1.0 - alpha)
     if size == 1:
         return s
@@ -249,7 +252,7 @@ def _placed(alpha: Floats, settings: Sequence[Setting], size: int) -> Floats:
 
 
 def _groups(u: Floats, judged: Live, number: int) -> NDArray[np.intp]:
-    """The group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
+    """Return the group (n,) of each ring, even in ln r over the judged ones; rings beyond them go with the nearest."""
     inner = u[judged]
     edges = np.linspace(inner.min(), inner.max() + 1e-9, min(number, inner.size) + 1)
     group = np.clip(np.searchsorted(edges, u, side="right") - 1, 0, edges.size - 2)
@@ -281,14 +284,8 @@ def _flat(data: Residuals):
     return data.u[g], data.s[a], data.table[a, g], data.slope[a, g], full
 
 
-def _unit(slope: Floats) -> Floats:
-    """With columns of unit length."""
-    length = np.linalg.norm(slope, axis=0)
-    return slope / np.where(length > 0, length, 1.0)
-
-
 def _scales(x: Floats) -> Floats:
-    """The shortest and the longest length worth looking at."""
+    """Return the shortest and the longest length worth looking at."""
     along = np.unique(x if x.ndim == 1 else x[:, 0])
     return np.array([SHORTEST * np.min(np.diff(along)), LONGEST * np.ptp(along)]) if along.size > 1 else np.ones(2)
 
@@ -318,7 +315,7 @@ def _energy(objective: str, law, rings: Rings) -> Array:
 
 
 def _error(curved: Floats) -> float:
-    """Standard error of ln amplitude from the curvature (3, 3) of the loss, lengths free unless it is blind to them."""
+    """Return the standard error of ln amplitude from the curvature (3, 3) of the loss, blind to lengths or not."""
     keep = np.diag(curved) > 1e-3
     if not keep[0]:
         return np.inf

@@ -86,7 +86,7 @@ class Fit:
 
 @dataclass(frozen=True)
 class Structure:
-    """What the residuals of a fit show.
+    """Structure in the residuals of a fit.
 
     rms           root mean square residual, in the objective's own weight
     largest       the largest |residual|
@@ -192,7 +192,7 @@ def scaled_inverse(matrix: Floats) -> Floats:
 
 
 def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
-    """A solution whose constants are not separately identifiable has failed, however small its misfit."""
+    """Return a solution, as failed where its constants are not separately identifiable."""
     if not solution.converged or (condition := solution.condition_number) <= DEGENERATE:
         return solution
     blind = [name for name, column in zip(names, solution.jacobian.T, strict=True) if not np.any(column)]
@@ -201,7 +201,7 @@ def judged(solution: Solution, names: tuple[str, ...]) -> Solution:
 
 
 def residual_structure(table: Floats) -> Structure:
-    """What residuals (m, k), a row an albedo, still show; zeros are rings that do not count."""
+    """Measure the structure of residuals (m, k), a row per albedo; zeros are rings that do not count."""
     live = table[table != 0]
     rms = float(np.sqrt(np.mean(live**2))) if live.size else 0.0
     waves = _half_waves(table) * _half_waves(table.T)
@@ -209,7 +209,7 @@ def residual_structure(table: Floats) -> Structure:
 
 
 def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
-    """Standard errors (p,) of a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982, ch. 2)."""
+    """Return standard errors (p,) by a grouped jackknife over neighbouring albedos (Efron, The Jackknife, 1982)."""
     m = rings.alpha.size
     if not solution.converged or m < JACKKNIFE_GROUPS:
         return np.full(solution.parameters.size, np.nan)
@@ -228,13 +228,12 @@ def _jackknife(problem: ResidualFunction, solution: Solution, law: Constants, ri
 
 
 def sensitivity(problem: ResidualFunction, solution: Solution, law: Constants, rings: Rings) -> Floats:
-    """d constants / d energies (p, m, n + 1) at the optimum, rings and then the light beyond: how the minimiser follows
-    its data."""
+    """Return d constants / d energies (p, m, n + 1) at the optimum, of rings and then of the light beyond."""
     return followed(*_second_derivatives(problem, solution, law, rings))
 
 
 def followed(hessian: Floats, mixed: Floats) -> Floats:
-    """The result of `sensitivity`, from second derivatives (p, p) and (m, n + 1, p) that are known."""
+    """Return the result of `sensitivity`, from second derivatives (p, p) and (m, n + 1, p) that are known."""
     return -np.einsum("pq,aiq->pai", scaled_inverse(hessian), mixed)
 
 

@@ -33,7 +33,7 @@ class Measure:
 
     @property
     def header(self) -> str:
-        """At the head of a narrow column."""
+        """Name at the head of a narrow column."""
         return self.short or self.name
 
     @property
@@ -42,7 +42,7 @@ class Measure:
         return self.formula if self.unit == "-" else f"{self.formula} [{self.unit}]"
 
     def worst(self, values: ArrayLike) -> float:
-        """The worst of its values, in its own unit."""
+        """Return the worst of its values, in its own unit."""
         return float(np.min(values) if self.is_high else np.max(values))
 
 

@@ -124,7 +124,7 @@ def _added_light(law, rings: Rings) -> Array:
 
 
 def radial(law, rings: Rings) -> Tables:
-    """As published: r R_d at the ring centres, unweighted, over the rings that the trimming (6) keeps."""
+    """Compare r R_d at the ring centres, unweighted, over the rings that the trimming (6) keeps: as published."""
     r = 0.5 * (rings.r_edges[1:] + rings.r_edges[:-1])
     a, b, c = law.coefficients(rings.alpha[:, None])
     data = rings.energy / (2.0 * jnp.pi * jnp.diff(rings.r_edges))  # r R_d: the area is 2 pi r dr
@@ -170,7 +170,7 @@ OBJECTIVES: dict[str, Callable] = {objective.__name__: objective for objective i
 
 
 def rings_of(profiles: Profiles, used=None, limits=NO_LIMITS, xi=()) -> Rings:
-    """The residuals' view of `profiles`.
+    """Return the residuals' view of `profiles`.
 
     Rings with too few effective photons, or outside `used`, do not count, and neither do albedos whose reflectance,
     or whose outermost share of energy in `xi`, rests on too few. InputError if none is left.

@@ -112,8 +112,10 @@ class Profiles:
 
     @classmethod
     def joined(cls, parts: Sequence[Profiles], setting: Setting) -> Profiles:
-        """Profiles without noise of several indices and g, each of the same albedos and rings, under the light of
-        `setting`, to which the record of a fit will belong."""
+        """Return profiles without noise of several indices and g, each of the same albedos and rings.
+
+        The illumination is that of `setting`, to which the record of a fit will belong.
+        """
         first = parts[0]
         if not all(
             np.array_equal(first.alpha, one.alpha) and np.array_equal(first.r_edges, one.r_edges) for one in parts
@@ -159,7 +161,7 @@ class Profiles:
 
     @classmethod
     def from_exact(cls, alpha: ArrayLike, r_edges: ArrayLike, setting: Setting | None = None) -> Profiles:
-        """The exact half space on rings: integrals over them, without noise."""
+        """Integrate the exact half space over rings, without noise."""
         where = setting or Setting()
         albedos, edges = _albedos(alpha), Grid.from_edges(r=r_edges).r_edges
         own = unreduced(albedos, where.g)
@@ -219,7 +221,7 @@ STRIDES = ((0.5, 0.05), (1.0, 0.1), (2.0, 0.2), (5.0, 0.5))
 
 
 def walk(last: float) -> Floats:
-    """The radii that the walk visits, from 0 to the first beyond `last`."""
+    """Return the radii that the search visits, from 0 to the first beyond `last`."""
     radii = [0.0]
     begin = 0.0
     for end, stride in STRIDES:

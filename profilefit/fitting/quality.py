@@ -1,4 +1,4 @@
-"""How far a law is from the exact profile: one name and one definition for each measure, used everywhere.
+"""Measures of a law's distance from the exact profile: one name and one definition each, used everywhere.
 
 rel      mean of |law/exact - 1| of R_d over r log-uniform in [0.01 l*, r at 99.5 % of the energy]
 largest  the largest such error at a single radius
@@ -76,7 +76,7 @@ class _Truth:
 
 
 def _medium(reduced: float, setting: Setting) -> tuple[float, float]:
-    """alpha and mfp of a reduced albedo, where l* = 1."""
+    """Return alpha and mfp of a reduced albedo, where l* = 1."""
     own = float(unreduced(reduced, setting.g))
     return own, 1.0 - own * setting.g
 
@@ -135,8 +135,7 @@ class AlbedoQuality:
 
 
 def albedo_quality(law: AlbedoLaw) -> AlbedoQuality:
-    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances up to the
-    largest."""
+    """Measure a map on 1000 (reduced) albedos even in sqrt(1 - alpha), and its shape on even reflectances."""
     law, setting = law.in_reduced(), law.setting
     s = (np.arange(1000) + 0.5) / 1000
     alpha = 1.0 - s**2

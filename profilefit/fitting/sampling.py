@@ -91,7 +91,7 @@ class LawTarget:
     law: ProfileLaw
 
     def density(self, x: Floats, alpha: float) -> Floats:
-        """The slope of the law's cdf: whatever the law scales its profile to."""
+        """Return the slope of the law's cdf: whatever the law scales its profile to."""
         return _called(_slope, self.law, x, alpha)
 
     def cdf(self, x: Floats, alpha: float) -> Floats:
@@ -148,7 +148,7 @@ def edge_light(target: Target, alpha: float, edge: float) -> float:
 
 
 class _Map(NamedTuple):
-    """Where t -> x = r/l of a sampler is smooth: `breaks` in t, `levels` in x where it turns, ends or stops.
+    """Pieces of a sampler's map t -> x = r/l: `breaks` in t, `levels` in x where it turns, ends or stops.
 
     flats  (low, high, x) of the stretches where x stands still
     """
@@ -180,11 +180,13 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
     atom = float(sum(_mass(low, high) for low, high, _ in shape.flats))
     beyond = edge_light(target, alpha, edge)
     mean = float(share @ weight)
+    # The density's only jumps and infinities are at the levels.
+    fine, dx = _rule(np.unique(np.concatenate([shape.levels, shape.levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
     xi = np.linspace(0.0, LAST_SHARE, BATCH)
     return {
         "alpha": alpha,
         "inversion_error": float(np.max(np.abs(drawn_by(sampler, xi, alpha, target) - xi))),
-        "missing": 1.0 - atom - _integral(own, shape.levels),
+        "missing": 1.0 - atom - float(dx @ own(fine)),
         "atom": atom,
         "bias": mean - 1.0,
         "edge_bias": float(share @ (weight * lit)) / beyond - 1.0,
@@ -195,8 +197,10 @@ def _at(sampler: Sampler, alpha: float, target: Target, edge: float) -> dict[str
 
 
 def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floats:
-    """The xi that an exact inverse of the target's cdf sends to the radii drawn at xi (m,) [-]: where a sampler draws a
-    radius twice, of its own two the nearer, as far off as the target's cdf is from the law's."""
+    """Return the xi that an exact inverse of the target's cdf sends to the radii drawn at xi (m,) [-].
+
+    Where a sampler draws a radius twice, it is the nearer of its own two, moved by the difference of the cdfs.
+    """
     x = _called(_sample, sampler, xi, alpha)
     with jax.enable_x64(True):
         found = np.asarray(sampler.undone(x, xi, alpha))
@@ -208,7 +212,7 @@ def drawn_by(sampler: Sampler, xi: Floats, alpha: float, target: Target) -> Floa
 def _at_atoms(
     sampler: Sampler, alpha: float, target: Target, flats: list[tuple[float, float, float]], edge: float
 ) -> tuple[float, float]:
-    """What samples at atoms add to the means of f / law's density, of even light and of light beyond the edge.
+    """Return what samples at atoms add to the means of f / law's density, of even light and light beyond the edge.
 
     Densities are those just outside: where a law ends in a zero, rounding decides whether it is one.
     """
@@ -259,7 +263,7 @@ def _map(radius: Callable[[Floats], Floats], edge: float, jump: float = np.inf) 
 
 
 def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> list[tuple[float, float, float]]:
-    """Runs of equal radii on the scan, their ends found to rounding."""
+    """Return runs of equal radii on the scan, their ends found to rounding."""
     edges = np.diff(np.concatenate([[0], still.astype(int), [0]]))
     found = []
     for first, last in zip(np.flatnonzero(edges == 1), np.flatnonzero(edges == -1), strict=True):
@@ -274,7 +278,7 @@ def _flats(radius: Callable[[Floats], Floats], x: Floats, still: NDArray) -> lis
 
 
 def _boundary(radius: Callable[[Floats], Floats], outside: float, inside: float, value: float) -> float:
-    """Where between the two the radius begins to be `value`."""
+    """Find where between the two the radius begins to be `value`."""
     for _ in range(ZOOMS):
         t = np.linspace(outside, inside, ZOOM)
         first = max(int(np.argmax(radius(t) == value)), 1)
@@ -283,7 +287,7 @@ def _boundary(radius: Callable[[Floats], Floats], outside: float, inside: float,
 
 
 def _turn(radius: Callable[[Floats], Floats], low: float, high: float, rising: float) -> float:
-    """Where between the two the radius is largest, if it rises first, or smallest."""
+    """Find where between the two the radius is largest, if it rises first, or smallest."""
     for _ in range(ZOOMS):
         t = np.linspace(low, high, ZOOM)
         best = int(np.argmax(rising * radius(t)))
@@ -292,7 +296,7 @@ def _turn(radius: Callable[[Floats], Floats], low: float, high: float, rising: f
 
 
 def _crossing(radius: Callable[[Floats], Floats], low: float, high: float, level: float) -> float:
-    """Where between the two the radius passes `level`."""
+    """Find where between the two the radius passes `level`."""
     for _ in range(ZOOMS):
         t = np.linspace(low, high, ZOOM)
         above = radius(t) > level
@@ -311,14 +315,8 @@ def _rule(breaks: Floats) -> tuple[Floats, Floats]:
     return t.ravel(), dt.ravel()
 
 
-def _integral(density: Callable[[Floats], Floats], levels: Floats) -> float:
-    """Of a density whose only jumps and infinities are at `levels`."""
-    x, dx = _rule(np.unique(np.concatenate([levels, levels[-1] * np.geomspace(1e-7, 1.0, 40)])))
-    return float(dx @ density(x))
-
-
 def _called(function: Callable, owner: Sampler | ProfileLaw, values: Floats, alpha: float) -> Floats:
-    """A compiled function of every value, BATCH of them at a time."""
+    """Call a compiled function on every value, BATCH of them at a time."""
     padded = np.pad(values, (0, -values.size % BATCH), mode="edge").reshape(-1, BATCH)
     with jax.enable_x64(True):
         owner, at = jax.tree.map(jnp.asarray, (owner, alpha))  # traced, so that other constants compile nothing

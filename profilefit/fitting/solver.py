@@ -10,7 +10,7 @@ A failure is a result, not an exception: `Solution.result` is "converged" or sta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
@@ -57,6 +57,8 @@ STRAIGHT = 0.01  # cosine of the angle y that stands for a bounded parameter: be
 SIZES = (4, 8, 16, 32, 64, 128)  # of a compiled step: fewer parameters are filled up with some that move nothing
 OPTIONS = {"jac": "bwd"}  # optimistix keeps the Jacobian as an array, not as a program
 NO_TAGS: frozenset[object] = frozenset()
+APART = 0.05  # in a parameter of size 1: minima nearer to each other than that are one
+STARTS = 4  # the best of a coarse search, no two neighbours, that are followed to their minimum
 
 
 @dataclass(frozen=True)
@@ -68,6 +70,7 @@ class Solution:
     steps       number of points at which the residuals were evaluated
     result      "converged", or what failed and what to try next
     at_bound    (p,) True for each parameter that a bound holds
+    others      other minima that a search from several starts found, the lowest first
     """
 
     parameters: Floats
@@ -76,6 +79,7 @@ class Solution:
     steps: int
     result: str
     at_bound: NDArray[np.bool_] | None = None
+    others: tuple[Solution, ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -88,7 +92,7 @@ class Solution:
 
     @property
     def covariance(self) -> Floats:
-        """(J'J)^-1 (p, p), of residuals in standard errors; times `variance` for residuals of unknown size."""
+        """Covariance (J'J)^-1 (p, p) for residuals in standard errors; times `variance` for others."""
         return covariance(self.jacobian)
 
     @property
@@ -101,8 +105,7 @@ class Solution:
         """Condition number of the Jacobian, columns of unit length: above 1e7 constants trade against each other."""
         if not np.all(np.isfinite(self.jacobian)):
             return float("inf")
-        lengths = np.linalg.norm(self.jacobian, axis=0)
-        return float(np.linalg.cond(self.jacobian / np.where(lengths > 0, lengths, 1.0)))
+        return float(np.linalg.cond(unit_columns(self.jacobian)))
 
 
 def _squares(values: Floats) -> float:
@@ -111,7 +114,7 @@ def _squares(values: Floats) -> float:
 
 
 def covariance(jacobian: Floats) -> Floats:
-    """(J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
+    """Return (J'J)^-1 (p, p) of derivatives (n, p) of residuals in standard errors.
 
     The singular values of J itself, columns of unit length, give it: products would lose half of the digits. Directions
     beyond rounding get the error of rounding, which is large but finite. Infinite where derivatives are not finite.
@@ -122,8 +125,7 @@ def covariance(jacobian: Floats) -> Floats:
     size = np.maximum(size, np.finfo(float).tiny ** 0.25)
     _, singular, ways = np.linalg.svd(jacobian / size, full_matrices=False)
     scaled = ways / np.maximum(singular, np.finfo(float).eps * singular[0])[:, None]
-    found: Floats = (scaled.T @ scaled) / np.outer(size, size)
-    return found
+    return np.asarray((scaled.T @ scaled) / np.outer(size, size), float)
 
 
 def least_squares(
@@ -173,6 +175,35 @@ def solve_batch(
         scale = None if scales is None else np.asarray(scales)[row]
         found.append(least_squares(residual, begin, item, worth=worth, scale=scale))
     return tuple(found)
+
+
+def best_apart(places: NDArray[np.int_], costs: Floats) -> list[int]:
+    """Return the rows of a coarse search where descents start: the cheapest, no two of them neighbours.
+
+    Args:
+        places: (m, 2) whole numbers, where each row lies in the search's grid.
+        costs: (m,) sum of squares of each.
+    """
+    chosen: list[int] = []
+    for at in np.argsort(costs):
+        if all(np.max(np.abs(places[at] - places[other])) > 1 for other in chosen):
+            chosen.append(int(at))
+    return chosen[:STARTS]
+
+
+def lowest(ends: Iterable[Solution], compared: int | None = None) -> Solution:
+    """Return the solution of lowest cost, converged or not, with the other minima; `compared` as of `are_apart`."""
+    first, *others = sorted(ends, key=lambda one: (not np.isfinite(one.cost), one.cost))
+    apart: list[Solution] = []
+    for one in others:
+        if np.isfinite(one.cost) and all(are_apart(one, other, compared) for other in (first, *apart)):
+            apart.append(one)
+    return replace(first, others=tuple(apart))
+
+
+def are_apart(one: Solution, other: Solution, compared: int | None = None) -> bool:
+    """Return whether two solutions are two minima: one of the first `compared` parameters differs by over `APART`."""
+    return bool(np.max(np.abs(one.parameters - other.parameters)[:compared]) > APART)
 
 
 @filter_jit
@@ -283,7 +314,7 @@ def _promised(best: tuple[Floats, Floats, Floats], step: Floats) -> float:
 
 
 def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: Floats, slope: Floats) -> Floats:
-    """A damped step (p,) within bounds: parameters that pass one end there, and the others are solved for again."""
+    """Return a damped step (p,) within bounds: parameters that pass one end there, and the others follow."""
     free = np.ones(step.size, bool)
     while np.any(out := free & ((step < room[0]) | (step > room[1]))):
         step, free = np.clip(step, *room), free & ~out
@@ -294,7 +325,7 @@ def _within(room: tuple[Floats, Floats], step: Floats, damping: float, values: F
 
 
 def _active(values: Floats, jacobian: Floats, y: Floats, ends: tuple[Floats, Floats]) -> NDArray[np.bool_]:
-    """True for each parameter (p,) that is at a bound and that descent would move beyond it."""
+    """Return whether each parameter (p,) is at a bound that descent would pass."""
     with np.errstate(over="ignore", invalid="ignore"):  # a point that is no answer may be far out
         uphill = jacobian.T @ values
     return ((y <= ends[0]) & (uphill > 0)) | ((y >= ends[1]) & (uphill < 0))
@@ -344,7 +375,7 @@ def _step(solver: Any, size: int, rows: tuple[int, ...]) -> tuple[Callable[..., 
 
 
 def _advanced(solver: Any, at: Floats, value: Floats, slope: Floats, state: Any, y: Floats) -> tuple[Any, ...]:
-    """The point (p,) after value and slope at `at` are known, the next proposal (p,), its damping, and the state."""
+    """Return the point (p,) after value and slope at `at`, the next proposal (p,), its damping, and the state."""
     with jax.enable_x64(True):
         step, first = _step(solver, y.size, value.shape)
         here, proposed, damping, state = step(at, value, slope, first if state is None else state, y)
@@ -369,7 +400,9 @@ def _stepped(at: Floats, values: Floats, slope: Floats, state: Any, y: Floats, s
 
 
 def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: float) -> str:
-    steepness, size = _steepness(values, jacobian), float(np.linalg.norm(values))
+    # The largest cosine between the residuals and a column of the Jacobian is 0 at an optimum.
+    steepness = float(np.max(np.abs(unit_columns(jacobian).T @ unit_columns(values)), initial=0.0))
+    size = float(np.linalg.norm(values))
     if not ended and steepness > ORTHOGONAL:
         return f"no convergence in {most} steps: constants trade against each other; fix one or widen the range"
     if steepness > STALLED and size > NO_MISFIT and (steepness * size) ** 2 > gain:
@@ -377,13 +410,8 @@ def _explain(ended: bool, most: int, values: Floats, jacobian: Floats, gain: flo
     return CONVERGED
 
 
-def _steepness(values: Floats, jacobian: Floats) -> float:
-    """Largest cosine between the residuals and a column of the Jacobian: 0 at an optimum."""
-    return float(np.max(np.abs(_unit(jacobian).T @ _unit(values)), initial=0.0))
-
-
-def _unit(columns: Floats) -> Floats:
-    """Columns of length 1, or 0; the largest number is divided by first, since squares of small ones would be 0."""
+def unit_columns(columns: Floats) -> Floats:
+    """Return columns of length 1, or 0; by the largest number first, since squares of small ones would be 0."""
     for size in (lambda c: np.max(np.abs(c), axis=0), lambda c: np.linalg.norm(c, axis=0)):
         columns = columns / np.where(size(columns) > 0, size(columns), 1.0)
     return columns

@@ -104,7 +104,7 @@ def fit_coefficient_laws(points: PerAlbedo, start: Liang, held: tuple[str, ...] 
 
 
 def length_exponents(points: tuple[PerAlbedo, ...]) -> dict[str, float]:
-    """The powers of l in a, b and c, by a straight line through ln|coefficient| over ln l.
+    """Return the powers of l in a, b and c, by a straight line through ln|coefficient| over ln l.
 
     Similarity says -1, 0, 1; the strides of (6), which stay what they are, move them a little.
     """
@@ -133,7 +133,7 @@ class _CoefficientProblem:
 
 
 def _coefficient_sensitivity(solutions, radii, data, used, profiles) -> Floats:
-    """d (a, b, c at every albedo) / d ring energies, (3 m, m, n): each albedo's fit sees its own rings only."""
+    """Return d (a, b, c at every albedo) / d ring energies, (3 m, m, n): each albedo's fit sees its own rings."""
     with jax.enable_x64(True):
         parameters = jnp.asarray(np.stack([s.parameters for s in solutions]))
         arrays = (jnp.asarray(radii), jnp.asarray(data), jnp.asarray(used, float))
@@ -165,7 +165,7 @@ def _gain_arrays(residual, vector, law, alpha, data):
 
 
 def _gain(residual, vector, law, alpha, data) -> Floats:
-    """d constants / d coefficients (p, m) of a coefficient law."""
+    """Return d constants / d coefficients (p, m) of a coefficient law."""
     with jax.enable_x64(True):
         hessian, mixed = _gain_arrays(residual, jnp.asarray(vector), law, jnp.asarray(alpha), jnp.asarray(data))
     return -scaled_inverse(np.asarray(hessian)) @ np.asarray(mixed).T

@@ -46,18 +46,18 @@ def map_classes() -> "dict[str, Any]":
 
 
 def home(place: str) -> "Any":
-    """The class at a home in one of the tables: "module.Class" of this package, or of another by its whole name."""
+    """Return the class at a home: "module.Class" of this package, or the whole name of one in another package."""
     module, _, kind = place.rpartition(".")
     return getattr(import_module(module if "." in module else f"{__name__}.{module}"), kind)
 
 
 def takes_g(name: str) -> bool:
-    """Whether the profile law of a name has a form in which scattering has a direction."""
+    """Return whether the profile law of a name has a form for anisotropic scattering."""
     return PROFILES.get(name) in FORWARD
 
 
 def at(kind: "Any", setting: "Any") -> "Any":
-    """The class that a law or map has in a setting: this one, or that for surfaces that refract, or for any g."""
+    """Return a law's class in a setting: this one, or the one for refracting interfaces, or for any g."""
     forms = REFRACTING if setting.is_isotropic else FORWARD
     place = forms.get(f"{kind.__module__.rpartition('.')[2]}.{kind.__name__}")
     return kind if setting.is_matched_isotropic or place is None else home(place)

@@ -1,4 +1,4 @@
-"""What every law offers, whatever its form: a frozen pytree whose leaves are its constants, in units of the mfp."""
+"""Base classes of laws: frozen pytrees whose leaves are their constants, in units of the mfp."""
 
 from __future__ import annotations
 
@@ -34,37 +34,37 @@ class Constants(eqx.Module):
 
     @classmethod
     def forms(cls) -> dict[str, type[Self]]:
-        """The classes that go by one name, by what stands behind its colon; "" for the name alone."""
+        """Return the classes that go by one name, by what stands behind its colon; "" for the name alone."""
         return {"": cls}
 
     @classmethod
     def constant_names(cls) -> tuple[str, ...]:
-        """The names of the constants, in the order of the flattened pytree."""
+        """Return the names of the constants, in the order of the flattened pytree."""
         return tuple(f.name for f in fields(cls) if not (f.metadata.get("static") or f.metadata.get("closed")))
 
     @classmethod
     def at_one_index(cls) -> tuple[str, ...]:
-        """The constants that profiles of one refractive index and g tell apart: all, but of a law that spans them."""
+        """Return the constants that profiles of one index and g tell apart: all, but for a law that spans them."""
         return cls.constant_names()
 
     def at(self, setting: Setting) -> Self:
-        """The same constants, and those of its map, in another setting of those that they span."""
+        """Return the law with the same constants, and those of its map, in another setting that they span."""
         given: dict[str, Any] = {"setting": setting}
         if getattr(self, "albedo", None) is not None:
             given["albedo"] = self.albedo.at(setting)  # type: ignore[attr-defined]
         return replace(self, **given)
 
     def in_reduced(self) -> Self:
-        """The same law of reduced albedos and l*, as its shader source has it: itself, but of a law with g."""
+        """Return the law of reduced albedos and l*, as in its shader source: itself, but for a law with g."""
         return self
 
     def under(self, surface: RefractingSurface | None) -> Self:
-        """The law under other surfaces, one for each profile, if it spans indices; None for that of its setting."""
+        """Return the law under other surfaces, one per profile, if it spans indices; None for its setting's own."""
         return self if surface is None else replace(self, surface=surface)  # type: ignore[call-arg]
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
-        """The constants that move when this objective is made small; none if it does not apply to the law."""
+        """Return the constants that move when this objective is made small; none if it does not apply to the law."""
         del objective
         return cls.constant_names()
 
@@ -77,19 +77,19 @@ class Constants(eqx.Module):
         return {}
 
     def text_constants(self) -> dict[str, float]:
-        """The constants of its shader source: every constant, or what they come to at the law's index."""
+        """Return the constants of its shader source: every constant, or what they come to at the law's index."""
         return self.constants()
 
     def folds(self) -> dict[str, dict[str, float]]:
-        """Of each constant of its shader source, the derivatives by its own constants."""
+        """Return derivatives of each constant of the shader source by the law's own constants."""
         return {name: {name: 1.0} for name in self.constant_names()}
 
     def vector(self, names: tuple[str, ...]) -> NDArray[np.float64]:
-        """The named constants as a vector."""
+        """Return the named constants as a vector."""
         return np.array([getattr(self, name) for name in names], float)
 
     def with_vector(self, names: tuple[str, ...], values) -> Self:
-        """The same law with the named constants replaced: a fit moves these and leaves the others."""
+        """Return the law with the named constants replaced: a fit moves these and leaves the others."""
         return replace(self, **{name: values[i] for i, name in enumerate(names)})
 
 
@@ -148,17 +148,16 @@ class ProfileLaw(Constants):
         """Limit of 2 pi x R_d at x -> 0, before any scaling [1/mfp]; the exact one is alpha / 2."""
 
     def total(self, alpha) -> Array:
-        """Total reflectance A [-] that the profile integrates to at an albedo of the scaled functions: by the map
-        `albedo`, where it has none of its own."""
+        """Return the total reflectance A [-] that the profile integrates to at an albedo of the scaled functions."""
         return self.albedo.reflectance(alpha)  # type: ignore[attr-defined]
 
     def text_shape(self) -> dict[str, float] | None:
-        """The members of its shape in its shader source by their dotted names, of a law of one albedo; else None."""
+        """Return members of the shape in the shader source by dotted names, for a law of one albedo; else None."""
         return None
 
     @property
     def is_finite_at_source(self) -> bool:
-        """Whether R_d stays finite at r = 0, where that of a half space does not."""
+        """True if R_d stays finite at r = 0, unlike that of a semi-infinite medium."""
         return float(self.source_strength(jnp.array(0.5))) == 0.0
 
     @property
@@ -172,7 +171,7 @@ class ProfileLaw(Constants):
         return {"exact": self.sampler}
 
     def similar(self, alpha: Any, mfp: Any) -> tuple[Any, Any]:
-        """alpha and l of the scaled functions: the medium's own, or its reduced albedo and l* where the law has a g."""
+        """Return alpha and l of the scaled functions: the medium's own, or reduced ones where the law has a g."""
         return alpha, mfp
 
     @evaluated
@@ -198,24 +197,24 @@ class Sampler(eqx.Module):
 
     @abc.abstractmethod
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
-        """x = r/l at xi in [0, 1)."""
+        """Return x = r/l at xi in [0, 1)."""
 
     @abc.abstractmethod
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
         """Density in x = r/l of `scaled_sample(xi)`, xi uniform in [0, 1), atoms left out [1/mfp]."""
 
     def scaled_undone(self, x: Array, xi: Array, alpha: Array) -> Array:
-        """The uniform number that an exact inverse sends to x; of several the one nearest to xi."""
+        """Return the uniform number that an exact inverse sends to x; of several the one nearest to xi."""
         del xi
         return self.law.scaled_cdf(x, alpha)
 
     def jump(self, alpha: Array) -> Array:
-        """xi at which radii begin at 0 anew, as another part of the light is drawn; 1 where none does."""
+        """Return xi at which radii begin at 0 anew, as another part of the light is drawn; 1 where none does."""
         return jnp.ones_like(alpha)
 
     @evaluated
     def undone(self, r, xi, alpha, mfp=1.0) -> Array:
-        """xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the error of the inversion. All broadcast."""
+        """Return xi [-] of a drawn radius: |undone(sample(xi), xi) - xi| is the inversion's error. All broadcast."""
         by, length = self.law.similar(alpha, mfp)
         return self.scaled_undone(r / length, xi, by)
 

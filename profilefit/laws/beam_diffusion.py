@@ -70,7 +70,7 @@ class BeamDiffusion(DiffusionLaw):
 
     @property
     def finer(self) -> BeamDiffusion:
-        """The same law with half as many nodes again in each of its quadratures: what they change is its error."""
+        """Law with half as many nodes again in each quadrature: the change is the error of the quadratures."""
         return BeamDiffusion(self.setting, self.albedo, FINER)
 
     def prefactor(self, alpha: Array) -> Array:
@@ -89,7 +89,7 @@ class BeamDiffusion(DiffusionLaw):
         return self.entered * alpha * once_scattered(jnp.zeros_like(alpha), self.setting.n, self.halves)
 
     def _beam(self, x: Array, alpha: Array, kappa) -> Array:
-        """int e^{-z} kappa(z, d_r) (C_phi phi + C_E E) dz [1/mfp^2]."""
+        """Return int e^{-z} kappa(z, d_r) (C_phi phi + C_E E) dz [1/mfp^2]."""
         depth, weight = depths(x, self.halves)
         x, alpha = x[..., None], alpha[..., None]
         c_phi, c_e, a = exitance_factors(self.setting.n)
@@ -100,7 +100,7 @@ class BeamDiffusion(DiffusionLaw):
         return jnp.sum(weight * kappa(depth, jnp.sqrt(x**2 + depth**2)) * exitance, axis=-1)
 
     def _beam_within(self, x: Array, alpha: Array) -> Array:
-        """The beam's energy within x [-]: in closed form at each depth, less what kappa takes away."""
+        """Return the beam's energy within x [-]: in closed form at each depth, less what kappa takes away."""
         depth, weight = depths(x, self.halves)
         c_phi, c_e, a = exitance_factors(self.setting.n)
         diffusion, sigma = grosjean(alpha[..., None])

@@ -47,7 +47,7 @@ class BetterDipole(DiffusionLaw):
     )
 
     def text_numbers(self) -> dict[str, float]:
-        """The share of the light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
+        """Return the share of light that enters, both factors of exitance, and the image's height over D less 1 [-]."""
         c_phi, c_e, mismatch = exitance_factors(self.setting.n)
         return {"entered": self.entered, "c_phi": c_phi, "c_e": c_e, "lift": 4.0 * mismatch}
 

@@ -99,7 +99,7 @@ class Burley(NormalizedDiffusion):
     )
 
     def text_numbers(self) -> dict[str, float]:
-        """The exponent p [-]."""
+        """Return the exponent p [-]."""
         return {"power": self.power}
 
     @property
@@ -193,7 +193,7 @@ class BurleyApproximateSampler(Sampler):
         return 2.0 + (self.c - 2.0) * (1.0 - (1.0 - tau) * jnp.exp(-tau))
 
     def _tau(self, target: Array) -> Array:
-        """tau with (2 + k (1 - e^{-tau})) tau = target."""
+        """Return tau with (2 + k (1 - e^{-tau})) tau = target."""
         target = jnp.minimum(target, FARTHEST)
         tau = target / self.c
         for _ in range(NEWTON_STEPS):

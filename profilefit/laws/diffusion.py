@@ -1,4 +1,4 @@
-"""What the physically based diffusion laws share: no constants to fit, their own reflectance, the surface, an image.
+"""Base of the physically based diffusion laws: no constants to fit, their own reflectance, surface and image.
 
 They are of a searchlight on a half space with reduced coefficients: by similarity g = 0 and l = 1 / (mu_s' + mu_a), any
 n. A point source at depth z under the surface and its image z_v above it make up a dipole (Eason et al. 1978; Farrell
@@ -134,7 +134,7 @@ def _arrays(x, alpha) -> tuple[Array, Array]:
 
 
 def distance(x: Array, z: Array | float) -> Array:
-    """From the point at radius x on the surface to a source at depth z; finite where x is not [mfp]."""
+    """Return the distance from radius x on the surface to a source at depth z; finite where x is not [mfp]."""
     return jnp.sqrt(_finite(x) ** 2 + z**2)
 
 
@@ -179,7 +179,7 @@ def _finite(x: Array) -> Array:
 
 
 def _beyond(x: Array, z: Array | float) -> Array:
-    """d - z [mfp]."""
+    """Return d - z [mfp]."""
     x = _finite(x)
     return x * (x / jnp.maximum(distance(x, z) + z, jnp.finfo(x.dtype).tiny))
 

@@ -32,7 +32,7 @@ class Dipole(DiffusionLaw):
     entry = Entry("dipole", "dipole", n=ANY_INDEX, text=Text("dipole", TEXT_PARTS, TEXT_ENDS, CLAMPS))
 
     def text_numbers(self) -> dict[str, float]:
-        """The share of the light that enters [-], and the height of the image [mfp]."""
+        """Return the share of the light that enters [-], and the height of the image [mfp]."""
         return {"entered": self.entered, "image": self.image}
 
     @property

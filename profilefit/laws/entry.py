@@ -1,4 +1,4 @@
-"""What is known of a law beside its formula: one `Entry` a law, which every list of laws is derived from."""
+"""Entries: facts about a law beside its formula, from which every list of laws is derived."""
 
 from __future__ import annotations
 
@@ -98,5 +98,5 @@ class Entry:
 
     @property
     def has_text(self) -> bool:
-        """Whether it has a shader source."""
+        """True if it has a shader source."""
         return isinstance(self.text, Text)

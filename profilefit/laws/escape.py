@@ -1,4 +1,4 @@
-"""What laws share that start from the energy left at r: decay far off, strength at the source, reflectance by a map."""
+"""Base of laws that start from the energy left at r: decay far away, strength at the source, reflectance by a map."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ DARKEST = 1e-6  # below this albedo kappa is 1 to the last bit
 
 
 def decay_rate(alpha) -> Array:
-    """kappa [1/mfp], the root of kappa = tanh(kappa / alpha): R_d falls off as e^{-kappa r} r^-2.
+    """Return kappa [1/mfp], the root of kappa = tanh(kappa / alpha): R_d falls off as e^{-kappa r} r^-2.
 
     kappa^2 = q (3 - 12/5 q + 12/175 q^2 + 58/175 q^3), q = 1 - alpha, has the three terms of the root's own series at
     q = 0 and its value at q = 1 (off by 2 % at most between); one step of Newton's method leaves 2.4e-5 (relative).
@@ -44,11 +44,11 @@ class EscapeLaw(ProfileLaw):
         """2 pi x R_d / A [1/mfp], finite at x = 0."""
 
     def reflected(self, alpha: Array) -> Array:
-        """A [-]."""
+        """Return A [-]."""
         return self.albedo.reflectance(alpha)
 
     def text_numbers(self) -> dict[str, float]:
-        """The strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
+        """Return the strength at the source over alpha, lim 2 pi x R_d / alpha [1/mfp]."""
         return {"source": single_scattering.source_strength(self.setting)}
 
     def source_hazard(self, alpha) -> Array:

@@ -62,7 +62,7 @@ def evaluated(method: Callable) -> Callable:
 
 @lru_cache(maxsize=PROGRAMS)
 def _program(method: Callable, form: Any, names: tuple[str, ...]) -> Callable:
-    """The method of a law of this class and setting, compiled: its constants are arguments like any other."""
+    """Return the method of a law of this class and setting, compiled: its constants are arguments like any other."""
 
     def run(leaves: list[jax.Array], *values: jax.Array) -> jax.Array:
         out = method(jax.tree.unflatten(form, leaves), **dict(zip(names, values, strict=True)))
@@ -72,7 +72,7 @@ def _program(method: Callable, form: Any, names: tuple[str, ...]) -> Callable:
 
 
 def _in_blocks(program: Callable, leaves: list[Floats], arguments: dict[str, Floats]) -> Floats:
-    """The program on arguments broadcast to one shape: a block at a time, but single numbers as they are."""
+    """Return the program on arguments broadcast to one shape: a block at a time, but single numbers as they are."""
     arrays = list(arguments.values())
     require_one_shape(**arguments)
     shape = np.broadcast_shapes(*(one.shape for one in arrays))

@@ -18,7 +18,9 @@ from profilefit.laws.two_parts import LEAST_W, Parts, TwoPartSampler, guess
 
 
 class ForwardHalfSpace(ProfileLaw):
-    """2 pi x R_d = a P S_1 lambda_1 + (A - a P) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r / l*
+    """Law of two hazard curves for anisotropic scattering.
+
+    2 pi x R_d = a P S_1 lambda_1 + (A - a P) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r / l*
 
     of one medium: reduced albedo a = mu_s (1 - g) / (mu_s (1 - g) + mu_a), l* = 1 / (mu_s (1 - g) + mu_a). The first
     part is light scattered once by the phase function p / (1 - g) with attenuation 1 / l*: its share P = A_1 / (1 - g)
@@ -87,11 +89,11 @@ class ForwardHalfSpace(ProfileLaw):
 
     @property
     def sampler(self) -> TwoPartSampler:
-        """As that of `TwoPartHazard`: a part of the light by chance, and the inverse of its cdf."""
+        """Sampler like that of `TwoPartHazard`: a part of the light by chance, and the inverse of its cdf."""
         return TwoPartSampler(self)
 
     def text_shape(self) -> dict[str, float]:
-        """Those of `TwoPartHazard`'s text."""
+        """Return the constants of the shader source of `TwoPartHazard`."""
         of = self.parts(jnp.asarray(0.0))
         white, slowest = guess(of)
         curve = ("kappa", "source", "w", "h", "a", "b", "c")

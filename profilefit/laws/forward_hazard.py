@@ -123,7 +123,7 @@ class ForwardHazard(TwoPartHazard):
         return {name: {name + term: value * slopes.get(name, 1.0) for term, value in terms.items()} for name in SHAPES}
 
     def _shapes(self) -> dict[str, Number]:
-        """k of each."""
+        """Return k of each."""
         z, rho = 1.0 - self.here().g, self.here().trapped
         return {
             name: getattr(self, f"{name}0") + z * getattr(self, f"{name}g") + rho * getattr(self, f"{name}n")

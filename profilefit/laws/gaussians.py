@@ -54,7 +54,7 @@ class GaussianSum(ProfileLaw):
 
     @abc.abstractmethod
     def count(self) -> int:
-        """The number N of Gaussians."""
+        """Return the number N of Gaussians."""
 
     @abc.abstractmethod
     def variances(self, alpha) -> Array:
@@ -62,7 +62,7 @@ class GaussianSum(ProfileLaw):
 
     @abc.abstractmethod
     def log_weights(self, alpha) -> Array:
-        """ln w_i(alpha) [-] along a last axis."""
+        """Return ln w_i(alpha) [-] along a last axis."""
 
     def scaled_profile(self, x: Array, alpha: Array) -> Array:
         variance = self.variances(alpha)
@@ -87,7 +87,9 @@ class GaussianSum(ProfileLaw):
 
 
 class Gaussians(GaussianSum):
-    """A sum for every albedo: with s = sqrt(1 - alpha), i = 2 ... N:
+    """Sum of N Gaussians for every albedo.
+
+    With s = sqrt(1 - alpha), i = 2 ... N:
 
     ln v_1 = v1 + f1 s + f2 s^2,  ln (v_i / v_{i-1}) = ln(1 + e^{vi})    variances rise with i, and with s by one factor
     w_i / w_1 = e^{wi0 + wi1 s}                                        weights are positive and sum to one
@@ -103,13 +105,13 @@ class Gaussians(GaussianSum):
 
     @classmethod
     def forms(cls) -> dict[str, type[Gaussians]]:
-        """The sum of six, and sums of 1 ... 8."""
+        """Return the sum of six, and sums of 1 ... 8."""
         return {"": law_class(), **{str(count): law_class(count) for count in range(1, MOST + 1)}}
 
     @classmethod
     @abc.abstractmethod
     def count(cls) -> int:
-        """The number N of Gaussians."""
+        """Return the number N of Gaussians."""
 
     @classmethod
     def start(cls) -> dict[str, float]:
@@ -124,7 +126,7 @@ class Gaussians(GaussianSum):
         return values | {"v1": float(low if cls.count() > 1 else 0.5 * (low + high))}
 
     def text_numbers(self) -> dict[str, float]:
-        """ln (v_i / v_{i-1}) [-]."""
+        """Return ln (v_i / v_{i-1}) [-]."""
         own = self.constants()
         return {f"rise{i}": math.log1p(math.exp(own[f"v{i}"])) for i in range(2, self.count() + 1)}
 
@@ -136,7 +138,7 @@ class Gaussians(GaussianSum):
         return jnp.exp(rising + s * (self.f1 + s * self.f2))
 
     def log_weights(self, alpha) -> Array:
-        """ln w_i(alpha) [-] along a last axis."""
+        """Return ln w_i(alpha) [-] along a last axis."""
         s = jnp.sqrt(1.0 - alpha)
         pairs = [(getattr(self, f"w{i}0"), getattr(self, f"w{i}1")) for i in range(2, self.count() + 1)]
         logits = [jnp.zeros_like(s), *(level + slope * s for level, slope in pairs)]
@@ -204,14 +206,14 @@ class MediumGaussians(GaussianSum):
         return self.total_reflectance + jnp.zeros_like(alpha)
 
     def text_shape(self) -> dict[str, float]:
-        """Those of `Gaussians`' text."""
+        """Return the constants of the shader source of `Gaussians`."""
         pairs = enumerate(zip(self.variance, self.weight, strict=True), start=1)
         each = {name: value for i, (v, w) in pairs for name, value in ((f"rate{i}", 0.5 / v), (f"weight{i}", w))}
         return {"reflectance": self.total_reflectance, **each}
 
 
 def law_class(count: int = DEFAULT) -> type[Gaussians]:
-    """The class of sums of `count` Gaussians, 1 to 8; InputError otherwise."""
+    """Return the class of sums of `count` Gaussians, 1 to 8; InputError otherwise."""
     if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MOST:
         raise InputError(f"count must be a number of Gaussians in 1 ... {MOST}, got {count!r}")
     return _law_class(count)

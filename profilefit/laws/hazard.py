@@ -30,7 +30,7 @@ GUESS = (0.43, 0.27)
 
 
 class Shape(NamedTuple):
-    """What the law needs of one material; all of it depends on alpha only. Lengths in mfp.
+    """Parameters of the law for one material; all of them depend on alpha only. Lengths in mfp.
 
     reflectance  A [-]; kappa decay rate, source hazard at x = 0 [1/mfp]
     w [1/mfp], h [mfp]  the light that leaves early;  a [1/mfp], b [1/mfp^2], c [1/mfp]  the light that spreads
@@ -74,7 +74,7 @@ def cumulative(x: Array, shape: Shape) -> Array:
 
 
 def radius(xi: Array, shape: Shape, steps: int) -> Array:
-    """x at which the share xi of the energy has left, by `steps` steps from a guess; 0 at xi = 0, infinite at 1."""
+    """Return x at which the share xi of the energy has left, by `steps` steps from a guess; 0 at xi = 0."""
     left = jnp.maximum(1.0 - xi, jnp.finfo(jnp.result_type(xi, float)).tiny)
     t = -jnp.log(left)
     x = radius_at(t, xi / (left * jnp.maximum(t, NEAREST)), shape, steps)
@@ -89,7 +89,7 @@ def growth(t: Array) -> Array:
 
 
 def radius_at(t: Array, growth: Array, shape: Shape, steps: int) -> Array:
-    """x at t = -ln(1 - xi), growth = xi / ((1 - xi) t) = (e^t - 1) / t."""
+    """Return x at t = -ln(1 - xi), growth = xi / ((1 - xi) t) = (e^t - 1) / t."""
     p, q = GUESS
     rise = shape.source - shape.kappa
     white = q * (rise / shape.source) ** 2
@@ -110,7 +110,7 @@ def _closer(x: Array, t: Array, shape: Shape) -> Array:
 
 
 def local(x: Array, shape: Shape) -> Local:
-    """The curve at x [mfp], NEAREST to FARTHEST."""
+    """Return the curve at x [mfp], NEAREST to FARTHEST."""
     q, per_h = shape.h / x, 1.0 / shape.h
     numerator, denominator, above = 1.0 + x * (shape.a + x * shape.b), 1.0 + shape.c * x, 1.0 + q
     # One reciprocal for three quotients.
@@ -173,7 +173,9 @@ LEAST_B = 1e-4
 
 
 class Hazard(EscapeLaw):
-    """2 pi x R_d = A S lambda,   S = 1 - cdf = e^{-kappa x - w h V(x/h)} (1 + c x) / (1 + a x + b x^2),   x = r/l
+    """Law of the hazard rate at which light leaves.
+
+    2 pi x R_d = A S lambda,   S = 1 - cdf = e^{-kappa x - w h V(x/h)} (1 + c x) / (1 + a x + b x^2),   x = r/l
 
     V(z) = z - z^2 ln(1 + 1/z)
     lambda = -S'/S = kappa + w V'(x/h) + (a + 2 b x) / (1 + a x + b x^2) - c / (1 + c x)

@@ -80,17 +80,17 @@ class Liang(ProfileLaw):
 
     @classmethod
     def seen_by(cls, objective: str) -> tuple[str, ...]:
-        """The profile and the inverse cdf share no constant: a fit of one leaves the other alone."""
+        """Return the constants of the profile or of the inverse cdf, which share none."""
         if objective in ("energy", "relative", "radial"):
             return PROFILE_CONSTANTS
         return INVERSE_CONSTANTS if objective in QUANTILES else ()
 
     def text_numbers(self) -> dict[str, float]:
-        """eps of the inverse [-], its root, and the largest -ln(1 + eps - xi)."""
+        """Return eps of the inverse [-], its root, and the largest -ln(1 + eps - xi)."""
         return {"eps": self.eps, "root": self.eps**0.5, "depth": -math.log(self.eps)}
 
     def coefficients(self, alpha) -> tuple[Array, Array, Array]:
-        """a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""
+        """Return a [1/mfp], b [-] and c [mfp] at albedo alpha, for l = 1   (9)-(15)."""
         a = self.a1 * alpha + self.a2 * 0.1 ** (-self.a3 * (alpha - 1.0))
         k = (self.b1 * (alpha - self.b2) ** 2 + self.b3) * alpha + self.b4
         return a, self.b0 * alpha**k, self.c1 * jnp.exp(self.c2 * alpha) + self.c3
@@ -176,7 +176,7 @@ class LiangSampler(Sampler):
         return jnp.abs(self.unclipped(xi, alpha))
 
     def _root(self, x, alpha, low, high) -> Array:
-        """xi in [low, high], where |g| is monotone, with |g(xi)| = x; an end of it where there is none."""
+        """Return xi in [low, high], where |g| is monotone, with |g(xi)| = x; an end of it where there is none."""
         rising = self._radius(high, alpha) > self._radius(low, alpha)
 
         def halve(_, bracket):
@@ -203,7 +203,7 @@ class LiangSampler(Sampler):
         return (k1 + (k1 * xi - k2) / (2.0 * xi)) * root * ln - (k1 * xi - k2) * root / (1.0 + law.eps - xi)
 
     def _turning_point(self, alpha) -> Array:
-        """The xi in (0, eps) where g is most negative."""
+        """Return the xi in (0, eps) where g is most negative."""
 
         def halve(_, bracket):
             left, right = bracket

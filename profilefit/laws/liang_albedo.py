@@ -35,12 +35,12 @@ class LiangAlbedo(AlbedoLaw):
     )
 
     def text_numbers(self) -> dict[str, float]:
-        """The reflectance where it turns [-]."""
+        """Return the reflectance where it turns [-]."""
         return {"fold": self.fold}
 
     @property
     def albedos(self) -> Range:
-        """Those below its largest, at the fold: it has no A for others."""
+        """Albedos below the largest, at the fold: it has no A for others."""
         return Range(0.0, float(self.alpha(self.fold)), open_high=True)
 
     @evaluated

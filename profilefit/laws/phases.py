@@ -31,7 +31,7 @@ NODES = 64
 
 
 class Haltrin(NamedTuple):
-    """weight of HG(g), and h: the rest of the light is scattered by HG(-h) [-]"""
+    """Weight of HG(g), and h: the rest of the light is scattered by HG(-h) [-]."""
 
     weight: float
     g: float
@@ -39,7 +39,7 @@ class Haltrin(NamedTuple):
 
 
 def haltrin(g: float) -> Haltrin:
-    """The two-term form of one parameter that Li et al. 2011 print as their (6) (Haltrin, Appl. Opt. 41, 1022, 2002).
+    """Return the two-term form of one parameter of Li et al. 2011, their (6) (Haltrin, Appl. Opt. 41, 1022, 2002).
 
     g  asymmetry of the forward term [-], in (0.30664, 1]; InputError elsewhere
 
@@ -58,7 +58,7 @@ def _haltrin(g: Any) -> tuple[Any, Any, Any]:
 
 
 def regression(share: float) -> float:
-    """The mean cosine that goes with a backscattered share [-], by the regression behind Haltrin's cubic."""
+    """Return the mean cosine that goes with a backscattered share [-], by the regression behind Haltrin's cubic."""
     return 2 * (1 - 2 * share) / (2 + share)
 
 
@@ -69,7 +69,7 @@ def backscattered(phase: Phase) -> float:
 
 @dataclass(frozen=True)
 class PhaseForm(ABC):
-    """name  by which it is asked for;  title  what a reader calls it;  names  of its constants, in their order"""
+    """Form of a phase function: its name, its title for readers, and the names of its constants, in their order."""
 
     name: str
     title: str
@@ -86,14 +86,14 @@ class PhaseForm(ABC):
 
     @abstractmethod
     def phase(self, constants: Sequence[Any] | Array) -> Phase:
-        """The phase function of constants (names,), unchecked."""
+        """Return the phase function of constants (names,), unchecked."""
 
     @abstractmethod
     def starts(self, random: np.random.Generator, count: int) -> Floats:
         """(count, free) parameters to start from."""
 
     def mean_cosine(self, constants: Array) -> Array:
-        """Of the phase function of constants (names,) [-]."""
+        """Return moments of the phase function of constants (names,) [-]."""
         return self.phase(constants).mean_cosine
 
 
@@ -102,7 +102,7 @@ class HenyeyTerms(PhaseForm):
 
     @property
     def count(self) -> int:
-        """Of terms."""
+        """Number of terms."""
         return (len(self.names) + 1) // 2
 
     @property
@@ -111,7 +111,7 @@ class HenyeyTerms(PhaseForm):
         return 2 * self.count - 1
 
     def constants(self, parameters: Array) -> Array:
-        """The terms in their order from forward to backward."""
+        """Return the terms in their order from forward to backward."""
         g = jnp.tanh(parameters[: self.count])
         if self.count == 1:
             return g

@@ -1,5 +1,6 @@
-"""Constants as their authors printed them, each with its source. They are never edited: a defended correction is a
-set of its own beside them.
+"""Constants as their authors printed them, each with its source.
+
+They are never edited: a defended correction is a set of its own beside them.
 """
 
 from __future__ import annotations
@@ -85,5 +86,5 @@ SETS = (
 
 
 def constants(law: str, name: str = "published") -> dict[str, float]:
-    """The printed constants of a law, in print's order; empty where nothing was printed."""
+    """Return the printed constants of a law, in print's order; empty where nothing was printed."""
     return next((dict(s.constants) for s in SETS if s.law == law and s.name == name), {})

@@ -30,7 +30,7 @@ STEPS = 6
 
 
 class Curve(NamedTuple):
-    """What the law needs of one material; all of it depends on alpha only.
+    """Parameters of the law for one material; all of them depend on alpha only.
 
     kappa decay rate, source hazard at x = 0 [1/mfp]; a, b, c [-] the coefficients of M
     """
@@ -43,7 +43,7 @@ class Curve(NamedTuple):
 
 
 class Quantile(EscapeLaw):
-    """r/l at the share xi of the energy: a rational function of t = -ln(1 - xi)
+    """Inverse cdf r/l at the share xi of the energy: a rational function of t = -ln(1 - xi).
 
     x = t M / (kappa M + lambda_0 - kappa),   M = 1 + a t + b t / (1 + 2.5 t) + c t^2 / (1 + 0.7 kappa t)
 
@@ -138,7 +138,7 @@ class QuantileSampler(Sampler):
 
 
 def radius(t: Array, curve: Curve) -> tuple[Array, Array]:
-    """x [mfp] at t, and dx/dt [mfp] there, at most that far away, 1 / kappa."""
+    """Return x [mfp] at t, and dx/dt [mfp] there, at most that far away, 1 / kappa."""
     near, far = 1.0 / (1.0 + NEAR * t), 1.0 / (1.0 + FAR * curve.kappa * t)
     m = 1.0 + t * (curve.a + curve.b * near + curve.c * t * far)
     rise = curve.a + curve.b * near * near + curve.c * t * far * (1.0 + far)  # dM/dt
@@ -149,7 +149,7 @@ def radius(t: Array, curve: Curve) -> tuple[Array, Array]:
 
 @eqx.filter_jit  # the steps are a loop, which would compile anew at each call
 def depth(x: Array, curve: Curve) -> Array:
-    """t [-] at x [mfp]: the inverse of `radius`."""
+    """Return t [-] at x [mfp]: the inverse of `radius`."""
     x = jnp.clip(x, NEAREST, FARTHEST)
     # Where M is c t^2, next to white, x goes as t^3: from x lambda_0 alone the steps would not settle there.
     rising = x * (curve.source - curve.kappa)

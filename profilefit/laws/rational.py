@@ -24,12 +24,12 @@ class Normalisation(AlbedoLaw):
 
     @property
     def reflectances(self) -> Range:
-        """Those that the surface lets out of a white half space, and less."""
+        """Range of reflectances: up to what the surface lets out of a white semi-infinite medium."""
         return Range(0.0, self.entered)
 
     @abc.abstractmethod
     def albedo_over_reflectance(self, alpha) -> Array:
-        """alpha / A [-], finite at alpha = 0 too."""
+        """Return alpha / A [-], finite at alpha = 0 too."""
 
 
 class Rational(Normalisation):
@@ -71,7 +71,7 @@ class Rational(Normalisation):
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:
-        """alpha / A [-], finite at alpha = 0 too."""
+        """Return alpha / A [-], finite at alpha = 0 too."""
         s = jnp.sqrt(1.0 - alpha)
         return (1.0 + s) * (1.0 + s * (self.c + self.d * s)) / (1.0 + self.b * s)
 

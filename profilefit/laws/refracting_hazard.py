@@ -11,7 +11,9 @@ from profilefit.laws.two_parts import ShapeCoefficients, TwoPartHazard
 
 
 class RefractingHazard(TwoPartHazard):
-    """2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r/l
+    """Law of two hazard curves under a refracting interface.
+
+    2 pi x R_d = alpha A_1 S_1 lambda_1 + (A - alpha A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r/l
 
     Under a surface that refracts, light scattered once dies with the critical angle, e^{-k_c x}, and all other light
     with kappa(alpha); one hazard cannot follow both. A_1, k_c and the strength at the source, lambda_1(0) = s_0 / A_1,
@@ -119,7 +121,7 @@ class RefractingHazard(TwoPartHazard):
         return ("m00", "m10", "a00", "a10", "a20", "b00", "b10", "b20", "c00", "c10", "c20")
 
     def coefficients(self) -> ShapeCoefficients:
-        """What the constants come to at its index."""
+        """Return the constants of the shader source at the law's index."""
         here = self.here()
         rho, strength = here.trapped, here.source / here.once
         y = here.critical / strength

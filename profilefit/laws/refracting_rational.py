@@ -40,7 +40,9 @@ class Terms(NamedTuple):
 
 
 class FoldedRational(Normalisation):
-    """A = t (1 - rho) R / (1 - rho R),  R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2),  s = sqrt(1 - a)
+    """Map of a reflectance that is rational inside, under a refracting interface.
+
+    A = t (1 - rho) R / (1 - rho R),  R = (1 - s)(1 + b s + f s^2) / (1 + c s + d s^2),  s = sqrt(1 - a)
 
     a is the reduced albedo; t is the share of the light that enters, rho that which the surface reflects back of
     cosine-weighted light from inside: were all light inside cosine-weighted, R would be the reflectance without a
@@ -58,14 +60,14 @@ class FoldedRational(Normalisation):
         """c, d, f at its index and g."""
 
     def here(self) -> RefractingSurface:
-        """The closed numbers of its setting, or of those that it was put under."""
+        """Return the closed numbers of its setting, or of those that it was put under."""
         return self.surface or surface_of(self.setting)
 
     def in_reduced(self) -> Self:
         return replace(self, setting=replace(self.setting, g=0.0), surface=self.here())
 
     def text_numbers(self) -> dict[str, float]:
-        """The share that enters, rho, and A_1 over alpha [-]."""
+        """Return the share that enters, rho, and A_1 over alpha [-]."""
         here = self.here()
         return {"entered": here.entered, "trapped": here.trapped, "once": here.once}
 
@@ -98,7 +100,7 @@ class FoldedRational(Normalisation):
 
     @evaluated
     def albedo_over_reflectance(self, alpha) -> Array:
-        """alpha / A [-] of a reduced albedo, finite at alpha = 0 too."""
+        """Return alpha / A [-] of a reduced albedo, finite at alpha = 0 too."""
         s, of = jnp.sqrt(1.0 - alpha), self.terms()
         return (1.0 + s) * _cubic(of.g, s) / (of.p * (1.0 + s * (of.b + of.f * s)))
 
@@ -126,8 +128,9 @@ class FoldedRational(Normalisation):
 
 
 class RefractingRational(FoldedRational):
-    """`FoldedRational` where g = 0. That light inside is not cosine-weighted makes the constants depend on n, by
-    q = mu_c^(2/3), mu_c = sqrt(1 - 1/n^2): A changes fastest next to n = 1.
+    """Map `FoldedRational` where g = 0, of constants that depend on n since light inside is not cosine-weighted.
+
+    They do by q = mu_c^(2/3), mu_c = sqrt(1 - 1/n^2): A changes fastest next to n = 1.
 
     c = c0 + c1 q + c2 q^2 + c3 q^3 + c4 q^4     d likewise, up to d5 q^5     f = f0 + f1 q
 
@@ -185,7 +188,7 @@ def _cubic(terms: tuple[Number, Number, Number, Number], s: Array) -> Array:
 
 
 def _root(rest: Array, linear: Array, quadratic: Array, cubic: Number) -> Array:
-    """x >= 0 with rest = linear x + quadratic x^2 + cubic x^3: that of the quadratic, and Newton's method."""
+    """Return x >= 0 with rest = linear x + quadratic x^2 + cubic x^3, by Newton's method from the quadratic's."""
     inside = linear**2 + 4.0 * quadratic * rest
     root = jnp.where(inside > 0.0, jnp.sqrt(jnp.where(inside > 0.0, inside, 1.0)), 0.0)  # 0 has no derivative
     x = 2.0 * rest / (linear + root)

@@ -61,7 +61,7 @@ class LayerLaw(Constants):
         return decay_rate(self.alpha) / self.mfp
 
     def whole(self) -> Array:
-        """A [-]."""
+        """Return A [-]."""
         return self.law.total(self.alpha)
 
     def value(self, r: Array) -> Array:
@@ -73,7 +73,7 @@ class LayerLaw(Constants):
         return self.law.unscaled_energy(r / self.mfp, jnp.asarray(self.alpha))
 
     def drawn(self, xi: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
-        """A radius [length] for xi in [0, 1), of light seen from a depth [length]."""
+        """Return a radius [length] for xi in [0, 1), of light seen from a depth [length]."""
         _require_none(thickness)
         return _moved(self.law.sampler.scaled_sample(xi, jnp.asarray(self.alpha)) * self.mfp, depth)
 
@@ -85,7 +85,9 @@ class LayerLaw(Constants):
 
 
 class StackLaw(Constants):
-    """R_d(r; d) = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r),   s_i^2 = r^2 + (g_i d)^2,   c_i = e^{-b_i x},
+    """Law of a layer of one thickness on a medium.
+
+    R_d(r; d) = R_1(r) - c_1 R_1(s_1) + c_2 R_2(s_2) + m I(r),   s_i^2 = r^2 + (g_i d)^2,   c_i = e^{-b_i x},
 
     of a first layer of thickness d, x = d / l its mean free paths, over a half space or stack R_2: R_1 is the half
     space of the first layer, the second term what of it went deeper than d, seen from a depth of about d, the third
@@ -162,7 +164,7 @@ class StackLaw(Constants):
         return jnp.maximum(self.top.decay(), LEAST_DECAY / self.top.mfp)
 
     def whole(self, thickness: Array | None = None) -> Array:
-        """A [-]."""
+        """Return A [-]."""
         d = self._bounded(thickness)
         e = jnp.exp(-2.0 * self.fading() * d + self.u * jnp.expm1(-d / self.top.mfp))
         first, second = self.top.whole(), self.below.whole()
@@ -183,7 +185,7 @@ class StackLaw(Constants):
         return self.top.within(r) - of.c1 * gone + of.c2 * back + of.image * image
 
     def drawn(self, xi: Array, thickness: Array | None = None, depth: Array | float = 0.0) -> Array:
-        """A radius [length] for xi in [0, 1), of one of the three terms that add light, seen from a depth [length]."""
+        """Return a radius [length] for xi in [0, 1) of one of three terms that add light, from a depth [length]."""
         of = self.terms(thickness)
         first, second, third = self.shares(of)
         own = self.top.drawn(_stretched(xi, 0.0, first), None, depth)
@@ -201,7 +203,7 @@ class StackLaw(Constants):
         return first * self.top.drawn_density(r, None, depth) + second * back + third * image
 
     def terms(self, thickness: Array | None = None) -> StackTerms:
-        """What depends on the thickness only: once a point of a surface."""
+        """Compute what depends on the thickness only: once per point of a surface."""
         d = self._bounded(thickness)
         x = d / self.top.mfp
         gone, back, height = self.g1 * d, self.g2 * d, self.h0 * self.top.mfp + self.h1 * d
@@ -217,7 +219,7 @@ class StackLaw(Constants):
         return jnp.minimum(jnp.asarray(given), THICKEST * self.top.mfp)
 
     def shares(self, of: StackTerms) -> tuple[Array, Array, Array]:
-        """Of the radii that are drawn for each term [-]: those of light that is added, not taken away."""
+        """Return the chance of each term's radii [-]: of light that is added, not taken away."""
         image = jnp.maximum(of.image, 0.0)
         total = of.kept + of.came + image
         whole = jnp.where(total > 0, total, 1.0)
@@ -225,7 +227,7 @@ class StackLaw(Constants):
 
 
 class StackTerms(NamedTuple):
-    """Of one thickness: depths g_i d [length], c_i [-], the image's height [length] and rate [1/length].
+    """Terms at one thickness: depths g_i d [length], c_i [-], the image's height [length] and rate [1/length].
 
     image, kept, came  energies [-]: m, of R_1 less what it lost, and of what came back from below
     """
@@ -287,7 +289,7 @@ def _image_radius(xi: Array, of: StackTerms) -> Array:
 
 
 def _moved(s: Array, depth: Array | float) -> Array:
-    """The radius of a law at which what it has beyond s is seen from a depth: from hypot(r, depth) = s + depth."""
+    """Return the radius at which what a law has beyond s is seen from a depth: hypot(r, depth) = s + depth."""
     return jnp.sqrt(s * (s + 2.0 * depth))
 
 
@@ -301,6 +303,6 @@ def _unmoved(r: Array, depth: Array | float) -> tuple[Array, Array]:
 
 
 def _stretched(xi: Array, low: Array | float, width: Array) -> Array:
-    """xi of a term, from its part of [0, 1) to all of it; below 1."""
+    """Map xi of a term from its part of [0, 1) to all of it; below 1."""
     inside = (xi - low) / jnp.where(width > 0, width, 1.0)
     return jnp.clip(inside, 0.0, 1.0 - jnp.finfo(jnp.result_type(xi, float)).epsneg)

@@ -1,4 +1,4 @@
-"""What is known in closed form of a half space under a surface that refracts: numbers of the light, the index and g.
+"""Closed forms of a semi-infinite medium under a refracting interface: numbers of the light, the index and g.
 
 A fit to several media gives arrays of them, one number for each profile; a law of one has floats.
 """
@@ -41,7 +41,7 @@ class RefractingSurface(NamedTuple):
 
 @lru_cache(maxsize=64)
 def surface_of(setting: Setting) -> RefractingSurface:
-    """The numbers of one setting, n >= 1."""
+    """Return the numbers of one setting, n >= 1."""
     forward = 1.0 - setting.g
     return RefractingSurface(
         cosine=float(np.sqrt((setting.n - 1.0) * (setting.n + 1.0))) / setting.n,
@@ -55,5 +55,5 @@ def surface_of(setting: Setting) -> RefractingSurface:
 
 
 def surfaces_of(settings: tuple[Setting, ...]) -> RefractingSurface:
-    """The numbers of several settings, each (k, 1)."""
+    """Return the numbers of several settings, each (k, 1)."""
     return RefractingSurface(*(np.array(column)[:, None] for column in zip(*map(surface_of, settings), strict=True)))

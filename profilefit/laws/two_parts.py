@@ -52,8 +52,10 @@ class ShapeCoefficients(NamedTuple):
 
 
 class Parts(NamedTuple):
-    """One material: the light scattered once and again, each a hazard curve whose `reflectance` is its own light;
-    `share` of the light is scattered once, `rest` again [-]: 1 - share, which would cancel where the medium is dark."""
+    """One material: light scattered once and more often, each a hazard curve whose `reflectance` is its own light.
+
+    `share` of the light is scattered once, `rest` again [-]: 1 - share, which would cancel where the medium is dark.
+    """
 
     once: Shape
     again: Shape
@@ -71,7 +73,9 @@ class Parts(NamedTuple):
 
 
 class TwoPartHazard(EscapeLaw):
-    """2 pi x R_d = a A_1 S_1 lambda_1 + (A - a A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r / l*
+    """Law of two hazard curves: light scattered once, and more often.
+
+    2 pi x R_d = a A_1 S_1 lambda_1 + (A - a A_1) S_2 lambda_2,   S, lambda as in `Hazard`,   x = r / l*
 
     a is the reduced albedo mu_s' / (mu_s' + mu_a), l* = 1 / (mu_s' + mu_a), mu_s' = mu_s (1 - g). Light scattered once
     dies with the critical angle, e^{-k_c x}, and all other light with kappa(a); one hazard cannot follow both. A_1, k_c
@@ -94,10 +98,10 @@ class TwoPartHazard(EscapeLaw):
 
     @abc.abstractmethod
     def coefficients(self) -> ShapeCoefficients:
-        """What the constants come to at its index and g."""
+        """Return the constants of the shader source at the law's index and g."""
 
     def here(self) -> RefractingSurface:
-        """The closed numbers of its setting, or of those that it was put under."""
+        """Return the closed numbers of its setting, or of those that it was put under."""
         return self.surface or surface_of(self.setting)
 
     def text_numbers(self) -> dict[str, float]:
@@ -198,7 +202,7 @@ class TwoPartSampler(Sampler):
         return jnp.where(jnp.abs(first - xi) < jnp.abs(second - xi), first, second)
 
     def jump(self, alpha: Array) -> Array:
-        """The share of light scattered once."""
+        """Return the share of light scattered once."""
         return self.law.parts(alpha).share
 
     def scaled_pdf(self, x: Array, alpha: Array) -> Array:
@@ -212,7 +216,7 @@ class TwoPartSampler(Sampler):
 
 
 def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int) -> Array:
-    """x at t = -ln S of a part, growth = (e^t - 1) / t."""
+    """Return x at t = -ln S of a part, growth = (e^t - 1) / t."""
     first, rest = of.once, of.again
     p, _, d, _, _, _, g = AGAIN
     white, slowest = guess(of)
@@ -230,7 +234,7 @@ def drawn(t: Array, growth: Array, of: Parts, is_once: Array | bool, steps: int)
 
 
 def guess(of: Parts) -> tuple[Array, Array]:
-    """Of the first guess of a radius, what depends on the material: the share that grows with e^t, and its slope.
+    """Return what the first guess of a radius takes from the material: the share that grows with e^t, and its slope.
 
     Far away x -> A e^t in a white medium, and t / kappa in any other; next to the source x goes with sqrt(t).
     """

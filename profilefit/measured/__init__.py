@@ -7,11 +7,11 @@ if TYPE_CHECKING:
     from profilefit.measured.data import Measured
     from profilefit.measured.problem import Known
     from profilefit.measured.reading import read
-    from profilefit.measured.result import Answer
-    from profilefit.measured.workflow import fit
+    from profilefit.measured.result import MediumPosterior, fit
 else:
     __getattr__ = attributes(
-        __name__, {"Measured": "data", "Known": "problem", "read": "reading", "Answer": "result", "fit": "workflow"}
+        __name__,
+        {"Measured": "data", "Known": "problem", "read": "reading", "MediumPosterior": "result", "fit": "result"},
     )
 
-__all__ = ["Answer", "Known", "Measured", "fit", "read"]
+__all__ = ["Known", "Measured", "MediumPosterior", "fit", "read"]

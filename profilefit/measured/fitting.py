@@ -13,15 +13,22 @@ from scipy import stats
 from mcml_sim.exact.light import ExactLight
 from mcml_sim.media.checks import require_own_process
 from profilefit.errors import InputError
-from profilefit.measured import law_error, model
-from profilefit.measured.data import Measured, require_workable
-from profilefit.measured.misfit import Misfit, alone, gaussianised, lack_of_fit, misfit
+from profilefit.fitting.misfit import (
+    Misfit,
+    gaussianised,
+    lack_of_fit,
+    misfit,
+    own_degrees_of_freedom,
+    rough_waves,
+    waves,
+)
+from profilefit.fitting.solver import Solution, are_apart
+from profilefit.measured import model
+from profilefit.measured.data import Measured, require_workable, widening
 from profilefit.measured.model import Model, alpha_of
-from profilefit.measured.noise import Noise, noise
-from profilefit.measured.problem import Question
-from profilefit.measured.ranges import Opened, opened, slopes_by_ranges
-from profilefit.measured.replicates import widening
-from profilefit.measured.solving import Minimum, Problem, are_apart, descended, descended_from, minimised
+from profilefit.measured.noise import WAVE, WITHIN, Noise, law_covariance, noise, relative_error
+from profilefit.measured.problem import FitSpec, Problem, descended, descended_from, is_at_edge, minimised
+from profilefit.measured.ranges import RangeMarginal, marginalise, slopes_by_ranges
 
 Floats = NDArray[np.float64]
 # Weights of counted rings come from the fit itself; three rounds leave nothing to gain.
@@ -39,22 +46,22 @@ LACK_ROUNDS, BETTER = 3, 0.9  # of its estimate; share of chi-square below which
 
 @dataclass(frozen=True)
 class MediumFit:
-    """Where a fit ended. `source` is the record of the law's constants, `rel` its own relative error there.
+    """End of a fit.
 
+    rel         relative error of the law there; None where it is not known
     widening    factor on the variances that the errors of the data, themselves estimates, put on those of the fit
     rivals      other minima whose chi-square is no more above it than where the 95 % interval ends
-    open        what the data leave open of ranges; the fit is that at their means
+    range_marginal  what the data leave open of ranges; the fit is that at their means
     plain       the fit by the errors of data and law alone, whose residuals suggest the lack of fit that this one
                 allows for; None where none is allowed for
     """
 
     problem: Problem
-    minimum: Minimum
-    source: law_error.Origin | None
+    minimum: Solution
     rel: float | None
     widening: float = 1.0
-    rivals: tuple[Minimum, ...] = ()
-    open: Opened | None = None
+    rivals: tuple[Solution, ...] = ()
+    range_marginal: RangeMarginal | None = None
     plain: MediumFit | None = None
 
     @property
@@ -62,12 +69,22 @@ class MediumFit:
         return self.problem.data
 
     @property
-    def question(self) -> Question:
-        return self.problem.question
+    def spec(self) -> FitSpec:
+        return self.problem.spec
 
     @property
     def point(self) -> Floats:
-        return self.minimum.point
+        return self.minimum.parameters
+
+    @property
+    def at_edge(self) -> bool:
+        """True where the best albedo is 0 or 1."""
+        return is_at_edge(self.minimum)
+
+    @property
+    def has_ended(self) -> bool:
+        """True at a minimum, or at an end of the albedo's range."""
+        return self.minimum.converged or self.at_edge
 
     @property
     def rows(self) -> int:
@@ -75,7 +92,7 @@ class MediumFit:
 
     @cached_property
     def predicted(self) -> tuple[Floats, Floats]:
-        """The light that the fit expects (n + 1,), the last being A, and its derivatives (n + 1, 3)."""
+        """Light that the fit expects (n + 1,), the last being A, and its derivatives (n + 1, 3)."""
         model: Model = self.problem.model
         return model.linearised(self.point, self.data.inner, self.data.outer)
 
@@ -85,9 +102,9 @@ class MediumFit:
 
     @cached_property
     def values(self) -> dict[str, float]:
-        """A, alpha, l, mu_s', mu_a, scale."""
-        found = model.quantities(self.point[None], self.predicted[0][-1:])
-        return {name: float(value[0]) for name, value in found.items()}
+        """Values of A, alpha, l, mu_s', mu_a and scale."""
+        each = model.quantities(self.point[None], self.predicted[0][-1:])
+        return {name: float(value[0]) for name, value in each.items()}
 
     @cached_property
     def gradients(self) -> dict[str, Floats]:
@@ -96,14 +113,14 @@ class MediumFit:
     @property
     def jacobian(self) -> Floats:
         """Derivatives (m, p) of the residuals by the free coordinates."""
-        return self.minimum.jacobian[:, list(self.question.free)]
+        return self.minimum.jacobian[:, list(self.spec.free)]
 
     @cached_property
     def gain(self) -> Floats:
-        """(3, m) how the coordinates follow errors of the rows, in standard errors."""
+        """Derivatives (3, m) of the coordinates by errors of the rows, in standard errors."""
         full = np.zeros((3, self.minimum.residuals.size))
         if np.all(np.isfinite(self.jacobian)):  # else the fit has failed and has no errors
-            full[list(self.question.free)] = np.linalg.pinv(self.jacobian)
+            full[list(self.spec.free)] = np.linalg.pinv(self.jacobian)
         return full
 
     @property
@@ -114,7 +131,7 @@ class MediumFit:
         return self.gain @ rows @ self.gain.T
 
     @property
-    def likely(self) -> Floats:
+    def total_covariance(self) -> Floats:
         """Covariance (3, 3) of the coordinates: errors of the data, of the law and by lack of fit, and open ranges."""
         return self.conditional + self.of_ranges
 
@@ -126,38 +143,33 @@ class MediumFit:
     @property
     def of_ranges(self) -> Floats:
         """Covariance (3, 3) of the coordinates from what is open of ranges."""
-        return np.zeros((3, 3)) if self.open is None else self.open.covariance
+        return np.zeros((3, 3)) if self.range_marginal is None else self.range_marginal.covariance
 
     @cached_property
     def law_rows(self) -> Floats:
         """Covariance (m, m) of the rows, in standard errors, from the law's own error; zero if that is unknown."""
-        return self._law_rows(self.problem.noise)
+        return self._in_errors(self.problem.noise.model, self.problem.noise)
 
     @cached_property
     def lack_rows(self) -> Floats:
         """Covariance (m, m) of the rows, in standard errors, from the lack of fit; zero where none is allowed for."""
-        return self._rows_of(self.problem.noise.lack, self.problem.noise)
-
-    def _law_rows(self, noise: Noise) -> Floats:
-        return self._rows_of(self.problem.noise.model, noise)
+        return self._in_errors(self.problem.noise.lack, self.problem.noise)
 
     @property
     def law_size(self) -> Floats:
-        """(n,) standard deviation of the law's own error in the light of each row; zero if that is unknown."""
+        """Standard deviation (n,) of the law's own error in the light of each row; zero if that is unknown."""
         model = self.problem.noise.model
         return np.zeros(self.rows) if model is None else np.sqrt(np.diag(model))
 
     @cached_property
     def beyond(self) -> NDArray[np.bool_]:
-        """(n,) rows farther out than the radii that `rel` covers."""
-        if isinstance(self.question.law, ExactLight):
+        """True (n,) for rows farther out than the radii that `rel` covers."""
+        if isinstance(self.spec.law, ExactLight):
             return np.zeros(self.rows, bool)
-        return self.problem.model.shares(self.point, self.data.inner) > law_error.WITHIN
+        return self.problem.model.shares(self.point, self.data.inner) > WITHIN
 
-    def _rows_of(self, error: Floats | None, noise: Noise) -> Floats:
-        """Covariance (m, m), in standard errors, of an error of covariance (n, n); zero if that is None."""
-        shape = np.zeros((self.rows,) * 2) if error is None else error
-        return law_error.whitened(shape, np.ones(self.rows), noise, self.minimum.residuals.size)
+    def _in_errors(self, error: Floats | None, noise: Noise) -> Floats:
+        return noise.in_errors(error, self.minimum.residuals.size)
 
     @property
     def of_law(self) -> Floats:
@@ -174,147 +186,144 @@ class MediumFit:
         """Goodness of fit by the errors of the data and of the law, without any lack of fit that is allowed for."""
         if self.plain is not None:
             return self.plain.misfit
-        rows, jacobian, law, (waves, uneven) = self._in_data_errors((law_error.WAVE, 0.0))
-        return misfit(rows, jacobian, law, waves, self.rows, uneven, self.data.pooled)
+        rows, jacobian, law, (smooth, uneven) = self._in_data_errors((WAVE, 0.0))
+        return misfit(rows, jacobian, law, smooth, self.rows, uneven, self.data.pooled)
 
     def lack_of_fit(self, values: Mapping[str, float]) -> Floats | None:
         """Estimate the covariance (n, n) of a lack of fit from the residuals; None where they do not suggest any.
 
-        values  those of the question's ranges. These take up residuals as the free coordinates do, and so hide a lack
-                of fit: one that the residuals allow is then presumed
+        Args:
+            values: those of the spec's ranges. These take up residuals as the free coordinates do, and so hide a
+                lack of fit: one that the residuals allow is then presumed.
         """
         rows, jacobian, law, shapes = self._in_data_errors(LACK_WAVES, values)
         variances, likelier = lack_of_fit(rows, jacobian, law, shapes, self.data.pooled)
         if likelier <= (-np.inf if values else 0.0):
             return None
         each = zip(variances, LACK_WAVES, strict=True)
-        joint = sum(variance * law_error.rough_waves(self.data.r, length) for variance, length in each)
+        joint = sum(variance * rough_waves(self.data.r, length) for variance, length in each)
         return np.asarray(joint * np.outer(self.light, self.light), float)
 
     def _in_data_errors(
         self, lengths: Sequence[float], values: Mapping[str, float] | None = None
     ) -> tuple[Floats, Floats, Floats, Floats]:
-        """Residuals (m,), their derivatives, and covariances of the law's error and of relative errors 1 in waves.
+        """Return residuals (m,), their derivatives, and covariances of the law's and of relative errors 1 in waves.
 
         All are in the errors of the data as they are: what widens those of the coordinates is no noise in a row.
-        Derivatives are by the free coordinates and, where `values` of them are given, by the question's ranges.
+        Derivatives are by the free coordinates and, where `values` of them are given, by the spec's ranges.
         """
         times = np.ones(self.minimum.residuals.size)
         times[: self.rows] = np.sqrt(self.widening)
-        own = self.problem.noise.alone
+        own = self.problem.noise.of_data
         problem = replace(self.problem, noise=own)
         rows, slopes = problem.residuals(self.point)
         rows, both = times * rows, np.outer(times, times)
-        rows[: self.rows] = gaussianised(rows[: self.rows], alone(self.data.freedom, self.data.pooled))
+        rows[: self.rows] = gaussianised(rows[: self.rows], own_degrees_of_freedom(self.data.freedom, self.data.pooled))
         size = np.outer(self.light, self.light)
-        shapes = [both * self._rows_of(size * law_error.waves(self.data.r, length), own) for length in lengths]
-        slopes = slopes[:, list(self.question.free)]
+        shapes = [both * self._in_errors(size * waves(self.data.r, length), own) for length in lengths]
+        slopes = slopes[:, list(self.spec.free)]
         if values:
             slopes = np.column_stack([slopes, slopes_by_ranges(problem, values, self.point)])
-        return rows, times[:, None] * slopes, both * self._law_rows(own), np.array(shapes)
+        return rows, times[:, None] * slopes, both * self._in_errors(self.problem.noise.model, own), np.array(shapes)
 
     @property
     def sigma(self) -> Floats:
-        """(n,) standard errors of the data's rows; of counts those of the light that the fit expects."""
+        """Standard errors (n,) of the data's rows; of counts those of the light that the fit expects."""
         return self.problem.noise.sigma / np.sqrt(self.widening)
 
     @property
     def quantile(self) -> float:
-        """How many standard errors an interval of 95 % goes to either side: Student's, of the errors' own freedom."""
+        """Standard errors to either side in an interval of 95 %: Student's, of the errors' own freedom."""
         return float(stats.t.ppf(0.5 + LEVEL / 2, self.data.pooled))
 
     def errors(self, covariance: Floats) -> dict[str, float]:
-        """Standard errors of the quantities from a covariance of the coordinates."""
+        """Return standard errors of the quantities from a covariance of the coordinates."""
         return model.errors(self.gradients, covariance)
 
 
-def fitted(data: Measured, question: Question, source: law_error.Origin | None = None) -> MediumFit:
+def fitted(data: Measured, spec: FitSpec) -> MediumFit:
     """Fit the free ones of alpha, l and scale to the data; a failure is named in `minimum.result`.
 
-    source  the record that the law's constants came from, which knows how far it is from the truth
     InputError if there are not more rows than free coordinates, or if the data are beyond `require_workable`.
     """
     require_own_process()
-    free = len(question.free)
+    free = len(spec.free)
     if data.value.size <= free:
         raise InputError(f"{data.source}: expected more than {free} rows, one more than is free, got {data.value.size}")
     require_workable(data)
     wider = widening(data.freedom, free)
-    each = [law_error.relative_error(question.law, alpha, source) or 0.0 for alpha in SEARCHED]
-    model = law_error.covariance(data, max(each), np.zeros(data.value.size, bool))
-    problem = Problem(data, question, noise(data, widening=wider, model=model))
+    data = replace(data, notes=(*data.notes, *spec.notes))
+    each = [relative_error(spec.law, alpha, spec.source) or 0.0 for alpha in SEARCHED]
+    model = law_covariance(data, max(each), np.zeros(data.value.size, bool))
+    problem = Problem(data, spec, noise(data, widening=wider, model=model))
     minimum = first = minimised(problem)
-    found = MediumFit(problem, minimum, source, _rel(question, minimum, source), wider)
+    fit = MediumFit(problem, minimum, _rel(spec, minimum), wider)
     rounds = REWEIGHTED if data.counted else ROUNDS if model is not None else 0
-    found = _allowing_for_lack(_settled(found, rounds), rounds)
-    return replace(found, rivals=_rivals(found, first.others))
+    fit = _allowing_for_lack(_settled(fit, rounds), rounds)
+    return replace(fit, rivals=_rivals(fit, first.others))
 
 
-def _settled(found: MediumFit, rounds: int) -> MediumFit:
+def _settled(fit: MediumFit, rounds: int) -> MediumFit:
     """Fit again with the errors that the fit's own light has, so many times, then with what is open of ranges."""
     for _ in range(rounds):
-        found = _reweighted(found)
-    if found.question.ranges:
-        left = opened(found.problem, found.minimum, None if found.open is None else found.open.mean)
-        found = replace(found, open=left)
+        fit = _reweighted(fit)
+    if fit.spec.ranges:
+        left = marginalise(fit.problem, fit.minimum, None if fit.range_marginal is None else fit.range_marginal.mean)
+        fit = replace(fit, range_marginal=left)
         if left is not None:
-            found = replace(found, problem=found.problem.under(left.mean), minimum=left.there)
-            found = _reweighted(found) if rounds else found
-    return found
+            fit = replace(fit, problem=fit.problem.under(left.mean), minimum=left.there)
+            fit = _reweighted(fit) if rounds else fit
+    return fit
 
 
-def _allowing_for_lack(found: MediumFit, rounds: int) -> MediumFit:
+def _allowing_for_lack(fit: MediumFit, rounds: int) -> MediumFit:
     """Fit again under errors with the lack of fit that the residuals suggest; unchanged where they suggest none.
 
     Wider errors let the search out of a local minimum; where this leads to a better fit, all begins again from there.
     """
-    wider = found
+    wider = fit
     for _ in range(LACK_ROUNDS):
-        values = {} if found.open is None else found.open.mean
-        lack = found.lack_of_fit(values) if _ended(found) else None
+        values = {} if fit.range_marginal is None else fit.range_marginal.mean
+        lack = fit.lack_of_fit(values) if fit.has_ended else None
         if lack is None:
-            return found
-        problem = replace(found.problem, noise=replace(found.problem.noise, lack=lack))
-        wider = _settled(replace(found, problem=problem, plain=found), 1)
-        if not _ended(wider):
-            return found
-        back = replace(wider.problem, noise=found.problem.noise)
+            return fit
+        problem = replace(fit.problem, noise=replace(fit.problem.noise, lack=lack))
+        wider = _settled(replace(fit, problem=problem, plain=fit), 1)
+        if not wider.has_ended:
+            return fit
+        back = replace(wider.problem, noise=fit.problem.noise)
         there = descended_from(back, wider.point)
-        if not there.cost < BETTER * found.minimum.cost:
+        if not there.cost < BETTER * fit.minimum.cost:
             break
-        found = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)
+        fit = _settled(replace(wider, problem=back, minimum=there, plain=None), rounds)
     return wider
 
 
-def _ended(found: MediumFit) -> bool:
-    return found.minimum.converged or found.minimum.at_edge
-
-
-def _reweighted(found: MediumFit) -> MediumFit:
-    """The same with the errors that its own light has; as it was where this is not finite."""
-    light, data = found.problem.model.linearised(found.point, found.data.inner, found.data.outer)[0][:-1], found.data
+def _reweighted(fit: MediumFit) -> MediumFit:
+    """Fit again with the errors that the fit's own light has; return it as it was where this is not finite."""
+    light, data = fit.problem.model.linearised(fit.point, fit.data.inner, fit.data.outer)[0][:-1], fit.data
     if not np.all(np.isfinite(light)):
-        return found
+        return fit
     expected = np.maximum(light, LEAST_EXPECTED * data.value)
-    model = law_error.covariance(data, found.rel, found.beyond)
-    weights = noise(data, expected, found.widening, model, found.problem.noise.lack)
-    problem = replace(found.problem, noise=weights)
-    minimum = descended(problem, found.point, found.question.free)
-    return replace(found, problem=problem, minimum=minimum, rel=_rel(found.question, minimum, found.source))
+    model = law_covariance(data, fit.rel, fit.beyond)
+    weights = noise(data, expected, fit.widening, model, fit.problem.noise.lack)
+    problem = replace(fit.problem, noise=weights)
+    minimum = descended(problem, fit.point, fit.spec.free)
+    return replace(fit, problem=problem, minimum=minimum, rel=_rel(fit.spec, minimum))
 
 
-def _rivals(found: MediumFit, others: tuple[Minimum, ...]) -> tuple[Minimum, ...]:
-    """Of other minima of the search those that fit as well within the interval's level, under the final errors."""
-    rivals: list[Minimum] = []
+def _rivals(fit: MediumFit, others: tuple[Solution, ...]) -> tuple[Solution, ...]:
+    """Return other minima of the search that fit as well within the interval's level, under the final errors."""
+    rivals: list[Solution] = []
     for one in others:
-        if one.cost > found.minimum.cost + FAR:
+        if one.cost > fit.minimum.cost + FAR:
             continue
-        there = descended_from(found.problem, one.point)
-        near = there.cost - found.minimum.cost < found.quantile**2
-        if near and all(are_apart(there, other) for other in (found.minimum, *rivals)):
+        there = descended_from(fit.problem, one.parameters)
+        near = there.cost - fit.minimum.cost < fit.quantile**2
+        if near and all(are_apart(there, other) for other in (fit.minimum, *rivals)):
             rivals.append(there)
     return tuple(rivals)
 
 
-def _rel(question: Question, minimum: Minimum, source: law_error.Origin | None) -> float | None:
-    return law_error.relative_error(question.law, float(alpha_of(minimum.point[0])), source)
+def _rel(spec: FitSpec, minimum: Solution) -> float | None:
+    return relative_error(spec.law, float(alpha_of(minimum.parameters[0])), spec.source)

@@ -1,8 +1,11 @@
-"""What stands between a profile and a row of data: the beam's width, and the ring or the fibre that gathers light.
+"""Instruments: the beam, and the ring or the fibre that gathers light, between a profile and a row of data.
 
-The light at a distance d from the axis of a beam of irradiance b is
+K(d, rho) is the mean of a beam's irradiance b over the circle of radius rho about a point at the distance d from its
+axis; b integrates to 1. A Gaussian beam of 1/e^2 radius w, b = 2 / (pi w^2) e^{-2 r^2 / w^2}, has
+K = b(d - rho) I_0(4 d rho / w^2) e^{-4 d rho / w^2}; a top hat of radius a, b = 1 / (pi a^2), has K = b theta / pi,
+cos theta = (d^2 + rho^2 - a^2) / (2 d rho). The light at the distance d is
 
-    R_b(d) = int_0^inf D(rho) K(d, rho) drho,    D = 2 pi rho R_d(rho),    K the mean of b over a circle (`beam`)
+    R_b(d) = int_0^inf D(rho) K(d, rho) drho,    D = 2 pi rho R_d(rho)
 
 (the convolution of R_d with b in polar coordinates), and a row is its mean over a ring or the end of a fibre. So a
 row is a sum over nodes rho with weights that know nothing of the medium. All rows share their nodes. Points under a
@@ -12,13 +15,40 @@ which is ln rho near the axis and rho itself far from it.
 
 from __future__ import annotations
 
+import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.special import i0e
 
-from profilefit.measured.beam import Floats, Irradiance, Nodes, TopHat
+from mcml_sim.files.whole_file import read_whole
+from profilefit.errors import InputError
+from profilefit.measured.data import length
 
+Floats = NDArray[np.float64]
+Nodes = tuple[Floats, Floats]
+PANEL = np.polynomial.legendre.leggauss(6)
+PANELS, REACH = 12, 6.0  # of a Gaussian beam: as wide as its standard deviation twice, so many w to either side
+GRADED, FINER = 9, 3.0  # panels into which the nearest one is divided, each that much narrower than the next
+EDGE = np.polynomial.legendre.leggauss(40)  # where a circle crosses the rim of a top hat
+OCTAVES = 10  # of a measured beam's radii, down from its last, as panels
+STEEP, STEEPEST = 0.05, 8  # change over its brightest in a straight piece that is a panel, too; as many of these
+AROUND = np.polynomial.legendre.leggauss(8)  # of a circle, in each panel
+LEAST = 1e-12  # of a beam's radius, from a point to a circle about it
+FWHM, TOPHAT = "fwhm:", "tophat:"
+BY_FWHM = 1.0 / math.sqrt(2.0 * math.log(2.0))  # 1/e^2 radius of a Gaussian beam over its full width at half maximum
+ACCEPTED = (
+    "a length > 0, the 1/e^2 radius of a Gaussian beam (0.5mm) or a range of it (0.3mm:0.7mm), fwhm:0.6mm, its full "
+    "width at half maximum, tophat:0.5mm, a radius, or a .csv file"
+)
+MAX_BYTES, MOST_ROWS = 2**20, 2000  # of a beam's file
+CELLS = re.compile(r"[\s,;]+")
 RING = np.polynomial.legendre.leggauss(16)
 NEAR = 1000.0  # outer over inner radius, up to which a ring's nodes are straight in ln d
 # Shared nodes: how many a polynomial goes through, their distance in t, the first t, and grains to the last of them.
@@ -26,9 +56,186 @@ STENCIL, STEP, FIRST, GRAINS = 8, 0.2, -10.0, 120.0
 COUNT = int(np.ceil((GRAINS - FIRST) / STEP)) + STENCIL
 
 
+class Irradiance(Protocol):
+    """Irradiance about an axis."""
+
+    @property
+    def words(self) -> str:
+        """Description for messages, without a unit."""
+
+    def nodes(self, d: Floats) -> Nodes:
+        """Radii rho and weights K drho, (..., J) each, for distances d from the axis of any shape."""
+
+
+@dataclass(frozen=True)
+class Gaussian:
+    """A beam of 1/e^2 radius w [unit of r]."""
+
+    w: float
+
+    @property
+    def words(self) -> str:
+        return f"a Gaussian beam of 1/e^2 radius {self.w:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        reach = REACH * self.w
+        rho, weight = _panels(np.maximum(d - reach, 0.0), d + reach)
+        b = 2.0 / (np.pi * self.w**2) * np.exp(-2.0 * ((d[..., None] - rho) / self.w) ** 2)
+        return rho, weight * b * i0e(4.0 * d[..., None] * rho / self.w**2)
+
+
+@dataclass(frozen=True)
+class TopHat:
+    """A uniform disc of radius a [unit of r]."""
+
+    a: float
+
+    @property
+    def words(self) -> str:
+        return f"a top hat of radius {self.a:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        whole, dw = _graded(np.zeros_like(d), np.maximum(self.a - d, 0.0))
+        whole = np.where(dw > 0, whole, self.a)  # off the beam nothing counts, anywhere
+        low, high = np.abs(d - self.a), d + self.a
+        t = 0.5 * (1.0 + EDGE[0])
+        part = low[..., None] + (high - low)[..., None] * t * t * (3.0 - 2.0 * t)  # roots of K at both ends
+        dp = (high - low)[..., None] * 6.0 * t * (1.0 - t) * 0.5 * EDGE[1]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            cosine = (d[..., None] ** 2 + part**2 - self.a**2) / (2.0 * d[..., None] * part)
+        share = np.where(np.isfinite(cosine), np.arccos(np.clip(cosine, -1.0, 1.0)) / np.pi, 0.5)
+        weights = np.concatenate([dw, dp * share], axis=-1) / (np.pi * self.a**2)
+        return np.concatenate([whole, part], axis=-1), weights
+
+
+@dataclass(frozen=True, eq=False)
+class Profiled:
+    """A measured beam: irradiance (n,) at radii (n,) from its axis, rising from 0, straight between them, 0 beyond."""
+
+    r: Floats
+    value: Floats
+
+    @property
+    def words(self) -> str:
+        return f"a measured beam out to {self.r[-1]:g}"
+
+    def nodes(self, d: Floats) -> Nodes:
+        at, low = d[..., None], np.maximum(d - self.r[-1], 0.0)[..., None]
+        edges = np.concatenate([low + self._edges, np.abs(at - self._edges), at + self._edges], axis=-1)
+        rho, weight = _between(np.sort(edges, axis=-1))
+        rho, weight = np.maximum(rho, LEAST * self.r[-1]), weight * self._around(at, rho)
+        return rho, weight / (2.0 * np.pi * np.sum(rho * weight, axis=-1))[..., None]
+
+    @cached_property
+    def _edges(self) -> Floats:
+        """Radii between which b is smooth, or little of the light."""
+        octaves = self.r[-1] * 0.5 ** np.arange(OCTAVES)
+        change = np.abs(np.diff(self.value))
+        steep = np.argsort(change)[-STEEPEST:]
+        steep = steep[change[steep] > STEEP * self.value.max()]
+        return np.unique(np.concatenate([[0.0], octaves, self.r[steep], self.r[steep + 1]]))
+
+    def _around(self, d: Floats, rho: Floats) -> Floats:
+        """Return the mean of b over circles, panel by panel of the distance s from the axis: none steps over a beam."""
+        nearest, across = np.abs(d - rho)[..., None], (4.0 * d * rho)[..., None]
+        s = np.maximum(self._edges, nearest)
+        with np.errstate(divide="ignore", invalid="ignore"):  # circles about the axis, or of no radius
+            turn = 2.0 * np.arcsin(np.sqrt(np.clip((s - nearest) * (s + nearest) / across, 0.0, 1.0)))
+        turn = np.where(across > 0, turn, np.linspace(0.0, np.pi, s.shape[-1]))
+        nodes, weights = _between(turn, AROUND)
+        far = np.sqrt(nearest**2 + across * np.sin(0.5 * nodes) ** 2)
+        return np.asarray(np.sum(weights * np.interp(far, self.r, self.value, right=0.0), axis=-1) / np.pi, float)
+
+
+def beam_of(option: str, text: str, unit: str, folder: Path = Path()) -> Irradiance:
+    """Return the beam of a text, one of `ACCEPTED` but a range.
+
+    unit    of r, in which the beam's lengths are then; InputError names the `option` and what it takes.
+    folder  where the file lies, if its path is not absolute
+    """
+    if text.lower().endswith((".csv", ".tsv", ".txt")):
+        return _read(folder / text)
+    if text.lower().startswith(TOPHAT):
+        return TopHat(length(option, text[len(TOPHAT) :], unit, ACCEPTED))
+    return gaussian(option, text, unit)
+
+
+def gaussian(option: str, text: str, unit: str) -> Gaussian:
+    """Return the Gaussian beam of a 1/e^2 radius, 0.5mm, or of a full width at half maximum, fwhm:0.6mm."""
+    if text.lower().startswith(FWHM):
+        return Gaussian(BY_FWHM * length(option, text[len(FWHM) :], unit, ACCEPTED))
+    return Gaussian(length(option, text, unit, ACCEPTED))
+
+
+def _read(path: Path) -> Profiled:
+    """Rows of a radius [unit of r] and an irradiance in any measure; a first row of names is passed over."""
+    content = read_whole(path, MAX_BYTES)
+    if len(content) > MAX_BYTES:
+        raise InputError(f"{path}: expected a beam of at most {MAX_BYTES} bytes, got a longer file")
+    text = content.decode("utf-8-sig", "replace")
+    lines = [(at, line.partition("#")[0].strip()) for at, line in enumerate(text.splitlines(), start=1)]
+    lines = [(at, line) for at, line in lines if line]
+    rows: list[list[float]] = []
+    for number, (at, line) in enumerate(lines):
+        cells = CELLS.split(line)
+        found = [_number(cell) for cell in cells]
+        if number == 0 and any(math.isnan(one) for one in found):
+            continue
+        if len(found) != 2 or not all(math.isfinite(one) and one >= 0 for one in found):
+            raise InputError(f"{path}:{at}: expected a radius >= 0 and an irradiance >= 0, got {line[:40]!r}")
+        if rows and found[0] <= rows[-1][0]:
+            raise InputError(f"{path}:{at}: expected radii that rise above {rows[-1][0]:g}, got {found[0]:g}")
+        rows.append(found)
+    while len(rows) > 2 and rows[-1][1] == rows[-2][1] == 0.0:  # darkness beyond the beam
+        rows.pop()
+    if not 2 <= len(rows) <= MOST_ROWS or not any(value > 0 for _, value in rows[:-1]):
+        raise InputError(
+            f"{path}: expected 2 to {MOST_ROWS} rows of radius and irradiance, with light, got {len(rows)}"
+        )
+    r, value = np.array(rows).T
+    if r[0] > 0:  # a profile that begins off the axis is flat up to there
+        r, value = np.append(0.0, r), np.append(value[0], value)
+    return Profiled(r, value)
+
+
+def _number(cell: str) -> float:
+    try:
+        return float(cell)
+    except ValueError:
+        return math.nan
+
+
+def _panels(low: Floats, high: Floats) -> Nodes:
+    """Return nodes of PANELS equal panels, the first of them graded towards its lower end."""
+    edges = low[..., None] + (high - low)[..., None] * np.arange(PANELS + 1) / PANELS
+    first, d_first = _graded(low, edges[..., 1])
+    rest, d_rest = _between(edges[..., 1:])
+    return np.concatenate([first, rest], axis=-1), np.concatenate([d_first, d_rest], axis=-1)
+
+
+def _between(edges: Floats, panel: Nodes = PANEL) -> Nodes:
+    """Return nodes of the panels between edges (..., k) that rise, some of them without width."""
+    half, middle = 0.5 * np.diff(edges)[..., None], 0.5 * (edges[..., 1:] + edges[..., :-1])[..., None]
+    flat = (*edges.shape[:-1], -1)
+    return (middle + half * panel[0]).reshape(flat), (half * panel[1]).reshape(flat)
+
+
+def _graded(low: Floats, high: Floats) -> Nodes:
+    edges, width = _grades()
+    width = (high - low)[..., None] * width
+    return low[..., None] + (high - low)[..., None] * edges, width
+
+
+@lru_cache(maxsize=1)
+def _grades() -> Nodes:
+    """Nodes and weights in (0, 1), finer towards 0."""
+    edges = np.append(0.0, FINER ** np.arange(1.0 - GRADED, 0.5))
+    return _between(edges)
+
+
 @dataclass(frozen=True)
 class Instrument:
-    """How the light of a row is gathered.
+    """Beam and fibre that gather the light of a row.
 
     beam   None of a pencil beam
     fibre  radius of the fibre's core that a point is averaged over [unit of r], which may cover the axis; 0 of a point
@@ -45,7 +252,7 @@ class Instrument:
         return self.gathered(*self._distances(inner, outer), farthest)
 
     def gathered(self, d: Floats, mean: Floats, farthest: float = 0.0) -> Nodes:
-        """Like `nodes`, of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
+        """Return `nodes` of rows that are sums over distances d (n, M) from the axis, weighted by `mean` (n, M)."""
         if self.beam is None:
             own = mean / (2.0 * np.pi * d)
             return (d[:, 0], np.diag(own[:, 0])) if d.shape[1] == 1 else _shared(zip(d, own, strict=True), farthest)
@@ -76,21 +283,16 @@ PENCIL = Instrument()
 
 
 def _shared(each: Iterable[Nodes], farthest: float) -> Nodes:
-    """The nodes and weights of all rows on common nodes, as many for any beam."""
+    """Return the nodes and weights of all rows on common nodes, as many for any beam."""
     rows = list(each)
     grain = max(farthest, *(float(rho.max()) for rho, _ in rows)) / GRAINS
     weights = np.zeros((len(rows), COUNT))
     for row, (rho, weight) in enumerate(rows):
-        at = (np.maximum(_straight(rho / grain), FIRST).ravel() - FIRST) / STEP
+        straight = rho / grain + np.log(-np.expm1(-rho / grain))  # t
+        at = (np.maximum(straight, FIRST).ravel() - FIRST) / STEP
         first = np.clip(np.floor(at).astype(int) - STENCIL // 2 + 1, 0, COUNT - STENCIL)
         for one in range(STENCIL):
             others = [other for other in range(STENCIL) if other != one]
             basis = np.prod([(at - first - other) / (one - other) for other in others], axis=0)
             weights[row] += np.bincount(first + one, weight.ravel() * basis, COUNT)
     return grain * np.logaddexp(0.0, FIRST + STEP * np.arange(COUNT)), weights
-
-
-def _straight(grains: Floats) -> Floats:
-    """t of a radius > 0 in grains."""
-    found: Floats = grains + np.log(-np.expm1(-grains))
-    return found

@@ -21,13 +21,13 @@ from mcml_sim.media.medium import Medium
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.fitting import solver
-from profilefit.measured.data import Measured, require_workable
+from profilefit.fitting.misfit import DETECTED, gaussianised, own_degrees_of_freedom, scatter_chance
+from profilefit.measured.data import Measured, require_workable, widening
+from profilefit.measured.identifiability import LOOSE
 from profilefit.measured.instrument import Instrument
-from profilefit.measured.misfit import DETECTED, alone, gaussianised, scatter_chance
 from profilefit.measured.noise import Noise, noise
 from profilefit.measured.premises import Premises
 from profilefit.measured.problem import Known
-from profilefit.measured.replicates import widening
 
 Floats = NDArray[np.float64]
 NAME = re.compile(r"(d|mu_a|mu_s)([1-9][0-9]?)")
@@ -39,13 +39,12 @@ REACH = math.log(300.0)  # how far ln of a quantity may go from where it starts
 TOLERANCE, MOST_STEPS = 1e-4, 20
 GAIN = 1e-3  # of chi-square, that another step must gain
 ROUNDS = 2  # of weights: those of counts come from the fit
-LOOSE = 0.5  # relative error from which a quantity is not identified
 NAMED = 0.1  # exponents below it are left out of a product's name
 
 
 @dataclass(frozen=True)
 class LayersFit:
-    """What was found; lengths in the unit of the data.
+    """Fit of layers; lengths in the unit of the data.
 
     names     of the free quantities; scale last where it is free
     values    (p,); errors (p,) their relative standard errors, with the misfit; correlation (p, p) of their logarithms
@@ -77,7 +76,7 @@ class LayersFit:
 
     @property
     def loose(self) -> tuple[str, ...]:
-        """What these data do not identify."""
+        """Quantities that these data do not identify."""
         return tuple(name for name, error in zip(self.names, self.errors, strict=True) if not error < LOOSE)
 
     def product(self, at: int) -> str:
@@ -97,8 +96,14 @@ def fit_layers(
 ) -> LayersFit:
     """Fit the free quantities of a stack, from where `medium` has them; lengths in the unit of the data. Minutes.
 
-    scale  as in `workflow.fit`; n and g are those of the layers. InputError of a medium that `exact.solve` has not, of
-           names that it has not, and of data that state another n, or a g
+    InputError of a medium that `exact.solve` has not, of names that it has not, of data that state another n, or a g.
+
+    Args:
+        data: the profile.
+        medium: the stack, whose n and g count.
+        free: names of the free quantities.
+        premises: light, beam and fibre.
+        scale: as of `premises.specified`.
     """
     require_workable(data)
     data = replace(data, notes=(*data.notes, *premises.notes))
@@ -106,34 +111,35 @@ def fit_layers(
     _require_free(medium, free)
     if data.value.size <= len(names):
         raise InputError(f"{data.source}: expected more than {len(names)} rows, one more than is free")
-    light = _Light(data, medium, tuple(free), premises)
-    light.rows(np.zeros(len(free)))  # what cannot be solved fails here
-    light = replace(light, premises=replace(premises, setting=_setting(data, medium, premises)))
-    held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     known = scale if isinstance(scale, Known) else None
+    held = 1.0 if isinstance(scale, Known) or scale is None else float(scale)
     wider = widening(data.freedom, len(names))
-    weights, start = noise(data, widening=wider), np.zeros(len(names))
+    problem = _LayersProblem(data, medium, tuple(free), premises, noise(data, widening=wider), held, known)
+    start = np.zeros(len(names))
+    light = problem.rows(start[: len(free)])  # what cannot be solved fails here
+    problem = replace(problem, premises=replace(premises, setting=_setting(data, medium, premises)))
     if known is not None:
         start[-1] = math.log(known.value)
     elif scale is None:
-        white = weights.whitened(light.rows(start[:-1]))
-        start[-1] = math.log(max(float(white @ weights.whitened(data.value) / (white @ white)), 1e-30))
+        white = problem.weights.whitened(light)
+        start[-1] = math.log(max(float(white @ problem.weights.whitened(data.value) / (white @ white)), 1e-30))
     for _ in range(ROUNDS if data.counted else 1):
-        done = _least(light, weights, start, held, known)
-        start, expected = done.parameters, _rows(light, done.parameters, held)
-        weights = noise(data, np.maximum(expected, 0.01 * data.value), wider)
-    return _judged(light, names, done, expected, weights, held, known)
+        bounds, at = (start - REACH, start + REACH), solver.differences(problem.residuals, STEP)
+        done = solver.solve(at, start, bounds, tolerance=TOLERANCE, gain=GAIN, most=MOST_STEPS)
+        start, expected = done.parameters, problem.rows(done.parameters)
+        problem = replace(problem, weights=noise(data, np.maximum(expected, 0.01 * data.value), wider))
+    return _judged(problem, names, done, expected)
 
 
-def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
-    """That of the layers; InputError where a table states another, or what is open is more than the layers."""
-    for name in told.ranges:
+def _setting(data: Measured, medium: Medium, premises: Premises) -> Setting:
+    """Return the layers' setting; InputError where a table states another, or more is open than layers."""
+    for name in premises.ranges:
         of = f"{data.source}:{data.stated[name].line}: " if name in data.stated else ""
         what = "width" if name == "beam" else "number"
         raise InputError(f"{of}{name} must be one {what} where layers are fitted, got a range")
-    own = Setting(told.setting.illumination, medium.layers[0].n / medium.n_above)
+    own = Setting(premises.setting.illumination, medium.layers[0].n / medium.n_above)
     for name, value in (("n", own.n), ("g", own.g)):
-        if name in data.stated and not math.isclose(got := getattr(told.setting, name), value):
+        if name in data.stated and not math.isclose(got := getattr(premises.setting, name), value):
             raise InputError(
                 f"{data.source}:{data.stated[name].line}: {name} must be {value:g} or left out, as of the layers that "
                 f"are fitted, got {got:g}"
@@ -142,66 +148,50 @@ def _setting(data: Measured, medium: Medium, told: Premises) -> Setting:
 
 
 @dataclass(frozen=True)
-class _Light:
-    """The light of the rows, of a medium whose free quantities are exp(logs) times what they start at."""
+class _LayersProblem:
+    """Rows of a medium whose free quantities are exp(x) times what they start at; ln of the scale is last if free.
+
+    weights  the errors of the rows; held the scale if it is not free, known what is known of it
+    """
 
     data: Measured
     medium: Medium
     free: tuple[str, ...]
     premises: Premises
+    weights: Noise
+    held: float
+    known: Known | None
 
-    def at(self, logs: Floats) -> Medium:
+    def at(self, x: Floats) -> Medium:
         layers = list(self.medium.layers)
-        for name, log in zip(self.free, logs, strict=True):
+        for name, log in zip(self.free, x, strict=False):
             kind, number = _parts(name)
-            layer = layers[number - 1]
-            field = FIELDS[kind]
+            layer, field = layers[number - 1], FIELDS[kind]
             layers[number - 1] = replace(layer, **{field: getattr(layer, field) * math.exp(log)})
         return replace(self.medium, layers=tuple(layers))
 
-    def rows(self, logs: Floats) -> Floats:
+    def rows(self, x: Floats) -> Floats:
         seen, light = self.premises.instrument, self.premises.setting.illumination
-        return solved_rows(self.at(logs), light, seen, self.data.inner.tobytes(), self.data.outer.tobytes())
+        rows = solved_rows(self.at(x), light, seen, self.data.inner.tobytes(), self.data.outer.tobytes())
+        return rows * (math.exp(x[-1]) if x.size > len(self.free) else self.held)
+
+    def residuals(self, x: Floats) -> Floats:
+        rows = self.weights.whitened(self.rows(x) - self.data.value)
+        return rows if self.known is None else np.append(rows, (math.exp(x[-1]) - self.known.value) / self.known.error)
 
 
 @lru_cache(maxsize=64)
 def solved_rows(medium: Medium, illumination: str, seen: Instrument, inner: bytes, outer: bytes) -> Floats:
-    """Exact light of rows from `inner` to `outer`, (n,) float64 as bytes, of a scale of 1."""
+    """Return exact light of rows from `inner` to `outer`, (n,) float64 as bytes, of a scale of 1."""
     rho, weight = seen.nodes(np.frombuffer(inner), np.frombuffer(outer))
     light = exact.solve(medium, illumination, NODES)
-    found: Floats = weight @ (2.0 * np.pi * rho * np.asarray(light.profile(rho)))
-    return found
+    return np.asarray(weight @ (2.0 * np.pi * rho * np.asarray(light.profile(rho))), float)
 
 
-def _rows(light: _Light, x: Floats, held: float) -> Floats:
-    free = len(light.free)
-    return light.rows(x[:free]) * (math.exp(x[free]) if x.size > free else held)
-
-
-def _residuals(light: _Light, weights: Noise, x: Floats, held: float, known: Known | None) -> Floats:
-    rows = weights.whitened(_rows(light, x, held) - light.data.value)
-    return rows if known is None else np.append(rows, (math.exp(x[-1]) - known.value) / known.error)
-
-
-def _least(light: _Light, weights: Noise, start: Floats, held: float, known: Known | None) -> solver.Solution:
-    at = solver.differences(lambda x: _residuals(light, weights, x, held, known), STEP)
-    bounds = start - REACH, start + REACH
-    return solver.solve(at, start, bounds, tolerance=TOLERANCE, gain=GAIN, most=MOST_STEPS)
-
-
-def _judged(
-    light: _Light,
-    names: tuple[str, ...],
-    done: solver.Solution,
-    expected: Floats,
-    weights: Noise,
-    held: float,
-    known: Known | None,
-) -> LayersFit:
-    rows = _residuals(light, weights, done.parameters, held, known)
-    data, count = light.data, light.data.value.size
+def _judged(problem: _LayersProblem, names: tuple[str, ...], done: solver.Solution, expected: Floats) -> LayersFit:
+    rows, data, count = problem.residuals(done.parameters), problem.data, problem.data.value.size
     times = math.sqrt(widening(data.freedom, len(names)))  # judged by the errors of the data as they are
-    rows[:count] = gaussianised(times * rows[:count], alone(data.freedom, data.pooled))
+    rows[:count] = gaussianised(times * rows[:count], own_degrees_of_freedom(data.freedom, data.pooled))
     chi2, freedom = float(rows @ rows), rows.size - len(names)
     chance = scatter_chance(chi2, freedom, data.pooled)
     wider = math.sqrt(chi2 / freedom) if chance < DETECTED else 1.0
@@ -214,11 +204,11 @@ def _judged(
     elif done.at_bound is not None and np.any(done.at_bound):
         result = f"{names[int(np.argmax(done.at_bound))]} runs away: these data do not constrain it"
     products = tuple((way / way[np.argmax(np.abs(way))], float(size)) for way, size in zip(ways, sizes, strict=True))
-    medium = light.at(done.parameters[: len(light.free)])
-    values = [getattr(medium.layers[number - 1], FIELDS[kind]) for kind, number in map(_parts, light.free)]
-    values += [math.exp(done.parameters[-1])] if len(names) > len(light.free) else []
+    medium = problem.at(done.parameters)
+    values = [getattr(medium.layers[number - 1], FIELDS[kind]) for kind, number in map(_parts, problem.free)]
+    values += [math.exp(done.parameters[-1])] if len(names) > len(problem.free) else []
     return LayersFit(
-        data, light.premises, light.medium, medium, names, np.array(values), errors,
+        data, problem.premises, problem.medium, medium, names, np.array(values), errors,
         covariance / np.outer(errors, errors), products, chi2, freedom, chance, expected, result,
     )  # fmt: skip
 

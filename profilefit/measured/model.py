@@ -1,4 +1,4 @@
-"""What exact light, or a law, predicts of a measurement, given alpha, a length and a scale: at radii or over annuli.
+"""Exact light, or a law, as an instrument sees it, given alpha, a length and a scale: at radii or over annuli.
 
 Three coordinates without bounds describe the medium and the instrument, in this order:
 
@@ -10,12 +10,17 @@ The light of a row is a sum over the radii that its instrument gathers (`instrum
 filled up to a multiple of one size, so that data of many lengths share one compiled function.
 
 The quantities A, alpha, l, mu_s' and mu_a follow from the coordinates, with errors.
+
+Exact light is that of `mcml_sim.exact.light`. Where scattering has a direction it is that of the table. Where it has
+none, between its nodes it is within 1e-5 of `mcml_sim.exact` for x up to 20 mfp, within 3e-4 farther out, until light
+has fallen by e^-20. Beyond x = 28 / kappa, where the exact solution runs out of digits (12 / kappa next to white), R_d
+goes on as e^{-kappa x} (1 + kappa x) / x^3.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache, partial
 
 import jax
@@ -23,11 +28,17 @@ import jax.numpy as jnp
 import numpy as np
 from jax import Array
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
 from scipy.special import expit
 
+from mcml_sim import exact
+from mcml_sim.exact.anisotropic import table
 from mcml_sim.exact.by_albedo import blocks
 from mcml_sim.exact.compiled import jit
-from mcml_sim.exact.light import ExactLight
+from mcml_sim.exact.half_space import require_solved
+from mcml_sim.exact.light import LEAST, ExactLight, coefficients, log_once, nodes, tabulated
+from mcml_sim.files.kept import kept
+from mcml_sim.media.setting import FORWARD_N, Setting
 from profilefit.laws.base import ProfileLaw
 from profilefit.measured.instrument import PENCIL, Instrument
 
@@ -36,7 +47,17 @@ NAMES = ("alpha", "l", "scale")
 U, LENGTH, SCALE = range(3)
 BLOCK = 32  # radii
 FLOCK = 16  # points of the three coordinates that are evaluated at once
-
+QUANTITIES = ("A", "alpha", "l", "mu_s'", "mu_a", "scale")
+POWERS = {"A": 0, "alpha": 0, "l": 1, "mu_s'": -1, "mu_a": -1, "scale": 0}  # of the unit of length
+# Quantities whose relative error is judged: each is zero or infinite only where there is no medium.
+STRENGTHS = ("mu_s'", "mu_a", "scale")
+EXACT = "exact"  # its name among laws
+DEGREES = 64  # Chebyshev polynomials in s
+STEP = 0.06  # of ln x
+NEAREST, FARTHEST = 1e-4, 1e3  # mfp, of f
+# kappa x that the exact solution reaches; the second where kappa < WHITE
+SOLVED, SOLVED_WHITE, WHITE = 28.0, 12.0, 0.06
+VERSION = 1  # of what `_solved` gives
 
 Light = ProfileLaw | ExactLight
 
@@ -80,7 +101,7 @@ class Model:
         return self._in_flocks(points, *self._nodes(inner, outer))[:, np.append(np.arange(inner.size), -1)]
 
     def _in_flocks(self, points: Floats, *nodes: Array | Floats) -> Floats:
-        """Sums over radii, and A, (m, n + 1) at points (m, 3)."""
+        """Return sums over radii, and A, (m, n + 1) at points (m, 3)."""
         flocks = -(-len(points) // FLOCK)
         filled = np.concatenate([points, np.repeat(points[-1:], flocks * FLOCK - len(points), axis=0)])
         light = [np.asarray(_predicted(self.traced, flock, *nodes)) for flock in np.split(filled, flocks)]
@@ -91,17 +112,17 @@ class Model:
         return np.concatenate([np.asarray(_shares(self.traced, point, one)) for one in blocks(r, BLOCK)])[: r.size]
 
     def _nodes(self, inner: Floats, outer: Floats) -> tuple[Array, Array]:
-        """Those of the rows, and of more like the last up to a multiple of BLOCK."""
+        """Return nodes of the rows, and of more like the last up to a multiple of BLOCK."""
         return _nodes(self.instrument, inner.tobytes(), outer.tobytes())
 
 
 def alpha_of(u) -> Floats:
-    """alpha [-] at the coordinate u, to rounding also where it is small."""
+    """Return alpha [-] at the coordinate u, to rounding also where it is small."""
     return expit(-np.asarray(u, float)) * (1.0 + expit(np.asarray(u, float)))
 
 
 def u_of(alpha: float) -> float:
-    """The coordinate u of an albedo in (0, 1)."""
+    """Return the coordinate u of an albedo in (0, 1)."""
     s = np.sqrt(1.0 - alpha)
     return float(np.log(s) - np.log(alpha / (1.0 + s)))
 
@@ -155,12 +176,6 @@ def _shares(law, point, r):
     return law.scaled_cdf(r / jnp.exp(point[LENGTH]), _alpha(point[U]))
 
 
-QUANTITIES = ("A", "alpha", "l", "mu_s'", "mu_a", "scale")
-POWERS = {"A": 0, "alpha": 0, "l": 1, "mu_s'": -1, "mu_a": -1, "scale": 0}  # of the unit of length
-# Quantities whose relative error is judged: each is zero or infinite only where there is no medium.
-STRENGTHS = ("mu_s'", "mu_a", "scale")
-
-
 def quantities(points: Floats, reflectance: Floats) -> dict[str, Floats]:
     """Each quantity (m,) at points (m, 3) whose total reflectances A are (m,)."""
     s = expit(points[:, U])
@@ -170,7 +185,7 @@ def quantities(points: Floats, reflectance: Floats) -> dict[str, Floats]:
 
 
 def slopes(point: Floats, reflectance_slope: Floats) -> dict[str, Floats]:
-    """The derivatives (3,) of each quantity by the coordinates; of A they are given."""
+    """Return the derivatives (3,) of each quantity by the coordinates; of A they are given."""
     s = float(1.0 / (1.0 + np.exp(-point[U])))
     alpha, length = float(alpha_of(point[U])), float(np.exp(point[LENGTH]))
     steep = 2.0 * s**2 * (1.0 - s)  # of 1 - alpha by u
@@ -186,7 +201,7 @@ def slopes(point: Floats, reflectance_slope: Floats) -> dict[str, Floats]:
 
 
 def errors(gradients: dict[str, Floats], covariance: Floats) -> dict[str, float]:
-    """Standard error of each quantity, from the covariance (3, 3) of the coordinates."""
+    """Return standard error of each quantity, from the covariance (3, 3) of the coordinates."""
     return {name: math.sqrt(max(float(row @ covariance @ row), 0.0)) for name, row in gradients.items()}
 
 
@@ -200,7 +215,56 @@ def correlation(gradients: dict[str, Floats], covariance: Floats, names: tuple[s
 
 
 def unit_of(name: str, unit: str) -> str:
-    """The unit of a quantity where lengths are in `unit`."""
+    """Return the unit of a quantity where lengths are in `unit`."""
     if POWERS[name] == 0:
         return ""
     return (unit or "unit of r") if POWERS[name] > 0 else f"1/{unit or 'unit of r'}"
+
+
+@lru_cache(maxsize=64)
+def exact_light(setting: Setting) -> ExactLight:
+    """Return exact light of a semi-infinite medium; SettingError of one not solved. Seconds at first, if g = 0."""
+    require_solved(setting)
+    if not setting.is_isotropic:
+        return _filled(table.light(setting))
+    parts = ("rest", "kappa", "share")
+    name = f"light-{setting.illumination}-n{setting.n!r}-{DEGREES}-v{VERSION}"
+    found = kept(name, parts, lambda: dict(zip(parts, _solved(setting), strict=True)))
+    return tabulated(setting, NEAREST, STEP, *(found[part] for part in parts))
+
+
+def light_at_hand(setting: Setting) -> ExactLight:
+    """Return exact light of one of many settings that a search tries: by the table, to 3e-4, where it has these n."""
+    if setting.is_isotropic and FORWARD_N[0] <= setting.n <= FORWARD_N[1]:
+        return _filled(table.light(setting))
+    return exact_light(setting)
+
+
+def _solved(setting: Setting) -> tuple[Floats, Floats, Floats]:
+    """Return the spline of f, kappa and A / alpha in Chebyshev polynomials of s."""
+    s = np.sqrt(1.0 - LEAST) * 0.5 * (1.0 + nodes(DEGREES))
+    alpha = 1.0 - s**2
+    log = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP)
+    kappa = np.asarray(exact.decay_rate(alpha))[:, None]
+    x = np.exp(log)[None]
+    solved = np.minimum(x, np.where(kappa > WHITE, SOLVED, SOLVED_WHITE) / kappa)
+    light = 2.0 * np.pi * solved * exact.profile(solved, alpha[:, None], setting=setting)
+    rest = (light - alpha[:, None] * np.exp(log_once(solved, setting))) / alpha[:, None] ** 2
+    f = np.log(rest) + kappa * solved - np.log1p(kappa * solved) - 2.0 * np.log(x / solved)
+    whole = nodes(DEGREES) * 0.5 + 0.5
+    share = coefficients(np.asarray(exact.reflectance(1.0 - whole**2, setting=setting)) / (1.0 - whole**2))
+    rest = coefficients(CubicSpline(log, f, axis=1).c.transpose(2, 1, 0))
+    return rest, coefficients(kappa[:, 0]), share
+
+
+def _filled(light: ExactLight) -> ExactLight:
+    """Return the light with as many intervals as where g = 0, so that both share compiled code.
+
+    Those that are added hold f at its end.
+    """
+    intervals = np.arange(np.log(NEAREST), np.log(FARTHEST) + STEP, STEP).size - 1
+    with jax.enable_x64(True):
+        end = light.rest[:, -1] @ jnp.power(light.step, jnp.arange(3.0, -1.0, -1.0))
+        shape = end.size, intervals - light.rest.shape[1], 4
+        more = jnp.zeros(shape).at[..., 3].set(end[:, None])
+        return replace(light, rest=jnp.concatenate([light.rest, more], 1))

@@ -53,7 +53,7 @@ class Oblique:
     error: float
 
     def residuals(self, setting: Setting, points: Floats) -> tuple[Floats, Floats]:
-        """In standard errors (m,) at points (m, 3) of `model`'s coordinates, and their derivatives (m, 3)."""
+        """Return residuals in standard errors (m,) at points (m, 3) of `model`'s coordinates; derivatives (m, 3)."""
         spline = _spline(setting.n, setting.g, self.angle)
         length = np.exp(points[:, model.LENGTH])
         s = 1.0 / (1.0 + np.exp(-points[:, model.U]))
@@ -77,7 +77,7 @@ def _spline(n: float, g: float, angle: float) -> RectBivariateSpline:
 
 
 def centres(alpha: float, n: float, g: float, angle: float, x: Floats) -> Floats:
-    """Where the centres of circles of radii x (m,) lie [l*] at a reduced albedo and an angle [degrees]."""
+    """Return the centres [l*] of circles of radii x (m,) at a reduced albedo and an angle [degrees]."""
     sine = np.sin(np.radians(angle)) / n
     at, weight, kappa = sources(alpha, g)
     aside, deep = at * sine, at * np.sqrt(1.0 - sine**2)

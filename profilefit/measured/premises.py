@@ -1,4 +1,4 @@
-"""Under which light, surface and scattering a profile was measured: as told, else as its file states, else assumed."""
+"""Premises of a fit: light, surface, scattering and beam as given, else as the file states them, else assumed."""
 
 from __future__ import annotations
 
@@ -11,14 +11,16 @@ from typing import Any
 from mcml_sim.media.checks import shown
 from mcml_sim.media.setting import ILLUMINATIONS, Setting
 from profilefit.errors import InputError
-from profilefit.laws import takes_g
-from profilefit.measured.beam import FWHM, TOPHAT, Gaussian, Irradiance, beam_of, gaussian
-from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import EXACT
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.lengths import length
-from profilefit.measured.problem import MEDIUM
+from profilefit.laws import profile_classes, takes_g
+from profilefit.measured.data import Measured, length
+from profilefit.measured.instrument import FWHM, PENCIL, TOPHAT, Gaussian, Instrument, Irradiance, beam_of, gaussian
+from profilefit.measured.model import EXACT, Light, exact_light
+from profilefit.measured.noise import origin
+from profilefit.measured.oblique import Oblique
+from profilefit.measured.problem import MEDIUM, FitSpec, Known, held_albedo
+from profilefit.recipes import catalogue
 
+HOLDABLE = ("alpha", "A", "l")
 ACCEPTED = {
     "n": "a refractive index > 0, or a range such as 1.33:1.45",
     "g": "a mean cosine in (-1, 1), or a range such as 0.7:0.95",
@@ -27,7 +29,7 @@ ACCEPTED = {
 
 @dataclass(frozen=True)
 class Premises:
-    """What a fit takes for granted.
+    """Premises of a fit.
 
     setting     illumination, surface and scattering; the middle of what is known as a range
     instrument  the beam, and what a row is averaged over
@@ -46,32 +48,37 @@ class Premises:
 def premises(
     data: Measured,
     law: str = EXACT,
-    told: Mapping[str, str | None] | None = None,
+    options: Mapping[str, str | None] | None = None,
     names: Mapping[str, str] | None = None,
 ) -> Premises:
-    """From what is told, texts by the names light, n, g, beam and fibre; else from what the file states.
+    """Return the premises of a fit from options, else from what the file states.
 
-    names   what messages call these. A simulation's medium is what its file states, its g only where exact light, or
-            the law that is fitted, has it
+    A simulation's medium is what its file states, its g only where exact light, or the law that is fitted, has it.
+
+    Args:
+        data: the profile.
+        law: that is fitted.
+        options: texts by the names light, n, g, beam and fibre.
+        names: what messages call these.
     """
-    spoken = {name: text for name, text in (told or {}).items() if text is not None}
-    options = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
+    chosen = {name: text for name, text in (options or {}).items() if text is not None}
+    labels = {name: name for name in ("light", *MEDIUM, "beam", "fibre")} | dict(names or {})
     notes = tuple(
-        f"the file's {name} is {shown(fact.text)} (line {fact.line}), fitted with {options[name]} {spoken[name]}"
+        f"the file's {name} is {shown(fact.text)} (line {fact.line}), fitted with {labels[name]} {chosen[name]}"
         for name, fact in data.stated.items()
-        if name in spoken and spoken[name].strip() != fact.text
+        if name in chosen and chosen[name].strip() != fact.text
     )
-    stated = {name: fact for name, fact in data.stated.items() if name not in spoken}
-    options |= {name: f"{data.source}:{fact.line}: {name}" for name, fact in stated.items()}
-    given = {name: fact.text for name, fact in stated.items()} | spoken
+    stated = {name: fact for name, fact in data.stated.items() if name not in chosen}
+    labels |= {name: f"{data.source}:{fact.line}: {name}" for name, fact in stated.items()}
+    given = {name: fact.text for name, fact in stated.items()} | chosen
     light = given.get("light", data.illumination or "searchlight")
     if light not in ILLUMINATIONS:
-        raise InputError(f"{options['light']} must be one of {', '.join(ILLUMINATIONS)}, got {shown(light)}")
+        raise InputError(f"{labels['light']} must be one of {', '.join(ILLUMINATIONS)}, got {shown(light)}")
     if data.illumination not in (None, light):
         raise InputError(
-            f"{options['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
+            f"{labels['light']} must be {data.illumination} for {data.source}, which was simulated so, got {light!r}"
         )
-    ranges = {name: parsed(options[name], given[name], name) for name in MEDIUM if name in given}
+    ranges = {name: parsed(labels[name], given[name], name) for name in MEDIUM if name in given}
     n, g = ranges.get("n", (data.n or 1.0,) * 2), ranges.get("g", (0.0, 0.0))
     setting = Setting(light, 0.5 * sum(n), 0.5 * sum(g))
     # Clear layers may state any g.
@@ -81,16 +88,16 @@ def premises(
     ranges = {name: ends for name, ends in ranges.items() if ends[0] < ends[1]}
     if ranges and law != EXACT:
         raise InputError(
-            f"{options[min(ranges)]} must be a number where a law is fitted, got {shown(given[min(ranges)])}"
+            f"{labels[min(ranges)]} must be a number where a law is fitted, got {shown(given[min(ranges)])}"
         )
     if "fibre" in given and data.rings:
-        raise InputError(f"{options['fibre']} must be left out where rows are averages over annuli")
+        raise InputError(f"{labels['fibre']} must be left out where rows are averages over annuli")
     # What a file states lies beside it; a pipe has no place.
-    beside = "beam" not in spoken and Path(data.source).is_file()
+    beside = "beam" not in chosen and Path(data.source).is_file()
     folder = Path(data.source).parent if beside else Path()
-    beam, widths = _beam(options["beam"], given.get("beam"), data.unit, folder)
+    beam, widths = _beam(labels["beam"], given.get("beam"), data.unit, folder)
     ranges |= {} if widths is None else {"beam": widths}
-    fibre = length(options["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
+    fibre = length(labels["fibre"], given["fibre"], data.unit) if "fibre" in given else 0.0
     assumed = () if data.medium is not None else tuple(name for name in MEDIUM if name not in given)
     return Premises(setting, Instrument(beam, fibre), ranges, assumed, notes)
 
@@ -113,7 +120,7 @@ def _beam(
 
 
 def parsed(option: str, text: Any, name: str) -> tuple[float, float]:
-    """Both ends of a number or of a range LOW:HIGH."""
+    """Return both ends of a number or of a range LOW:HIGH."""
     parts = str(text).split(":")
     try:
         ends = [float(part) for part in parts]
@@ -123,3 +130,78 @@ def parsed(option: str, text: Any, name: str) -> tuple[float, float]:
     if not (1 <= len(ends) <= 2 and all(least < one < most for one in ends) and ends[0] <= ends[-1]):
         raise InputError(f"{option} must be {ACCEPTED[name]}, got {shown(text)}")
     return ends[0], ends[-1]
+
+
+def specified(
+    data: Measured,
+    law: str = EXACT,
+    constants: str = "regenerated",
+    setting: Setting | Premises | None = None,
+    held: Mapping[str, float] | None = None,
+    total: Known | None = None,
+    scale: float | Known | None = 1.0,
+    folder: Path | None = None,
+    oblique: Oblique | None = None,
+) -> FitSpec:
+    """Return the specification of a fit to data; InputError, SettingError or RecordError of one that cannot be.
+
+    Args:
+        data: the profile.
+        law: "exact", light solved exactly, or a law's name.
+        constants: which of the law's, as for `catalogue.load`.
+        setting: illumination, surface and scattering, or all premises; by default what the file states, else
+            "searchlight" (a pencil beam, normal, collimated), n = 1 and g = 0.
+        held: fixed quantities: alpha or A [-], l [unit of the data].
+        total: the total reflectance A [-], if that was measured too.
+        scale: the values are light times this: a number, one that is known to within an error, or None if unknown.
+        folder: of the records, by default the ones shipped.
+        oblique: the centre of a circle of the same medium's light, where a beam fell in obliquely.
+    """
+    records, held = folder or catalogue.fits_folder(), {**(held or {})}
+    where = Premises(setting) if isinstance(setting, Setting) else setting or premises(data, law)
+    illumination, n = where.setting.illumination, where.setting.n
+    if data.illumination not in (None, illumination):
+        got = f"{data.illumination} light, got {illumination} light to fit"
+        raise InputError(f"{data.source}: a simulation of {got}")
+    if oblique is not None and illumination != Setting().illumination:
+        raise InputError(f"oblique light must be a {Setting().illumination}, got {illumination} light to fit")
+    light = _light(law, constants, where.setting, records)
+    _require_held(light, held)
+    if not (scale is None or isinstance(scale, Known)):
+        held["scale"] = _positive("scale", scale)
+    known = scale if isinstance(scale, Known) else None
+    notes = where.notes
+    if data.n is not None and not math.isclose(data.n, n):
+        notes = (*notes, f"the file's n is {data.n:g}, fitted as n = {n:g}")
+    return FitSpec(
+        light, held, total, known, oblique, where.instrument, where.ranges, where.assumed,
+        origin(law, constants, light.setting, records), law, constants, notes,
+    )  # fmt: skip
+
+
+def _light(law: str, constants: str, setting: Setting, folder: Path) -> Light:
+    if law == EXACT:
+        if constants != "regenerated":
+            raise InputError(f"constants must be left out where light is solved exactly, got {constants!r}")
+        return exact_light(setting)
+    if law not in profile_classes() and not law.startswith("gaussians:"):
+        raise InputError(f"law must be one of {', '.join((EXACT, *catalogue.names()))}, got {law!r}")
+    return catalogue.load(law, constants, setting, folder)
+
+
+def _require_held(law: Light, held: Mapping[str, float]) -> None:
+    if unknown := [name for name in held if name not in HOLDABLE]:
+        raise InputError(f"held must name some of {', '.join(HOLDABLE)}, got {unknown[0]!r}")
+    if {"alpha", "A"} <= set(held):
+        raise InputError("held must have one of alpha and A, which say the same, got both")
+    for name, value in held.items():
+        if name == "l":
+            _positive("held l", value)
+        else:
+            held_albedo(law, name, value)
+
+
+def _positive(name: str, value: float) -> float:
+    if not value > 0:
+        raise InputError(f"{name} must be a number > 0, got {value!r}")
+    return value

@@ -1,35 +1,58 @@
-"""The result of a fit: values, identifiability, the most informative additional measurement; and its JSON content."""
+"""The posterior of a fit: values, intervals, identifiability, the best additional measurement; and its JSON content.
+
+Priors are flat in s = sqrt(1 - alpha), in ln l and in ln k: nothing is known of the units, and alpha may be 1. Errors
+estimated from replicates share a scale that is itself an estimate: with that unknown the likelihood is Student's t.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from profilefit.fitting.chains import Walk
+from mcml_sim.media.setting import Setting
+from profilefit.fitting.chains import Node, Ridge, Walk, sample
+from profilefit.fitting.misfit import likelihood
+from profilefit.fitting.solver import Solution
 from profilefit.measured import model
-from profilefit.measured.assumed import BeamWidth, Tissue, as_tissue, beam_width
 from profilefit.measured.data import Measured
-from profilefit.measured.fitting import LEVEL, MediumFit
-from profilefit.measured.identifiability import Identifiability, Interval, identifiability
-from profilefit.measured.model import NAMES, U, u_of
-from profilefit.measured.optimal_design import Advice, advised
-from profilefit.measured.posterior import points, posterior
-from profilefit.measured.solving import Minimum, descended
+from profilefit.measured.fitting import LEVEL, MediumFit, fitted
+from profilefit.measured.identifiability import (
+    BeamWidth,
+    DesignRanking,
+    Identifiability,
+    Interval,
+    Tissue,
+    as_tissue,
+    beam_width,
+    identifiability,
+    rank_designs,
+)
+from profilefit.measured.model import EXACT, FLOCK, NAMES, U, u_of
+from profilefit.measured.oblique import Oblique
+from profilefit.measured.premises import Premises, specified
+from profilefit.measured.problem import FARTHEST_LN, FARTHEST_U, Known, descended, log_prior
+from profilefit.measured.reading import read
 from profilefit.recipes import record
 
 Floats = NDArray[np.float64]
 Ends = tuple[float | None, float | None]
 BEYOND = "its errors are beyond double precision: check the unit, sigma and what is held"
 GREY = 0.9  # albedo assumed for the advice where the data do not bound it at all
+KEPT = 4000  # draws
+WALKERS = 2 * FLOCK  # which move by halves
+MAX_STEPS = 20_000
+ROOM = 1.0  # in u beyond where a search may end: a fit at the edge has a density
 
 
 @dataclass(frozen=True)
-class Answer:
-    """A judged fit: how identifiable its quantities are, the most informative additional measurements, the chain.
+class MediumPosterior:
+    """Posterior of a medium, from a fit: identifiability, the most informative additional measurements, the chain.
 
     The first two are None where the fit failed, the chain (`walk`) also where the posterior is unbounded. `width` is
     None of a simulation, whose beam is known, and where a beam is given; `tissue` where n and g are known.
@@ -43,9 +66,9 @@ class Answer:
     includes the law's own error.
     """
 
-    found: MediumFit
+    fit: MediumFit
     identifiability: Identifiability | None
-    advice: Advice | None
+    advice: DesignRanking | None
     walk: Walk | None
     width: BeamWidth | None = None
     tissue: Tissue | None = None
@@ -59,14 +82,14 @@ class Answer:
         """
         if self.walk is None:
             return {}
-        if self.found.plain is None or not self.identified:
-            return self._quantities(self._sampled)
-        found, free = self.found, list(self.found.question.free)
-        whole, data = (one[np.ix_(free, free)] for one in (found.likely, found.likely - found.of_misfit))
+        if self.fit.plain is None or not self.identified:
+            return quantities_at(self.fit, self._sampled)
+        fit, free = self.fit, list(self.fit.spec.free)
+        whole, data = (one[np.ix_(free, free)] for one in (fit.total_covariance, fit.total_covariance - fit.of_misfit))
         nearer = np.linalg.cholesky(data) @ np.linalg.inv(np.linalg.cholesky(whole))
         moved = self._sampled.copy()
-        moved[:, free] = found.point[free] + (moved[:, free] - found.point[free]) @ nearer.T
-        return self._quantities(moved)
+        moved[:, free] = fit.point[free] + (moved[:, free] - fit.point[free]) @ nearer.T
+        return quantities_at(fit, moved)
 
     @cached_property
     def whole_draws(self) -> dict[str, Floats]:
@@ -74,53 +97,48 @@ class Answer:
 
         Empty at an end, and where neither the law's error nor a lack of fit is known.
         """
-        if self.walk is None or not self.identified or (self.found.plain is None and self.found.rel is None):
+        if self.walk is None or not self.identified or (self.fit.plain is None and self.fit.rel is None):
             return {}
-        return self.draws if self.found.plain is None else self._quantities(self._sampled)
+        return self.draws if self.fit.plain is None else quantities_at(self.fit, self._sampled)
 
     @cached_property
     def _sampled(self) -> Floats:
         """Posterior draws (k, 3) of the coordinates: those of the chain, each moved by what is open of ranges."""
         if self.walk is None:
             return np.zeros((0, len(NAMES)))
-        sampled = points(self.found, self.walk.samples)
-        return sampled if self.found.open is None else sampled + self.found.open.offsets[: len(sampled)]
-
-    def _quantities(self, points: Floats) -> dict[str, Floats]:
-        data = self.found.data
-        reflectance = self.found.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
-        return model.quantities(points, reflectance)
+        sampled = points(self.fit, self.walk.samples)
+        return sampled if self.fit.range_marginal is None else sampled + self.fit.range_marginal.offsets[: len(sampled)]
 
     @property
     def _intervals(self) -> tuple[Interval, ...]:
-        """Those of the free coordinates."""
+        """Intervals of the free coordinates."""
         return self.identifiability.intervals if self.identifiability else ()
 
     @property
     def moving(self) -> tuple[str, ...]:
-        """The quantities that depend on the free coordinates."""
-        return tuple(name for name, one in self.found.gradients.items() if np.any(one[list(self.found.question.free)]))
+        """Quantities that depend on the free coordinates."""
+        return tuple(name for name, one in self.fit.gradients.items() if np.any(one[list(self.fit.spec.free)]))
 
     @property
     def identified(self) -> tuple[str, ...]:
-        """Those with symmetric errors: none where an end of a range is not excluded, or where the fit failed."""
-        opened = self.identifiability is None or any(one.is_open for one in self._intervals)
-        return () if opened or not self.found.minimum.converged else self.moving
+        """Quantities with symmetric errors: none where an end of a range is not excluded, or where the fit failed."""
+        is_open = self.identifiability is None or any(one.is_open for one in self._intervals)
+        return () if is_open or not self.fit.minimum.converged else self.moving
 
     def ends(self, name: str) -> tuple[bool, bool]:
-        """Whether the data fail to exclude the lowest and the highest possible value of a quantity: (low, high)."""
-        of = {one.name: (one.open_low, one.open_high) for one in self._intervals}
-        (dark, white), (short, long) = of.get("alpha", (False, False)), of.get("l", (False, False))
+        """Return whether the data fail to exclude the lowest and the highest value that a quantity can have."""
+        each = {one.name: (one.open_low, one.open_high) for one in self._intervals}
+        (dark, white), (short, long) = each.get("alpha", (False, False)), each.get("l", (False, False))
         return {
             "A": (dark, white),
             "alpha": (dark, white),
             "mu_s'": (dark or long, short),
             "mu_a": (white or long, short),
-        }.get(name, of.get(name, (False, False)))
+        }.get(name, each.get(name, (False, False)))
 
     def value(self, name: str) -> float | None:
-        """The best value: of what was held, or has an error or an interval, and lies inside; else None."""
-        value = self.found.values[name]
+        """Return the best value of what was held, or has an error or an interval and lies inside; else None."""
+        value = self.fit.values[name]
         if name not in self.moving:
             return value
         intervals = [one for one in (self.interval(name), self.whole_interval(name)) if one is not None]
@@ -130,17 +148,17 @@ class Answer:
         return value if inside else None
 
     def interval(self, name: str) -> Ends | None:
-        """95 % by the data's errors and the law's: of the posterior draws; without a chain, of the profile likelihood.
+        """Return 95 % by the errors of data and law: of posterior draws; without a chain, of the profile likelihood.
 
         Both ends, or one and None: a one-sided limit. That limit, and the profile likelihood, are by all errors.
         """
         if name in self.draws and name in self.moving:
             return self._middle(name, self.draws[name])
-        found = [one for one in self._intervals if one.name == name]
-        return _closed(found[0].low, found[0].high, self.ends(name)) if found and name in self.moving else None
+        own = [one for one in self._intervals if one.name == name]
+        return _closed(own[0].low, own[0].high, self.ends(name)) if own and name in self.moving else None
 
     def whole_interval(self, name: str) -> Ends | None:
-        """95 % by all errors: statistical, model, and lack of fit if allowed for; None where these are unknown."""
+        """Return 95 % by all errors: statistical, model, and lack of fit if allowed for; None of unknown errors."""
         held = name not in self.whole_draws or name not in self.moving
         return None if held else self._middle(name, self.whole_draws[name])
 
@@ -151,47 +169,124 @@ class Answer:
         return _closed(float(low), float(high), ends)
 
 
-def _closed(low: float, high: float, opened: tuple[bool, bool]) -> Ends | None:
-    """The ends of an interval that are not open; None if both are."""
-    return None if all(opened) else (None if opened[0] else low, None if opened[1] else high)
+def _closed(low: float, high: float, is_open: tuple[bool, bool]) -> Ends | None:
+    """Return the ends of an interval that are not open; None if both are."""
+    return None if all(is_open) else (None if is_open[0] else low, None if is_open[1] else high)
 
 
-def judged(found: MediumFit, seed: int = 0, walk: bool = True) -> Answer:
+def fit(
+    data: Measured | Path | str,
+    law: str = EXACT,
+    constants: str = "regenerated",
+    setting: Setting | Premises | None = None,
+    held: Mapping[str, float] | None = None,
+    total: Known | None = None,
+    scale: float | Known | None = 1.0,
+    seed: int = 0,
+    walk: bool = True,
+    folder: Path | None = None,
+    oblique: Oblique | None = None,
+) -> MediumPosterior:
+    """Fit a medium to a measured or simulated profile, and judge the fit.
+
+    Args:
+        data: a file (see `reading.read`), or what was read from one, for instance `within` some radii.
+        law, constants, setting, held, total, scale, folder, oblique: as of `premises.specified`.
+        seed: of the posterior's walkers.
+        walk: whether to sample it; else intervals are of the statistical error alone.
+
+    InputError, SettingError or RecordError for input that cannot be fitted; a fit that fails is returned and says so.
+    """
+    measured = data if isinstance(data, Measured) else read(Path(data), scaled=scale is None)
+    spec = specified(measured, law, constants, setting, held, total, scale, folder, oblique)
+    return judged(fitted(measured, spec), seed, walk)
+
+
+def judged(fit: MediumFit, seed: int = 0, walk: bool = True) -> MediumPosterior:
     """Judge a fit; with `walk` the posterior is sampled, which takes longest, where the data bound every coordinate.
 
     Where an intermediate number is not finite, that is the fit's result, and nothing else is reported.
     """
-    if not (found.minimum.converged or found.minimum.at_edge):
-        return Answer(found, None, None, None)
+    if not fit.has_ended:
+        return MediumPosterior(fit, None, None, None)
     try:
         with np.errstate(over="raise", divide="raise", invalid="raise"):
-            return _judged_finite(found, seed, walk)
+            return _judged_finite(fit, seed, walk)
     except (FloatingPointError, np.linalg.LinAlgError):
-        return Answer(replace(found, minimum=replace(found.minimum, result=BEYOND)), None, None, None)
+        return MediumPosterior(replace(fit, minimum=replace(fit.minimum, result=BEYOND)), None, None, None)
 
 
-def _judged_finite(found: MediumFit, seed: int, walk: bool) -> Answer:
-    judgement = identifiability(found)
+def _judged_finite(fit: MediumFit, seed: int, walk: bool) -> MediumPosterior:
+    judgement = identifiability(fit)
     # The prior ends at alpha = 1; with any other open end the posterior is unbounded.
     endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
-    walked = posterior(found, seed) if walk and found.question.free and not endless else None
-    width = None if found.data.medium is not None else beam_width(found)
-    result = Answer(found, judgement, advised(_inside(found, judgement)), walked, width, as_tissue(found))
-    _ = found.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
+    walked = posterior(fit, seed) if walk and fit.spec.free and not endless else None
+    width = None if fit.data.medium is not None else beam_width(fit)
+    result = MediumPosterior(fit, judgement, rank_designs(_inside(fit, judgement)), walked, width, as_tissue(fit))
+    _ = fit.misfit, result.draws, result.whole_draws  # computed on first use: they fail here or never
     return result
 
 
-def _inside(found: MediumFit, judgement: Identifiability) -> MediumFit:
-    """A fit at an edge, moved to the other end of alpha's interval: at the edge no measurement seems to help."""
-    if not found.minimum.at_edge:
-        return found
+def _inside(fit: MediumFit, judgement: Identifiability) -> MediumFit:
+    """Return a fit at an edge moved to the other end of alpha's interval: at the edge no measurement seems to help."""
+    if not fit.at_edge:
+        return fit
     (alpha,) = [one for one in judgement.intervals if one.name == "alpha"]
-    start = found.point.copy()
+    start = fit.point.copy()
     start[U] = u_of(
         next((x for x, is_open in ((alpha.low, alpha.open_low), (alpha.high, alpha.open_high)) if not is_open), GREY)
     )
-    others = tuple(at for at in found.question.free if at != U)
-    return replace(found, minimum=descended(found.problem, start, others))
+    others = tuple(at for at in fit.spec.free if at != U)
+    return replace(fit, minimum=descended(fit.problem, start, others))
+
+
+def posterior(fit: MediumFit, seed: int = 0, max_steps: int = MAX_STEPS) -> Walk:
+    """Sample the posterior of a fit's free coordinates, by emcee along the fit's ridge: samples (k, p)."""
+    best, reach = fit.point, np.full(fit.point.size, FARTHEST_LN)
+
+    def log_density(samples: Floats, volume: Floats) -> Floats:
+        full = points(fit, samples)
+        inside = np.all(np.abs(full - best)[:, U + 1 :] < reach[U + 1 :], axis=1) & (
+            np.abs(full[:, U]) < FARTHEST_U + ROOM
+        )
+        costs = fit.problem.costs(np.clip(full, best - 3 * reach, best + 3 * reach))
+        value = _log_density(fit, costs, full[:, U], volume)
+        return np.where(inside & np.isfinite(value), value, -np.inf)
+
+    return sample(log_density, ridge(fit), WALKERS, seed, max_steps, KEPT)
+
+
+def _log_density(fit: MediumFit, costs: Floats, u: Floats, volume: Floats) -> Floats:
+    value = likelihood(costs - fit.minimum.cost, len(fit.spec.free), fit.data.pooled) + volume
+    return value + log_prior(u) if U in fit.spec.free else value
+
+
+def ridge(fit: MediumFit) -> Ridge:
+    """Follow the ridge of a fit: its first free coordinate is moved to either side, and the others are fitted again."""
+    first = fit.spec.free[0]
+    middle, reach = (0.0, FARTHEST_U + ROOM) if first == U else (float(fit.point[first]), FARTHEST_LN)
+    error = float(np.sqrt(fit.conditional[first, first]))
+    return Ridge.along(_node(fit, fit.minimum), partial(moved, fit), (middle - reach, middle + reach), error)
+
+
+def moved(fit: MediumFit, near: Node, first: float) -> Node:
+    """Fit the others where the first free coordinate has another value than in a node nearby."""
+    start, others = fit.point.copy(), fit.spec.free[1:]
+    start[list(others)] = near.others + near.slope * (first - near.first)
+    start[fit.spec.free[0]] = first
+    return _node(fit, descended(fit.problem, start, others))
+
+
+def _node(fit: MediumFit, there: Solution) -> Node:
+    density = partial(_log_density, fit, np.array(there.cost), np.array(there.parameters[U]))
+    return Node.of(there, fit.spec.free, density)
+
+
+def points(fit: MediumFit, samples: Floats) -> Floats:
+    """Return the coordinates (k, 3) of samples (k, p) of the free ones."""
+    full = np.repeat(fit.point[None], len(samples), axis=0)
+    full[:, list(fit.spec.free)] = samples
+    return full
 
 
 def known_medium(data: Measured) -> dict[str, float]:
@@ -202,20 +297,26 @@ def known_medium(data: Measured) -> dict[str, float]:
     return {"alpha": layer.alpha, "l": layer.mfp, "mu_s'": layer.mu_s, "mu_a": layer.mu_a}
 
 
-def rival_values(found: MediumFit, rival: Minimum) -> dict[str, float]:
-    """The quantities at another minimum."""
-    data = found.data
-    reflectance = found.problem.model.predicted(rival.point[None], data.inner[:1], data.outer[:1])[:, -1]
-    return {name: float(value[0]) for name, value in model.quantities(rival.point[None], reflectance).items()}
+def quantities_at(fit: MediumFit, points: Floats) -> dict[str, Floats]:
+    """Return each quantity (k,) at points (k, 3) of the coordinates."""
+    data = fit.data
+    reflectance = fit.problem.model.predicted(points, data.inner[:1], data.outer[:1])[:, -1]
+    return model.quantities(points, reflectance)
 
 
-def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
-    """Everything, as JSON content; model errors are null where they are not known.
+def rival_values(fit: MediumFit, rival: Solution) -> dict[str, float]:
+    """Return the quantities at another minimum."""
+    return {name: float(value[0]) for name, value in quantities_at(fit, rival.parameters[None]).items()}
+
+
+def content(result: MediumPosterior) -> dict[str, Any]:
+    """Return everything as JSON content; model errors are null where they are not known.
 
     Of a quantity at an edge (`at_edge`) the value is null, and so is that end of its intervals: one-sided limits.
     """
-    found = result.found
-    data, question = found.data, found.question
+    fit = result.fit
+    data, spec, names = fit.data, fit.spec, result.identified
+    joint = model.correlation(fit.gradients, fit.statistical, names) if names else None
     body = {
         "data": {
             "file": data.source,
@@ -229,82 +330,76 @@ def content(result: Answer, law: str, constants: str) -> dict[str, Any]:
             "inner": data.inner,
             "outer": data.outer,
             "value": data.value,
-            "sigma": found.sigma,
+            "sigma": fit.sigma,
             "freedom": data.freedom if np.isfinite(data.pooled) else None,
             "pooled_freedom": data.pooled if np.isfinite(data.pooled) else None,
             "photons": data.photons if np.isfinite(data.photons) else None,
         },
         "law": {
-            "name": law,
-            "constants": constants,
-            "setting": question.law.setting,
-            "record": None if found.source is None else found.source.path.name,
-            "record_sha256": None if found.source is None else found.source.digest,
-            "rel": found.rel,
+            "name": spec.name,
+            "constants": spec.constants,
+            "setting": spec.law.setting,
+            "record": None if spec.source is None else spec.source.path.name,
+            "record_sha256": None if spec.source is None else spec.source.digest,
+            "rel": fit.rel,
         },
-        "beam": None if question.instrument.beam is None else question.instrument.beam.words,
-        "fibre": question.instrument.fibre,
-        "ranges": question.ranges,
-        "of_ranges": None if found.open is None else {"mean": found.open.mean, "error": found.open.error},
-        "free": [NAMES[at] for at in question.free],
-        "held": question.held,
-        "known": {"A": question.total, "scale": question.scale, "oblique": question.oblique},
-        "result": found.minimum.result,
-        "steps": found.minimum.steps,
-        "widening": found.widening,
-        "quantile_95": found.quantile,
+        "beam": None if spec.instrument.beam is None else spec.instrument.beam.words,
+        "fibre": spec.instrument.fibre,
+        "ranges": spec.ranges,
+        "of_ranges": None
+        if fit.range_marginal is None
+        else {"mean": fit.range_marginal.mean, "error": fit.range_marginal.error},
+        "free": [NAMES[at] for at in spec.free],
+        "held": spec.held,
+        "known": {"A": spec.total, "scale": spec.scale, "oblique": spec.oblique},
+        "result": fit.minimum.result,
+        "steps": fit.minimum.steps,
+        "widening": fit.widening,
+        "quantile_95": fit.quantile,
         "quantities": _quantities(result),
-        "correlation": _correlation(result),
-        "light": found.light,
-        "residuals": found.minimum.residuals,
+        "correlation": {"names": names, "matrix": joint} if names else {},
+        "light": fit.light,
+        "residuals": fit.minimum.residuals,
         "versions": record.versions(),
     }
     if result.identifiability is not None and result.advice is not None:
         body["misfit"] = {
-            **vars(found.misfit),
-            "detected": found.misfit.detected,
-            "within_law": found.misfit.within_law,
-            "allowed_for": found.plain is not None,
+            **vars(fit.misfit),
+            "detected": fit.misfit.detected,
+            "within_law": fit.misfit.within_law,
+            "allowed_for": fit.plain is not None,
         }
         body["telling"] = {**vars(result.identifiability), "told": result.identifiability.all_identified}
         body["advice"] = result.advice
         body["beam_width"] = result.width
         body["tissue"] = result.tissue
-        body["rivals"] = [rival_values(found, one) | {"chi2": one.cost} for one in found.rivals]
-        body["rows_beyond_99.5_percent"] = int(found.beyond.sum())
+        body["rivals"] = [rival_values(fit, one) | {"chi2": one.cost} for one in fit.rivals]
+        body["rows_beyond_99.5_percent"] = int(fit.beyond.sum())
     if result.walk is not None:
         body["posterior"] = {k: v for k, v in vars(result.walk).items() if k not in ("samples", "log_density")}
     plain: dict[str, Any] = record.plain(body)
     return plain
 
 
-def _quantities(result: Answer) -> dict[str, Any]:
-    found = result.found
+def _quantities(result: MediumPosterior) -> dict[str, Any]:
+    fit = result.fit
     kinds: dict[str, Floats | None] = {
-        "statistical": found.statistical if result.identified else None,
-        "law": found.of_law if result.identified and found.rel is not None else None,
+        "statistical": fit.statistical if result.identified else None,
+        "law": fit.of_law if result.identified and fit.rel is not None else None,
     }
     if result.identifiability is not None:
-        kinds["misfit"] = found.of_misfit if result.identified else None
-    errors = {kind: found.errors(one) if one is not None else {} for kind, one in kinds.items()}
-    truth = known_medium(found.data)
+        kinds["misfit"] = fit.of_misfit if result.identified else None
+    errors = {kind: fit.errors(one) if one is not None else {} for kind, one in kinds.items()}
+    truth = known_medium(fit.data)
     return {
         name: {
             "value": result.value(name),
             "at_edge": any(result.ends(name)),
-            "unit": model.unit_of(name, found.data.unit),
+            "unit": model.unit_of(name, fit.data.unit),
             **{f"{kind}_error": one.get(name) if name in result.identified else None for kind, one in errors.items()},
             "interval_95_data": result.interval(name),
             "interval_95_total": result.whole_interval(name),
             "of_file": truth.get(name),
         }
-        for name in found.values
+        for name in fit.values
     }
-
-
-def _correlation(result: Answer) -> dict[str, Any]:
-    names = result.identified
-    if not names:
-        return {}
-    joint = model.correlation(result.found.gradients, result.found.statistical, names)
-    return {"names": names, "matrix": joint}

@@ -294,3 +294,41 @@ def test_one_pool_of_processes():
 )
 def test_pools_of_processes_are_seen(text, makes):
     assert makes_processes(ast.parse(text), "bad", False) == makes
+
+
+# One machine each: the only modules that may import a library, and all that may be imported of scipy's optimisers.
+HOMES = {"optimistix": {"profilefit.fitting.solver"}, "emcee": {"profilefit.fitting.chains"}}
+SOLVED_BY_SCIPY = {
+    "scipy.optimize.brentq",
+    "scipy.optimize.nnls",
+}  # a root in an interval; least squares of weights >= 0
+
+
+def imports_of(root: Path, packages: Sequence[str], library: str) -> dict[str, set[str]]:
+    """Module -> what it imports of a library, by dotted names."""
+    each: dict[str, set[str]] = {}
+    for package in packages:
+        for module, path in modules(root, package).items():
+            names = imported_names(parsed(path), module, path.name == "__init__.py")
+            if own := {name for name in names if f"{name}.".startswith(f"{library}.")}:
+                each[module] = own
+    return each
+
+
+@pytest.mark.parametrize("library", HOMES)
+def test_a_library_has_one_home(library):
+    assert set(imports_of(ROOT, PACKAGES, library)) == HOMES[library]
+
+
+def test_scipy_minimises_nothing():
+    names = set().union(*imports_of(ROOT, PACKAGES, "scipy.optimize").values())
+    assert names == SOLVED_BY_SCIPY, "what is fitted is fitted by fitting.solver"
+
+
+def test_second_homes_are_seen(tmp_path):
+    """Negative control: two modules with a sampler and a minimiser of their own, one under another name."""
+    (tmp_path / "bad").mkdir()
+    (tmp_path / "bad" / "walks.py").write_text("from emcee.moves import DEMove\nimport emceeish\n")
+    (tmp_path / "bad" / "fits.py").write_text("def f():\n    from scipy import optimize as o\n    import emcee as e\n")
+    assert imports_of(tmp_path, ["bad"], "emcee") == {"bad.fits": {"emcee"}, "bad.walks": {"emcee.moves.DEMove"}}
+    assert imports_of(tmp_path, ["bad"], "scipy.optimize") == {"bad.fits": {"scipy.optimize"}}

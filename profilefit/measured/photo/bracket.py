@@ -55,14 +55,14 @@ class Picture:
 
 
 class Times(NamedTuple):
-    """Of exposures (m,), relative to the longest, and the covariance (m, m) of their logarithms."""
+    """Times of exposures (m,), relative to the longest, and the covariance (m, m) of their logarithms."""
 
     value: Floats
     covariance: Floats
 
 
 def times(shots: Sequence[Exposure]) -> Times:
-    """From what the exposures record; InputError where neighbours share no pixels."""
+    """Estimate times from what the exposures record; InputError where neighbours share no pixels."""
     stated = [one.seconds or 0.0 for one in shots]
     light = [sum(float(each.counts.mean()) for each in one.planes) for one in shots]
     order = np.lexsort((light, stated)) if all(stated) else np.argsort(light)
@@ -76,7 +76,7 @@ def times(shots: Sequence[Exposure]) -> Times:
 
 
 def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
-    """Of two exposures' times, the shorter one's first, and its relative error.
+    """Return the ratio of two exposures' times, the shorter one's first, and its relative error.
 
     Pixels are chosen by what their neighbourhood records: by their own, those that are bright by chance would be.
     """
@@ -108,12 +108,11 @@ def _ratio(shorter: Exposure, longer: Exposure) -> tuple[float, float]:
 
 
 def shares(light: Floats, relative: Floats, own: Sensor, most: Floats) -> Floats:
-    """Of exposures (m,) in a picture of so much light (n,), where more than `most` steps (m,) clip: (n, m)."""
+    """Return shares (n, m) of exposures (m,) in a picture of light (n,), where more than `most` steps (m,) clip."""
     steps = np.maximum(np.multiply.outer(light, relative), 0.0)
     weight = np.where(steps < most, relative**2 / (steps / own.gain + own.read**2), 0.0)
     total = weight.sum(axis=1, keepdims=True)
-    found: Floats = np.divide(weight, total, out=np.zeros_like(weight), where=total > 0)
-    return found
+    return np.asarray(np.divide(weight, total, out=np.zeros_like(weight), where=total > 0), float)
 
 
 def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
@@ -145,7 +144,7 @@ def sensor(shots: Sequence[Exposure], relative: Floats) -> Sensor:
 
 
 def merged(shots: Sequence[Exposure], relative: Floats, own: Sensor) -> list[Picture]:
-    """The planes of a bracket, light in steps of the longest exposure."""
+    """Return the planes of a bracket, light in steps of the longest exposure."""
     pictures = []
     for at, plane in enumerate(shots[0].planes):
         total = np.zeros(plane.counts.shape, np.float32)

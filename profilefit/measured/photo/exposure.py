@@ -55,8 +55,10 @@ class BayerPlane:
 
 @dataclass(frozen=True, eq=False)
 class Exposure:
-    """A photograph. sides are columns and rows of the whole; seconds, iso and aperture (an f-number) None where the
-    file does not state them."""
+    """Photograph of so many columns and rows (`sides`).
+
+    seconds, iso and aperture (an f-number) are None where the file does not state them
+    """
 
     source: str
     planes: tuple[BayerPlane, ...]
@@ -124,7 +126,7 @@ def of_sensor(
     white: float,
     seconds: float | None,
 ) -> Exposure:
-    """From what a sensor of a Bayer pattern counted (rows, columns); colours and black levels by row and column."""
+    """Return the exposure of a Bayer sensor's counts (rows, columns); colours and black levels by row and column."""
     rows, columns = counts.shape[0] // 2 * 2, counts.shape[1] // 2 * 2  # planes of as many pixels each
     planes = tuple(
         BayerPlane(
@@ -139,13 +141,15 @@ def of_sensor(
 
 
 def _plain(path: Path, kind: str) -> Exposure:
-    """A picture of one or three values a pixel."""
+    """Return a picture of one or three values a pixel."""
     values = _decoded(path, kind)
     values = values[..., None] if values.ndim == 2 else values
     if values.ndim != 3 or values.shape[2] not in (1, 3):
         raise InputError(f"{path}: expected one or three values a pixel, got an array of shape {values.shape}")
     if kind in JPEG and values.dtype == np.uint8:
-        counts = np.float32(255.0) * _decode_srgb(values.astype(np.float32) / 255.0)
+        coded = values.astype(np.float32) / 255.0
+        counts = np.float32(255.0) * np.where(coded <= 0.04045, coded / 12.92, ((coded + 0.055) / 1.055) ** 2.4)
+        counts = counts.astype(np.float32)
     elif kind in TIFF and values.dtype == np.uint16:
         counts = values.astype(np.float32)
     elif values.dtype in (np.float32, np.float16):
@@ -214,11 +218,6 @@ def _decoded(path: Path, kind: str) -> NDArray[Any]:
         raise _refused(path, "a picture", error) from None
 
 
-def _decode_srgb(value: Plane) -> Plane:
-    found: Plane = np.where(value <= 0.04045, value / 12.92, ((value + 0.055) / 1.055) ** 2.4).astype(np.float32)
-    return found
-
-
 def _require_size(path: Path, columns: int, rows: int, values: int) -> None:
     """Before it is read: not more than MOST_PIXELS, of three values each."""
     if columns * rows > MOST_PIXELS:
@@ -239,14 +238,10 @@ def library(name: str) -> Any:
 
 
 def _refused(path: Path, kind: str, error: Exception) -> InputError:
-    """In a library's words, where none of ours say it already."""
+    """Return an error in a library's words, where none of ours say it already."""
     if isinstance(error, InputError):
         return error
-    return InputError(f"{path}: cannot be read as {kind}: {_first_line(error)}")
-
-
-def _first_line(error: Exception) -> str:
-    text = str(error.args[0] if error.args else error)
-    if isinstance(error.args[0] if error.args else None, bytes):
-        text = error.args[0].decode("utf-8", "replace")
-    return (text.splitlines() or [type(error).__name__])[0][:100]
+    words = error.args[0] if error.args else error
+    text = words.decode("utf-8", "replace") if isinstance(words, bytes) else str(words)
+    first = (text.splitlines() or [type(error).__name__])[0][:100]
+    return InputError(f"{path}: cannot be read as {kind}: {first}")

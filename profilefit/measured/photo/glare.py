@@ -1,4 +1,4 @@
-"""What beam and lens make of a point of light, and rings of a medium seen so.
+"""Point spread of beam and lens, and rings of a medium seen under it.
 
 A point is spread over a core, a Gaussian of standard deviation sigma (the beam, its 1/e^2 radius being 2 sigma, and
 what a lens blurs), and over halos, h_a(r) = 3 a^3 / (2 pi (r^2 + a^2)^{5/2}), whose transform is (1 + ka) e^{-ka}:
@@ -23,8 +23,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipe, ellipk
 
-from profilefit.measured.beam import Floats, Gaussian
-from profilefit.measured.instrument import Instrument
+from profilefit.measured.instrument import Floats, Gaussian, Instrument
 from profilefit.measured.photo.rings import SpotRings, over_rings
 
 FARTHER = 5.0  # of the last ring, from where halos still bring light
@@ -45,7 +44,7 @@ class RingWeights(NamedTuple):
 
 
 def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> RingWeights:
-    """Of a core and halos; the core's weights lie on cubics between those of sigmas APART."""
+    """Return weights of a core and halos; the core's lie on cubics between those of sigmas APART."""
     place = float(np.log(sigma)) / APART
     first = int(np.floor(place)) - 1
     share = POLYNOMIALS @ (place - first) ** np.arange(4.0)
@@ -59,7 +58,7 @@ def ring_weights(sigma: float, halos: Sequence[float], rings: SpotRings) -> Ring
 
 
 def _blur(sigma: float, halos: Sequence[float]) -> Floats:
-    """Of each halo by the core; where that is no small part of it, as much as the second order gives."""
+    """Return the blur of each halo by the core; where that is no small part of it, what the second order gives."""
     return np.minimum(sigma, 0.5 * np.array(halos))
 
 
@@ -108,5 +107,4 @@ def halo(a: float, d: Floats, rho: Floats) -> Floats:
     whole, cross = d * d + rho * rho + a * a, 2.0 * d * rho
     m, less, more = 2.0 * cross / (whole + cross), whole - cross, whole + cross
     e, k = ellipe(m), ellipk(m)
-    found: Floats = 2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more))
-    return found
+    return np.asarray(2.0 * a**3 * (e / less + 0.5 * (2.0 * e - k) / more) / (np.pi**2 * less * np.sqrt(more)), float)

@@ -20,24 +20,14 @@ from scipy import stats
 from scipy.linalg import block_diag, solve_triangular
 
 from mcml_sim.exact.light import ExactLight
-from profilefit.fitting.solver import CONVERGED, covariance, solve
-from profilefit.measured import law_error, model
-from profilefit.measured.misfit import DETECTED
+from profilefit.fitting.misfit import DETECTED, waves
+from profilefit.fitting.solver import CONVERGED, Solution, best_apart, covariance, lowest, solve
+from profilefit.measured import model
 from profilefit.measured.model import Model, u_of
+from profilefit.measured.noise import WAVE
 from profilefit.measured.photo.glare import ring_means, ring_weights
 from profilefit.measured.photo.rings import SpotRings
-from profilefit.measured.problem import Known
-from profilefit.measured.solving import (
-    ALBEDOS,
-    BLACK,
-    FARTHEST_LN,
-    FARTHEST_U,
-    LENGTHS,
-    WHITE,
-    Minimum,
-    best_apart,
-    lowest,
-)
+from profilefit.measured.problem import ALBEDOS, BLACK, FARTHEST_LN, FARTHEST_U, LENGTHS, WHITE, Known
 
 Floats = NDArray[np.float64]
 MEDIUM = ("mu_s'", "mu_a")
@@ -64,7 +54,7 @@ LARGEST = 100.0  # of a logarithm, where an interval ends that tells nothing
 
 @dataclass(frozen=True)
 class Beliefs:
-    """What is known beforehand, as values with errors; lengths in the unit of the rings. None: nothing.
+    """Prior knowledge, as values with errors; lengths in the unit of the rings. None: nothing is known.
 
     beam     1/e^2 radius that beam and lens make together; surface and glare shares of light
     scale    of the counts, per light that falls on the medium
@@ -123,7 +113,7 @@ class SpotLight(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Shot:
-    """What is fitted: rings of the medium, and of cards."""
+    """Rings that are fitted: of the medium, and of cards."""
 
     medium: SpotRings
     cards: tuple[Card, ...]
@@ -132,14 +122,14 @@ class Shot:
 
     @property
     def names(self) -> tuple[str, ...]:
-        """Of the coordinates."""
+        """Names of the coordinates."""
         halos = tuple(f"glare {a:g}" for a in self.beliefs.halos)
         own = ("alpha", "l", "scale", "core", "surface", *halos, "dark", "corner")
         return own + tuple(f"card {at + 1}" for at in range(len(self.cards)))
 
     @property
     def size(self) -> float:
-        """Of the counts: what ln's and shares leave as the largest number."""
+        """Size of the counts: the largest number beside logarithms and shares."""
         return float(np.max(self.medium.value))
 
     def rows(self, x: Floats) -> tuple[Floats, Floats]:
@@ -147,7 +137,7 @@ class Shot:
         return self._rows(x, self._spread(float(np.exp(x[3])), *self._profile(x)))
 
     def _rows(self, x: Floats, spread: SpotLight) -> tuple[Floats, Floats]:
-        """Like `rows`, for the light of the medium as beam and lens spread it."""
+        """Return `rows` for the light of the medium as beam and lens spread it."""
         halos = len(self.beliefs.halos)
         sigma, surface, glare, dark = float(np.exp(x[3])), x[4], x[5 : 5 + halos], x[5 + halos]
         scale, share, corner = np.exp(x[2]), np.append(1.0 - glare.sum(), glare), x[6 + halos]
@@ -176,7 +166,7 @@ class Shot:
         return np.concatenate(values), np.vstack(each)
 
     def _darkened(self, rings: SpotRings, value: Floats, slopes: Floats, corner: float) -> tuple[Floats, Floats]:
-        """As a lens darkens it outwards."""
+        """Return light and derivatives as a lens darkens them outwards."""
         outwards = (rings.r / self.beliefs.border) ** 2
         slopes = slopes * (1.0 - corner * outwards)[:, None]
         slopes[:, 6 + len(self.beliefs.halos)] = -value * outwards
@@ -200,7 +190,7 @@ class Shot:
 
     @property
     def middle(self) -> Floats:
-        """What the coordinates (p,) are thought to be beforehand; 0 of which nothing is."""
+        """Prior means (p,) of the coordinates; 0 of which nothing is known."""
         given, halos = self.beliefs, len(self.beliefs.halos)
         found = np.zeros(len(self.names))
         if given.scale is not None:
@@ -237,20 +227,19 @@ class Shot:
         """Matrix that turns errors of the rows into independent ones of size 1: the inverse of their lower root."""
         blocks = [self._covariance(one) for one in (self.medium, *(card.rings for card in self.cards))]
         root = np.linalg.cholesky(block_diag(*blocks))
-        found: Floats = solve_triangular(root, np.eye(len(root)), lower=True)
-        return found
+        return np.asarray(solve_triangular(root, np.eye(len(root)), lower=True), float)
 
     def _covariance(self, one: SpotRings) -> Floats:
         size = UNEVEN * one.value
-        smooth = law_error.waves(one.r) * np.outer(size, size)
+        smooth = waves(one.r, WAVE) * np.outer(size, size)
         return one.covariance + smooth + np.diag((1e-4 * one.value) ** 2 + (1e-9 * self.size) ** 2)
 
     def residuals(self, x: Floats) -> tuple[Floats, Floats]:
-        """In standard errors (m,), those of what is known beforehand last, and their derivatives (m, p)."""
+        """Return residuals in standard errors (m,), those of prior knowledge last, and their derivatives (m, p)."""
         return self._residuals(x, *self.rows(x))
 
     def _residuals(self, x: Floats, value: Floats, slopes: Floats) -> tuple[Floats, Floats]:
-        """Like `residuals`, for the light of all rings (n,) and its derivatives (n, p)."""
+        """Return `residuals` for the light of all rings (n,) and its derivatives (n, p)."""
         data = np.concatenate([self.medium.value, *(card.rings.value for card in self.cards)])
         ways, thought = self.knowledge
         rows = self.whitening @ np.column_stack([value - data, slopes])
@@ -387,20 +376,20 @@ class PhotoFit:
         return low, min(high, 1.0) if name in ("A", "alpha") else high
 
     def holds(self, values: Mapping[str, float]) -> bool:
-        """Whether the intervals of mu_s' and mu_a hold these values."""
+        """Return whether the intervals of mu_s' and mu_a hold these values."""
         return all(low <= values[name] <= high for name in MEDIUM for low, high in [self.interval(name)])
 
 
 def fitted(shot: Shot) -> PhotoFit:
     """Fit a shot by least squares: the lowest minimum that a search finds, and its rivals."""
-    found = lowest(_descended(shot, start) for start in shot.starts)
+    found = lowest((_descended(shot, start) for start in shot.starts), compared=len(model.NAMES))
     first, *others = (_ended(shot, one) for one in (found, *found.others))
     within = RIVAL * first.widening**2
     rivals = tuple(one for one in others if one.chi2 - first.chi2 < within and not first.holds(one.values))
     return replace(first, rivals=rivals, result=RIVALLED if rivals and first.converged else first.result)
 
 
-def _descended(shot: Shot, start: Floats) -> Minimum:
+def _descended(shot: Shot, start: Floats) -> Solution:
     """End of damped least squares within bounds, from a start."""
     longest = np.full(start.size, np.inf)
     longest[:4], longest[start.size - len(shot.cards) :] = FARTHEST, FARTHEST
@@ -409,12 +398,12 @@ def _descended(shot: Shot, start: Floats) -> Minimum:
         if done.converged:
             break
         start = done.parameters
-    return Minimum(**vars(done))
+    return done
 
 
-def _ended(shot: Shot, done: Minimum) -> PhotoFit:
-    """A descent's end as a fit, whose verdict says where there is no medium."""
-    (u, ln_l), (low, high) = done.point[:2], (one[1] for one in shot.bounds)
+def _ended(shot: Shot, done: Solution) -> PhotoFit:
+    """Return a descent's end as a fit, whose verdict says where there is no medium."""
+    (u, ln_l), (low, high) = done.parameters[:2], (one[1] for one in shot.bounds)
     result = done.result
     if u > BLACK:
         result = AT_BLACK
@@ -424,7 +413,9 @@ def _ended(shot: Shot, done: Minimum) -> PhotoFit:
         result = RAN_AWAY
     elif not done.converged:
         result = UNENDED
-    return PhotoFit(shot, done.point, done.covariance, done.cost, done.residuals.size - done.point.size, result)
+    return PhotoFit(
+        shot, done.parameters, done.covariance, done.cost, done.residuals.size - done.parameters.size, result
+    )
 
 
 def fisher(truth: Shot, x: Floats) -> Mapping[str, float]:

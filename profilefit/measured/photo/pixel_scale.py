@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.checks import shown
 from profilefit.errors import InputError
-from profilefit.measured.lengths import length
+from profilefit.measured.data import length
 from profilefit.measured.photo.exposure import Exposure, Plane, library
 
 Floats = NDArray[np.float64]
@@ -57,7 +57,7 @@ class PixelScale:
 
 
 def pixel_scale(option: str, text: str, shots: Sequence[Exposure], unit: str = "mm") -> PixelScale:
-    """From words; InputError names the option and what it takes."""
+    """Return the scale of a text; InputError names the option and what it takes."""
     if match := PER_PIXEL.fullmatch(text):
         size = length(option, match["length"], unit)
         return PixelScale(np.diag([size, size, 1.0]), f"{size:g} {unit} a pixel, as told")
@@ -96,5 +96,4 @@ def _preview(shot: Exposure) -> NDArray[np.uint8]:
     """Eight bits of the first green or only plane."""
     counts = next((one for one in shot.planes if one.colour == "green"), shot.planes[0]).counts
     most = max(float(np.percentile(counts, BRIGHT)), 1e-9)
-    found: NDArray[np.uint8] = (255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0))).astype(np.uint8)
-    return found
+    return np.asarray(255.0 * np.sqrt(np.clip(counts / most, 0.0, 1.0)), np.uint8)

@@ -61,7 +61,7 @@ class SpotRings:
 
     @property
     def shows_spot(self) -> bool:
-        """Whether the middle is brighter than the outer half of the rings, by more than their noise explains."""
+        """True if the middle is brighter than the outer half of the rings, by more than their noise explains."""
         if self.value.size < 2:
             return False
         areas, far = np.pi * (self.outer - self.inner) * (self.outer + self.inner), slice(self.value.size // 2, None)
@@ -78,7 +78,7 @@ def edges_of(reach: float, pixel: float) -> Floats:
 
 
 def rings(pictures: Sequence[Picture], centre: tuple[float, float], edges: Floats, plate: PixelScale) -> SpotRings:
-    """Of the planes of one colour, between edges [unit]."""
+    """Return rings of the planes of one colour, between edges [unit]."""
     count = edges.size - 1
     cells, parts = count * SECTORS, count * PARTS
     kept = []
@@ -145,10 +145,9 @@ def _of_grains(covariance: Floats, pixels: Floats, light: Floats, narrow: NDArra
 
 
 def _polynomials(powers: Floats, products: Floats) -> Floats:
-    """Of each ring, by least squares (DEGREE + 1, n), lowest power first; from sums over its pixels."""
+    """Fit each ring by least squares (DEGREE + 1, n), lowest power first; from sums over its pixels."""
     at = np.add.outer(POWERS, POWERS)
-    found: Floats = np.einsum("nij,jn->in", np.linalg.pinv(np.moveaxis(powers[at], 2, 0)), products)
-    return found
+    return np.asarray(np.einsum("nij,jn->in", np.linalg.pinv(np.moveaxis(powers[at], 2, 0)), products), float)
 
 
 def shrunk(off: Floats) -> Floats:
@@ -163,8 +162,7 @@ def shrunk(off: Floats) -> Floats:
     share = float(np.clip(noise[apart].sum() / max(np.sum(correlation[apart] ** 2), 1e-12), 0.05, 1.0))
     kept = np.where(apart, (1.0 - share) * correlation, 1.0)
     size = np.sqrt(variance / sectors)
-    found: Floats = kept * np.outer(size, size)
-    return found
+    return np.asarray(kept * np.outer(size, size), float)
 
 
 def over_rings(inner: Floats, outer: Floats) -> tuple[Floats, Floats]:

@@ -21,13 +21,12 @@ from mcml_sim.files.whole_file import ROOM, read_whole, write_whole
 from mcml_sim.media.checks import is_number
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
-from profilefit.measured.model import u_of
+from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import medium, simulated
 from profilefit.measured.photo.exposure import library
 from profilefit.measured.photo.medium import Beliefs, Card, Shot
 from profilefit.measured.photo.rings import SpotRings, edges_of
-from profilefit.measured.photo.simulated import CHANNELS, SpotCamera, SpotOptics, Taken
+from profilefit.measured.photo.simulated import CHANNELS, SimulatedExposure, SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
 from profilefit.recipes.toml_tables import Table, Tables
 
@@ -58,7 +57,7 @@ SCATTER = 0.003  # of a ring, by speckle and noise
 
 @dataclass(frozen=True)
 class Setup:
-    """What is photographed, and how.
+    """Medium, beam, lens and camera of a simulation.
 
     photons  that are traced for each colour; 0: light is exact
     late     relative error of stated times
@@ -144,7 +143,7 @@ def _far(camera: SpotCamera) -> float:
     return 1.2 * camera.pitch * float(np.hypot(*camera.sides))
 
 
-def brackets(setup: Setup) -> dict[str, list[Taken]]:
+def brackets(setup: Setup) -> dict[str, list[SimulatedExposure]]:
     """Exposures of the spot, and of the cards that there are, by what they show."""
     radii = simulated.radii(_far(setup.camera), setup.optics)
     spot = {}
@@ -171,7 +170,7 @@ def brackets(setup: Setup) -> dict[str, list[Taken]]:
 
 
 def written(setup: Setup, out: Path) -> list[Path]:
-    """The photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
+    """Write the photographs as raw files (DNG): spot-1.dng, ..., and those of the cards that there are.
 
     InputError where another camera's lie under these names, or where any lie that are not of this setup, which SPOT-*
     would name too.
@@ -197,8 +196,8 @@ def room(setup: Setup) -> float:
     return ROOM + scenes * setup.exposures * 2 * math.prod(setup.camera.sides)
 
 
-def as_dng(one: Taken) -> bytes:
-    """A raw file of Adobe's format."""
+def as_dng(one: SimulatedExposure) -> bytes:
+    """Return a raw file of Adobe's format."""
     tifffile = library("tifffile")
     codes = tuple(CFA[colour] for row in one.pattern for colour in row)
     identity = (1, 1, 0, 1, 0, 1, 0, 1, 1, 1, 0, 1, 0, 1, 0, 1, 1, 1)
@@ -223,7 +222,7 @@ def _ratio(seconds: float) -> tuple[int, int]:
     return round(seconds * below), below
 
 
-def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
+def fisher_bounds(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     """Errors of mu_s' and mu_a by Fisher's information, by colour: without cards, with either, with both.
 
     Of rings of exact light under the setup's beam, as fine and as far out as its pixels, which scatter by SCATTER; of
@@ -235,14 +234,14 @@ def told(setup: Setup) -> Mapping[str, Mapping[str, Mapping[str, float]]]:
     of = {"no cards": (), "a white card": (None,), "a grey card": (known,), "both": (None, known)}
     return {
         label: {
-            colour: _told(setup, mu_s, mu_a, cards)
+            colour: _bounds(setup, mu_s, mu_a, cards)
             for colour, mu_s, mu_a in zip(CHANNELS, setup.mu_s, setup.mu_a, strict=True)
         }
         for label, cards in of.items()
     }
 
 
-def _told(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
+def _bounds(setup: Setup, mu_s: float, mu_a: float, cards: Sequence[Known | None]) -> dict[str, float]:
     pixel, core = setup.camera.pitch, setup.optics.sigma
     edges = edges_of(0.5 * min(setup.camera.sides) * pixel, 2.0 * pixel)
     blank = SpotRings(edges[:-1], edges[1:], np.ones(edges.size - 1), np.eye(edges.size - 1))

@@ -28,7 +28,7 @@ from mcml_sim.media.medium import Layer, Medium
 from mcml_sim.media.setting import Setting
 from mcml_sim.runs.simulation import simulate
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 
 Floats = NDArray[np.float64]
 Counts = NDArray[np.uint16]
@@ -46,7 +46,7 @@ SPILLS = 200  # pixels along a column that an overfull one may reach
 
 @dataclass(frozen=True)
 class SpotOptics:
-    """Of beam and lens; lengths in mm.
+    """Beam and lens; lengths in mm.
 
     beam     1/e^2 radius; core standard deviation of the lens's blur
     surface  share of the light that the surface scatters; glare that in the halo, width its a, falling its b
@@ -64,12 +64,11 @@ class SpotOptics:
         return float(np.hypot(0.5 * self.beam, self.core))
 
     def transform(self, k: Floats) -> Floats:
-        """Of beam and lens, at k [1/mm]."""
+        """Return the transform of beam and lens at k [1/mm]."""
         order = self.falling - 1.0
         x = np.maximum(k * self.width, 1e-12)
         halo = 2.0 * (0.5 * x) ** order * kv(order, x) / gamma(order)
-        found: Floats = np.exp(-0.5 * (k * self.sigma) ** 2) * (1.0 - self.glare + self.glare * halo)
-        return found
+        return np.asarray(np.exp(-0.5 * (k * self.sigma) ** 2) * (1.0 - self.glare + self.glare * halo), float)
 
 
 @dataclass(frozen=True)
@@ -103,7 +102,7 @@ class SpotCamera:
 
 
 @dataclass(frozen=True)
-class Taken:
+class SimulatedExposure:
     """An exposure. `seconds` are those that the camera states, which need not be those that it took."""
 
     counts: Counts
@@ -132,18 +131,17 @@ def card(optics: SpotOptics, r: Floats) -> Floats:
 
 
 def transform(alpha: float, length: float, setting: Setting, k: Floats) -> Floats:
-    """int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
+    """Return int D(rho) J_0(k rho) drho, D = 2 pi rho R_d, at k [1/mm]."""
     return _transform(alpha, length, setting, k.tobytes())
 
 
 def traced(alpha: float, length: float, setting: Setting, k: Floats, photons: int, seed: int) -> Floats:
-    """The same of traced photons, whose light is even over a ring."""
+    """Return the Hankel transform of traced rings, taken as constant within a ring."""
     layer = Layer(n=setting.n, mu_a=(1.0 - alpha) / length, mu_s=alpha / length / (1.0 - setting.g), g=setting.g)
     edges = np.append(0.0, np.geomspace(TRACED_NEAR, FAR, TRACED_RINGS)) * length
     tally = simulate(Medium((layer,)), Grid.from_edges(r=edges), photons, seed, progress=False)
     disc = 2.0 * np.pi * edges * j1(np.multiply.outer(np.maximum(k, 1e-12), edges)) / np.maximum(k, 1e-12)[:, None]
-    found: Floats = np.diff(disc, axis=1) @ tally.reflectance_r.value
-    return found
+    return np.asarray(np.diff(disc, axis=1) @ tally.reflectance_r.value, float)
 
 
 @lru_cache(maxsize=8)
@@ -171,7 +169,7 @@ def require_resolved(length: float, optics: SpotOptics, far: float) -> None:
 
 
 def _waves(optics: SpotOptics, far: float) -> tuple[Floats, Floats]:
-    """k [1/mm] and their weights, for light out to `far` [mm]."""
+    """Return k [1/mm] and their weights, for light out to `far` [mm]."""
     return _panels(_turned(np.linspace(0.0, CUT / optics.sigma, PANELS + 1), far))
 
 
@@ -179,8 +177,7 @@ def _turned(edges: Floats, rate: float) -> Floats:
     """Edges of panels, cut where J_0 turns by more than TURN between them: by `rate` a unit."""
     pieces = np.ceil(np.diff(edges) * rate / TURN).clip(1.0)
     at = np.append(0.0, np.cumsum(pieces))
-    found: Floats = np.interp(np.arange(at[-1] + 1.0), at, edges)
-    return found
+    return np.asarray(np.interp(np.arange(at[-1] + 1.0), at, edges), float)
 
 
 def _inverse(transformed: Floats, k: Floats, weight: Floats, r: Floats) -> Floats:
@@ -199,8 +196,8 @@ def taken(
     electrons: float,
     times: Mapping[float, float],
     seed: int,
-) -> list[Taken]:
-    """A bracket of exposures.
+) -> list[SimulatedExposure]:
+    """Simulate a bracket of exposures.
 
     radial     radii [mm], out to the corners, and light (n,) [1/mm^2] by channel
     electrons  a second where light is 1 [1/mm^2]; times: seconds that it took, by those that the camera states
@@ -222,19 +219,19 @@ def taken(
             expected[at] = np.maximum(CubicSpline(*radial[PATTERN[row][column]])(r[at]), 0.0)
     expected *= np.float32(electrons) * sees
     return [
-        Taken(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)
+        SimulatedExposure(_recorded(expected * np.float32(real), camera, rng), stated, camera.black, camera.white)
         for stated, real in times.items()
     ]
 
 
 def radii(farthest: float, optics: SpotOptics) -> Floats:
-    """Where a picture's light is found, from the axis out to `farthest` [mm]."""
+    """Return radii at which a picture's light is computed, from the axis out to `farthest` [mm]."""
     near = 0.02 * optics.sigma
     return np.append(0.0, np.geomspace(near, farthest, RADII))
 
 
 def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Of mean 1, of the camera's contrast, in grains."""
+    """Draw speckle of mean 1, of the camera's contrast, in grains."""
     if camera.speckle == 0:
         return np.ones((1, 1), np.float32)
     noise = gaussian_filter(rng.standard_normal(camera.sides[::-1], dtype=np.float32), camera.grain, mode="wrap")
@@ -243,7 +240,7 @@ def _speckle(camera: SpotCamera, rng: np.random.Generator) -> NDArray[np.float32
 
 
 def _recorded(expected: NDArray[np.float32], camera: SpotCamera, rng: np.random.Generator) -> Counts:
-    """Counts of so many expected electrons."""
+    """Draw counts of so many expected electrons."""
     # A Poisson number of more than a hundred is a normal one to a percent of its error.
     many = expected.copy()
     many += np.sqrt(expected) * rng.standard_normal(expected.shape, dtype=np.float32)
@@ -255,7 +252,7 @@ def _recorded(expected: NDArray[np.float32], camera: SpotCamera, rng: np.random.
 
 
 def _spill(electrons: NDArray[np.float32], well: float) -> None:
-    """What is too much for a pixel goes to its neighbours in the column, half up and half down."""
+    """Move what is too much for a pixel to its neighbours in the column, half up and half down."""
     for _ in range(SPILLS):
         over = electrons > well
         if not over.any():

@@ -1,4 +1,4 @@
-"""Where the spot is: the point about which its far rings are even; and what makes a picture useless."""
+"""Centre of the spot, about which its far rings are even; and what makes a picture useless."""
 
 from __future__ import annotations
 
@@ -25,8 +25,11 @@ RINGS = 40
 
 @dataclass(frozen=True)
 class Spot:
-    """centre (column, row) in the whole picture, reach the distance to the nearest border, half the radius within which
-    light is half of the brightest; all in pixels."""
+    """Spot of light; all in pixels.
+
+    centre  (column, row) in the whole picture; reach the distance to the nearest border
+    half    radius within which light is half of the brightest
+    """
 
     centre: tuple[float, float]
     reach: float
@@ -34,7 +37,7 @@ class Spot:
 
 
 def spot(pictures: Sequence[Picture], sides: tuple[int, int], plate: PixelScale, source: str) -> Spot:
-    """Of the planes of one colour; InputError where a picture shows none, two, or one that cannot be measured."""
+    """Find the spot in planes of one colour; InputError where a picture shows none, two, or an unmeasurable one."""
     first = pictures[0]
     known = np.isfinite(first.light)
     smooth = gaussian_filter(np.where(known, first.light, 0.0), BLUR)
@@ -65,7 +68,7 @@ def spot(pictures: Sequence[Picture], sides: tuple[int, int], plate: PixelScale,
 
 
 def _require_centre(known: NDArray[np.bool_], smooth: NDArray[np.float32], source: str) -> None:
-    """What no exposure recorded must not lie in bright light; a pixel that is stuck elsewhere may."""
+    """Require that what no exposure recorded lies in no bright light; a pixel that is stuck elsewhere may."""
     patches, count = label(~known)
     sizes = np.bincount(patches.ravel(), minlength=count + 1)
     around = grey_dilation(patches, size=(3, 3))
@@ -86,7 +89,7 @@ def _reach(centre: tuple[float, float], sides: tuple[int, int]) -> float:
 def _evened(
     pictures: Sequence[Picture], start: tuple[float, float], half: float, reach: float, plate: PixelScale
 ) -> tuple[float, float]:
-    """By the dipoles of rings beyond the brightest: those of a centre that is off by d are -I'(r) d cos."""
+    """Find the centre by dipoles of rings beyond the brightest: -I'(r) d cos at a distance d from it."""
     centre: Floats = np.array(start, float)
     pixel = plate.pixel(start)
     edges = np.geomspace(half, reach, RINGS + 1) * pixel

@@ -1,4 +1,4 @@
-"""From photographs to the media behind a spot, colour by colour."""
+"""Media behind a spot from photographs, colour by colour."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 from profilefit.measured.photo import bracket, medium, rings
 from profilefit.measured.photo.bracket import FULL, Picture, Sensor, Times
 from profilefit.measured.photo.exposure import COLOURS, GREY, Exposure, read
@@ -48,7 +48,7 @@ class Bracket:
 
     @property
     def seconds(self) -> Known | None:
-        """Of the longest exposure: the mean of what all state, and the error that their scatter says."""
+        """Time of the longest exposure: the mean of what all state, and the error that their scatter says."""
         off = np.array([np.log(said / time) for said, time in zip(self.stated, self.times.value, strict=True) if said])
         if off.size == 0:
             return None
@@ -64,7 +64,7 @@ class Bracket:
 
 @dataclass(frozen=True, eq=False)
 class Photo:
-    """What was seen, and the fit of each colour."""
+    """Merged brackets, and the fit of each colour."""
 
     shot: Bracket
     cards: tuple[Bracket, ...]
@@ -150,7 +150,10 @@ def _read(paths: Sequence[Path], like: Exposure | None = None) -> list[Exposure]
     found: list[Exposure] = []
     for path in paths:
         found.append(read(path))
-        _require_alike(found[-1], like or found[0])
+        own, other = found[-1], like or found[0]
+        for expected, got in zip(_kind(other), _kind(own), strict=True):
+            if None not in (expected, got) and expected != got:
+                raise InputError(f"{own.source}: expected {expected} as {other.source} has, got {got}")
     return found
 
 
@@ -159,14 +162,8 @@ def _require_count(paths: Sequence[Path]) -> None:
         raise InputError(f"photographs must be 1 to {MOST_SHOTS} exposures of one bracket, got {len(paths)}")
 
 
-def _require_alike(one: Exposure, other: Exposure) -> None:
-    """As many pixels, of the same filters, taken alike but for the time, where that is stated."""
-    for expected, got in zip(_kind(other), _kind(one), strict=True):
-        if None not in (expected, got) and expected != got:
-            raise InputError(f"{one.source}: expected {expected} as {other.source} has, got {got}")
-
-
 def _kind(one: Exposure) -> tuple[str | None, ...]:
+    """Return pixels, filters, ISO and aperture in words, None where a file does not state them."""
     return (
         f"{one.sides[0]} x {one.sides[1]} pixels",
         f"planes {', '.join(plane.colour for plane in one.planes)}",
@@ -184,8 +181,7 @@ def _level(paths: Sequence[Path], like: Exposure) -> Floats:
     for path in paths:  # one at a time: they are as large as photographs
         (frame,) = _read([path], like)
         means.append([float(plane.counts.mean(dtype=float)) for plane in frame.planes])
-    found: Floats = np.mean(means, axis=0)
-    return found
+    return np.asarray(np.mean(means, axis=0), float)
 
 
 def _darkened(one: Exposure, level: Floats) -> Exposure:
@@ -229,7 +225,7 @@ def ringed(one: Bracket, colour: str, size: PixelScale) -> SpotRings:
 
 
 def carded(card: Bracket, colour: str, size: PixelScale, reflectance: Known | None, seen: Bracket) -> Card:
-    """A card beside the spot that was `seen`; what their times leave open is in the error of its reflectance."""
+    """Return a card beside the spot that was `seen`; its reflectance's error has what their times leave open."""
     own, other = card.seconds, seen.seconds
     if reflectance is not None and own is not None and other is not None:
         relative = np.hypot.reduce([one.error / one.value for one in (reflectance, own, other)])

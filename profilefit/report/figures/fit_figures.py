@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
 from profilefit.measured.model import unit_of
-from profilefit.measured.result import Answer
+from profilefit.measured.result import MediumPosterior
 from profilefit.report.figures.canvas import (
     BLACK,
     BLUE,
@@ -33,30 +33,30 @@ LABEL_DISTANCE = 0.3  # of an axis name, in panels
 
 
 @styled
-def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
+def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residuals") -> list[Path]:
     """Reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
-    found, data = result.found, result.found.data
+    fit, data = result.fit, result.fit.data
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     unit = data.unit or "unit of r"
     r, half = data.r, 0.5 * (data.outer - data.inner)
     line = np.geomspace(r[0] / ENDS, r[-1] * ENDS, CURVE)
     inner, outer = (line * 0.999, line * 1.001) if data.rings else (line, line)
-    light = found.problem.model.linearised(found.point, inner, outer)[0][:-1]
+    light = fit.problem.model.linearised(fit.point, inner, outer)[0][:-1]
     top.plot(line, light, label="fitted law", **WHOLE)
     seen = data.value > 0
     top.errorbar(
-        r[seen], data.value[seen], yerr=found.sigma[seen], xerr=half[seen] if data.rings else None,
+        r[seen], data.value[seen], yerr=fit.sigma[seen], xerr=half[seen] if data.rings else None,
         label="data, one standard error" + (", width of the annulus" if data.rings else ""), **DATA,
     )  # fmt: skip
     top.set(xscale="log", yscale="log", ylabel=f"reflected light per area [1/{unit}²]")
-    residual = (data.value - found.light) / found.sigma
+    residual = (data.value - fit.light) / fit.sigma
     below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
     below.axhspan(-1, 1, color=GREY, alpha=0.22, linewidth=0, label="one and two standard errors")
     below.axhline(0.0, color=BLUE, linewidth=1.0)
     below.plot(r, residual, color=BLACK, marker="o", markersize=3.0, linewidth=0.6)
-    if found.rel is not None and result.identifiability is not None:
-        band = found.law_size / found.sigma
+    if fit.rel is not None and result.identifiability is not None:
+        band = fit.law_size / fit.sigma
         below.plot(r, band, color=VERMILION, linestyle="--", linewidth=0.9, label="model error")
         below.plot(r, -band, color=VERMILION, linestyle="--", linewidth=0.9)
     span = max(3.0, 1.15 * float(np.max(np.abs(residual))))
@@ -66,7 +66,7 @@ def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> l
 
 
 @styled
-def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> list[Path]:
+def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner") -> list[Path]:
     """The posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
     names = shown(result)
     if not names:
@@ -85,7 +85,7 @@ def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> lis
             _dressed(grid[row, column], row, column)
             _marked(grid[row, column], [result.value(names[at]) for at in (column, row)], row != column)
     for at, one in enumerate(names):
-        unit = unit_of(one, result.found.data.unit)
+        unit = unit_of(one, result.fit.data.unit)
         label = f"{_symbol(one)} [{unit or '-'}]"
         grid[size - 1, at].set_xlabel(label)
         grid[size - 1, at].xaxis.set_label_coords(0.5, -LABEL_DISTANCE)
@@ -97,11 +97,11 @@ def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> lis
     return save(figure, out, name)
 
 
-def shown(result: Answer) -> tuple[str, ...]:
+def shown(result: MediumPosterior) -> tuple[str, ...]:
     """The quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
     if result.walk is None:
         return ()
-    free = result.found.question.free
+    free = result.fit.spec.free
     if len(free) == 1:
         return ({0: "alpha", 1: "l", 2: "scale"}[free[0]],)
     return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)

@@ -9,13 +9,12 @@ from rich.console import RenderableType
 from rich.text import Text
 
 from mcml_sim.media.setting import Setting
+from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.fitting import MediumFit
-from profilefit.measured.identifiability import relative_errors
-from profilefit.measured.misfit import DETECTED
+from profilefit.measured.identifiability import REFERENCE_ERROR, REPEATS, Candidate, relative_errors
 from profilefit.measured.model import QUANTITIES, correlation, unit_of
 from profilefit.measured.oblique import NEAR
-from profilefit.measured.optimal_design import REFERENCE_ERROR, REPEATS, Candidate
-from profilefit.measured.result import Answer, known_medium, rival_values
+from profilefit.measured.result import MediumPosterior, known_medium, rival_values
 from profilefit.report.tables.cells import (
     ABSENT,
     SEARCHLIGHT,
@@ -42,7 +41,7 @@ OF_RANGES = "; ± model: from what is known as a range"
 OF_LAW = "; ± model: from the law's own error, taken for a Gaussian process along ln r"
 
 
-def fit_tables(result: Answer, title: str) -> list[RenderableType]:
+def fit_tables(result: MediumPosterior, title: str) -> list[RenderableType]:
     """Estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
@@ -52,28 +51,28 @@ def fit_tables(result: Answer, title: str) -> list[RenderableType]:
     return parts
 
 
-def fit_lines(result: Answer) -> list[Text]:
+def fit_lines(result: MediumPosterior) -> list[Text]:
     """A sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
     return [Text(line) for line in _lines(result)]
 
 
-def _quantity_table(result: Answer, title: str) -> RenderableType:
-    found, names = result.found, QUANTITIES
-    data = found.errors(found.statistical) if result.identified else {}
-    law = found.errors(found.of_law) if found.rel is not None and result.identified else {}
+def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
+    fit, names = result.fit, QUANTITIES
+    data = fit.errors(fit.statistical) if result.identified else {}
+    law = fit.errors(fit.of_law) if fit.rel is not None and result.identified else {}
     moving = result.identified
-    truth = known_medium(found.data)
+    truth = known_medium(fit.data)
     columns = {
         "": list(names),
         "value": on_the_point([to_error(result.value(name), data[name] if name in moving else None) for name in names]),
         "± statistical": [significant(data[name]) if name in moving else _mark(result, name) for name in names],
     }
     caption = CAPTION
-    if found.rel != 0 or found.question.ranges:  # exact light has no error of its own
+    if fit.rel != 0 or fit.spec.ranges:  # exact light has no error of its own
         columns["± model"] = [significant(law[name]) if name in law and name in moving else ABSENT for name in names]
-        caption += OF_RANGES if found.question.ranges else OF_LAW
-    if found.plain is not None:
-        misfit = found.errors(found.of_misfit) if moving else {}
+        caption += OF_RANGES if fit.spec.ranges else OF_LAW
+    if fit.plain is not None:
+        misfit = fit.errors(fit.of_misfit) if moving else {}
         columns["± lack of fit"] = [significant(misfit[name]) if name in moving else ABSENT for name in names]
         caption += "; ± lack of fit: from the residuals that these do not explain, likewise"
     whole = bool(result.whole_draws)
@@ -82,14 +81,14 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
         for name in names
     ]
     caption += "; 95 %: interval by " + (
-        "all of these errors together" if whole or found.plain is not None else "the statistical error alone"
+        "all of these errors together" if whole or fit.plain is not None else "the statistical error alone"
     )
     if any(any(result.ends(name)) for name in result.moving):
         caption += f"; {EDGE}: the data do not exclude the end of its range, so a one-sided 95 % limit and no value"
-    if found.question.law.setting.illumination == Setting().illumination:
+    if fit.spec.law.setting.illumination == Setting().illumination:
         caption += f"; {SEARCHLIGHT}"
-    columns["unit"] = [unit_of(name, found.data.unit) for name in names]
-    if found.question.law.setting.g:
+    columns["unit"] = [unit_of(name, fit.data.unit) for name in names]
+    if fit.spec.law.setting.g:
         caption += "; alpha is the reduced albedo, l = 1 / (mu_s' + mu_a)"
     if truth:
         columns["of file"] = [significant(truth.get(name), 4) for name in names]
@@ -104,33 +103,33 @@ def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
     return ANYTHING if wide else interval(ends, most)
 
 
-def _mark(result: Answer, name: str) -> str:
+def _mark(result: MediumPosterior, name: str) -> str:
     """What stands where a quantity has no symmetric error."""
     if name not in result.moving:
         return HELD
     return EDGE if any(result.ends(name)) else ABSENT
 
 
-def _correlation_table(result: Answer) -> RenderableType:
+def _correlation_table(result: MediumPosterior) -> RenderableType:
     names = result.identified
-    joint = correlation(result.found.gradients, result.found.statistical, names)
+    joint = correlation(result.fit.gradients, result.fit.statistical, names)
     columns = {"": list(names)}
     for at, name in enumerate(names):
         columns[name] = [f"{joint[row, at]:.3f}" if row > at else "" for row in range(len(names))]
     return column_table("Correlations", {k: v for k, v in columns.items() if k != names[-1]})
 
 
-def _advice_table(result: Answer) -> RenderableType:
+def _advice_table(result: MediumPosterior) -> RenderableType:
     advice = result.advice
     if advice is None:
         return Text("")
-    unit = result.found.data.unit or "units of r"
+    unit = result.fit.data.unit or "units of r"
     columns = {
         "additional measurement": ["none", *(described(one, unit) for one in advice.candidates)],
         "least certain quantity": [advice.name, *(one.worst[0] for one in advice.candidates)],
         "± statistical, relative": [significant(advice.now), *(significant(one.worst[1]) for one in advice.candidates)],
     }
-    place = "at the far end of the interval of alpha" if result.found.minimum.at_edge else "at the fitted values"
+    place = "at the far end of the interval of alpha" if result.fit.at_edge else "at the fitted values"
     caption = f"predicted {place}, best first; a value is given the median relative error of the data"
     left = "additional measurement", "least certain quantity"
     return column_table("Most informative additional measurement", columns, caption, left)
@@ -150,17 +149,17 @@ def described(one: Candidate, unit: str) -> str:
     return f"the whole profile, {REPEATS} times"
 
 
-def _lines(result: Answer) -> Iterator[str]:
-    found = result.found
-    for note in found.data.notes:
+def _lines(result: MediumPosterior) -> Iterator[str]:
+    fit = result.fit
+    for note in fit.data.notes:
         yield f"data: {note}"
-    yield f"errors of the data: {found.data.errors}"
+    yield f"errors of the data: {fit.data.errors}"
     if result.identifiability is None:
-        yield f"the fit failed: {found.minimum.result}"
+        yield f"the fit failed: {fit.minimum.result}"
         return
-    if found.minimum.at_edge:
-        yield f"AT AN EDGE: {found.minimum.result}"
-    if np.isfinite(found.data.pooled):
+    if fit.at_edge:
+        yield f"AT AN EDGE: {fit.minimum.result}"
+    if np.isfinite(fit.data.pooled):
         yield from _estimated(result)
     yield from _goodness(result)
     yield from _rivals(result)
@@ -174,38 +173,38 @@ def _lines(result: Answer) -> Iterator[str]:
             f"the medium scatters with g = {g:g}, what is fitted isotropically: within ten transport mean free paths "
             "this is off by tens of percent, which shows as a misfit only if rows lie within one"
         )
-    if found.rel is None:
+    if fit.rel is None:
         yield "the model error is unknown for this surface: there is neither an exact profile nor a record of it"
-    elif beyond := int(found.beyond.sum()):
+    elif beyond := int(fit.beyond.sum()):
         rows = f"{beyond} row{'s lie' if beyond > 1 else ' lies'}"
         yield f"{rows} beyond 99.5 % of the energy, where the law's error is larger; `r_max` leaves such rows out"
     if result.walk is not None and result.walk.result != "converged":
         yield f"posterior: {result.walk.result}"
 
 
-def _estimated(result: Answer) -> Iterator[str]:
+def _estimated(result: MediumPosterior) -> Iterator[str]:
     """How errors that are themselves estimates are allowed for."""
-    found = result.found
+    fit = result.fit
     yield (
-        f"these are estimates of {np.median(found.data.freedom):.2g} degrees of freedom each, their trend of "
-        f"{found.data.pooled:.2g}: so ± statistical is widened by a factor of {np.sqrt(found.widening):.2f}, 95 % is "
-        f"{found.quantile:.2f} times ± statistical (Student's t) and the p-value below is of an F test; {HELD_IN}"
+        f"these are estimates of {np.median(fit.data.freedom):.2g} degrees of freedom each, their trend of "
+        f"{fit.data.pooled:.2g}: so ± statistical is widened by a factor of {np.sqrt(fit.widening):.2f}, 95 % is "
+        f"{fit.quantile:.2f} times ± statistical (Student's t) and the p-value below is of an F test; {HELD_IN}"
     )
 
 
-def _forward(result: Answer) -> float | None:
+def _forward(result: MediumPosterior) -> float | None:
     """Return g of a simulation whose scattering the law takes for isotropic."""
-    layer = result.found.data.layer
-    return None if layer is None or result.found.question.law.setting.g else layer.g or None
+    layer = result.fit.data.layer
+    return None if layer is None or result.fit.spec.law.setting.g else layer.g or None
 
 
 def p_value(value: float) -> str:
     return f"below {TINIEST:g}" if value < TINIEST else f"{value:.2g}"
 
 
-def _goodness(result: Answer) -> Iterator[str]:
-    one = result.found.misfit
-    at_most = " (at most: the errors are bounds)" if result.found.data.bounded else ""
+def _goodness(result: MediumPosterior) -> Iterator[str]:
+    one = result.fit.misfit
+    at_most = " (at most: the errors are bounds)" if result.fit.data.bounded else ""
     yield (
         f"chi-square {one.chi2:.1f} for {one.freedom} degrees of freedom{at_most}, p-value {p_value(one.chance)}; "
         f"lag-1 autocorrelation {one.along_r:+.2f}, {one.runs[0]} sign runs ({one.runs[1]:.0f} expected)"
@@ -217,35 +216,35 @@ def _goodness(result: Answer) -> Iterator[str]:
             f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data "
             f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
         )
-    elif result.found.plain is not None:
-        ranges = result.found.question.ranges
+    elif result.fit.plain is not None:
+        ranges = result.fit.spec.ranges
         why = f"though {' and '.join(ranges)}, known as ranges, may hide one" if ranges else "but more likely than none"
         yield f"a misfit is not detected (p-value {p_value(one.joined)}) {why}; {_effect(result, _added(result))}"
     elif one.within_law:
         yield "the misfit is within the law's own error: what is missing is a better law, not another medium"
-    elif not result.found.data.bounded and 1.0 - one.chance < DETECTED:
+    elif not result.fit.data.bounded and 1.0 - one.chance < DETECTED:
         yield "the residuals are too small: the errors of the data are overstated, or common to all rows"
     else:
         yield "no misfit is detected: one layer explains the data"
 
 
-def _added(result: Answer) -> dict[str, float]:
+def _added(result: MediumPosterior) -> dict[str, float]:
     """Relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for or has no such errors."""
-    found = result.found
-    if found.plain is None:
+    fit = result.fit
+    if fit.plain is None:
         return {}
-    errors = relative_errors(found, found.of_misfit)
+    errors = relative_errors(fit, fit.of_misfit)
     return {name: errors[name] for name in ("mu_a", "mu_s'") if name in result.identified}
 
 
-def _effect(result: Answer, added: dict[str, float]) -> str:
+def _effect(result: MediumPosterior, added: dict[str, float]) -> str:
     """Return how much a lack of fit adds to the errors, and how large the other errors are, in words."""
-    found = result.found
-    if found.plain is None:
+    fit = result.fit
+    if fit.plain is None:
         return "no error below allows for it"
     if not added:
         return "the limits allow for it"
-    others = relative_errors(found, found.likely - found.of_misfit)
+    others = relative_errors(fit, fit.total_covariance - fit.of_misfit)
     by_lack = " and ".join(f"± {significant(100 * error)} % to {name}" for name, error in added.items())
     rest = " and ".join(f"± {significant(100 * others[name])} %" for name in added)
     return f"it adds {by_lack}, where all other errors are {rest}; 95 % includes it"
@@ -257,41 +256,41 @@ def _unexplained(relative: float) -> str:
     )
 
 
-def _rivals(result: Answer) -> Iterator[str]:
+def _rivals(result: MediumPosterior) -> Iterator[str]:
     """Other media that explain the data as well."""
-    found, unit = result.found, result.found.data.unit
-    for one in found.rivals:
-        values = rival_values(found, one)
+    fit, unit = result.fit, result.fit.data.unit
+    for one in fit.rivals:
+        values = rival_values(fit, one)
         told = ", ".join(f"{name} {values[name]:.3g} {unit_of(name, unit)}".rstrip() for name in RIVALLED)
         yield (
-            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - found.minimum.cost:+.1f}. No interval holds "
+            f"ANOTHER MEDIUM FITS AS WELL: {told}; chi-square {one.cost - fit.minimum.cost:+.1f}. No interval holds "
             "both: measure nearer to the beam, or the total reflectance, or the scale"
         )
 
 
-def _oblique(result: Answer) -> Iterator[str]:
+def _oblique(result: MediumPosterior) -> Iterator[str]:
     """Whether the centre of light aslant is explained, and known well where it was measured."""
-    found, unit = result.found, result.found.data.unit or "units of r"
-    one = found.question.oblique
+    fit, unit = result.fit, result.fit.data.unit or "units of r"
+    one = fit.spec.oblique
     if one is None:
         return
-    (off,), _ = one.residuals(found.question.law.setting, found.point[None])
+    (off,), _ = one.residuals(fit.spec.law.setting, fit.point[None])
     yield f"centre of oblique light: the fit has it {off:+.1f} of its errors from {one.centre:g} {unit}" + (
         ": IT CONTRADICTS THE PROFILE under this n, g and beam" if abs(off) > UNLIKELY else ""
     )
-    if one.r < (near := NEAR * found.values["l"]):
+    if one.r < (near := NEAR * fit.values["l"]):
         yield (
             f"at r = {one.r:g} {unit} a centre of oblique light is known less well than is taken for granted: measure "
             f"it beyond {near:.2g} {unit}"
         )
 
 
-def _beam(result: Answer) -> Iterator[str]:
+def _beam(result: MediumPosterior) -> Iterator[str]:
     """Which beam was assumed, and whether another one would matter."""
-    found, width = result.found, result.width
-    unit = found.data.unit or "units of r"
-    if found.question.instrument.beam is not None:
-        yield f"beam: {found.question.instrument.beam.words} {unit}"
+    fit, width = result.fit, result.width
+    unit = fit.data.unit or "units of r"
+    if fit.spec.instrument.beam is not None:
+        yield f"beam: {fit.spec.instrument.beam.words} {unit}"
     if width is None:
         return
     if width.noticed:
@@ -308,27 +307,27 @@ def _beam(result: Answer) -> Iterator[str]:
         )
 
 
-def _narrowed(found: MediumFit) -> str:
+def _narrowed(fit: MediumFit) -> str:
     """What the data say of ranges."""
-    if found.open is None:
+    if fit.range_marginal is None:
         return "no value of theirs gives a fit with errors, so the middle is fitted"
-    units = {"beam": f" {found.data.unit or 'units of r'}"}
+    units = {"beam": f" {fit.data.unit or 'units of r'}"}
     told = ", ".join(
-        f"{name} {value:.3g} ± {found.open.error[name]:.2g}{units.get(name, '')}"
-        for name, value in found.open.mean.items()
+        f"{name} {value:.3g} ± {fit.range_marginal.error[name]:.2g}{units.get(name, '')}"
+        for name, value in fit.range_marginal.mean.items()
     )
     return f"the data and the ranges together say {told}, and what this leaves open is in the intervals"
 
 
-def _medium(result: Answer) -> Iterator[str]:
+def _medium(result: MediumPosterior) -> Iterator[str]:
     """What is open of n and g, or assumed."""
-    question, there, unit = result.found.question, result.tissue, result.found.data.unit
-    if question.ranges:
-        known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in question.ranges.items())
-        yield f"known as ranges: {known}; {_narrowed(result.found)}"
+    spec, there, unit = result.fit.spec, result.tissue, result.fit.data.unit
+    if spec.ranges:
+        known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
+        yield f"known as ranges: {known}; {_narrowed(result.fit)}"
     if there is not None:
-        names = question.assumed
-        here, other = (_named(names, one) for one in (question.law.setting, there.setting))
+        names = spec.assumed
+        here, other = (_named(names, one) for one in (spec.law.setting, there.setting))
         told = ", ".join(f"{name} {there.values[name]:.3g} {unit_of(name, unit)}" for name in ("mu_s'", "mu_a"))
         yield (
             f"{here} {'are' if len(names) > 1 else 'is'} assumed; {other}, as of soft tissue, would say {told}, "
@@ -340,11 +339,11 @@ def _named(names: tuple[str, ...], setting: Setting) -> str:
     return " and ".join(f"{name} = {getattr(setting, name):g}" for name in names)
 
 
-def _scale(result: Answer) -> Iterator[str]:
+def _scale(result: MediumPosterior) -> Iterator[str]:
     """A free scale that no reflectance has, and a length that the data do not reach."""
-    found = result.found
-    scale, mfp, r = found.values["scale"], found.values["l"], found.data.r
-    free = "scale" in result.moving and found.question.scale is None and found.data.unit
+    fit = result.fit
+    scale, mfp, r = fit.values["scale"], fit.values["l"], fit.data.r
+    free = "scale" in result.moving and fit.spec.scale is None and fit.data.unit
     if free and not ODD[0] < scale < ODD[1]:
         yield (
             f"the scale is {scale:.3g}; of values per incident light it is near 1: if yours are that, hold it, for "
@@ -354,8 +353,8 @@ def _scale(result: Answer) -> Iterator[str]:
         yield f"l = {mfp:.3g} is beyond the data's reach, from r = {r[0]:.3g} to {r[-1]:.3g}: they tell little of it"
 
 
-def _identifiability(result: Answer) -> Iterator[str]:
-    identifiability, advice, unit = result.identifiability, result.advice, result.found.data.unit
+def _identifiability(result: MediumPosterior) -> Iterator[str]:
+    identifiability, advice, unit = result.identifiability, result.advice, result.fit.data.unit
     if identifiability is None or advice is None:
         return
     if identifiability.all_identified:

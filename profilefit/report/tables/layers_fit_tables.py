@@ -8,8 +8,9 @@ from typing import Any
 
 from rich.console import RenderableType
 
-from profilefit.measured.layers import LOOSE, LayersFit
-from profilefit.measured.misfit import DETECTED
+from profilefit.fitting.misfit import DETECTED
+from profilefit.measured.identifiability import LOOSE
+from profilefit.measured.layers import LayersFit
 from profilefit.recipes import record
 from profilefit.report.tables.cells import ABSENT, column_table, interval, significant, to_error
 from profilefit.report.tables.fit_tables import p_value

@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 from rich.console import RenderableType
 
+from profilefit.fitting.misfit import DETECTED
 from profilefit.measured.identifiability import LOOSE
-from profilefit.measured.misfit import DETECTED
 from profilefit.measured.photo.workflow import Photo
 from profilefit.recipes import record
 from profilefit.report.tables.cells import column_table, interval, significant, to_error

@@ -7,7 +7,7 @@ import pytest
 
 from profilefit.fitting import discrepancy
 from profilefit.fitting.discrepancy import FOUND, NOT_SEEN, Discrepancy, Residuals, of_residuals
-from profilefit.fitting.gaussian_process import apart
+from profilefit.fitting.misfit import apart
 
 U, S = np.linspace(-4.0, 2.5, 14), np.linspace(0.08, 0.97, 12)
 AMPLITUDE, LENGTH_U, LENGTH_S, NOISE = 0.03, 1.2, 0.3, 0.002

@@ -5,15 +5,12 @@ import pytest
 
 from benchmarks import own_data
 from mcml_sim import Setting
-from profilefit.measured.assumed import beam_width
-from profilefit.measured.beam import Gaussian
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.identifiability import identifiability
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
-from profilefit.measured.problem import Question
+from profilefit.measured.identifiability import beam_width, identifiability
+from profilefit.measured.instrument import PENCIL, Gaussian, Instrument
+from profilefit.measured.model import Model, exact_light, u_of
+from profilefit.measured.problem import FitSpec
 
 LIGHT = exact_light(Setting())
 ALPHA, MFP = 0.93817, 0.5  # A = .5
@@ -32,7 +29,7 @@ def rings(instrument, noise=0.002, seed=1, nearest=0.0, alpha=ALPHA, mfp=MFP, ed
 
 
 def fit(data, instrument=PENCIL, held=None):
-    return fitted(data, Question(LIGHT, held or {}, instrument=instrument))
+    return fitted(data, FitSpec(LIGHT, held or {}, instrument=instrument))
 
 
 @pytest.mark.parametrize("nearest", [0.0, 2.0])
@@ -49,7 +46,7 @@ def test_with_its_beam_a_fit_of_any_scale_holds_the_truth(nearest):
 
 def test_without_its_beam_the_data_say_that_it_has_a_width():
     found = fit(rings(Instrument(Gaussian(0.5))), held={"scale": 1.0})
-    off = abs(found.plain.values["mu_a"] - (1 - ALPHA) / MFP) / found.plain.errors(found.plain.likely)["mu_a"]
+    off = abs(found.plain.values["mu_a"] - (1 - ALPHA) / MFP) / found.plain.errors(found.plain.total_covariance)["mu_a"]
     assert off > 10, "negative control: by the data's errors alone the answer is wrong"
     width = beam_width(found)
     assert width.noticed
@@ -62,14 +59,16 @@ def test_a_pencil_beam_is_not_accused_and_the_width_that_would_matter_does():
     assert not width.noticed
     assert width.telling is not None
     there = fit(rings(PENCIL), Instrument(Gaussian(width.telling)), held={"scale": 1.0})
-    moved = abs(there.values[width.moved] - found.values[width.moved]) / found.errors(found.likely)[width.moved]
+    moved = (
+        abs(there.values[width.moved] - found.values[width.moved]) / found.errors(found.total_covariance)[width.moved]
+    )
     assert moved == pytest.approx(1.0, abs=0.3)
     assert beam_width(there) is None, "it has a beam"
 
 
 def test_a_misfit_of_a_pencil_beam_is_not_taken_for_a_width():
     """Light of tissue under a pencil beam, with a wave of .4 % along ln r and noise of .1 %."""
-    found = fitted(own_data.wavy(), Question(exact_light(own_data.SMOOTH.setting), own_data.SCALE))
+    found = fitted(own_data.wavy(), FitSpec(exact_light(own_data.SMOOTH.setting), own_data.SCALE))
     assert found.misfit.detected
     assert not beam_width(found).noticed
     assert beam_width(found.plain).chance < 1e-8, "negative control: by the data's errors alone"

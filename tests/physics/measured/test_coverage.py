@@ -10,19 +10,15 @@ from scipy.special import expit
 
 from benchmarks import own_data
 from mcml_sim import Grid, Layer, Medium, Setting, exact, read_mco, simulate, write_mco, write_results
-from profilefit.measured.beam import Gaussian
-from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.data import Measured, moderated_variances
 from profilefit.measured.fitting import fitted
 from profilefit.measured.identifiability import identifiability
-from profilefit.measured.instrument import Instrument
-from profilefit.measured.law_error import origin
-from profilefit.measured.model import U
-from profilefit.measured.posterior import posterior, ridge
-from profilefit.measured.problem import Question
+from profilefit.measured.instrument import Gaussian, Instrument
+from profilefit.measured.model import U, exact_light
+from profilefit.measured.noise import origin
+from profilefit.measured.problem import FitSpec
 from profilefit.measured.reading import read
-from profilefit.measured.replicates import moderated_variances
-from profilefit.measured.result import Answer, judged
+from profilefit.measured.result import MediumPosterior, judged, moved, posterior, ridge
 from profilefit.recipes import catalogue
 
 pytestmark = pytest.mark.slow
@@ -57,9 +53,9 @@ def band(share, count):
 def replicates():
     """Fits to light of the law itself with 2 % noise."""
     generator, light = np.random.default_rng(5), LAW.profile(R, ALPHA, MFP)
-    question = Question(LAW, {"scale": 1.0})
+    spec = FitSpec(LAW, {"scale": 1.0}, source=source())
     draws = light * (1 + 0.02 * generator.standard_normal((REPLICATES, R.size)))
-    return [fitted(points(one, 0.02 * light), question, source()) for one in draws]
+    return [fitted(points(one, 0.02 * light), spec) for one in draws]
 
 
 def covered(replicates, level, wider=1.0):
@@ -103,7 +99,7 @@ def test_replicates_are_not_accused_and_cover(count, uneven):
         size = 0.01 * np.sqrt(count) * np.exp(uneven * generator.standard_normal((R.size, 1)))
         one = moderated_variances(light[:, None] * (1 + size * generator.standard_normal((R.size, count))))
         data = points(one.value, one.sigma, one.freedom, pooled=one.pooled)
-        found.append(fitted(data, Question(LAW, {"scale": 1.0}), source()))
+        found.append(fitted(data, FitSpec(LAW, {"scale": 1.0}, source=source())))
     low, high = band(0.95, REPLICATES)
     assert all(low <= held <= high for held in covered(found, 0.95).values())
     assert sum(one.misfit.detected for one in found) <= 3
@@ -123,7 +119,7 @@ def test_the_laws_own_error_is_what_moves_a_fit():
             for low, high in ((0.1, 0.99), (0.5, 0.99), (0.1, 0.9)):
                 r = np.geomspace(*exact.quantile([low, high], alpha), 16)
                 light = np.asarray(exact.profile(r, alpha))
-                found = fitted(points(light, 0.01 * light, r=r), Question(law, {"scale": 1.0}), known)
+                found = fitted(points(light, 0.01 * light, r=r), FitSpec(law, {"scale": 1.0}, source=known))
                 errors = found.errors(found.of_law)
                 shifts.append(
                     [(found.values["alpha"] - alpha) / errors["alpha"], (found.values["l"] - 1) / errors["l"]]
@@ -143,20 +139,20 @@ def test_errors_of_simulations_are_the_scatter_of_seeds(tmp_path):
     for seed in range(60):
         tally = simulate(medium, grid, 2**14, seed=seed, progress=False)
         write_results(tally, tmp_path / "a.npz")
-        found.append(fitted(read(tmp_path / "a.npz"), Question(LAW, {"scale": 1.0}), source()))
+        found.append(fitted(read(tmp_path / "a.npz"), FitSpec(LAW, {"scale": 1.0}, source=source())))
     assert all(one.minimum.converged for one in found)
     for name, too_wide in (("alpha", 1.5), ("l", 1.0)):
         scatter = np.std([one.values[name] for one in found], ddof=1)
         stated = np.median([one.errors(one.statistical)[name] for one in found])
         assert stated / scatter == pytest.approx(1.0, abs=0.23), name
-        shared = [fitted(replace(one.data, photons=np.inf), one.question, source()) for one in found[:5]]
+        shared = [fitted(replace(one.data, photons=np.inf), one.spec) for one in found[:5]]
         assert np.median([one.errors(one.statistical)[name] for one in shared]) > too_wide * scatter, "negative control"
 
 
 def test_the_chain_has_the_width_of_the_covariance(replicates):
     walked = posterior(replicates[0])
     assert walked.result == "converged"
-    expected = np.sqrt(np.diag(replicates[0].likely))[:2]
+    expected = np.sqrt(np.diag(replicates[0].total_covariance))[:2]
     # 4000 thinned draws of tau ten know a standard deviation to 4 %: three of these.
     np.testing.assert_allclose(walked.samples.std(axis=0), expected, rtol=0.12)
 
@@ -166,7 +162,7 @@ def test_a_chain_starts_where_the_data_leave_a_direction_open():
     direction, and the errors of the two others are lost in rounding."""
     one, edges = own_data.Medium(Setting(), 0.969137, 0.249761, 0.0031), np.arange(1.5, 10.1, 0.25)
     data = own_data.rows(one, np.random.default_rng(1), Instrument(Gaussian(0.897)), edges)
-    found = fitted(data, Question(exact_light(Setting()), {}))
+    found = fitted(data, FitSpec(exact_light(Setting()), {}))
     assert np.linalg.cond(found.jacobian) > 1e8, "whose square is more than double precision has"
     walked = posterior(found, max_steps=2000)
     spread = np.linalg.svd(np.cov(walked.samples.T))[1]
@@ -183,13 +179,13 @@ def test_a_chain_walks_the_whole_of_a_bent_ridge():
     one, edges = own_data.Medium(Setting(), 0.715456, 0.676514, 0.00577), np.arange(2.75, 10.1, 0.25)
     seen = Instrument(Gaussian(0.64))
     data = own_data.rows(one, np.random.default_rng(10), seen, edges)
-    found = fitted(data, Question(exact_light(Setting()), {}, instrument=seen))
+    found = fitted(data, FitSpec(exact_light(Setting()), {}, instrument=seen))
     walked, along = posterior(found), ridge(found)
     u = np.linspace(along.first[0], along.first[-1], 81)
     z = np.stack(np.meshgrid(*[np.linspace(-4.5, 4.5, 19)] * 2), axis=-1).reshape(-1, 2)
     log = []
     for first in u:
-        node = min(along.nodes, key=lambda one: abs(one.first - first)).moved(first)
+        node = moved(found, min(along.nodes, key=lambda one: abs(one.first - first)), first)
         others = node.others + z @ node.root.T
         costs = found.problem.costs(np.column_stack([np.full(len(z), first), others])) - found.minimum.cost
         log.append(np.logaddexp.reduce(-0.5 * costs) + np.sum(np.log(np.diag(node.root))))
@@ -200,7 +196,7 @@ def test_a_chain_walks_the_whole_of_a_bent_ridge():
     error = np.sqrt(levels * (1 - levels) * walked.tau / (walked.steps * walked.walkers))
     assert walked.tau < 10, "in coordinates that are not straight it is 226, and the share .975 ends where .93 does"
     assert np.all(np.abs(np.mean(walked.samples[:, :1] < places, axis=0) - levels) < 4 * error)
-    wide = found.point[U] + np.sqrt(found.likely[U, U]) * stats.norm.ppf(levels)
+    wide = found.point[U] + np.sqrt(found.total_covariance[U, U]) * stats.norm.ppf(levels)
     assert np.max(np.abs(np.interp(wide, u, summed / share.sum()) - levels) / error) > 20, "negative control"
 
 
@@ -227,9 +223,9 @@ def test_simulated_tissue_and_what_similarity_costs(tmp_path):
             Medium((Layer(1.4, 0.2, 10.0 / (1 - g), g),)), Grid(0.01, 150, 1.0, 1), 2**19, seed=seed, progress=False
         )
         write_results(tally, tmp_path / "a.npz")
-        data, question = read(tmp_path / "a.npz"), Question(exact_light(Setting(n=1.4)), {"scale": 1.0})
+        data, spec = read(tmp_path / "a.npz"), FitSpec(exact_light(Setting(n=1.4)), {"scale": 1.0})
         for least in (None, 0.2):
-            found[g, least] = fitted(data.within(least, None), question)
+            found[g, least] = fitted(data.within(least, None), spec)
     straight = found[0.0, None]
     errors = straight.errors(straight.statistical)
     assert abs(straight.values["mu_a"] - 0.2) < 3 * errors["mu_a"]
@@ -237,7 +233,7 @@ def test_simulated_tissue_and_what_similarity_costs(tmp_path):
     assert not straight.misfit.detected
     whole, far = found[0.9, None], found[0.9, 0.2]
     assert whole.misfit.detected
-    allowed = whole.errors(whole.likely)
+    allowed = whole.errors(whole.total_covariance)
     assert abs(whole.values["mu_a"] - 0.2) < 2 * allowed["mu_a"], "by errors with the lack of fit"
     assert abs(whole.values["mu_s'"] - 10.0) < 2 * allowed["mu_s'"]
     assert whole.plain.values["mu_a"] == pytest.approx(0.187, rel=0.03)
@@ -252,12 +248,12 @@ def test_a_white_medium_has_an_upper_limit_of_absorption():
     """No absorption at all: in half of the replicates alpha runs to 1, and mu_a has an upper limit and no value."""
     light = np.asarray(exact.profile(R, 1.0, MFP)) * (1 + 0.02 * np.random.default_rng(3).standard_normal(R.size))
     for part in (light, 1.03 * light):
-        result = judged(fitted(points(part, 0.02 * light), Question(LAW, {"scale": 1.0}), source()))
+        result = judged(fitted(points(part, 0.02 * light), FitSpec(LAW, {"scale": 1.0}, source=source())))
         assert result.walk is not None
         low, high = result.interval("mu_a")
         assert low is None
         assert 0 < high < 2e-3, "per mm: a five-hundredth of mu_s'"
-    assert result.found.minimum.at_edge
+    assert result.fit.at_edge
     assert result.identified == ()
     assert [result.value(name) for name in ("A", "alpha", "mu_a")] == [None] * 3
     assert result.value("l") == pytest.approx(MFP, rel=0.05)
@@ -276,8 +272,8 @@ def test_limits_at_the_white_end_cover(alpha):
     generator, held, stated, too_low = np.random.default_rng(11), 0, 0, 0
     for _ in range(count):
         value = light * (1 + 0.02 * generator.standard_normal(R.size))
-        found = fitted(points(value, 0.02 * light), Question(LAW, {"scale": 1.0}), None)
-        result = Answer(found, identifiability(found), None, posterior(found, max_steps=1000))
+        found = fitted(points(value, 0.02 * light), FitSpec(LAW, {"scale": 1.0}))
+        result = MediumPosterior(found, identifiability(found), None, posterior(found, max_steps=1000))
         truth, limit = (1 - alpha) / MFP, np.quantile(result.draws["mu_a"], 0.95)
         held += truth <= limit
         too_low += truth > limit / 4

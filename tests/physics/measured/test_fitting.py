@@ -13,15 +13,12 @@ from profilefit.errors import InputError
 from profilefit.fitting.quality import profile_quality
 from profilefit.measured.data import Measured
 from profilefit.measured.fitting import MediumFit, fitted
-from profilefit.measured.identifiability import identifiability, relative_errors
-from profilefit.measured.law_error import BEYOND, RMS, WAVE, origin, relative_error
+from profilefit.measured.identifiability import identifiability, rank_designs, relative_errors
 from profilefit.measured.model import Model, u_of
-from profilefit.measured.optimal_design import advised
-from profilefit.measured.posterior import posterior
-from profilefit.measured.problem import Known, Question
+from profilefit.measured.noise import BEYOND, RMS, WAVE, origin, relative_error
+from profilefit.measured.problem import FARTHEST_LN, LONGEST, FitSpec, Known
 from profilefit.measured.reading import read
-from profilefit.measured.result import Answer, judged
-from profilefit.measured.solving import FARTHEST_LN, LONGEST
+from profilefit.measured.result import MediumPosterior, judged, posterior
 from profilefit.recipes import catalogue
 
 DATA = Path(__file__).parents[3] / "examples"
@@ -50,7 +47,7 @@ def rings(error=0.02, seed=None, most=np.inf, scale=1.0) -> Measured:
 
 def fit(data, total=None, scale_error=None, **held) -> MediumFit:
     known = None if scale_error is None else Known(1.0, scale_error)
-    return fitted(data, Question(LAW, held, total, known), SOURCE)
+    return fitted(data, FitSpec(LAW, held, total, known, source=SOURCE))
 
 
 @pytest.fixture(scope="module")
@@ -87,7 +84,7 @@ def test_errors_are_those_of_linear_least_squares(plain):
     apart = np.subtract.outer(np.log(data.r), np.log(data.r)) / WAVE
     law, noise = np.exp(-np.abs(apart)) * np.outer(size, size), np.diag(data.sigma**2)
     gain = np.linalg.solve(jacobian.T @ np.linalg.solve(law + noise, jacobian), jacobian.T) @ np.linalg.inv(law + noise)
-    for found, rows in ((plain.statistical, noise), (plain.of_law, law), (plain.likely, law + noise)):
+    for found, rows in ((plain.statistical, noise), (plain.of_law, law), (plain.total_covariance, law + noise)):
         np.testing.assert_allclose(found[:2, :2], gain @ rows @ gain.T, rtol=1e-4)
     errors = plain.errors(plain.statistical)
     assert errors["scale"] == 0
@@ -99,7 +96,7 @@ def test_what_is_held_stays_and_what_is_known_counts():
     data = rings(seed=1)
     held = fit(data, scale=1.0, l=1.0)
     assert held.values["l"] == pytest.approx(1.0, rel=1e-12)
-    assert held.question.free == (0,)
+    assert held.spec.free == (0,)
     darker = fit(data, total=Known(TOTAL / 2, TOTAL / 1000), scale=1.0)
     assert TOTAL / 2 < darker.values["A"] < 0.6 * TOTAL, "thousandth against 2 % errors"
     assert darker.minimum.residuals.size == data.value.size + 1
@@ -135,7 +132,7 @@ def test_light_that_rises_outwards_runs_away():
 
 
 def test_a_simulation_is_not_asked_for_its_total_reflectance():
-    kinds = {one.kind for one in advised(fit(read(DATA / "half_space.mco"))).candidates}
+    kinds = {one.kind for one in rank_designs(fit(read(DATA / "half_space.mco"))).candidates}
     assert kinds == {"point", "scale", "repeats"}
 
 
@@ -182,7 +179,7 @@ def test_near_the_beam_colour_length_and_scale_are_one():
 def test_intervals_are_where_chi_square_rises(plain):
     """Where the problem is nearly linear the profile likelihood has the width of the covariance."""
     for one in identifiability(plain).intervals:
-        half = 1.96 * plain.errors(plain.likely)[one.name]
+        half = 1.96 * plain.errors(plain.total_covariance)[one.name]
         assert (one.high - one.low) / 2 == pytest.approx(half, rel=0.05)
         assert one.low < plain.values[one.name] < one.high
 
@@ -203,11 +200,11 @@ def test_no_value_lies_outside_its_own_interval():
     at_edge = given = 0
     for seed in range(5):
         found = small(np.random.default_rng(seed))
-        if not (found.minimum.converged or found.minimum.at_edge):
+        if not (found.minimum.converged or found.at_edge):
             continue
         judgement = identifiability(found)
         endless = any(one.open_low or (one.open_high and one.name != "alpha") for one in judgement.intervals)
-        result = Answer(found, judgement, None, None if endless else posterior(found, max_steps=100))
+        result = MediumPosterior(found, judgement, None, None if endless else posterior(found, max_steps=100))
         for name in result.moving:
             value, shown = result.value(name), [result.interval(name), result.whole_interval(name)]
             if any(result.ends(name)):
@@ -225,26 +222,26 @@ def test_no_value_lies_outside_its_own_interval():
 
 
 def test_the_advice_does_what_it_predicts_and_what_it_rejects_does_less(unscaled):
-    advice = advised(unscaled)
+    advice = rank_designs(unscaled)
     found = {one.kind: one for one in advice.candidates}
     assert set(found) == {"point", "reflectance", "scale", "repeats"}
-    assert advice.now == max(relative_errors(unscaled, unscaled.likely).values())
+    assert advice.now == max(relative_errors(unscaled, unscaled.total_covariance).values())
     best = advice.candidates[0]
     assert best.kind == "reflectance"
     assert best.worst[1] < advice.now / 4
 
-    taken = fitted(unscaled.data, replace(unscaled.question, total=Known(TOTAL, best.error)), SOURCE)
-    real = relative_errors(taken, taken.likely)
+    taken = fitted(unscaled.data, replace(unscaled.spec, total=Known(TOTAL, best.error)))
+    real = relative_errors(taken, taken.total_covariance)
     assert real == pytest.approx(best.relative, rel=0.02)
 
     point = found["point"]
     value = light(np.array([point.inner]), np.array([point.outer]), 3.0)[0]
     assert value == pytest.approx(point.value, rel=1e-5)
-    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.question, SOURCE)
-    assert relative_errors(with_point, with_point.likely) == pytest.approx(point.relative, rel=0.02)
+    with_point = fitted(unscaled.data.with_row(point.inner, point.outer, value, point.error), unscaled.spec)
+    assert relative_errors(with_point, with_point.total_covariance) == pytest.approx(point.relative, rel=0.02)
     assert max(point.relative.values()) > max(real.values())
     four = fit(rings(error=0.01, scale=3.0))
-    assert relative_errors(four, four.likely) == pytest.approx(found["repeats"].relative, rel=0.02)
+    assert relative_errors(four, four.total_covariance) == pytest.approx(found["repeats"].relative, rel=0.02)
 
 
 def test_what_is_known_of_a_law():
@@ -273,6 +270,6 @@ def test_errors_beyond_double_precision_are_the_result_and_nothing_is_told():
     sigma = np.array([1.6e-15, 1.6e-7, 6.1e14, 5.3e11, 3.3e-9, 770.0, 1.8e-22])
     data = Measured("made up", "", r, r, value, sigma, np.full(r.size, np.inf), "as given", "mm")
     result = judged(fit(data))
-    assert result.found.minimum.result != "converged"
+    assert result.fit.minimum.result != "converged"
     assert (result.identifiability, result.identified, result.draws) == (None, (), {})
     assert {result.value(name) for name in result.moving} == {None}

@@ -9,7 +9,7 @@ from mcml_sim import Layer, Medium, Setting
 from mcml_sim.exact.anisotropic import table
 from profilefit.measured import fit
 from profilefit.measured.data import Measured
-from profilefit.measured.exact_light import exact_light
+from profilefit.measured.model import exact_light
 from profilefit.measured.premises import Premises
 from profilefit.report.tables.fit_tables import fit_lines
 from tests.fixtures import slow
@@ -41,13 +41,13 @@ def off(found):
 def test_photons_of_tissue_give_their_medium(photons):
     """2 % and 1 % from all rings, 4 % and 2 % from those beyond two transport mean free paths."""
     result = fit(photons, walk=False)
-    assert result.found.question.law.setting == TISSUE, "of the simulation"
-    near, far = off(result.found), off(fit(photons.within(0.2, None), walk=False).found)
+    assert result.fit.spec.law.setting == TISSUE, "of the simulation"
+    near, far = off(result.fit), off(fit(photons.within(0.2, None), walk=False).fit)
     assert abs(near[0]) < 0.02
     assert abs(near[1]) < 0.01
     assert abs(far[0]) < 0.04
     assert abs(far[1]) < 0.02
-    isotropic = fit(photons, setting=Setting(n=1.4), walk=False).found
+    isotropic = fit(photons, setting=Setting(n=1.4), walk=False).fit
     assert abs(off(isotropic)[0]) > 0.04, "a negative control: similarity"
 
 
@@ -55,14 +55,14 @@ def test_photons_of_tissue_give_their_medium(photons):
 def test_what_is_open_widens_the_errors(ranges):
     one = own_data.TISSUE
     data = own_data.rows(one, np.random.default_rng(3))
-    given = fit(data, setting=one.setting, walk=False).found
+    given = fit(data, setting=one.setting, walk=False).fit
     found = fit(
         data, setting=Premises(Setting(n=1.4, g=float(np.mean(ranges.get("g", 0.9)))), ranges=ranges), walk=False
     )
-    errors = found.found.errors(found.found.likely)
-    own = given.errors(given.likely)
+    errors = found.fit.errors(found.fit.total_covariance)
+    own = given.errors(given.total_covariance)
     assert (errors["mu_a"] > 1.05 * own["mu_a"]) == bool(ranges)
-    assert abs(found.found.values["mu_a"] - 0.02) < 3 * errors["mu_a"]
+    assert abs(found.fit.values["mu_a"] - 0.02) < 3 * errors["mu_a"]
     lines = [line.plain for line in fit_lines(found)]
     assert any(line.startswith("known as ranges: ") for line in lines) == bool(ranges)
 

@@ -10,10 +10,8 @@ import pytest
 
 from mcml_sim import Setting, exact
 from profilefit.errors import InputError
-from profilefit.measured.beam import Gaussian, Profiled, TopHat, beam_of
-from profilefit.measured.exact_light import exact_light
-from profilefit.measured.instrument import PENCIL, Instrument
-from profilefit.measured.model import Model, u_of
+from profilefit.measured.instrument import PENCIL, Gaussian, Instrument, Profiled, TopHat, beam_of
+from profilefit.measured.model import Model, exact_light, u_of
 from tests.fixtures import slow
 
 SETTINGS = Setting(), Setting(n=1.4), Setting("diffuse", n=1.4)

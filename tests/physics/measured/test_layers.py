@@ -10,12 +10,11 @@ from scipy import stats
 from mcml_sim import Layer, Medium, Setting, exact
 from profilefit.errors import InputError
 from profilefit.measured import read
-from profilefit.measured.data import Measured
+from profilefit.measured.data import Measured, widening
 from profilefit.measured.instrument import PENCIL
 from profilefit.measured.layers import fit_layers, solved_rows
 from profilefit.measured.premises import Premises, premises
 from profilefit.measured.problem import Known
-from profilefit.measured.replicates import widening
 
 DATA = Path(__file__).parents[3] / "examples"
 GUESS = Medium((Layer(1.0, 10.0, 10.0, 0.0, 0.05), Layer(1.0, 0.1, 10.0, 0.0)))  # of two_layers.mco, in cm

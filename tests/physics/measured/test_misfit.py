@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from profilefit.measured.law_error import waves
-from profilefit.measured.misfit import DETECTED, lack_of_fit, misfit
+from profilefit.fitting.misfit import DETECTED, lack_of_fit, misfit, waves
+from profilefit.measured.noise import WAVE
 
 ROWS, SETS = 24, 120
 R = np.geomspace(0.1, 10.0, ROWS)
 JACOBIAN = np.column_stack([np.ones(ROWS), np.log(R)]) * 50.0
-SHAPE = waves(R) * 50.0**2  # a relative error where sigma is 2 %
+SHAPE = waves(R, WAVE) * 50.0**2  # a relative error where sigma is 2 %
 NONE = np.zeros((ROWS, ROWS))
 
 

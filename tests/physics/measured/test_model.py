@@ -7,8 +7,7 @@ import pytest
 from mcml_sim import Setting
 from profilefit.errors import InputError
 from profilefit.measured import model
-from profilefit.measured.exact_light import exact_light
-from profilefit.measured.model import BLOCK, Model, alpha_of, u_of
+from profilefit.measured.model import BLOCK, Model, alpha_of, exact_light, u_of
 from profilefit.measured.problem import held_albedo
 from profilefit.recipes import catalogue
 

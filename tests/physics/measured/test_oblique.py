@@ -102,11 +102,11 @@ def test_an_oblique_beam_gives_the_scattering_that_a_free_scale_leaves_open(tmp_
     (centre,) = oblique.centres(0.95, 1.4, 0.8, ANGLE, np.array([4.0]))
     known = oblique.Oblique(ANGLE, 4.0, float(centre), 0.01)
     alone, both = (fit(table, setting=setting, scale=None, walk=False, oblique=one) for one in (None, known))
-    errors = [one.found.errors(one.found.likely)["mu_s'"] for one in (alone, both)]
+    errors = [one.fit.errors(one.fit.total_covariance)["mu_s'"] for one in (alone, both)]
     assert errors[1] < 0.5 * errors[0]
-    assert both.found.values["mu_s'"] == pytest.approx(0.95, rel=0.01)
+    assert both.fit.values["mu_s'"] == pytest.approx(0.95, rel=0.01)
     wrong = fit(table, setting=setting, scale=None, walk=False, oblique=replace(known, centre=1.3 * float(centre)))
-    assert wrong.found.values["mu_s'"] < 0.9, "a negative control: the centre counts"
+    assert wrong.fit.values["mu_s'"] < 0.9, "a negative control: the centre counts"
 
 
 def test_light_from_everywhere_has_no_slant(tmp_path):

@@ -10,10 +10,9 @@ from scipy.interpolate import CubicSpline
 
 from benchmarks import photo as bench
 from profilefit.errors import InputError
-from profilefit.fitting.solver import CONVERGED
+from profilefit.fitting.solver import CONVERGED, Solution, lowest
 from profilefit.measured import model
-from profilefit.measured.exact_light import exact_light
-from profilefit.measured.model import u_of
+from profilefit.measured.model import exact_light, u_of
 from profilefit.measured.photo import bracket, medium, rings, simulated, spot, workflow
 from profilefit.measured.photo.bracket import Picture
 from profilefit.measured.photo.exposure import BayerPlane, Exposure
@@ -23,7 +22,6 @@ from profilefit.measured.photo.pixel_scale import PixelScale, pixel_scale
 from profilefit.measured.photo.rings import SpotRings
 from profilefit.measured.photo.simulated import SpotCamera, SpotOptics
 from profilefit.measured.problem import Known
-from profilefit.measured.solving import Minimum, lowest
 from profilefit.report.tables.photo_tables import photo_lines
 from tests.fixtures import slow
 
@@ -281,13 +279,13 @@ def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
     fit = medium.fitted(shot)
     assert (fit.rivals, fit.result) == ((), CONVERGED)
     rows, slopes = shot.residuals(x)
-    ends = [Minimum(x + at * np.eye(x.size)[0], rows + 0.1 * at, slopes, 1, CONVERGED) for at in (1, 0)]
+    ends = [Solution(x + at * np.eye(x.size)[0], rows + 0.1 * at, slopes, 1, CONVERGED) for at in (1, 0)]
     monkeypatch.setattr(Shot, "starts", range(2))
     monkeypatch.setattr(medium, "_descended", lambda shot, at: ends[at])
     fit = medium.fitted(replace(shot))
     assert (fit.x[0], fit.result, len(fit.rivals)) == (x[0], medium.RIVALLED, 1)
     assert fit.rivals[0].chi2 - fit.chi2 < medium.RIVAL
-    ends[0] = Minimum(ends[0].parameters, np.append(rows, np.sqrt(medium.RIVAL)), slopes, 1, CONVERGED)
+    ends[0] = Solution(ends[0].parameters, np.append(rows, np.sqrt(medium.RIVAL)), slopes, 1, CONVERGED)
     assert medium.fitted(replace(shot)).rivals == (), "negative control: a chance of 1 in 1000"
     seen = SimpleNamespace(
         shot=SimpleNamespace(spot=SimpleNamespace(centre=(1.0, 2.0)), sources=("one",)), plate=SQUARE, notes=(),
@@ -298,7 +296,7 @@ def test_media_that_fit_as_well_are_named_and_no_answer(monkeypatch):
 
 def test_the_lowest_chi_square_is_kept_though_its_descent_did_not_end():
     low, high = (
-        Minimum(np.full(3, at), np.full(2, at), np.eye(2, 3), 1, result)
+        Solution(np.full(3, at), np.full(2, at), np.eye(2, 3), 1, result)
         for at, result in ((1.0, "no convergence"), (2.0, CONVERGED))
     )
     kept = lowest([high, low])

@@ -8,14 +8,12 @@ import pytest
 from benchmarks import own_data
 from mcml_sim import Setting
 from profilefit.measured import model
-from profilefit.measured.assumed import as_tissue
-from profilefit.measured.beam import Gaussian
-from profilefit.measured.exact_light import exact_light
 from profilefit.measured.fitting import fitted
-from profilefit.measured.instrument import Instrument
+from profilefit.measured.identifiability import as_tissue
+from profilefit.measured.instrument import Gaussian, Instrument
+from profilefit.measured.model import exact_light
 from profilefit.measured.noise import noise
-from profilefit.measured.problem import Known, Question, held_albedo
-from profilefit.measured.solving import Problem, descended
+from profilefit.measured.problem import FitSpec, Known, Problem, descended, held_albedo
 from tests.fixtures import slow
 
 ONE = own_data.TISSUE
@@ -23,9 +21,9 @@ RANGE = (0.3, 0.95)
 EDGES = np.array([1.0]), np.array([2.0])
 
 
-def asked(ranges, **known) -> Question:
+def asked(ranges, **known) -> FitSpec:
     setting = Setting(n=1.4, g=float(np.mean(ranges["g"])) if "g" in ranges else ONE.setting.g)
-    return Question(exact_light(setting), known.pop("held", own_data.SCALE), ranges=ranges, **known)
+    return FitSpec(exact_light(setting), known.pop("held", own_data.SCALE), ranges=ranges, **known)
 
 
 @pytest.fixture(scope="module")
@@ -37,38 +35,40 @@ def measured():
 @pytest.mark.parametrize("nearest", [0.1, 2.0], ids=["narrowed", "hardly narrowed"])
 def test_polynomials_are_the_fits_between_their_nodes(measured, nearest):
     """Mean and error of g, and the covariance of the coordinates, are those of sixty fits."""
-    question = asked({"g": RANGE})
-    found = fitted(measured.within(nearest, None), question)
-    ends = np.clip(found.open.mean["g"] + 6.0 * found.open.error["g"] * np.array([-1.0, 1.0]), *RANGE)
+    spec = asked({"g": RANGE})
+    found = fitted(measured.within(nearest, None), spec)
+    ends = np.clip(
+        found.range_marginal.mean["g"] + 6.0 * found.range_marginal.error["g"] * np.array([-1.0, 1.0]), *RANGE
+    )
     g = ends[0] + (ends[1] - ends[0]) * (np.arange(60) + 0.5) / 60
     fits, start = [], found.minimum
     for value in g:
-        start = descended(found.problem.under({"g": float(value)}), start.point, question.free)
+        start = descended(found.problem.under({"g": float(value)}), start.parameters, spec.free)
         fits.append(start)
     volumes = [np.linalg.slogdet(one.jacobian[:, :2].T @ one.jacobian[:, :2])[1] for one in fits]
-    s = np.array([np.sqrt(1.0 - model.alpha_of(one.point[0])) for one in fits])
+    s = np.array([np.sqrt(1.0 - model.alpha_of(one.parameters[0])) for one in fits])
     log = -0.5 * (np.array([one.cost for one in fits]) + volumes) + np.log(s * (1.0 - s))
     share = np.exp(log - log.max())
     share /= share.sum()
     mean = share @ g
-    assert found.open.mean["g"] == pytest.approx(mean, abs=0.02 * found.open.error["g"])
-    assert found.open.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
-    points = np.array([one.point[:2] for one in fits])
+    assert found.range_marginal.mean["g"] == pytest.approx(mean, abs=0.02 * found.range_marginal.error["g"])
+    assert found.range_marginal.error["g"] == pytest.approx(np.sqrt(share @ (g - mean) ** 2), rel=0.02)
+    points = np.array([one.parameters[:2] for one in fits])
     off = points - share @ points
     np.testing.assert_allclose(
-        np.diag(np.cov(found.open.offsets[:, :2].T)), np.diag((share[:, None] * off).T @ off), rtol=0.1
+        np.diag(np.cov(found.range_marginal.offsets[:, :2].T)), np.diag((share[:, None] * off).T @ off), rtol=0.1
     )
-    assert (found.open.error["g"] < 0.5 * (RANGE[1] - RANGE[0]) / 12**0.5) == (nearest < 1.0)
+    assert (found.range_marginal.error["g"] < 0.5 * (RANGE[1] - RANGE[0]) / 12**0.5) == (nearest < 1.0)
 
 
 def test_data_find_the_width_of_a_beam(measured):
     instrument = Instrument(Gaussian(0.5))
     data = own_data.rows(ONE, np.random.default_rng(5), instrument)
-    question = asked({"beam": (0.1, 2.0)}, instrument=Instrument(Gaussian(1.05)))
-    found = fitted(data, question)
-    assert found.open.error["beam"] < 0.05
-    assert abs(found.open.mean["beam"] - 0.5) < 3 * found.open.error["beam"]
-    assert found.question.instrument.beam.w == found.open.mean["beam"]
+    spec = asked({"beam": (0.1, 2.0)}, instrument=Instrument(Gaussian(1.05)))
+    found = fitted(data, spec)
+    assert found.range_marginal.error["beam"] < 0.05
+    assert abs(found.range_marginal.mean["beam"] - 0.5) < 3 * found.range_marginal.error["beam"]
+    assert found.spec.instrument.beam.w == found.range_marginal.mean["beam"]
 
 
 def test_a_known_reflectance_counts_at_every_value(measured):
@@ -76,24 +76,24 @@ def test_a_known_reflectance_counts_at_every_value(measured):
     held = fitted(measured, asked({"n": (1.33, 1.45)}, held={"A": 0.4, "scale": 1.0}))
     for n in (1.34, 1.44):
         there = held.problem.under({"n": n})
-        assert there.model.predicted(there.question.base[None], *EDGES)[0, -1] == pytest.approx(0.4, abs=1e-9)
+        assert there.model.predicted(there.spec.base[None], *EDGES)[0, -1] == pytest.approx(0.4, abs=1e-9)
     loose = fitted(measured, asked({"g": RANGE}))
     total = Known(loose.values["A"], 0.002)
     tight = fitted(measured, asked({"g": RANGE}, total=total))
-    assert tight.open.covariance[0, 0] <= loose.open.covariance[0, 0] * 1.05
-    assert tight.errors(tight.likely)["A"] < 0.0022
+    assert tight.range_marginal.covariance[0, 0] <= loose.range_marginal.covariance[0, 0] * 1.05
+    assert tight.errors(tight.total_covariance)["A"] < 0.0022
 
 
 @pytest.mark.parametrize("own", [1.4, *slow(1.39)])
 def test_an_index_without_direction_is_at_hand(measured, monkeypatch, own):
     """No table is made for each n that is tried, and between those that are made light is the same."""
-    question, n = Question(exact_light(Setting(n=own)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
-    exactly = replace(question, law=exact_light(Setting(n=n)), ranges={})
-    monkeypatch.setattr("profilefit.measured.exact_light.kept", lambda *_: pytest.fail("a table is made"))
-    assert fitted(measured, question).open.error["n"] > 0
+    spec, n = FitSpec(exact_light(Setting(n=own)), own_data.SCALE, ranges={"n": (1.33, 1.45)}), 1.37
+    exactly = replace(spec, law=exact_light(Setting(n=n)), ranges={})
+    monkeypatch.setattr("profilefit.measured.model.kept", lambda *_: pytest.fail("a table is made"))
+    assert fitted(measured, spec).range_marginal.error["n"] > 0
     light, right = (
         Problem(measured, one, noise(measured)).model.predicted(np.array([[-3.0, 0.0, 0.0]]), *EDGES)
-        for one in (question.under({"n": n}), exactly)
+        for one in (spec.under({"n": n}), exactly)
     )
     np.testing.assert_allclose(light, right, rtol=3e-4)
 
@@ -108,16 +108,16 @@ def test_intervals_hold_under_a_misfit(size, wavelength, phase, opened):
     ranges = {"n": (1.33, 1.45), "g": (0.7, 0.95)} if opened else {}
     setting = Setting(n=1.39, g=0.825) if opened else own_data.SMOOTH.setting
     data = own_data.wavy(size, wavelength, phase)
-    found = fitted(data, Question(exact_light(setting), own_data.SCALE, ranges=ranges))
+    found = fitted(data, FitSpec(exact_light(setting), own_data.SCALE, ranges=ranges))
     assert found.misfit.detected
     for one, holds in ((found, True), (found.plain, False)):
-        errors = one.errors(one.likely)
+        errors = one.errors(one.total_covariance)
         for name, truth in {"mu_s'": 0.98, "mu_a": 0.02}.items():
             assert (abs(one.values[name] - truth) < one.quantile * errors[name]) == holds, name
     if opened:
-        assert abs(found.open.mean["n"] - 1.4) < 2 * found.open.error["n"]
-        assert abs(found.open.mean["g"] - 0.8) < 2 * found.open.error["g"]
-        assert found.open.error["n"] > 5 * found.plain.open.error["n"]
+        assert abs(found.range_marginal.mean["n"] - 1.4) < 2 * found.range_marginal.error["n"]
+        assert abs(found.range_marginal.mean["g"] - 0.8) < 2 * found.range_marginal.error["g"]
+        assert found.range_marginal.error["n"] > 5 * found.plain.range_marginal.error["n"]
 
 
 @pytest.mark.slow
@@ -126,12 +126,14 @@ def test_open_ranges_hold_media_that_a_misfit_hides_in(at):
     """Three media of `benchmarks.own_data --distorted`, off by 2.7 to 5.6 errors where none is allowed for."""
     data, one, _ = own_data.waved(np.random.default_rng([3, at]), False, (0.003, 0.01))
     ranges = own_data.ALLOWED["n and g open"]
-    found = fitted(data, Question(exact_light(Setting(n=1.39, g=0.825)), own_data.SCALE, ranges=ranges))
-    errors = found.errors(found.likely)
+    found = fitted(data, FitSpec(exact_light(Setting(n=1.39, g=0.825)), own_data.SCALE, ranges=ranges))
+    errors = found.errors(found.total_covariance)
     for name, truth in {"mu_s'": one.alpha / one.length, "mu_a": (1.0 - one.alpha) / one.length}.items():
         assert abs(found.values[name] - truth) < found.quantile * errors[name], name
     for name in ranges:
-        assert abs(found.open.mean[name] - getattr(one.setting, name)) < 3 * found.open.error[name], name
+        assert (
+            abs(found.range_marginal.mean[name] - getattr(one.setting, name)) < 3 * found.range_marginal.error[name]
+        ), name
 
 
 @pytest.mark.slow
@@ -140,21 +142,21 @@ def test_ranges_of_data_without_absorption_leave_the_limit():
     white = own_data.Medium(Setting(n=1.4, g=0.8), 1.0 - 1e-9, 1.0, 0.005)
     data = own_data.rows(white, np.random.default_rng(4))
     data = replace(data, value=1.15 * data.value * (data.r / data.r[0]) ** 0.1)
-    found = fitted(data, Question(exact_light(white.setting), own_data.SCALE, ranges={"g": (0.75, 0.85)}))
-    assert found.minimum.at_edge
+    found = fitted(data, FitSpec(exact_light(white.setting), own_data.SCALE, ranges={"g": (0.75, 0.85)}))
+    assert found.at_edge
     assert found.values["alpha"] > 0.999
 
 
 def test_a_held_reflectance_is_held_under_tissue(measured):
     """What n and g of tissue would say has the albedo of that reflectance there."""
     setting = Setting(n=1.4, g=0.9)
-    found = fitted(measured, Question(exact_light(Setting()), {"A": 0.53, "scale": 1.0}, assumed=("n", "g")))
+    found = fitted(measured, FitSpec(exact_light(Setting()), {"A": 0.53, "scale": 1.0}, assumed=("n", "g")))
     values = as_tissue(found).values
     assert values["alpha"] == pytest.approx(held_albedo(exact_light(setting), "A", 0.53), abs=1e-9)
 
 
 def test_what_is_held_is_not_moved_by_ranges(measured):
-    question = asked({"g": RANGE}, held={"alpha": 0.98, "l": 1.0, "scale": 1.0})
-    found = fitted(measured, question)
-    np.testing.assert_allclose(found.open.offsets, 0.0, atol=1e-12)
-    assert found.open.error["g"] < 0.1, "the data say what g must be then"
+    spec = asked({"g": RANGE}, held={"alpha": 0.98, "l": 1.0, "scale": 1.0})
+    found = fitted(measured, spec)
+    np.testing.assert_allclose(found.range_marginal.offsets, 0.0, atol=1e-12)
+    assert found.range_marginal.error["g"] < 0.1, "the data say what g must be then"

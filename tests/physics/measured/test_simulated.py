@@ -10,7 +10,8 @@ import pytest
 
 from mcml_sim import read_mco
 from profilefit.errors import InputError
-from profilefit.measured.reading import FEWEST_PHOTONS, NARROWEST, merged, read
+from profilefit.measured.reading import read
+from profilefit.measured.simulated_file import FEWEST_PHOTONS, NARROWEST, merged
 
 DATA = Path(__file__).parents[3] / "examples"
 

@@ -161,6 +161,6 @@ def test_a_fit_takes_the_light_that_was_simulated(tmp_path):
     tally = simulate(half_space(0.9), grid, 2**18, illumination="diffuse", progress=False)
     write_results(tally, tmp_path / "diffuse.npz")
     answer = fit(tmp_path / "diffuse.npz", walk=False)
-    assert answer.found.question.law.setting == Setting("diffuse")
+    assert answer.fit.spec.law.setting == Setting("diffuse")
     with pytest.raises(InputError, match=r"diffuse\.npz: a simulation of diffuse light, got searchlight light to fit"):
         fit(tmp_path / "diffuse.npz", setting=Setting())

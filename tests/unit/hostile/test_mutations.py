@@ -35,7 +35,7 @@ from mcml_sim.results.tally_file import read_results
 from profilefit.cli.report import report
 from profilefit.errors import RecordError, ShaderError
 from profilefit.measured import reading
-from profilefit.measured.beam import beam_of
+from profilefit.measured.instrument import beam_of
 from profilefit.measured.photo.setup import read_setup
 from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record

@@ -3,7 +3,7 @@
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.measured.lengths import area_unit, checked_unit, factor, length
+from profilefit.measured.data import area_unit, checked_unit, factor, length
 
 
 def test_lengths_come_in_the_unit_of_the_data():

@@ -1,4 +1,4 @@
-"""What a fit takes for granted: as told, else as the file states, else assumed."""
+"""What a fit takes for granted: as options, else as the file states, else assumed."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -9,10 +9,10 @@ import pytest
 from mcml_sim import Layer, Medium, Setting, phase
 from profilefit.errors import InputError
 from profilefit.measured import fit, read
-from profilefit.measured.beam import Gaussian, TopHat
+from profilefit.measured.instrument import Gaussian, TopHat
 from profilefit.measured.premises import Premises, premises
+from profilefit.measured.reading import FACTS
 from profilefit.measured.result import known_medium
-from profilefit.measured.table_file import FACTS
 
 DATA = Path(__file__).parents[3] / "examples"
 ROWS = "r [mm],value,sigma\n0.5,0.1,0.01\n1,0.05,0.01\n2,0.01,0.001\n"
@@ -37,7 +37,7 @@ def test_a_file_states_and_options_go_before_it(stated):
     found = premises(data)
     assert found.setting == Setting("diffuse", 1.4, 0.9)
     assert (found.instrument.beam, found.assumed) == (Gaussian(0.5), ())
-    assert premises(data, told={"g": "0.8", "beam": None}).setting.g == 0.8
+    assert premises(data, options={"g": "0.8", "beam": None}).setting.g == 0.8
     assert stated("# unit = cm\n", ROWS.replace(" [mm]", "")).unit == "cm"
     assert premises(stated("", ROWS + "# n = 1.4\n")).setting.n == 1.4, "wherever the comment stands"
 
@@ -81,10 +81,10 @@ def test_what_comments_state_besides_is_told_in_one_line(stated):
 
 def test_an_option_in_place_of_a_fact_is_noted(stated):
     data = stated("# n = 1.4\n# g = 0.9\n# unit = mm\n", ROWS.replace(" [mm]", ""))
-    assert premises(data, told={"n": "1.33", "g": "0.9"}, names={"n": "--n"}).notes == (
+    assert premises(data, options={"n": "1.33", "g": "0.9"}, names={"n": "--n"}).notes == (
         "the file's n is '1.4' (line 1), fitted with --n 1.33",
     )
-    found = fit(data, setting=premises(data, told={"n": "1.33"}), walk=False).found.data.notes
+    found = fit(data, setting=premises(data, options={"n": "1.33"}), walk=False).fit.data.notes
     assert found == ("the file's n is '1.4' (line 1), fitted with n 1.33",)
     converted = read(Path(data.source), unit="cm")
     assert converted.notes == ("the file's unit is 'mm' (line 3), read with `unit` cm",)
@@ -110,15 +110,15 @@ def test_a_beam_that_a_file_states_lies_beside_it(stated, tmp_path, monkeypatch)
     data = stated("# beam = beam.csv\n")
     assert premises(data).instrument.beam.r[-1] == 1.0
     with pytest.raises(InputError, match=r"^beam\.csv: expected a file that can be read"):
-        premises(data, told={"beam": "beam.csv"})
+        premises(data, options={"beam": "beam.csv"})
 
 
 def test_a_range_is_its_middle_and_its_ends(stated):
-    found = premises(stated(""), told={"n": "1.33:1.45", "g": "0.7:0.9"})
+    found = premises(stated(""), options={"n": "1.33:1.45", "g": "0.7:0.9"})
     assert (found.setting.n, found.setting.g) == pytest.approx((1.39, 0.8))
     assert found.ranges == {"n": (1.33, 1.45), "g": (0.7, 0.9)}
-    assert premises(stated(""), told={"n": "1.4", "g": "0.9"}).ranges == {}
-    beamed = premises(stated(""), told={"beam": "0.3:700um"})
+    assert premises(stated(""), options={"n": "1.4", "g": "0.9"}).ranges == {}
+    beamed = premises(stated(""), options={"beam": "0.3:700um"})
     assert beamed.instrument.beam == Gaussian(0.5)
     assert beamed.ranges["beam"] == pytest.approx((0.3, 0.7))
 
@@ -139,7 +139,7 @@ def test_a_simulation_states_its_medium():
 
 
 @pytest.mark.parametrize(
-    ("comments", "told", "message"),
+    ("comments", "options", "message"),
     [
         ("# n = 1.4\n# n = 1.5\n", {}, r"own\.csv:2: expected n once, got it again"),
         ("# n =\n", {}, r"own\.csv:1: expected a value of n, got none"),
@@ -161,9 +161,9 @@ def test_a_simulation_states_its_medium():
         ("", {"light": "sun"}, r"light must be one of searchlight, diffuse, got 'sun'"),
     ],
 )
-def test_what_is_wrong_is_named(stated, comments, told, message):
+def test_what_is_wrong_is_named(stated, comments, options, message):
     with pytest.raises(InputError, match=message):
-        premises(stated(comments), told=told)
+        premises(stated(comments), options=options)
 
 
 def test_a_law_takes_no_range(stated):

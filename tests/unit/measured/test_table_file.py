@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from profilefit.errors import InputError
-from profilefit.measured.lengths import UNITS
+from profilefit.measured.data import UNITS
 from profilefit.measured.reading import read
 
 GOOD = "r,value,sigma\n1,0.5,0.01\n2,0.2,0.01\n3,0.1,0.01\n"

@@ -10,8 +10,8 @@ from mcml_sim import Setting, half_space
 from profilefit.errors import InputError, SettingError
 from profilefit.measured import Known, fit, read
 from profilefit.measured.fitting import fitted
-from profilefit.measured.law_error import origin
-from profilefit.measured.problem import Question
+from profilefit.measured.noise import origin
+from profilefit.measured.problem import FitSpec
 from profilefit.recipes.catalogue import fits_folder
 
 DATA = Path(__file__).parents[3] / "examples"
@@ -30,21 +30,21 @@ def test_it_reads_files():
 
 def test_it_is_the_fit_of_its_parts(near):
     law = profilefit.load("hazard")
-    parts = fitted(near, Question(law, {"scale": 1.0}), origin("hazard", "regenerated", Setting(), fits_folder()))
+    parts = fitted(near, FitSpec(law, {"scale": 1.0}, source=origin("hazard", "regenerated", Setting(), fits_folder())))
     result = fit(near, "hazard", walk=False)
-    assert result.found.values == parts.values
+    assert result.fit.values == parts.values
     assert result.walk is None
     assert result.identifiability.all_identified
-    assert result.found.rel is not None, "the law's record was found"
+    assert result.fit.rel is not None, "the law's record was found"
 
 
 def test_what_is_known_goes_in(near):
-    assert fit(near, held={"l": 1.1}, walk=False).found.values["l"] == pytest.approx(1.1, rel=1e-12)
-    free = fit(near, held={"A": 0.53}, scale=None, walk=False).found
+    assert fit(near, held={"l": 1.1}, walk=False).fit.values["l"] == pytest.approx(1.1, rel=1e-12)
+    free = fit(near, held={"A": 0.53}, scale=None, walk=False).fit
     assert free.values["A"] == pytest.approx(0.53, rel=1e-6)
-    assert free.question.held.keys() == {"A"}
-    measured = fit(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).found
-    assert measured.question.held == {}
+    assert free.spec.held.keys() == {"A"}
+    measured = fit(near, total=Known(0.53, 0.005), scale=Known(1.0, 0.02), walk=False).fit
+    assert measured.spec.held == {}
     assert measured.values["alpha"] == pytest.approx(0.95, abs=4 * measured.errors(measured.statistical)["alpha"])
 
 
@@ -55,8 +55,8 @@ def test_a_simulation_brings_its_own_surface():
         fit(oily, "hazard")
     with pytest.raises(SettingError, match=r"exact light needs n >= 1 where g = 0, .*, got searchlight, n = 0.9"):
         fit(oily, setting=Setting(n=0.9))
-    found = fit(oily, setting=Setting(n=1.4), walk=False).found
-    assert found.question.law.setting.n == 1.4
+    found = fit(oily, setting=Setting(n=1.4), walk=False).fit
+    assert found.spec.law.setting.n == 1.4
     assert found.rel == 0, "light solved exactly"
     assert "the file's n is 1.67, fitted as n = 1.4" in found.data.notes
 
