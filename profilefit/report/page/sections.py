@@ -197,8 +197,8 @@ def failures(found: EvidenceFolder) -> Iterator[str]:
     yield found.origin(told)
     yield paragraph(HOLDS[bool(told["passed"])], "bold")
     yield paragraph(_unjudged(told["regions"]), "dim")
-    causes = _causes(told["regions"])
-    yield markup(column_table("Why cells are red, and what helps", causes, left=("cause", "as"), fold=("remedy",)))
+    columns = _advice(told["regions"])
+    yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
     for path in sorted(found.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
         figure = found.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
@@ -210,22 +210,19 @@ def _unjudged(regions: Sequence[Told]) -> str:
     return f"{count} cells, of all laws, are not judged: there is no reference value."
 
 
-def _causes(regions: Sequence[Told]) -> dict[str, list[str]]:
+def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
     groups: dict[str, list[Told]] = {}
     for region in regions:
-        groups.setdefault(str(region["cause"]), []).append(region)
-    rows = sorted(groups.values(), key=lambda group: -len(_laws(group)))
+        # Earlier versions wrote a cause and its remedy.
+        sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"
+        groups.setdefault(sentence or UNKNOWN, []).append(region)
+    rows = sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]}))
     return {
-        "cause": [group[0]["cause"] for group in rows],
-        "laws": [str(len(_laws(group))) for group in rows],
-        "cells": [str(sum(int(one["count"]) for one in group)) for group in rows],
-        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows],
-        "remedy": [group[0]["remedy"] or UNKNOWN for group in rows],
+        "laws": [str(len({one["law"] for one in group})) for _, group in rows],
+        "cells": [str(sum(int(one["count"]) for one in group)) for _, group in rows],
+        "as": [", ".join(sorted({one["class"] for one in group})) for _, group in rows],
+        "what helps": [sentence for sentence, _ in rows],
     }
-
-
-def _laws(group: Sequence[Told]) -> set[str]:
-    return {one["law"] for one in group}
 
 
 def promises(found: EvidenceFolder) -> Iterator[str]:

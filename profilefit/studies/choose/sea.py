@@ -14,7 +14,7 @@ from profilefit.scenes.sea.passes import axes, reach_of
 from profilefit.scenes.sea.request import SPLATS, SeaRequest
 from profilefit.scenes.sea.waves import FINE, refracted
 from profilefit.scenes.sea.world import World
-from profilefit.studies.stability.causes_of_sea import LIMITS
+from profilefit.studies.stability.sea import LIMITS
 
 Floats = NDArray[np.float64]
 CHEAPER = (SINGLE, SCALED)  # than what they are held against, the cheapest first
