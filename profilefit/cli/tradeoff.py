@@ -55,14 +55,14 @@ def tradeoff(
         from profilefit.recipes.evidence import made, require_apart
         from profilefit.report.tables.tradeoff_tables import as_numbers, tradeoff_tables
         from profilefit.studies.tradeoff import stopwatch
-        from profilefit.studies.tradeoff.parts import chosen, is_alike, keep, measured, read
+        from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
 
     names = chosen(parts or [])
     folder = records_folder(fits, quiet)
     require_apart(out, folder, "tradeoff.json", *(f"tradeoff-{name}.csv" for name in names))
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": made(typed(), folder)}
-    if file.exists() and not is_alike(read(file), origin):
+    if file.exists() and not is_comparable(read(file), origin):
         said.print(f"{file} is of other records, another version or machine: written afresh", markup=False)
 
     def track(turns: range, title: str) -> Iterable[int]:

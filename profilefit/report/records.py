@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -55,8 +55,14 @@ def z_score(constant: Content) -> float | None:
 
 
 def known_errors(constants: Content) -> dict[str, str]:
-    """Those of `ERRORS` that a record's constants, by name, have."""
+    """Return those of `ERRORS` that a record's constants, by name, have."""
     return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
+
+
+def numbered_errors(constants: Iterable[Content]) -> dict[str, str]:
+    """Return those of `ERRORS` that any constant has a number for: exact light has none of photons."""
+    every = list(constants)
+    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in every)}
 
 
 def measured_sets(content: Content) -> list[str]:

@@ -13,8 +13,8 @@ from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
 from profilefit.recipes.stack.sum_errors import constant_names, quality
 from profilefit.recipes.stack.sum_record import COUNTS, SumRecord, beside, load
-from profilefit.report.records import known_errors, largest_error
-from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
+from profilefit.report.records import largest_error, numbered_errors
+from profilefit.report.tables.cells import column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.scenes.skin.law import D_EON
 
@@ -36,12 +36,12 @@ LEFT = ("light", "constant")
 
 
 def sum_tables(found: SumRecord) -> list[RenderableType]:
-    """Errors of 1 to 8 Gaussians in both lights, and the constants of six in the light that the stack is for."""
+    """Return the errors of 1 to 8 Gaussians in both lights, and the constants of six in the light of the stack."""
     return [_over_number(found), _constants(found)]
 
 
 def sum_sections(stacks: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
-    """The table of the sums of these records of stacks for Markdown, by the name of its mark; none where none has."""
+    """Return the table of these stacks' sums for Markdown, by the name of its mark; none where none has a sum."""
     paths = {name: found for name, path in stacks.items() if (found := beside(path)) is not None}
 
     def made() -> str:
@@ -58,7 +58,7 @@ def sum_sections(stacks: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
 
 
 def published(found: SumRecord) -> dict[str, list[dict[str, float]]]:
-    """`quality` of the published Gaussians of human skin at a stack named skin, by light and colour; else none."""
+    """Return `quality` of the published Gaussians of skin at a stack of that name, by light and colour; else none."""
     if found.path.stem != "skin" or found.stack.unit != "mm":
         return {}
     variances, weights = np.array(D_EON.variances), np.transpose(D_EON.weights)
@@ -78,16 +78,14 @@ def _over_number(found: SumRecord) -> RenderableType:
         if light in others:
             rel, rms, ks = ([one[key] for one in others[light]] for key in ("rel", "rms", "ks"))
             rows.append((light, "published", *map(significant, (*rel, max(rms), max(ks))), ""))
-    columns = dict(
-        zip(("light", "N", *CHANNELS, "rms", "ks", "alone"), map(list, zip(*rows, strict=True)), strict=True)
-    )
-    return column_table(TITLE, columns, MEASURES + (PUBLISHED if others else ""), left=LEFT)
+    header = ("light", "N", *CHANNELS, "rms", "ks", "alone")
+    return row_table(TITLE, header, rows, MEASURES + (PUBLISHED if others else ""), LEFT)
 
 
 def _constants(found: SumRecord) -> RenderableType:
     light, unit = found.content["setting"]["illumination"], found.content["unit"]
     of = {name: found.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
-    known = {key: word for key, word in known_errors(of).items() if any(one[key] is not None for one in of.values())}
+    known = numbered_errors(of.values())
     columns = {
         "constant": [f"{name} [{unit}^2]" if "." not in name else name for name in of],
         "regenerated": on_the_point([to_error(one["regenerated"], largest_error(one)) for one in of.values()]),

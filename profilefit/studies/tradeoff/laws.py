@@ -19,7 +19,7 @@ from jax import Array
 
 from profilefit.fitting.quality import profile_quality
 from profilefit.studies.tradeoff import stopwatch
-from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders, table_contender
+from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders, table_contender
 from profilefit.studies.tradeoff.counting import FunctionCounts, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
@@ -69,7 +69,7 @@ class ContenderResult:
 def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
-    found, left_out = contenders(folder, [one for one in WANTED if not quick or one.label in QUICKLY])
+    found, left_out = contenders(folder, [one for one in SPECS if not quick or one.label in QUICKLY])
     if not quick:
         found.append(table_contender(MATERIAL))
     rows = measured(found, sizes, track)

@@ -36,7 +36,7 @@ from profilefit.scenes.stage.step_edge import (
     random_points,
 )
 from profilefit.studies.tradeoff import laws, stopwatch
-from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders
+from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders
 from profilefit.studies.tradeoff.counting import count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
@@ -111,8 +111,8 @@ class WeighedSampler:
 def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time every sampler, and judge it both ways."""
     quick = sizes.trials <= QUICK.trials
-    wanted = [one for one in WANTED if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
-    found, left_out = contenders(folder, wanted)
+    specs = [one for one in SPECS if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
+    found, left_out = contenders(folder, specs)
     found += [_uniform(one) for one in found if isinstance(one.law, Hazard) and not one.another]
     counted = {one.name: laws.counts(one)["both"].transcendental for one in found}
     timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
@@ -143,7 +143,7 @@ def _uniform(hazard: Contender) -> Contender:
     if not isinstance(law, Hazard):
         raise TypeError(f"hazard must be the contender of that law, got {hazard.name!r}")
     sampler = UniformSampler(law)
-    return Contender("uniform radii, hazard", law, sampler, hazard.constants, law.shape, sampler, another=True)
+    return Contender("uniform radii, hazard", law, sampler, law.shape, sampler, another=True)
 
 
 def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:

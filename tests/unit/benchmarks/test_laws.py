@@ -10,7 +10,7 @@ from profilefit.studies.tradeoff.stopwatch import Ratio
 
 
 def test_many_functions_are_summed():
-    (dipole,) = contenders.made("dipole", profilefit.load("dipole", "published"))
+    (dipole,) = contenders.with_samplers("dipole", profilefit.load("dipole", "published"))
     ratios = {part: Ratio(2.0, 1.0, 3.0) for part in PARTS}
     row = ContenderResult(dipole, counts(dipole), {}, ratios, None, np.array([0.1]), np.array([0.2]))
     assert laws.as_cells(row)[1:4] == ("0", "2 exp, 2 sqrt", "162 in all")
