@@ -35,7 +35,7 @@ Curve = tuple[str, Any, dict[str, Any], Fitted | None]
 
 @styled
 def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> list[Path]:
-    """alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
+    """Draw alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
     data = source.needed("albedo-liang")
     curves = _curves(source, data)
     figure = canvas(6.4)
@@ -69,7 +69,7 @@ def _curves(source: Source, data: Fitted) -> list[Curve]:
 
 
 def _points(data: Fitted) -> Points:
-    """alpha, A and the standard error of A [-] of the fitted points."""
+    """Return alpha, A and the standard error of A [-] of the fitted points."""
     at = data.arrays.get("alpha")
     alpha = albedo_values(Albedos(**data.content["protocol"]["albedos"])) if at is None else at
     return alpha, data.arrays["reflectance"], data.arrays["reflectance_error"]
@@ -108,7 +108,7 @@ def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact
 
 
 def _folds(panels: dict[str, Axes], curves: list[Curve]) -> None:
-    """Where a map falls again, two reflectances share one albedo."""
+    """Mark where a map falls again, so that two reflectances share one albedo."""
     for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)
         if fold >= 1.0:

@@ -1,4 +1,4 @@
-"""What every figure shares: its size, colours that colour-blind readers can distinguish, files whole or not at all."""
+"""Canvas of every figure: its size, colours that colour-blind readers can distinguish, files whole or not at all."""
 
 from __future__ import annotations
 
@@ -74,14 +74,14 @@ def styled(draw: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def canvas(height: float, width: float = WIDTH, layout: Any = "constrained") -> Figure:
-    """An empty figure of `width` x `height` [inch] with its own Agg canvas: pyplot never hears of it."""
+    """Return an empty figure of `width` x `height` [inch] with its own Agg canvas: pyplot never hears of it."""
     figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
 
 def legend_below(figure: Figure, axes: list[Axes]) -> None:
-    """One legend for all `axes`, under the figure, where it covers no data, in as many columns as fit."""
+    """Draw one legend for all `axes` under the figure, in as many columns as fit."""
     found: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
@@ -108,7 +108,7 @@ def plain_log(axis: Axis) -> None:
 
 
 def albedo_axis(ax: Axes) -> None:
-    """alpha [-] from 0 to 1 along x, stretched evenly in sqrt(1 - alpha): the end near 1 is where laws differ."""
+    """Stretch x evenly in sqrt(1 - alpha), alpha [-] from 0 to 1: the end near 1 is where laws differ."""
 
     def forward(alpha: Any) -> Any:
         return 1.0 - np.sqrt(np.clip(1.0 - np.asarray(alpha), 0.0, None))

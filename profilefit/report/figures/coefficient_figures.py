@@ -44,7 +44,7 @@ Line = tuple[str, Any, Any, Fitted | None]
 
 @styled
 def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -> list[Path]:
-    """One coefficient against alpha [-], the end near 1 enlarged, and below each the laws over the fitted points."""
+    """Draw one coefficient against alpha [-], the end near 1 enlarged, and the laws over the fitted points below."""
     data = source.needed("liang-as-published")
     lines = _lines(letter, source, data)
     figure = canvas(6.4)
@@ -145,7 +145,7 @@ FAR = 3.0  # standard errors
 
 @styled
 def constants_figure(source: Source, out: Path, name: str = "constants") -> list[Path]:
-    """(published - regenerated) / |regenerated| [-] of every constant that is printed, ± its total error, and z."""
+    """Draw (published - regenerated) / |regenerated| [-] of every printed constant, ± its total error, and z."""
     rows = _printed(source)
     figure = canvas(ROW * len(rows) + FEET, layout=ConstrainedLayoutEngine(w_pad=0.1))
     ax = figure.subplots()
@@ -170,12 +170,12 @@ def constants_figure(source: Source, out: Path, name: str = "constants") -> list
 
 
 def has_printed(source: Source) -> tuple[str, ...]:
-    """Records with a constant that was printed."""
+    """Return records with a constant that was printed."""
     return tuple(dict.fromkeys(label.split(" ")[0] for label, _ in _printed(source)))
 
 
 def _printed(source: Source) -> list[tuple[str, Content]]:
-    """(record and name, constant) of each that was printed; those of a failed fit are no law."""
+    """Return (record and name, constant) of each that was printed; those of a failed fit are no law."""
     found = []
     for record_name in source.paths:
         content = source.content(record_name)

@@ -30,7 +30,7 @@ LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 @styled
 def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
-    """The posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
+    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
 
     kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
     """
@@ -59,14 +59,14 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
 
 
 def _most_correlated(samples: Floats, count: int) -> list[int]:
-    """Places of the constants that have the largest correlation with any other, in order."""
+    """Return places of the constants that have the largest correlation with any other, in order."""
     correlation = np.abs(np.corrcoef(samples, rowvar=False))
     np.fill_diagonal(correlation, 0.0)
     return sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:count].tolist())
 
 
 def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]]) -> None:
-    """Lines at the regenerated value and, where it lies in the panel, at the printed one."""
+    """Draw lines at the regenerated value and, where it lies in the panel, at the printed one."""
     for column, constant in enumerate(constants):
         low, high = samples[:, column].min(), samples[:, column].max()
         for value, color, style in (
@@ -82,7 +82,7 @@ def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]])
 
 
 def _axes(grid: NDArray[Any], names: list[str]) -> None:
-    """Names on the outside, few numbers, none with an offset that the reader must add."""
+    """Write names on the outside and few numbers, none with an offset that the reader must add."""
     size = len(names)
     small = size > LARGE
     for row in range(size):
@@ -112,7 +112,7 @@ def _outer(axis: Any, label: str, rotation: float) -> None:
 
 
 def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any], title: str) -> None:
-    """What is seen, and what is not, in the empty upper right."""
+    """Write what is seen, and what is not, into the empty upper right."""
     low, high = samples.min(axis=0), samples.max(axis=0)
     printed = [constant.get("published") for constant in constants]
     outside = [

@@ -34,7 +34,7 @@ LABEL_DISTANCE = 0.3  # of an axis name, in panels
 
 @styled
 def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> list[Path]:
-    """Reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
+    """Draw reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
     found, data = result.found, result.found.data
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -67,7 +67,7 @@ def residual_figure(result: Answer, out: Path, name: str = "fit-residuals") -> l
 
 @styled
 def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> list[Path]:
-    """The posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
+    """Draw the posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
     names = shown(result)
     if not names:
         return []
@@ -98,7 +98,7 @@ def posterior_figure(result: Answer, out: Path, name: str = "fit-corner") -> lis
 
 
 def shown(result: Answer) -> tuple[str, ...]:
-    """The quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
+    """Return the quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
     if result.walk is None:
         return ()
     free = result.found.question.free
@@ -108,7 +108,7 @@ def shown(result: Answer) -> tuple[str, ...]:
 
 
 def _marked(ax: Axes, best: list[float | None], is_pair: bool) -> None:
-    """Thin lines at the best fit, where it is a value."""
+    """Draw thin lines at the best fit, where it is a value."""
     if best[0] is not None:
         ax.axvline(best[0], color=BLACK, linewidth=0.8)
     if is_pair and best[1] is not None:
@@ -120,7 +120,7 @@ def _symbol(name: str) -> str:
 
 
 def _dressed(ax: Axes, row: int, column: int) -> None:
-    """Few numbers, none with an offset that the reader must add."""
+    """Write few numbers, none with an offset that the reader must add."""
     ax.grid(False)
     axes: list[Any] = [ax.xaxis] if row == column else [ax.xaxis, ax.yaxis]
     for axis in axes:

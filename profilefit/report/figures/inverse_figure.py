@@ -45,7 +45,7 @@ LABELS = {
 
 @styled
 def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") -> list[Path]:
-    """r [mfp] against xi [-] at six albedos; max |cdf(r(xi)) - xi| [-] against alpha [-] for each set of constants."""
+    """Draw r [mfp] against xi [-] at six albedos, and max |cdf(r(xi)) - xi| [-] against alpha [-]."""
     data = source.needed("liang-inverse-whole")
     figure = canvas(8.2)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.1))
@@ -106,12 +106,12 @@ def _errors(ax: Axes, source: Source) -> None:
 
 
 def _radius(law: Any, xi: Floats, alpha: float) -> Floats:
-    """|g(xi)| [mfp] of (19), before the clip (21) at r_max."""
+    """Return |g(xi)| [mfp] of (19), before the clip (21) at r_max."""
     return np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9)
 
 
 def _rings(ax: Axes, data: Fitted, row: int) -> None:
-    """The tallied cdf at some ring edges, with the standard error of its sum."""
+    """Draw the tallied cdf at some ring edges, with the standard error of its sum."""
     energy, error = data.arrays["energy"][row], data.arrays["energy_error"][row]
     total = energy.sum() + data.arrays["beyond"][row]
     share, sigma = np.cumsum(energy) / total, np.sqrt(np.cumsum(error**2)) / total
@@ -139,7 +139,7 @@ REQUIRED = 1e-3
 
 @styled
 def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -> list[Path]:
-    """max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
+    """Draw max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
     figure = canvas(4.6)
     axes = list(figure.subplots(1, 2, sharey=True))
     for ax, (light, records) in zip(axes, RECORDS.items(), strict=True):
@@ -168,7 +168,7 @@ def draw(ax: Axes, source: Source, record: str) -> None:
 
 
 def points_of(fitted: Fitted) -> Points:
-    """alpha and the error of the regenerated law: as its record says, or measured now."""
+    """Return alpha and the error of the regenerated law: as its record says, or measured now."""
     quality = fitted.content["quality"]
     alpha = np.asarray(quality["alpha"], float)
     if "inversion_error" in quality["regenerated"]:
@@ -177,14 +177,14 @@ def points_of(fitted: Fitted) -> Points:
 
 
 def _printed(source: Source, record: str) -> Points | None:
-    """The same of the printed constants, where the record has judged them."""
+    """Return alpha and the error of the printed constants, where the record has judged them."""
     quality = source.content(record)["quality"]
     found = quality.get("published", {}).get("inversion_error")
     return None if found is None else (np.asarray(quality["alpha"], float), np.asarray(found, float))
 
 
 def caption_of(source: Source) -> str:
-    """How bad the printed inverse is where its authors doubt it, and on either side of that."""
+    """Return how bad the printed inverse is where its authors doubt it, and on either side of that."""
     name = "liang-inverse-whole"
     printed = _printed(source, name) if name in source.paths else None
     if printed is None:

@@ -31,7 +31,7 @@ EVERY = 4  # rings of which one is drawn
 
 @styled
 def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
-    """The merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
+    """Draw the merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
     figure = canvas(5.4)
     axes = figure.subplots()
     colour = next((one for one in found.fits if one == "green"), next(iter(found.fits)))
@@ -55,7 +55,7 @@ def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
 
 @styled
 def rings_figure(found: Photo, out: Path, name: str = RINGS) -> list[Path]:
-    """Light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
+    """Draw light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
     for colour, fit in found.fits.items():

@@ -44,7 +44,7 @@ STYLES = {"published": PUBLISHED, "corrected": CORRECTED, "liang-as-published": 
 
 @styled
 def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> list[Path]:
-    """r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
+    """Draw r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
     data = source.needed("liang-as-published")
     figure = canvas(6.6)
     axes = list(figure.subplots(2, 3).flat)
@@ -58,7 +58,7 @@ def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> 
 
 @styled
 def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list[Path]:
-    """R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their photon noise."""
+    """Draw R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their noise."""
     data = source.needed("liang-whole")
     figure = canvas(6.4)
     axes = list(figure.subplots(2, 3, sharey=True).flat)
@@ -129,7 +129,7 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
 
 
 def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
-    """The band in which a fitted law states the exact profile to lie; None of printed laws and of old records."""
+    """Return the band in which a fitted law states the exact profile to lie; None for printed laws and old records."""
     if not isinstance(one, Fitted):
         return None
     known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)
@@ -137,14 +137,14 @@ def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | No
 
 
 def _draw(ax: Axes, r: Floats, one: Any, evaluate: Any, name: str) -> None:
-    """A law's line; under it the 95 % band, where it has one."""
+    """Draw a law's line; under it the 95 % band, where it has one."""
     fitted = isinstance(one, Fitted)
     band_under(ax, r, one.band(evaluate) if fitted else None, STYLES[name]["color"])
     ax.plot(r, evaluate(one.law if fitted else one), label=LABELS[name], **STYLES[name])
 
 
 def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
-    """Some of the rings, with the photons' standard error: even in r would crowd the start with none to see."""
+    """Draw some of the rings, with the photons' standard error: even in r would crowd the start with none to see."""
     edges, energy, error = (data.arrays[key] for key in ("r_edges", "energy", "energy_error"))
     r = 0.5 * (edges[1:] + edges[:-1])
     wanted = np.linspace(0.0, min(end, r[-1]), RINGS_SHOWN)

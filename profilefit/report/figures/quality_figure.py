@@ -1,4 +1,4 @@
-"""How good each law is: the relative error of R_d and the largest error of the cdf, over the albedos."""
+"""Quality of each law: the relative error of R_d and the largest error of the cdf, over the albedos."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Line:
 
 @styled
 def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Path]:
-    """rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
+    """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
 
     A row of panels for each light, one for all surfaces that refract.
     """
@@ -58,7 +58,7 @@ def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Pat
 
 @styled
 def record_quality_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
-    """The same of one record: its constants, and those printed for its law."""
+    """Draw rel and ks [-] of one record: its constants, and those printed for its law."""
     return _drawn(source, [record_name], out, name or f"quality-{record_name}")
 
 
@@ -103,7 +103,7 @@ def _kind(content: Content) -> str:
 
 
 def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
-    """Each set once: printed constants are the same in every record of their law."""
+    """Yield each set once: printed constants are the same in every record of their law."""
     drawn: set[str] = set()
     for name, content in contents:
         quality = content["quality"]

@@ -1,4 +1,4 @@
-"""What N Gaussians cost: the error of sums of them over their number, of every stack that a folder has records of."""
+"""Error of sums of Gaussians over their number, of every stack that a folder has records of."""
 
 from __future__ import annotations
 
@@ -27,13 +27,13 @@ LINES = {"searchlight": (0, (1, 1.5)), "diffuse": "-"}
 
 
 def sums_of(folder: Path) -> dict[str, SumRecord]:
-    """The records of sums that lie in a folder of records, by the names of their stacks."""
+    """Return the records of sums that lie in a folder of records, by the names of their stacks."""
     return {name: load(path) for name, path in record.available(folder / SUMS).items()}
 
 
 @styled
 def sum_figure(source: Source, out: Path, name: str = NAME) -> list[Path]:
-    """rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
+    """Draw rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
     found = sums_of(source.folder)
     columns = min(len(found), LONGEST)
     rows = -(-len(found) // columns)
@@ -51,7 +51,7 @@ def sum_figure(source: Source, out: Path, name: str = NAME) -> list[Path]:
 
 
 def sum_caption(found: Mapping[str, SumRecord]) -> str:
-    """What the figure shows, and what six Gaussians cost by these records."""
+    """Return what the figure shows, and what six Gaussians cost by these records."""
     of_six = {
         (key, stack, light, channel): value
         for stack, one in found.items()

@@ -106,7 +106,7 @@ def write_page(
 
 
 def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
-    """Part -> what makes it; each record is a part of its own, since they take longest."""
+    """Return the makers of the parts by name; each record is a part of its own, since they take longest."""
     return {
         "fits": lambda: fits.overview(source),
         "explorer": lambda: explorer_section(source.folder),
@@ -128,7 +128,7 @@ def _document(made: Mapping[str, str], count: int) -> str:
 
 
 def document(title: str, lead: str, told: str, parts: Mapping[str, tuple[str, str]]) -> str:
-    """A page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
+    """Return a page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
     rules, sections = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
     links = "".join(element("li", element("a", escape(head), href=f"#{key}")) for key, (head, _) in parts.items())
     return PAGE.substitute(

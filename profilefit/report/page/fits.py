@@ -1,4 +1,4 @@
-"""What was fitted from what: records, each with tables, figures, the command that makes it; digests and versions."""
+"""Records as parts of the page, each with tables, figures, the command that makes it; digests and versions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHOWN = 12  # letters of a SHA-256
 
 
 def provenance(source: Source, page: str) -> Iterator[str]:
-    """Digests of data and records, libraries, the commands that make it again; `page` is the file's own name."""
+    """Yield digests of data and records, libraries, the commands that make it again; `page` is the file's own name."""
     contents = {name: source.content(name) for name in source.paths}
     columns = {
         "record": list(contents),
@@ -46,7 +46,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
 
 
 def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
-    """The commands that make these records again, a line for each preset, seed and number of photons."""
+    """Return the commands that make these records again, a line for each preset, seed and number of photons."""
     groups: dict[str, list[str]] = {}
     for name, one in contents.items():
         groups.setdefault(_options(one), []).append(name)
@@ -90,7 +90,7 @@ CAPTIONS = {
 
 
 def drawn(plan: Plan, source: Source) -> str:
-    """The figure of a plan as part of a page; where it cannot be drawn, why."""
+    """Return the figure of a plan as part of a page; where it cannot be drawn, why."""
     reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
@@ -98,7 +98,7 @@ def drawn(plan: Plan, source: Source) -> str:
 
 
 def drawing(name: str, draw: Callable[[Path], list[Path]], title: str = "") -> str:
-    """The figure `name` that `draw` writes into a folder; its title is its name's `caption` where none is given."""
+    """Return the figure `name` that `draw` writes into a folder; its title is by default the `caption` of its name."""
     with tempfile.TemporaryDirectory() as folder, only("svg"):
         (file,) = draw(Path(folder))
         svg = file.read_text(encoding="utf-8")
@@ -107,30 +107,30 @@ def drawing(name: str, draw: Callable[[Path], list[Path]], title: str = "") -> s
 
 
 def caption(name: str) -> str:
-    """What a figure shows: by its name, or by how that begins."""
+    """Return what a figure shows: by its name, or by how that begins."""
     return CAPTIONS.get(name) or CAPTIONS[name.split("-")[0]]
 
 
 def overview(source: Source) -> str:
-    """A line a record."""
+    """Return the summary of all records, a line each."""
     return markup(summary({name: source.content(name) for name in source.paths}))
 
 
 def whole_figure(source: Source, name: str) -> str:
-    """A figure of more than one record: constants, printed against regenerated, or quality by albedo."""
+    """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
     (plan,) = (one for one in plans(source) if one.name == name)
     return drawn(plan, source)
 
 
 def paper_figures(source: Source) -> Iterator[str]:
-    """The figures of the paper again, as far as there are records for them."""
+    """Yield the figures of the paper again, as far as there are records for them."""
     for plan in PAPER:
         if all(name in source.paths for name in plan.needs):
             yield drawn(plan, source)
 
 
 def record_part(source: Source, name: str, figures: bool = True) -> str:
-    """Everything of one record, folded; without `figures` only what its .json has."""
+    """Return everything of one record, folded; without `figures` only what its .json has."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
     plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []

@@ -1,4 +1,4 @@
-"""What was measured with the laws, as sections of the page: shader check, cost, failures."""
+"""Measurements of the laws as sections of the page: shader check, cost, failures."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median 
 
 
 def shader(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
+    """Yield the parts of the section."""
     told = found.told("check")
     yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
     for name, title in RENDERS.items():
@@ -65,7 +65,7 @@ def shader(found: EvidenceFolder) -> Iterator[str]:
 
 
 def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section: records of stacks, sums of Gaussians, and pictures; none where there is no record."""
+    """Yield the parts of the section: records of stacks, sums of Gaussians, pictures; none without a record."""
     table = None if source.names else stack_table(source.folder)
     if table is None:
         return
@@ -139,7 +139,7 @@ CHARTS = {
 
 
 def speed(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
+    """Yield the parts of the section."""
     told = found.told("tradeoff")
     if told is None:
         yield missing("tradeoff")
@@ -168,7 +168,7 @@ def _numbers(part: Told) -> str:
 
 
 def _plain(text: str) -> str:
-    """Without the marks that make a subscript in a figure."""
+    """Return the text without the marks that make a subscript in a figure."""
     return text.replace("$", "")
 
 
@@ -189,7 +189,7 @@ FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folde
 
 
 def failures(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
+    """Yield the parts of the section."""
     told = found.told("stability")
     if told is None:
         yield missing("stability")
@@ -226,7 +226,7 @@ def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
 
 
 def promises(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section; nothing where no checkout measured them."""
+    """Yield the parts of the section; nothing where no checkout measured them."""
     if (found.folder / FILE).exists():
         made, claims = read_claims(found.folder)
         yield found.origin({"made": made})

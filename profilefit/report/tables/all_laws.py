@@ -48,7 +48,7 @@ class MeasuredSampler:
 
 
 def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
-    """The items, without any progress shown."""
+    """Yield the items, without any progress shown."""
     del title, total
     return items
 
@@ -56,23 +56,23 @@ def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Mea
 def for_each(
     measure: Callable[[Named], Measured], laws: Sequence[Named], track: Track = untracked, title: str = ""
 ) -> list[Measured]:
-    """`measure` of every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
+    """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         return list(track(pool.map(measure, laws), title, len(laws)))
 
 
 def measured_profile(one: Named, alpha: ArrayLike = ALBEDOS) -> Quality:
-    """The measures of a profile law at `alpha` (m,)."""
+    """Return the measures of a profile law at `alpha` (m,)."""
     return profile_quality(one.law, alpha)
 
 
 def measured_map(one: Named) -> AlbedoQuality:
-    """The measures of an A -> alpha map."""
+    """Return the measures of an A -> alpha map."""
     return albedo_quality(one.law)
 
 
 def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
-    """Every sampler of a profile law at (reduced) `alpha` (m,)."""
+    """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
     found = []
     for name, sampler in one.law.in_reduced().samplers.items():

@@ -20,7 +20,7 @@ BEST = 3  # readings shown of each equation, nearest to print first
 
 
 def evidence_line(content: Content) -> str:
-    """How many equations have a reading that reproduces them, for the summary."""
+    """Return how many equations have a reading that reproduces them, for the summary."""
     readings = content.get("readings") or []
     equations = {reading.get("equation") for reading in readings}
     good = {r.get("equation") for r in readings if r.get("verdict") == "reproduced"}
@@ -28,7 +28,7 @@ def evidence_line(content: Content) -> str:
 
 
 def evidence_tables(content: Content) -> list[RenderableType]:
-    """The best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
+    """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
     found: list[RenderableType] = []
     for equation, readings in _by(content.get("readings") or [], "equation").items():
         found.append(_readings(equation, readings))
@@ -64,7 +64,7 @@ def _summary(reading: Content) -> str:
 
 
 def _table1(rows: list[Content]) -> RenderableType:
-    """Every model of each material, at the channel and range that the other law's printed error points to."""
+    """Return every model of each material, at the channel and range that the other law's printed error points to."""
     shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
     columns = {
         "material": [f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {_range(row)}" for row in shown],
@@ -125,7 +125,7 @@ def _number(value: float | None, absent: float) -> float:
 
 
 def _by(rows: Iterable[Content], *keys: str) -> dict[Any, list[Content]]:
-    """Rows by the values of these keys, in order."""
+    """Return rows by the values of these keys, in order."""
     found: dict[Any, list[Content]] = {}
     for row in rows:
         values = tuple(row.get(key, ABSENT) for key in keys)

@@ -43,7 +43,7 @@ OF_LAW = "; ± model: from the law's own error, taken for a Gaussian process alo
 
 
 def fit_tables(result: Answer, title: str) -> list[RenderableType]:
-    """Estimates with errors, their correlations, and the most informative additional measurement."""
+    """Return estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
         if len(result.identified) > 1:
@@ -53,7 +53,7 @@ def fit_tables(result: Answer, title: str) -> list[RenderableType]:
 
 
 def fit_lines(result: Answer) -> list[Text]:
-    """A sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
+    """Return a sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
     return [Text(line) for line in _lines(result)]
 
 
@@ -98,14 +98,14 @@ def _quantity_table(result: Answer, title: str) -> RenderableType:
 
 
 def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
-    """An interval, or in words that it says nothing."""
+    """Return an interval, or in words that it says nothing."""
     low, high = ends or (None, None)
     wide = low is not None and high is not None and low > 0 and high > WIDE * low
     return ANYTHING if wide else interval(ends, most)
 
 
 def _mark(result: Answer, name: str) -> str:
-    """What stands where a quantity has no symmetric error."""
+    """Return what stands where a quantity has no symmetric error."""
     if name not in result.moving:
         return HELD
     return EDGE if any(result.ends(name)) else ABSENT
@@ -137,7 +137,7 @@ def _advice_table(result: Answer) -> RenderableType:
 
 
 def described(one: Candidate, unit: str) -> str:
-    """A candidate in words."""
+    """Return a candidate in words."""
     if one.kind == "point":
         where = f"at r = {0.5 * (one.inner + one.outer):.3g} {unit}"
         if one.outer > one.inner:
@@ -184,7 +184,7 @@ def _lines(result: Answer) -> Iterator[str]:
 
 
 def _estimated(result: Answer) -> Iterator[str]:
-    """How errors that are themselves estimates are allowed for."""
+    """Yield a line on errors of data that are themselves estimates."""
     found = result.found
     yield (
         f"these are estimates of {np.median(found.data.freedom):.2g} degrees of freedom each, their trend of "
@@ -230,7 +230,7 @@ def _goodness(result: Answer) -> Iterator[str]:
 
 
 def _added(result: Answer) -> dict[str, float]:
-    """Relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for or has no such errors."""
+    """Return relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for."""
     found = result.found
     if found.plain is None:
         return {}
@@ -258,7 +258,7 @@ def _unexplained(relative: float) -> str:
 
 
 def _rivals(result: Answer) -> Iterator[str]:
-    """Other media that explain the data as well."""
+    """Yield other media that explain the data as well."""
     found, unit = result.found, result.found.data.unit
     for one in found.rivals:
         values = rival_values(found, one)
@@ -270,7 +270,7 @@ def _rivals(result: Answer) -> Iterator[str]:
 
 
 def _oblique(result: Answer) -> Iterator[str]:
-    """Whether the centre of light aslant is explained, and known well where it was measured."""
+    """Yield lines on the centre of oblique light: whether it is explained, and known well where it was measured."""
     found, unit = result.found, result.found.data.unit or "units of r"
     one = found.question.oblique
     if one is None:
@@ -287,7 +287,7 @@ def _oblique(result: Answer) -> Iterator[str]:
 
 
 def _beam(result: Answer) -> Iterator[str]:
-    """Which beam was assumed, and whether another one would matter."""
+    """Yield lines on the beam that was assumed, and whether another one would matter."""
     found, width = result.found, result.width
     unit = found.data.unit or "units of r"
     if found.question.instrument.beam is not None:
@@ -309,7 +309,7 @@ def _beam(result: Answer) -> Iterator[str]:
 
 
 def _narrowed(found: MediumFit) -> str:
-    """What the data say of ranges."""
+    """Return what the data say of ranges."""
     if found.open is None:
         return "no value of theirs gives a fit with errors, so the middle is fitted"
     units = {"beam": f" {found.data.unit or 'units of r'}"}
@@ -321,7 +321,7 @@ def _narrowed(found: MediumFit) -> str:
 
 
 def _medium(result: Answer) -> Iterator[str]:
-    """What is open of n and g, or assumed."""
+    """Yield lines on n and g: known as ranges, or assumed."""
     question, there, unit = result.found.question, result.tissue, result.found.data.unit
     if question.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in question.ranges.items())
@@ -341,7 +341,7 @@ def _named(names: tuple[str, ...], setting: Setting) -> str:
 
 
 def _scale(result: Answer) -> Iterator[str]:
-    """A free scale that no reflectance has, and a length that the data do not reach."""
+    """Yield lines on a free scale that no reflectance has, and a length that the data do not reach."""
     found = result.found
     scale, mfp, r = found.values["scale"], found.values["l"], found.data.r
     free = "scale" in result.moving and found.question.scale is None and found.data.unit

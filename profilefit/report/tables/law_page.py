@@ -70,7 +70,7 @@ class Page:
 
 
 def law_pages(folder: Folder) -> list[Page]:
-    """Every law and map that loads with the records in `folder`, profile laws first."""
+    """Return every law and map that loads with the records in `folder`, profile laws first."""
     records = Records.of(folder)
     profiles = sorted(all_profiles(records), key=lambda one: one.setting.n)  # that of n = 1 first
     laws = _grouped(profiles, lambda one: one.name.split(":")[0])
@@ -81,7 +81,7 @@ def law_pages(folder: Folder) -> list[Page]:
 
 
 def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
-    """One page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
+    """Return one page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
     parts = [
         f"# {page.title}",
         *(f"```{{eval-rst}}\n.. autoclass:: {_constructor(one)}\n   :no-members:\n```" for one in page.law_classes),
@@ -98,7 +98,7 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
 
 
 def index_text(pages: Sequence[Page], folder: Folder) -> str:
-    """The table of all laws with the worst errors that their records state, and the list of the pages."""
+    """Return the table of all laws with the worst errors that their records state, and the list of the pages."""
     contents = _contents(folder)
     header = ("law", "constants", "light", "n", "number", *(f"{MEASURES[key].symbol} worst" for key in WORST))
     rows = [_row(page, one, contents) for page in pages for one in page.members]
@@ -129,13 +129,13 @@ def _title(name: str) -> str:
 
 
 def _spans(one: Named) -> bool:
-    """Whether its constants hold for every index of a range."""
+    """Return whether its constants hold for every index of a range."""
     n = one.law.entry.n
     return bool(one.records) and n.low < n.high
 
 
 def _constructor(kind: type) -> str:
-    """The class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
+    """Return the class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
     names = [field.name for field in fields(kind)]
     return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
 
@@ -153,12 +153,12 @@ def _row(page: Page, one: Named, contents: Mapping[str, Content]) -> Sequence[st
 
 
 def _surface(one: Named) -> str:
-    """n, or the indices that its constants span."""
+    """Return n, or the indices that its constants span."""
     return str(one.law.entry.n) if _spans(one) else f"{one.setting.n:g}"
 
 
 def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
-    """The largest error of each measure: of its own records, or of a record that measured the printed set as well."""
+    """Return the largest error of each measure, from its own records or one that measured the printed set."""
     if one.records:
         own: list[Content] = [_of_record(contents[name]) for name in one.records]
     else:
@@ -167,12 +167,12 @@ def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
 
 
 def _of_record(content: Content) -> Content:
-    """The measures of its constants; where they span indices, those of every index."""
+    """Return the measures of its constants; where they span indices, those of every index."""
     return {**content["quality"]["regenerated"], **by_index(content)}
 
 
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
-    """Records of the same law and light that measured this printed set as well: the record, and what it measured."""
+    """Yield each record of the same law and light that measured this printed set, and the measures."""
     pipelines = ("albedo",) if isinstance(one.law, AlbedoLaw) else ("profile", "as-published", "inverse")
     which = one.constants if one.constants in SETS else SETS[0]  # records call the printed set of their light so
     for content in contents.values():
@@ -182,7 +182,7 @@ def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tupl
 
 
 def _loading(one: Named) -> str:
-    """How Python and the shell get this very law."""
+    """Return the lines by which Python and the shell get this law."""
     call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
     lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
     if _spans(one):
@@ -196,7 +196,7 @@ def _loading(one: Named) -> str:
 
 
 def _arguments(one: Named) -> list[str]:
-    """Of `load` or `albedo_law`: the constants' name, a record's path, or the setting of regenerated ones."""
+    """Return the arguments of `load` or `albedo_law`: name, and constants, record's path or setting."""
     name = f'"{one.name}"'
     if not one.records:
         return [name, f'constants="{one.constants}"'] if one.constants else [name]
@@ -213,7 +213,7 @@ def _setting(setting: Setting) -> str:
 
 
 def _export(one: Named) -> str:
-    """The command that writes this law's shader source; none where it has none."""
+    """Return the command that writes this law's shader source; none where it has none."""
     if not one.law.entry.has_text:
         return ""
     if one.records:
@@ -223,7 +223,7 @@ def _export(one: Named) -> str:
 
 
 def _ranges(entry: Entry) -> str:
-    """Where the law says that it holds."""
+    """Return where the law says that it holds."""
     n = f"n = {entry.n.low:g}" if entry.n.low == entry.n.high else f"n in {entry.n}"
     profile = f", R_d in {entry.profile}" if entry.profile != entry.alpha and entry.profile != EVERYWHERE else ""
     return f"Holds for alpha in {entry.alpha}{profile}; made for a surface of {n}."
@@ -239,7 +239,7 @@ def _shader(page: Page) -> str:
 
 
 def _printed(one: Named, folder: Folder) -> str:
-    """A printed set: its source, its constants and the errors that a record found for it."""
+    """Return a printed set: its source, its constants and the errors that a record found for it."""
     own = one.law.entry.printed, one.constants
     found = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
     if found is None:
@@ -252,7 +252,7 @@ def _printed(one: Named, folder: Folder) -> str:
 
 
 def _recorded(name: str, folder: Folder) -> str:
-    """A record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
+    """Return a record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
     records = Records.of(folder)
     path, content = records.paths[name], records.content(name, whole=True)
     facts = [
@@ -293,7 +293,7 @@ def _constants(content: Content) -> str:
 
 
 def _with_errors(value: Content, kinds: Sequence[str]) -> list[str]:
-    """A constant, to the digits of its largest error, and its errors."""
+    """Return a constant, to the digits of its largest error, and its errors."""
     errors = [significant(value.get(key)) for key in kinds]
     held = ["held", *[ABSENT] * (len(kinds) - 1)]
     return [to_error(value["regenerated"], largest_error(value)), *(errors if value.get("free", True) else held)]
@@ -317,7 +317,7 @@ def _quality(content: Content, values: Content) -> str:
 
 
 def _by_index(content: Content) -> str:
-    """The worst measures at each index that a record was judged at; what follows is at that of its setting."""
+    """Return the worst measures at each index that a record was judged at; what follows is at that of its setting."""
     found = by_index(content)
     if not found:
         return ""

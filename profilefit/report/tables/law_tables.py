@@ -58,7 +58,7 @@ CAPTION = (
 
 
 def sampler_tables(qualities: Mapping[str, SamplerQuality]) -> list[RenderableType]:
-    """A table a sampler, by albedo, the worst last; what the columns are stands under the last."""
+    """Return a table a sampler, by albedo, the worst last; what the columns are stands under the last."""
     names = list(qualities)
     return [_table(name, qualities[name], CAPTION if name == names[-1] else "") for name in names]
 
@@ -73,7 +73,7 @@ def _table(name: str, quality: SamplerQuality, caption: str) -> RenderableType:
 
 
 def sampler_number(value: float) -> str:
-    """A measure of a sampler as text."""
+    """Return a measure of a sampler as text."""
     if abs(value) < NEGLIGIBLE:
         return "0"
     if math.isinf(value):
@@ -95,7 +95,7 @@ NOTHING = "None of these records holds a law that can be measured against the ex
 
 @dataclass(frozen=True)
 class Qualities:
-    """What was measured of the laws of a folder, in the order in which it is shown."""
+    """Measures of the laws of a folder, in the order in which they are shown."""
 
     profiles: list[tuple[Named, Quality]]
     maps: list[tuple[Named, AlbedoQuality]]
@@ -128,7 +128,7 @@ def measured(
 
 
 def every_law(found: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
-    """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
+    """Yield profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
     for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
         by_label = {one.label: quality for one, quality in laws}
         for measure in SCALES:
@@ -145,7 +145,7 @@ def every_law(found: Qualities, in_detail: bool = False) -> Iterator[RenderableT
 
 
 def content(found: Qualities) -> dict[str, Any]:
-    """The same for JSON: every measure at every albedo."""
+    """Return every measure at every albedo, for JSON."""
     return {
         "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],
         "maps": [{**_whose(one), "quality": quality} for one, quality in found.maps],
@@ -161,7 +161,7 @@ def _whose(one: Named) -> dict[str, Any]:
 
 
 def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
-    """Tables of a README that are measured, not read from records, by the names of their marks.
+    """Return tables of a README that are measured, not read from records, by the names of their marks.
 
     "check" needs OpenGL, and raises ShaderError where there is none.
     """
@@ -180,7 +180,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
-    """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
+    """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
     header = (
         "law",
         "constants",
@@ -201,14 +201,14 @@ def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
 
 
 def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
-    """A line a sampler, each measure at its worst albedo."""
+    """Return a line a sampler, each measure at its worst albedo."""
     header = ("law", "constants", "light", "n", "sampler", *_sampler_headers())
     rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
     return markdown_table(header, rows)
 
 
 def _home(one: Named) -> tuple[str, str, str, str]:
-    """Law, constants, light, n."""
+    """Return law, constants, light, n."""
     return one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"
 
 
@@ -264,7 +264,7 @@ def _sampler_label(one: MeasuredSampler) -> str:
 
 
 def _number(measure: str, value: float) -> str:
-    """A value in the measure's unit, in few characters."""
+    """Return a value in the measure's unit, in few characters."""
     value *= SCALES[measure][0]
     if measure == "r2":
         return f"{value:.3f}" if value > -1.0 else f"{value:.1f}"
@@ -274,5 +274,5 @@ def _number(measure: str, value: float) -> str:
 
 
 def _order(setting: Setting) -> tuple[bool, float, float]:
-    """The searchlight setting first."""
+    """Return a key by which pencil beams come first."""
     return setting.illumination != Setting().illumination, setting.n, setting.g

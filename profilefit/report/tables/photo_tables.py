@@ -1,4 +1,4 @@
-"""What photographs of a spot tell, as tables, as sentences, and as JSON content."""
+"""Results of photographs of a spot as tables, as sentences, and as JSON content."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says
 
 
 def photo_tables(found: Photo) -> list[RenderableType]:
-    """A line a colour and quantity, with what such photographs can know at best."""
+    """Return a line a colour and quantity, with what such photographs can know at best."""
     columns: dict[str, list[str]] = {name: [] for name in ("colour", "", "value", "±", "95 %", "at best", "unit")}
     for colour, fit in found.fits.items():
         for name in NAMES:
@@ -44,7 +44,7 @@ def photo_tables(found: Photo) -> list[RenderableType]:
 
 
 def photo_lines(found: Photo) -> Iterator[str]:
-    """A sentence each on sensor, spot, what surface and lens add, the goodness of fit, and what is not identified."""
+    """Yield a sentence each on sensor, spot, surface and lens, the goodness of fit, and what is not identified."""
     shot = found.shot
     yield f"scale: {found.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
     if len(shot.sources) == 1:
@@ -81,7 +81,7 @@ def photo_lines(found: Photo) -> Iterator[str]:
 
 
 def photo_content(found: Photo) -> dict[str, Any]:
-    """Everything, as JSON content."""
+    """Return all results as JSON content."""
     plain: dict[str, Any] = record.plain(
         {
             "shots": found.shot.sources,
@@ -117,7 +117,7 @@ def photo_content(found: Photo) -> dict[str, Any]:
 
 
 def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[RenderableType]:
-    """What a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
+    """Return what a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
     columns: dict[str, list[str]] = {"photographs": [], "colour": [], "mu_s'": [], "mu_a": []}
     for setup, by_colour in bounds.items():
         for colour, errors in by_colour.items():

@@ -34,7 +34,7 @@ CAPTION = (
 
 
 def summary(records: Records) -> RenderableType:
-    """Profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
     kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
     told = [make(found) for make, found in kinds.items() if found]
@@ -47,7 +47,7 @@ def summary(records: Records) -> RenderableType:
 
 
 def outcome(path: Path) -> dict[str, Any]:
-    """What came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
+    """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
     content = record.read(path)
     told: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
     if "fit" not in content:
@@ -60,7 +60,7 @@ def outcome(path: Path) -> dict[str, Any]:
 def reproduced(
     seconds: Mapping[str, float], paths: Mapping[str, Path], found: Mapping[str, Reproduction | None]
 ) -> RenderableType:
-    """Seconds of each record and of each setting's light, and how far each record is from the shipped one."""
+    """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
     rows = []
     for name, spent in seconds.items():
         one, result = found.get(name), _result(record.read(paths[name])) if name in paths else ""
@@ -73,7 +73,7 @@ def reproduced(
 
 
 def verdict(found: Sequence[Reproduction]) -> str:
-    """One line: how many records are reproduced, and the largest move of a constant."""
+    """Return one line: how many records are reproduced, and the largest move of a constant."""
     count, moved = sum(one.is_reproduced for one in found), max(one.moved for one in found)
     return f"{count} of {len(found)} records reproduced; largest move {moved:.1g} of a stated error"
 
@@ -83,7 +83,7 @@ def _result(content: Content) -> str:
 
 
 def truth(content: Content) -> str:
-    """What a record was fitted to: the exact solution, or so many photons."""
+    """Return what a record was fitted to: the exact solution, or so many photons."""
     source = content.get("truth") or {}
     if source.get("photons") is None:
         return str(source.get("kind", ABSENT))
@@ -100,7 +100,7 @@ def _inverses(records: Records) -> RenderableType:
 
 
 def _errors(title: str, records: Records, measure: str, more: Mapping[str, str]) -> RenderableType:
-    """A line a record: the worst of a measure, set by set, and how it goes over α."""
+    """Return a line a record: the worst of a measure, set by set, and how it goes over α."""
     rows = {name: values_of(content["quality"]["regenerated"], measure) or [] for name, content in records.items()}
     ends = span(rows.values())
     header = measure.replace("inversion_error", "error")
@@ -132,13 +132,13 @@ def _first(records: Records) -> dict[str, list[str]]:
 
 
 def _indices(content: Content) -> str:
-    """n, or the largest where the constants hold for every n above 1 up to it."""
+    """Return n, or the largest where the constants hold for every n above 1 up to it."""
     span = content.get("indices")
     return f"≤ {span[1]:g}" if span else f"{content['setting']['n']:g}"
 
 
 def _course(content: Content, measure: str, last: bool = False) -> str:
-    """The worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
+    """Return the worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
     found = worst_measures(content).get(measure, {})
     shown = [significant(found[name]) for name in SETS if name in found]
     if not converged(content):
@@ -151,7 +151,7 @@ def _spaced(tables: list[RenderableType]) -> list[RenderableType]:
 
 
 def _kind(content: Content) -> Callable[[Records], RenderableType]:
-    """The table that a record stands in."""
+    """Return the table that a record stands in."""
     if content["pipeline"] == "evidence":
         return _readings
     if measures(content, "delta_A"):

@@ -45,7 +45,7 @@ ENDS = {"": "value", "_low": "low", "_high": "high"}
 
 
 def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
-    """A table a panel; under the last one what was left out, and what is not in the times."""
+    """Return a table a panel; under the last one what was left out, and what is not in the times."""
     last = len(part.panels) - 1
     return [_table(part, panel, "\n".join(part.notes) if i == last else "") for i, panel in enumerate(part.panels)]
 
@@ -69,7 +69,7 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
 
 
 def _with_spread(measured: WithSpread) -> str:
-    """1.23 (1.20 … 1.31), or the number alone where it has no spread."""
+    """Return text such as 1.23 (1.20 … 1.31), or the number alone where it has no spread."""
     value = significant(measured.value, 3)
     if measured.low == measured.high:
         return value
@@ -77,7 +77,7 @@ def _with_spread(measured: WithSpread) -> str:
 
 
 def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
-    """The part's file."""
+    """Return the CSV file of a part."""
     comments = [f"{part.name}: {part.title}", *(f"{name}: {value}" for name, value in machine.items())]
     comments += [f"panel {p.name}: {p.title}; cost: {p.cost}; error, worst: {p.error}" for p in part.panels]
     comments += part.notes
@@ -92,7 +92,7 @@ def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
 
 
 def as_numbers(part: TradeoffPart) -> dict[str, Any]:
-    """The same for --json."""
+    """Return a part as numbers, for --json."""
     return {
         "title": part.title,
         "notes": list(part.notes),

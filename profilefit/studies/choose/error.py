@@ -1,4 +1,4 @@
-"""How wrong a way to scatter light will be at a step edge, and through what."""
+"""Error of a technique at a step edge of light, and its parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Error:
 
 
 def error(option: Option, case: Case, light: ReferenceLight, within: Within) -> Error:
-    """Of the worst channel."""
+    """Return the error of an option in the worst channel."""
     return max((_of_channel(option, case, light, within, c) for c in range(3)), key=lambda one: one.total)
 
 
@@ -67,7 +67,7 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
 
 
 def _found(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
-    """L / A at places (m,), (m, trials)."""
+    """Return L / A at places (m,), (m, trials)."""
     if option.law is None:
         return _mean(option, case, light, channel, x)[:, None]
     law = option.law
@@ -76,7 +76,7 @@ def _found(option: Option, case: Case, light: ReferenceLight, channel: int, x: F
 
 
 def _mean(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
-    """The same without noise (m,)."""
+    """Return L / A at places (m,) without noise."""
     if option.law is not None:
         share = beyond(_alpha(option.law, case.reflectance[channel]), option.law.setting, option.law)
         return response(share, x, case.mfp[channel], case.radius, case.window[0])
@@ -85,5 +85,5 @@ def _mean(option: Option, case: Case, light: ReferenceLight, channel: int, x: Fl
 
 @cache
 def _alpha(law: ProfileLaw, reflectance: float) -> float:
-    """The albedo that a law's own map gives to a reflectance A [-], as its shader has it."""
+    """Return the albedo that a law's own map gives to a reflectance A [-], as its shader has it."""
     return float(law.albedo.alpha(reflectance))  # type: ignore[attr-defined]

@@ -114,7 +114,7 @@ class Contender:
 
     @property
     def constants(self) -> tuple[int, int]:
-        """Numbers of fitted constants of the profile, and besides of the sampler alone; those of A(alpha) do not count."""
+        """Numbers of fitted constants of the profile, and of the sampler alone; those of A(alpha) do not count."""
         of_profile = len(self.law.seen_by("energy"))
         return of_profile, len(self.law.constant_names()) - of_profile
 

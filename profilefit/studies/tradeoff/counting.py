@@ -1,4 +1,4 @@
-"""How many transcendental functions a law computes, read off what jax traces: for each point, and for each material."""
+"""Number of transcendental functions of a law, read off what jax traces: for each point, and for each material."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FunctionCounts:
 
     @property
     def transcendental(self) -> int:
-        """Of each point, without square roots."""
+        """Number of functions of each point, without square roots."""
         return sum(self.point.values()) - sum(self.point[name] for name in ROOTS)
 
 
@@ -73,6 +73,6 @@ def _add_one(name: str, shape: tuple[int, ...], times: int, counts: FunctionCoun
 
 
 def described(functions: Counter[str]) -> str:
-    """As 2 exp, log; a dash where there is none."""
+    """Return functions as text, for example "2 exp, log"; a dash where there is none."""
     parts = [f"{number} {name}" if number > 1 else name for name, number in sorted(functions.items())]
     return ", ".join(parts) or "–"

@@ -59,7 +59,7 @@ FULL, QUICK = FitSizes(), FitSizes((100_000,), (), 3)
 
 @dataclass(frozen=True)
 class FittedConstants:
-    """What a way ended at: constants by name, their standard errors where there are any, and what the solver said."""
+    """Result of a fit: constants by name, their standard errors where there are any, and the word of the solver."""
 
     constants: Mapping[str, float]
     errors: Mapping[str, float]
@@ -121,7 +121,7 @@ def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:
 
 
 def _light(photons: int, seed: int) -> tuple[Profiles, float]:
-    """Profiles with their covariance, and the time it took [s]."""
+    """Return profiles with their covariance, and the time it took [s]."""
     begin = time.perf_counter()
     run = simulate_orders(Grid.from_edges(r=EDGES), photons, seed, workers=1, progress=False)
     profiles = Profiles.from_orders(run, ALPHAS)
@@ -172,12 +172,12 @@ def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: FittedC
 
 
 def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
-    """The law with these constants replaced."""
+    """Return the law with these constants replaced."""
     return law.with_vector(tuple(constants), list(constants.values()))
 
 
 def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:
-    """Root mean square and worst change of ring energies, before any scaling to A, over the exact energies [-]."""
+    """Return root mean square and worst change of ring energies, not scaled to A, over the exact energies [-]."""
     energy, counts = judged()
     ours, theirs = (np.diff(energy_within(one), axis=1) for one in (law, limit))
     relative = np.abs(ours - theirs)[counts] / energy[counts]
@@ -186,20 +186,20 @@ def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:
 
 @cache
 def judged() -> tuple[Floats, NDArray[np.bool_]]:
-    """Exact energies of the rings (albedos, rings) [-], and the rings that count."""
+    """Return exact energies of the rings (albedos, rings) [-], and the rings that count."""
     share = np.asarray(exact.cdf(RINGS, ALPHAS[:, None]))
     energy = np.diff(share, axis=1) * np.asarray(exact.reflectance(ALPHAS))[:, None]
     return energy, share[:, 1:] <= ENERGY_WITHIN
 
 
 def energy_within(law: ProfileLaw) -> Floats:
-    """Energy within each edge of the rings (albedos, rings + 1) [-]."""
+    """Return energy within each edge of the rings (albedos, rings + 1) [-]."""
     with jax.enable_x64(True):
         return np.asarray(law.unscaled_energy(jnp.asarray(RINGS), jnp.asarray(ALPHAS)[:, None]))
 
 
 def standardised(found: FittedConstants, limit: FittedConstants) -> float:
-    """Root mean square distance of the constants from their limits, in standard errors [-]; NaN if there are none."""
+    """Return the root mean square distance of constants from their limits, in standard errors [-], or NaN."""
     if not found.errors:
         return float("nan")
     distances = [(found.constants[name] - limit.constants[name]) / error for name, error in found.errors.items()]

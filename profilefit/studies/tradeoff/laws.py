@@ -79,18 +79,18 @@ def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = s
 
 
 def judged_albedos(number: int) -> np.ndarray:
-    """Even in sqrt(1 - alpha) over [0.05, 0.995]."""
+    """Return albedos even in sqrt(1 - alpha) over [0.05, 0.995]."""
     return 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), number) ** 2
 
 
 def counts(contender: Contender) -> dict[str, FunctionCounts]:
-    """Functions of each part that there is."""
+    """Count the functions of each part of a contender."""
     functions = {**contender.parts, **({"profile": contender.profile} if contender.another else {})}
     return {part: count(functions[part]) for part in PARTS if part in functions}
 
 
 def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, stopwatch.Work]:
-    """What to time of a contender, by part."""
+    """Return the timed calls of a contender, by part."""
     found = {}
     for part, function in contender.parts.items():
         each = counted[part].transcendental
@@ -100,7 +100,7 @@ def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSi
 
 
 def timed(function: Callable[[Array, Array], object], radii: bool, points: int) -> stopwatch.Work:
-    """Calls on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
+    """Return a call on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
     shares = np.random.default_rng(1).random(points)
     near, far = RADII
     given = jnp.asarray(near * (far / near) ** shares if radii else shares, jnp.float32)

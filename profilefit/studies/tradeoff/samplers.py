@@ -78,7 +78,7 @@ class UniformSampler(Sampler):
     law: ProfileLaw
 
     def farthest(self, alpha: Array) -> Array:
-        """x of that share [mfp]."""
+        """Return the radius x within which `UNIFORM_SHARE` of the light leaves [mfp]."""
         return self.law.sampler.scaled_sample(jnp.full_like(alpha, UNIFORM_SHARE), alpha)
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
@@ -91,7 +91,7 @@ class UniformSampler(Sampler):
 
 @dataclass(frozen=True)
 class WeighedSampler:
-    """Of one way to weigh: ratios of square error and of variance (2, albedos, blocks), biases (albedos, edges) [A].
+    """Sampler with a weight: ratios of square error and variance (2, albedos, blocks), biases (albedos, edges) [A].
 
     searched  whether the weight takes a density that is not the law's
     """
@@ -103,7 +103,7 @@ class WeighedSampler:
     searched: bool = False
 
     def weighed(self, xi: Array, alpha: Array) -> tuple[Array, ...]:
-        """A radius, and what its weight is made of: what is timed."""
+        """Return a radius, and what its weight is made of: what is timed."""
         x, value = self.owner.both(xi, alpha)
         return (x, value, self.owner.sampler.scaled_pdf(x, alpha)) if self.searched else (x, value)
 
@@ -147,12 +147,12 @@ def _uniform(hazard: Contender) -> Contender:
 
 
 def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:
-    """Points of one timed call."""
+    """Return points of one timed call."""
     return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
 
 
 def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
-    """A sampler weighed by its own density; and by its law's, where that is another."""
+    """Return a sampler weighed by its own density; and by its law's, where that is another."""
     sampler = one.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
@@ -166,7 +166,7 @@ def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
 
 
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
-    """Light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
+    """Return light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
 
     With weights by the sampler's own density, and by its law's. alpha is the reduced albedo, the edge in l*.
     """
@@ -181,13 +181,13 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
-    """Weights by the law's own density are all 1."""
+    """Return a gather weighted by the law's own density: all weights are 1."""
     drawn = by_law(law, alpha, sampler)
     return EdgeGather(drawn.sample, np.ones_like)
 
 
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
-    """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
+    """Return square error by the edge and variance, over those of the exact quantile (2, m, blocks)."""
     rows = []
     for alpha in unreduced(np.array(sizes.alphas), sampler.law.setting.g).tolist():
         ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)

@@ -16,7 +16,7 @@ SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
     absent = contenders.Wanted("absent", "gaussians", "no-such-set")
-    monkeypatch.setattr(contenders, "WANTED", (*(w for w in contenders.WANTED if w[0] in wanted), absent))
+    monkeypatch.setattr(contenders, "SPECS", (*(w for w in contenders.SPECS if w[0] in wanted), absent))
     monkeypatch.setattr(laws, "QUICK", SMALL)
     numbers = tmp_path / "numbers.json"
     laws.main(["--quick", "--json", str(numbers)])
