@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -98,6 +98,22 @@ def band_under(ax: Axes, x: Any, band: tuple[Any, Any] | None, color: str, label
     if band is not None:
         ax.fill_between(x, *band, color=color, alpha=0.25, linewidth=0)
         ax.fill_between([], [], [], color=GREY, alpha=0.4, linewidth=0, label=label)
+
+
+class Curve(NamedTuple):
+    """Law in a figure: its label and look, and the record with its posterior, if it has one."""
+
+    label: str
+    law: Any
+    style: Mapping[str, Any]
+    fitted: Any = None
+
+
+def draw_curves(ax: Axes, x: Any, curves: Iterable[Curve], evaluate: Callable[[Any], Any]) -> None:
+    """Draw `evaluate(law)` of each curve over x, and under it the 95 % band of its record."""
+    for one in curves:
+        band_under(ax, x, one.fitted.band(evaluate) if one.fitted else None, one.style["color"])
+        ax.plot(x, evaluate(one.law), label=one.label, **one.style)
 
 
 def plain_log(axis: Axis) -> None:

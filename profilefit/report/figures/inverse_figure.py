@@ -24,9 +24,10 @@ from profilefit.report.figures.canvas import (
     PUBLISHED,
     PURPLE,
     WHOLE,
+    Curve,
     albedo_axis,
-    band_under,
     canvas,
+    draw_curves,
     legend_below,
     plain_log,
     save,
@@ -69,14 +70,11 @@ def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = source.printed("liang", "published", setting)
-    ax.plot(xi, _radius(printed, xi, alpha), label="(19) as printed", **PUBLISHED)
+    curves = [Curve("(19) as printed", source.printed("liang", "published", setting), PUBLISHED)]
     for name, (label, style) in LABELS.items():
-        fitted = source.usable(name)
-        if fitted is None:
-            continue
-        band_under(ax, xi, fitted.band(lambda law: _radius(law, xi, alpha)), style["color"])
-        ax.plot(xi, _radius(fitted.law, xi, alpha), label=label, **style)
+        if (fitted := source.usable(name)) is not None:
+            curves.append(Curve(label, fitted.law, style, fitted))
+    draw_curves(ax, xi, curves, lambda law: _radius(law, xi, alpha))
     whole = source.usable("liang-whole")
     if whole is not None:
         label = "r$_{max}$ where (21) clips, whole profile"
