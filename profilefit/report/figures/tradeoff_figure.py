@@ -217,13 +217,9 @@ def _label(axes: Axes, panel: Panel) -> None:
 
 def text_of(point: Point, first: bool) -> str:
     """Return the method, and what distinguishes it from others of its line; of the later ones only that."""
-    effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: _power(m[1], m[2]), point.label)
+    effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: f"{'' if m[1] == '1' else m[1] + '·'}10$^{m[2]}$", point.label)
     method = point.method.replace("normalized diffusion, Xie", "Xie").replace("normalized diffusion", "norm. diffusion")
     return f"{method}: {effort}" if first and effort else effort or method
-
-
-def _power(digit: str, exponent: str) -> str:
-    return f"10$^{exponent}$" if digit == "1" else f"{digit}·10$^{exponent}$"
 
 
 def _boxes(axes: Axes, point: Point) -> list[Bbox]:

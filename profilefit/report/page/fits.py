@@ -32,7 +32,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
         "seed": [str(one["seed"]) for one in contents.values()],
         "preset": [str(one["preset"]) for one in contents.values()],
         "data": [str(one.get("data_digest", ABSENT))[:SHOWN] for one in contents.values()],
-        "record's own": [_sha(path.read_bytes()) for path in source.paths.values()],
+        "record's own": [hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] for path in source.paths.values()],
     }
     caption = f"SHA-256, the first {SHOWN} letters, of the numbers that were fitted and of the record's file"
     yield markup(column_table("Records", columns, caption, left=("record", "preset", "data", "record's own")))
@@ -67,10 +67,6 @@ def _options(content: Content) -> str:
 def _photons(content: Content) -> str:
     photons = (content.get("truth") or {}).get("photons")
     return ABSENT if photons is None else f"{photons:.3g}".replace("e+0", "e")
-
-
-def _sha(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:SHOWN]
 
 
 # What a figure shows, by how its name begins.

@@ -70,14 +70,12 @@ class EvidenceFolder:
         when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
         parts = [paragraph(when, "dim"), command(str(made.get("command")))]
         if told.get("of", ALL) != ALL:
-            parts.append(paragraph(f"Not of everything: of {_listed(told['of'])}.", "red"))
+            of = told["of"]
+            listed = ", ".join(of) if isinstance(of, list) else str(of)
+            parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
         if evidence.stale(made, self.records):
             parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
         return "\n".join(parts)
-
-
-def _listed(of: Any) -> str:
-    return ", ".join(of) if isinstance(of, list) else str(of)
 
 
 def missing(name: str) -> str:

@@ -17,6 +17,7 @@ from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.stack_table import stack_table
 from profilefit.report.tables.sum_table import sum_tables
+from profilefit.report.tables.tradeoff_tables import with_spread
 from profilefit.studies.stability.cells import Verdict
 
 # `python -m benchmarks.render` makes them.
@@ -106,16 +107,12 @@ def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[s
         columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
         columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
     for place in ("inside", "outside"):
-        columns[f"bad\n{place}"] = [_count(one[place]) for one in group]
+        columns[f"bad\n{place}"] = [str(sum(v for v in one[place].values() if isinstance(v, int))) for one in group]
     return columns
 
 
 def _label(one: Told) -> str:
     return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
-
-
-def _count(bad: Told) -> str:
-    return str(sum(value for value in bad.values() if isinstance(value, int)))
 
 
 def _costs(costs: Told) -> dict[str, list[str]]:
@@ -157,25 +154,14 @@ def _numbers(part: Told) -> str:
         points = panel["points"]
         columns = {
             "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
-            "cost": [_with_spread(one["cost"]) for one in points],
-            "error": [_with_spread(one["error"]) for one in points],
+            "cost": [with_spread(**one["cost"]) for one in points],
+            "error": [with_spread(**one["error"]) for one in points],
             "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
             "stands": [one["standing"] for one in points],
         }
-        caption = _plain(f"cost: {panel['cost']}; error: {panel['error']}")
-        tables.append(markup(column_table(_plain(panel["title"]), columns, caption, left=("", "stands"))))
+        caption = f"cost: {panel['cost']}; error: {panel['error']}".replace("$", "")
+        tables.append(markup(column_table(panel["title"].replace("$", ""), columns, caption, left=("", "stands"))))
     return "\n".join([*tables, *(paragraph(note, "dim") for note in part["notes"])])
-
-
-def _plain(text: str) -> str:
-    """Return the text without the marks that make a subscript in a figure."""
-    return text.replace("$", "")
-
-
-def _with_spread(measured: Told) -> str:
-    value, low, high = (measured[key] for key in ("value", "low", "high"))
-    alone = significant(value, 3)
-    return alone if low == high else f"{alone} ({significant(low)} … {significant(high)})"
 
 
 HOLDS = {
@@ -196,18 +182,14 @@ def failures(found: EvidenceFolder) -> Iterator[str]:
         return
     yield found.origin(told)
     yield paragraph(HOLDS[bool(told["passed"])], "bold")
-    yield paragraph(_unjudged(told["regions"]), "dim")
+    aside = sum(int(one["count"]) for one in told["regions"] if one["class"] == NOT_JUDGED)
+    yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
     columns = _advice(told["regions"])
     yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
     for path in sorted(found.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
         figure = found.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
         yield details(title, figure, is_open=path.stem == FIRST)
-
-
-def _unjudged(regions: Sequence[Told]) -> str:
-    count = sum(int(one["count"]) for one in regions if one["class"] == NOT_JUDGED)
-    return f"{count} cells, of all laws, are not judged: there is no reference value."
 
 
 def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:

@@ -58,14 +58,9 @@ def interval(ends: Sequence[float | None] | None, most: float | None = None) -> 
 
 def on_the_point(texts: Sequence[str]) -> list[str]:
     """Return the texts with blanks on the right, so that a right-aligned column has its decimal points together."""
-    tails = [len(text) - _point(text) for text in texts]
+    tails = [len(text) - text.index(".") if "." in text else 0 for text in texts]
     widest = max(tails, default=0)
     return [text + " " * (widest - tail) for text, tail in zip(texts, tails, strict=True)]
-
-
-def _point(text: str) -> int:
-    """Return where the decimal point stands, or would."""
-    return text.index(".") if "." in text else len(text)
 
 
 def _exponent(value: float) -> int:

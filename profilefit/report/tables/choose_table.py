@@ -50,7 +50,8 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
         "next dearer": choice.dearer,
     }
     rows = {name: one for name, one in shown.items() if one is not None}
-    places = _places([one.error.total for one in rows.values()])
+    least = min(one.error.total for one in rows.values())
+    places = max(1 - math.floor(math.log10(max(100.0 * least, 1e-4))), 0)  # two digits of the least
     columns = {
         "": list(rows),
         "way": [one.option.label for one in rows.values()],
@@ -293,11 +294,6 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     if not math.isclose(layer.n, index, rel_tol=0.01):
         text += f" The choice is for n = {index:g}, as the file says, and these layers are not."
     return text
-
-
-def _places(shares: list[float]) -> int:
-    """Return decimals of a percentage that show two digits of the least of these."""
-    return max(1 - math.floor(math.log10(max(100.0 * min(shares), 1e-4))), 0)
 
 
 def _percent(share: float, places: int | None = None) -> str:

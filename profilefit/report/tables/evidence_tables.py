@@ -40,7 +40,7 @@ def evidence_tables(content: Content) -> list[RenderableType]:
 
 
 def _readings(equation: str, readings: list[Content]) -> RenderableType:
-    best = sorted(readings, key=lambda reading: _number(reading.get("curve_distance"), inf))[:BEST]
+    best = sorted(readings, key=_curve_distance)[:BEST]
     columns = {
         "verdict": [str(reading.get("verdict", ABSENT)) for reading in best],
         "curve": [_share(reading.get("curve_distance")) for reading in best],
@@ -71,7 +71,7 @@ def _table1(rows: list[Content]) -> RenderableType:
         "model": [str(row.get("model", ABSENT)) for row in shown],
     }
     for place, part in enumerate(("near half", "far half", "all")):
-        columns[part] = [_at(_ratio(row), place) for row in shown]
+        columns[part] = [significant(ratio[place], 3) if place < len(ratio) else ABSENT for ratio in map(_ratio, shown)]
     caption = (
         f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
         "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
@@ -107,10 +107,6 @@ def _distance(row: Content) -> float:
     return abs(log(whole)) if whole else inf
 
 
-def _at(values: list[Any], place: int) -> str:
-    return significant(values[place], 3) if place < len(values) else ABSENT
-
-
 def _range(row: Content) -> str:
     size = row.get("range_mm", row.get("range"))
     return f"{size:g} mm" if isinstance(size, int | float) else str(size or ABSENT)
@@ -120,8 +116,9 @@ def _share(value: float | None) -> str:
     return ABSENT if value is None else f"{100 * value:.1f} %"
 
 
-def _number(value: float | None, absent: float) -> float:
-    return absent if value is None else value
+def _curve_distance(reading: Content) -> float:
+    distance = reading.get("curve_distance")
+    return inf if distance is None else float(distance)
 
 
 def _by(rows: Iterable[Content], *keys: str) -> dict[Any, list[Content]]:

@@ -213,9 +213,11 @@ def _goodness(result: Answer) -> Iterator[str]:
     if one.detected:
         added = _added(result)
         loud = max(added.values(), default=one.relative) >= LOUD
+        share = f"residuals of {100 * one.relative:.2g} % of a value are unexplained"
+        missed = share if one.relative < 1 else "it misses whole values"
         yield (
             f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data "
-            f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
+            f"under this light, scattering and surface; {missed}; {_effect(result, added)}"
         )
     elif result.found.plain is not None:
         ranges = result.found.question.ranges
@@ -249,12 +251,6 @@ def _effect(result: Answer, added: dict[str, float]) -> str:
     by_lack = " and ".join(f"± {significant(100 * error)} % to {name}" for name, error in added.items())
     rest = " and ".join(f"± {significant(100 * others[name])} %" for name in added)
     return f"it adds {by_lack}, where all other errors are {rest}; 95 % includes it"
-
-
-def _unexplained(relative: float) -> str:
-    return (
-        f"residuals of {100 * relative:.2g} % of a value are unexplained" if relative < 1 else "it misses whole values"
-    )
 
 
 def _rivals(result: Answer) -> Iterator[str]:

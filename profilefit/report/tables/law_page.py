@@ -77,7 +77,8 @@ def law_pages(folder: Folder) -> list[Page]:
     maps = _grouped(
         sorted(albedo_laws(records, matched=False), key=lambda one: one.setting.n), lambda one: MAP + one.name
     )
-    return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
+    titles = {name: f"{name.removeprefix(MAP)}, map between alpha and A" for name in maps}
+    return [Page(name, titles.get(name, name), tuple(members)) for name, members in {**laws, **maps}.items()]
 
 
 def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
@@ -124,10 +125,6 @@ def _grouped(found: Iterable[Named], key: Any) -> dict[str, list[Named]]:
     return groups
 
 
-def _title(name: str) -> str:
-    return f"{name.removeprefix(MAP)}, map between alpha and A" if name.startswith(MAP) else name
-
-
 def _spans(one: Named) -> bool:
     """Return whether its constants hold for every index of a range."""
     n = one.law.entry.n
@@ -160,15 +157,11 @@ def _surface(one: Named) -> str:
 def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
     """Return the largest error of each measure, from its own records or one that measured the printed set."""
     if one.records:
-        own: list[Content] = [_of_record(contents[name]) for name in one.records]
+        every = [contents[name] for name in one.records]  # where constants span indices, of every index
+        own: list[Content] = [{**content["quality"]["regenerated"], **by_index(content)} for content in every]
     else:
         own = [values for _, values in _measured_sets(one, contents)]
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
-
-
-def _of_record(content: Content) -> Content:
-    """Return the measures of its constants; where they span indices, those of every index."""
-    return {**content["quality"]["regenerated"], **by_index(content)}
 
 
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:

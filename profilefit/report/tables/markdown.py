@@ -26,6 +26,7 @@ from profilefit.report.records import (
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.quality_tables import albedo_number
 
+OF_THE_PAPER = ("liang", "burley", "rational")  # its own laws, and those it is compared with
 PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
@@ -132,7 +133,11 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
 
 def sections(records: Mapping[str, Content]) -> dict[str, str]:
     """Return the tables that are made of records, by the names of their marks in README and documentation."""
-    paper = {name: content for name, content in records.items() if _is_of_the_paper(content)}
+    paper = {
+        name: content
+        for name, content in records.items()
+        if _is_searchlight(content) and content["law"] in OF_THE_PAPER
+    }
     found = {
         "short": _short_quality(records),
         "quality": _profile_quality(paper),
@@ -220,11 +225,6 @@ def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
 
 def _number(measure: str, value: float) -> str:
     return f"{value:.4f}" if measure == "r2" else significant(value)
-
-
-def _is_of_the_paper(content: Content) -> bool:
-    """Return whether a record is of the paper's laws, or those it is compared with, under its own light."""
-    return _is_searchlight(content) and content["law"] in ("liang", "burley", "rational")
 
 
 def _is_searchlight(content: Content) -> bool:

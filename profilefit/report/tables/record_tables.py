@@ -50,13 +50,9 @@ TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
 KINDS = {"statistical": "photon noise", "misfit": "misfit as noise"}
 
 
-def _is_evidence(content: Content) -> bool:
-    return content["pipeline"] == "evidence"
-
-
 def record_tables(content: Content) -> list[RenderableType]:
     """Return everything about one record: where it comes from, constants, the state of fit and chains, quality."""
-    if _is_evidence(content):
+    if content["pipeline"] == "evidence":
         return _spaced([_title(content), *evidence_tables(content)])
     if content["pipeline"] == STACK:
         return _spaced([_title(content), *stack_tables(content)])
@@ -91,17 +87,13 @@ def constants_table(content: Content) -> RenderableType:
     scores = [z_score(row) for row in rows]
     meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
-        columns["\nz"] = [_signed(score) for score in scores]
+        columns["\nz"] = [ABSENT if z is None else f"{z:+.0f}" if abs(z) >= TENFOLD else f"{z:+.1f}" for z in scores]
         meanings.append(f"z: published less regenerated, over the errors of {TOTAL}, combined")
     title = "Constants, lengths in units of the transport mean free path"
     caption = "; ".join(meanings)
     if not converged(content):
         caption = f"The fit failed, so these are where it stopped, and no law: {content['fit']['result']}"
     return column_table(title, {"": list(constants), **columns}, caption)
-
-
-def _signed(score: float | None) -> str:
-    return ABSENT if score is None else f"{score:+.0f}" if abs(score) >= TENFOLD else f"{score:+.1f}"
 
 
 def intervals_table(content: Content) -> RenderableType:

@@ -53,9 +53,13 @@ class Beyond:
         return float(NEAR * np.sinh(brentq(lambda u: float(self.curve(u)) - np.log(0.25), 0.0, self.curve.x[-1])))
 
 
+@lru_cache(maxsize=512)
 def beyond(alpha: float, setting: Setting, law: ProfileLaw | None = None) -> Beyond:
     """Return F(d) of the exact half space, or of a law."""
-    return _of_law(alpha, law) if law is not None else _exact(alpha, setting)
+    u = np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOTS)
+    d = NEAR * np.sinh(u)
+    share = step_response(-d, alpha, setting=setting) if law is None else step_response(-d, alpha, law=law)
+    return Beyond(CubicSpline(u, np.log(np.maximum(share, FAINT))))
 
 
 def response(share: Beyond, x: Floats, mfp: float, radius: float, window: float = np.inf) -> Floats:
@@ -93,21 +97,6 @@ def _within(share: Beyond, mfp: float, radius: float) -> CubicSpline:
     fall = -np.diff(share(2.0 * radius * np.sin(np.minimum(0.5 * s / radius, 0.5 * np.pi)) / mfp))
     total = np.append(0.0, np.cumsum(fall / np.cos(0.5 * middle / radius)))
     return lambda arc: np.interp(np.arcsinh(arc / first), u, total)
-
-
-@lru_cache(maxsize=256)
-def _exact(alpha: float, setting: Setting) -> Beyond:
-    return _curve(lambda d: step_response(-d, alpha, setting=setting))
-
-
-@lru_cache(maxsize=256)
-def _of_law(alpha: float, law: ProfileLaw) -> Beyond:
-    return _curve(lambda d: step_response(-d, alpha, law=law))
-
-
-def _curve(share) -> Beyond:
-    u = np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOTS)
-    return Beyond(CubicSpline(u, np.log(np.maximum(share(NEAR * np.sinh(u)), FAINT))))
 
 
 @dataclass(frozen=True)

@@ -75,14 +75,13 @@ def of_convert() -> Iterator[Cells]:
         ("medium", _cases(ALBEDO), lambda _, value: Optical(np.array(value), one)),
         ("medium of l", _cases(LENGTH), lambda _, value: Optical(np.array(0.5), np.array(value))),
         (ALPHA_OF, _cases(("A", "reflectance", SHARES)), lambda _, value: alpha_of(value, "diffuse")),
-        *((name, _cases((name, name, LENGTHS)), _length_of) for name in BY_NAME),
+        *(
+            (name, _cases((name, name, LENGTHS)), lambda key, value: Optical.from_length(key, value, 0.5))
+            for name in BY_NAME
+        ),
     ]
     for name, cases, call in calls:
         yield refusals("convert", False, name, cases, call)
-
-
-def _length_of(key: str, value: float) -> Any:
-    return Optical.from_length(key, value, 0.5)
 
 
 def _with_keyword(function: Callable[..., Any], name: str) -> Call:

@@ -56,20 +56,16 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
         name = equation.primitive.name
         if name in COUNTED:
             result: Any = equation.outvars[0].aval
-            _add_one(name, result.shape, times, counts)
+            size = int(np.prod(result.shape, dtype=int))
+            if POINTS in result.shape:
+                counts.point[name] += times * (size // POINTS)
+            else:
+                counts.material[name] += times * size
         if name == "while":
             raise ValueError(f"function must have no loop of unknown length, got {equation}")
         inner = times * (equation.params["length"] if name == "scan" else 1)
         for nested in core.jaxprs_in_params(equation.params):
             _add(nested, inner, counts)
-
-
-def _add_one(name: str, shape: tuple[int, ...], times: int, counts: FunctionCounts) -> None:
-    size = int(np.prod(shape, dtype=int))
-    if POINTS in shape:
-        counts.point[name] += times * (size // POINTS)
-    else:
-        counts.material[name] += times * size
 
 
 def described(functions: Counter[str]) -> str:

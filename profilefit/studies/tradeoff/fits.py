@@ -93,7 +93,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     for seed in track(range(sizes.seeds + 1), "fits"):  # the first compiles
         for photons in sizes.photons:
             profiles, light = _light(photons, 1000 * seed + 700)
-            for name in _named(ways, photons, sizes):
+            for name in [name for name in ways if name != EMCEE or photons in sizes.chained]:
                 trial = _trial(ways[name], profiles, seed, light, limits[name], start)
                 if seed == 0:
                     compiling[name] = max(compiling.get(name, 0.0), trial.fit_seconds)
@@ -114,10 +114,6 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
         )
     )
     return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
-
-
-def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:
-    return [name for name in ways if name != EMCEE or photons in sizes.chained]
 
 
 def _light(photons: int, seed: int) -> tuple[Profiles, float]:

@@ -31,6 +31,9 @@ RADII = 0.01, 10.0  # of the timed profiles [mfp]
 NANO = 1e9
 PARTS = ("profile", "sample", "both")
 TITLES = {"profile": "R$_d$ at a given radius", "both": "a radius drawn, and R$_d$ there"}
+COST = "time of one {}, one core, float32 [ns]"
+AXES = {"profile": COST.format("evaluation"), "both": COST.format("sample")}
+ERROR = "relative error of R$_d$ [-]"
 QUICKLY = (YARDSTICK, "Liang, corrected", "hazard", "hazard, n = 1.4")
 
 
@@ -73,7 +76,7 @@ def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = s
     if not quick:
         found.append(table_contender(MATERIAL))
     rows = measured(found, sizes, track)
-    panels = tuple(Panel(part, title, *_axes(part), points_of(rows, part)) for part, title in TITLES.items())
+    panels = tuple(Panel(part, title, AXES[part], ERROR, points_of(rows, part)) for part, title in TITLES.items())
     notes = [f"left out: {line}" for line in left_out]
     return TradeoffPart("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
 
@@ -178,8 +181,3 @@ def points_of(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
         for row in rows
         if part in row.times
     )
-
-
-def _axes(part: str) -> tuple[str, str]:
-    what = "evaluation" if part == "profile" else "sample"
-    return f"time of one {what}, one core, float32 [ns]", "relative error of R$_d$ [-]"

@@ -118,7 +118,11 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
     timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
     dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in found if one not in timed]
     judged = [way for i in track(range(len(timed)), "noise and bias") for way in ways_of(timed[i], sizes)]
-    works = {one.name: laws.timed(one.weighed, False, _calls(one, sizes)) for one in judged}
+
+    def calls(way: WeighedSampler) -> int:
+        return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
+
+    works = {one.name: laws.timed(one.weighed, False, calls(one)) for one in judged}
     rates = stopwatch.take_turns(works, sizes.turns, track, "samplers")
     points = [point for one in judged for point in points_of(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
     panels = tuple(
@@ -144,11 +148,6 @@ def _uniform(hazard: Contender) -> Contender:
         raise TypeError(f"hazard must be the contender of that law, got {hazard.name!r}")
     sampler = UniformSampler(law)
     return Contender("uniform radii, hazard", law, sampler, law.shape, sampler, another=True)
-
-
-def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:
-    """Return points of one timed call."""
-    return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
 
 
 def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:

@@ -130,7 +130,7 @@ def facts(pinned: bool) -> dict[str, str]:
     return {
         "processor": processor(),
         "cores": f"{os.cpu_count() or 1}, {'pinned to one' if pinned else f'{len(cores())} used'}",
-        "load before": _load(),
+        "load before": f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown",
         "device": jax.devices()[0].device_kind,
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         **{name: version(name) for name in LIBRARIES},
@@ -140,8 +140,3 @@ def facts(pinned: bool) -> dict[str, str]:
 def caption(known: dict[str, str]) -> str:
     """Return the facts in one line for a figure."""
     return f"{known['processor']}; cores: {known['cores']}; load before: {known['load before']}; jax {known['jax']}"
-
-
-def _load() -> str:
-    """Return the mean number of processes that wanted a core over the last minute."""
-    return f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown"
