@@ -95,8 +95,8 @@ def cosine_words(content: Content) -> str:
 
 def by_index(content: Content) -> Mapping[str, list[float]]:
     """Return the worst measures of a record at each index n, and g, that it was judged at; empty if it is of one."""
-    found: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
-    return found
+    worst: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
+    return worst
 
 
 def regenerated_worst(content: Content, measure: str) -> float:
@@ -159,15 +159,15 @@ class Source(Records):
 
     def needed(self, name: str) -> Fitted:
         """Return a record and its law; RecordError if the folder has none of that name."""
-        found = self.fitted(name)
-        if found is None:
+        fitted = self.fitted(name)
+        if fitted is None:
             raise RecordError(f"{self.folder} has no record {name!r}; `profilefit regenerate` makes it")
-        return found
+        return fitted
 
     def usable(self, name: str) -> Fitted | None:
         """Return a record whose fit converged, or None: constants of a failed fit are no law to draw."""
-        found = self.fitted(name)
-        return found if found is not None and found.converged else None
+        fitted = self.fitted(name)
+        return fitted if fitted is not None and fitted.converged else None
 
     def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
         """Return a profile law with printed constants, normalised as the records here are."""

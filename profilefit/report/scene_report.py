@@ -21,10 +21,10 @@ NOWHERE = "#BBBBBB"  # where no error is measured
 
 def scene_figures(drawn: Drawn, device: str) -> dict[str, bytes]:
     """Return PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart"."""
-    found = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
+    files = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
     if len(drawn.chart) > 1:
-        found["-chart"] = _chart(drawn.chart, device)
-    return found
+        files["-chart"] = _chart(drawn.chart, device)
+    return files
 
 
 def _png(picture: NDArray[np.uint8]) -> bytes:

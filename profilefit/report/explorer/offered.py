@@ -45,13 +45,13 @@ class Offered:
 
 def offered(folder: Folder) -> list[Offered]:
     """Return every law of a matched surface that has a text, the best first; records are those in `folder`."""
-    records, found = Records.of(folder), []
+    records, laws = Records.of(folder), []
     for named in sorted(profile_laws(records), key=_place):
         if named.law.entry.has_text:
             text = _text(named, records)
             light = named.setting.illumination
-            found.append(Offered(address(named), named.name, light, _label(named), text, _refracting(named, records)))
-    return found
+            laws.append(Offered(address(named), named.name, light, _label(named), text, _refracting(named, records)))
+    return laws
 
 
 def first(laws: list[Offered]) -> str:

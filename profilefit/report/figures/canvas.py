@@ -82,12 +82,12 @@ def canvas(height: float, width: float = WIDTH, layout: Any = "constrained") -> 
 
 def legend_below(figure: Figure, axes: list[Axes]) -> None:
     """Draw one legend for all `axes` under the figure, in as many columns as fit."""
-    found: dict[str, Any] = {}
+    handles: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
+            handles.setdefault(label, handle)
     for columns in (4, 3, 2, 1):
-        legend = figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns)
+        legend = figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width < 0.98 * figure.bbox.width:
             return
         legend.remove()

@@ -173,15 +173,15 @@ def has_printed(source: Source) -> tuple[str, ...]:
 
 def _printed(source: Source) -> list[tuple[str, Content]]:
     """Return (record and name, constant) of each that was printed; those of a failed fit are no law."""
-    found = []
+    rows = []
     for record_name in source.paths:
         content = source.content(record_name)
         if "constants" not in content or not converged(content):
             continue
         source.needed(record_name)  # whole, or an error that says what is wrong with it
         of = content["constants"].items()
-        found += [(f"{record_name} {name}", one) for name, one in of if one.get("published") is not None]
-    return found
+        rows += [(f"{record_name} {name}", one) for name, one in of if one.get("published") is not None]
+    return rows
 
 
 def _legend(figure: Figure) -> None:

@@ -177,8 +177,8 @@ def points_of(fitted: Fitted) -> Points:
 def _printed(source: Source, record: str) -> Points | None:
     """Return alpha and the error of the printed constants, where the record has judged them."""
     quality = source.content(record)["quality"]
-    found = quality.get("published", {}).get("inversion_error")
-    return None if found is None else (np.asarray(quality["alpha"], float), np.asarray(found, float))
+    error = quality.get("published", {}).get("inversion_error")
+    return None if error is None else (np.asarray(quality["alpha"], float), np.asarray(error, float))
 
 
 def caption_of(source: Source) -> str:

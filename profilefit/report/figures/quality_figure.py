@@ -65,7 +65,7 @@ def record_quality_figure(record_name: str, source: Source, out: Path, name: str
 def _drawn(source: Source, names: Iterable[str], out: Path, name: str) -> list[Path]:
     contents = {one: source.content(one) for one in names if measures(source.content(one), "rel")}
     rows = {kind: [c for c in contents.items() if _kind(c[1]) == kind] for kind in KINDS}
-    shown = {kind: list(_lines(found)) for kind, found in rows.items() if found}
+    shown = {kind: list(_lines(group)) for kind, group in rows.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
     for row, (kind, lines) in zip(grid, shown.items(), strict=True):

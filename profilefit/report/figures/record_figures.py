@@ -84,9 +84,9 @@ def draw_all(
     drawn: dict[int, list[Path]] = {}
     with Workers(min(processes, len(possible))) as workers:
         task = partial(_drawn, source if processes == 1 else Source(folder), out)  # what is read travels with it
-        found = workers.each(task, possible)
+        figures = workers.each(task, possible)
         for _ in track(possible):
-            number, drawn[number] = next(found)
+            number, drawn[number] = next(figures)
     return [path for number in range(len(possible)) for path in drawn[number]], left_out
 
 

@@ -95,17 +95,17 @@ def write_page(
     """
     require_writable(path, room=ROOM)
     source = Source(folder, tuple(names) if names else None)
-    found = EvidenceFolder(evidence, folder)
+    measures = EvidenceFolder(evidence, folder)
     for file in source.paths.values():  # damage is reported now, not after a minute
         record.read(file, whole=True)
-    measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
-    measured["claims"] = "\n".join(promises(found))
-    makers = _makers(source, found, path.name) | {key: partial(str, text) for key, text in measured.items()}
+    measured = {key: measures.section(name, parts) for key, (name, parts) in MEASURED.items()}
+    measured["claims"] = "\n".join(promises(measures))
+    makers = _makers(source, measures, path.name) | {key: partial(str, text) for key, text in measured.items()}
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     write_whole(path, _document(made, len(source.paths)))
 
 
-def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
+def _makers(source: Source, measures: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
     """Return the makers of the parts by name; each record is a part of its own, since they take longest."""
     return {
         "fits": lambda: fits.overview(source),
@@ -113,7 +113,7 @@ def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Calla
         "constants": lambda: fits.whole_figure(source, "constants"),
         "quality": lambda: fits.whole_figure(source, "quality"),
         "paper": lambda: "\n".join(fits.paper_figures(source)),
-        "stacks": lambda: "\n".join(layers(source, found)),
+        "stacks": lambda: "\n".join(layers(source, measures)),
         **{f"{RECORD}{name}": partial(fits.record_part, source, name) for name in source.paths},
         "provenance": lambda: "\n".join(provenance(source, page)),
     }

@@ -55,17 +55,17 @@ MEANING = (
 COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
 
 
-def shader(found: EvidenceFolder) -> Iterator[str]:
+def shader(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = found.told("check")
-    yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
+    told = evidence.told("check")
+    yield missing("check") if told is None else "\n".join([evidence.origin(told), *_check(told)])
     for name, title in RENDERS.items():
-        path = found.folder / name
+        path = evidence.folder / name
         if path.exists():
             yield _picture(path.read_bytes(), title)
 
 
-def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
+def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section: records of stacks, sums of Gaussians, pictures; none without a record."""
     table = None if source.names else stack_table(source.folder)
     if table is None:
@@ -76,7 +76,7 @@ def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     for name, title in OF_LAYERS.items():
-        path = found.folder / name
+        path = evidence.folder / name
         if path.exists():
             yield _picture(path.read_bytes(), title)
 
@@ -135,16 +135,17 @@ CHARTS = {
 }
 
 
-def speed(found: EvidenceFolder) -> Iterator[str]:
+def speed(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = found.told("tradeoff")
+    told = evidence.told("tradeoff")
     if told is None:
         yield missing("tradeoff")
         return
     for name, title in CHARTS.items():
         if name in told:
-            yield found.origin({"made": told["made"], **told[name]})  # parts may have been measured on different days
-            yield found.drawing(f"tradeoff-{name}", title)
+            # Parts may have been measured on different days.
+            yield evidence.origin({"made": told["made"], **told[name]})
+            yield evidence.drawing(f"tradeoff-{name}", title)
             yield details(f"{escape(title)} The numbers", _numbers(told[name]))
 
 
@@ -174,21 +175,21 @@ ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
-def failures(found: EvidenceFolder) -> Iterator[str]:
+def failures(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section."""
-    told = found.told("stability")
+    told = evidence.told("stability")
     if told is None:
         yield missing("stability")
         return
-    yield found.origin(told)
+    yield evidence.origin(told)
     yield paragraph(HOLDS[bool(told["passed"])], "bold")
     aside = sum(int(one["count"]) for one in told["regions"] if one["class"] == NOT_JUDGED)
     yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
     columns = _advice(told["regions"])
     yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
-    for path in sorted(found.folder.glob(f"{ATLAS}*.svg")):
+    for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
-        figure = found.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
+        figure = evidence.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
         yield details(title, figure, is_open=path.stem == FIRST)
 
 
@@ -207,9 +208,9 @@ def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
     }
 
 
-def promises(found: EvidenceFolder) -> Iterator[str]:
+def promises(evidence: EvidenceFolder) -> Iterator[str]:
     """Yield the parts of the section; nothing where no checkout measured them."""
-    if (found.folder / FILE).exists():
-        made, claims = read_claims(found.folder)
-        yield found.origin({"made": made})
+    if (evidence.folder / FILE).exists():
+        made, claims = read_claims(evidence.folder)
+        yield evidence.origin({"made": made})
         yield from map(markup, claim_tables(claims))

@@ -85,14 +85,14 @@ def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
     return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("source",))
 
 
-def half_table(found: Sequence[HalfCheck]) -> RenderableType:
+def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
     """Return a line a law, a column for each thing that is stored in float16."""
-    columns = {"law": [_at_index(one.of) for one in found]}
+    columns = {"law": [_at_index(one.of) for one in checks]}
     for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
-        if any(name in one.rel for one in found):
+        if any(name in one.rel for one in checks):
             columns[name] = [
                 f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT
-                for one in found
+                for one in checks
             ]
     return column_table("Half precision", columns, HALF_CAPTION, fold=("law",))
 
@@ -108,8 +108,8 @@ def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
 def markdown_check(folder: Path) -> str:
     """Return the README's tables: all regenerated laws, and Liang et al.'s printed ones. ShaderError without OpenGL."""
     regenerated, printed = chosen((), REGENERATED, folder), chosen(("liang",), "published", folder)
-    found = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
-    return markdown_checks(found.laws, found.maps, found.costs, found.device)
+    results = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
+    return markdown_checks(results.laws, results.maps, results.costs, results.device)
 
 
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
@@ -194,8 +194,8 @@ def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str,
 
 
 def _verdicts(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
-    found = _columns(COUNTS, [_counts(one) for one in checks])
-    return {**found, "result": [_result(one) for one in checks]}
+    columns = _columns(COUNTS, [_counts(one) for one in checks])
+    return {**columns, "result": [_result(one) for one in checks]}
 
 
 def _law_cells(one: LawCheck) -> tuple[str, ...]:

@@ -117,15 +117,15 @@ def sea_content(need: SeaNeed) -> dict[str, Any]:
 
 def fur_lines(need: FurNeed) -> list[str]:
     """Return how many layers fur needs, a line an angle, and the answer."""
-    found = []
+    lines = []
     for angle, layers in need.layers.items():
         told = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
         best = need.cheapest(angle)
-        found.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
+        lines.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
     wanted = f"(requested: {_percent(need.tolerance)} % of the length)"
     if need.way is None:
-        return [*found, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
-    return [*found, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
+        return [*lines, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
+    return [*lines, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
 
 
 def fur_content(need: FurNeed) -> dict[str, Any]:
@@ -222,10 +222,10 @@ def _filters(choice: Choice) -> list[dict[str, Any]]:
     option, scene = choice.nearest.option, choice.scene
     if not is_filter(option):
         return []
-    found = passes(option, middle(scene), reference_light(scene.setting))
+    filters = passes(option, middle(scene), reference_light(scene.setting))
     return [
         {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
-        for share, kernel, stretches in found
+        for share, kernel, stretches in filters
     ]
 
 

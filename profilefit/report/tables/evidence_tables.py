@@ -29,14 +29,14 @@ def evidence_line(content: Content) -> str:
 
 def evidence_tables(content: Content) -> list[RenderableType]:
     """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
-    found: list[RenderableType] = []
+    parts: list[RenderableType] = []
     for equation, readings in _by(content.get("readings") or [], "equation").items():
-        found.append(_readings(equation, readings))
+        parts.append(_readings(equation, readings))
     if content.get("table1"):
-        found.append(_table1(content["table1"]))
+        parts.append(_table1(content["table1"]))
     if content.get("halves"):
-        found.append(_halves(content["halves"]))
-    return found or [Text("This record holds no readings.")]
+        parts.append(_halves(content["halves"]))
+    return parts or [Text("This record holds no readings.")]
 
 
 def _readings(equation: str, readings: list[Content]) -> RenderableType:
@@ -123,8 +123,8 @@ def _curve_distance(reading: Content) -> float:
 
 def _by(rows: Iterable[Content], *keys: str) -> dict[Any, list[Content]]:
     """Return rows by the values of these keys, in order."""
-    found: dict[Any, list[Content]] = {}
+    groups: dict[Any, list[Content]] = {}
     for row in rows:
         values = tuple(row.get(key, ABSENT) for key in keys)
-        found.setdefault(values if len(keys) > 1 else values[0], []).append(row)
-    return found
+        groups.setdefault(values if len(keys) > 1 else values[0], []).append(row)
+    return groups

@@ -118,9 +118,9 @@ def _contents(folder: Folder) -> Mapping[str, Content]:
     return Records.of(folder).contents()
 
 
-def _grouped(found: Iterable[Named], key: Any) -> dict[str, list[Named]]:
+def _grouped(members: Iterable[Named], key: Any) -> dict[str, list[Named]]:
     groups: dict[str, list[Named]] = {}
-    for one in found:
+    for one in members:
         groups.setdefault(key(one), []).append(one)
     return groups
 
@@ -234,13 +234,13 @@ def _shader(page: Page) -> str:
 def _printed(one: Named, folder: Folder) -> str:
     """Return a printed set: its source, its constants and the errors that a record found for it."""
     own = one.law.entry.printed, one.constants
-    found = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
-    if found is None:
+    printed = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
+    if printed is None:
         return "" if one.records else "It has no constants: everything follows from alpha and the surface."
-    table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in found.constants.items()])
+    table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in printed.constants.items()])
     contents = _contents(folder)
     measured = next(_measured_sets(one, contents), None)
-    parts = [f"Source: {found.source}.", table]
+    parts = [f"Source: {printed.source}.", table]
     return "\n\n".join(parts if measured is None else [*parts, _quality(measured[0], measured[1])])
 
 
@@ -311,17 +311,17 @@ def _quality(content: Content, values: Content) -> str:
 
 def _by_index(content: Content) -> str:
     """Return the worst measures at each index that a record was judged at; what follows is at that of its setting."""
-    found = by_index(content)
-    if not found:
+    worst = by_index(content)
+    if not worst:
         return ""
-    keys = [key for key in INDEX_MEASURES if key in found]
-    places = [name for name in SPANS if name in found]
+    keys = [key for key in INDEX_MEASURES if key in worst]
+    places = [name for name in SPANS if name in worst]
     rows = [
-        (*(f"{found[name][i]:g}" for name in places), *(significant(found[key][i]) for key in keys))
-        for i in range(len(found["n"]))
+        (*(f"{worst[name][i]:g}" for name in places), *(significant(worst[key][i]) for key in keys))
+        for i in range(len(worst["n"]))
     ]
     meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in keys)
-    table, by = markdown_table((*places, *keys), rows), "refractive index" + (" and g" if "g" in found else "")
+    table, by = markdown_table((*places, *keys), rows), "refractive index" + (" and g" if "g" in worst else "")
     return f"By {by}, the worst albedo:\n\n{table}\n\n{meaning}.\n\nAt{at_index(content).removeprefix(',')}:"
 
 

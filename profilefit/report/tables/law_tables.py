@@ -88,11 +88,11 @@ def measured_map(one: Named) -> AlbedoQuality:
 def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
     """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
     albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
-    found = []
+    samplers = []
     for name, sampler in one.law.in_reduced().samplers.items():
         errors = np.array([_exact_error(one.law.samplers[name], float(value)) for value in albedos])
-        found.append(MeasuredSampler(one, name, sampler_quality(sampler, albedos), errors))
-    return found
+        samplers.append(MeasuredSampler(one, name, sampler_quality(sampler, albedos), errors))
+    return samplers
 
 
 def _exact_error(sampler: Sampler, reduced: float) -> float:
@@ -190,31 +190,31 @@ def measured(
     )
 
 
-def every_law(found: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
+def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
     """Yield profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
-    for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
+    for setting, laws in groupby(qualities.profiles, key=lambda pair: pair[0].setting):
         by_label = {one.label: quality for one, quality in laws}
         for measure in SCALES:
             yield _profile_table(measure, setting, by_label)
-    if found.maps:
-        yield _map_table(found.maps)
-    for setting, of_setting in groupby(found.samplers, key=lambda one: one.of.setting):
+    if qualities.maps:
+        yield _map_table(qualities.maps)
+    for setting, of_setting in groupby(qualities.samplers, key=lambda one: one.of.setting):
         samplers = list(of_setting)
         yield _sampler_table(setting, samplers)
         if in_detail:
             yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
-    if not (found.profiles or found.maps or found.samplers):
+    if not (qualities.profiles or qualities.maps or qualities.samplers):
         yield Text(NOTHING)
 
 
-def content(found: Qualities) -> dict[str, Any]:
+def content(qualities: Qualities) -> dict[str, Any]:
     """Return every measure at every albedo, for JSON."""
     return {
-        "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],
-        "maps": [{**_whose(one), "quality": quality} for one, quality in found.maps],
+        "profiles": [{**_whose(one), "quality": quality} for one, quality in qualities.profiles],
+        "maps": [{**_whose(one), "quality": quality} for one, quality in qualities.maps],
         "samplers": [
             {**_whose(one.of), "sampler": one.name, "exact_error": one.exact_error, "quality": one.quality}
-            for one in found.samplers
+            for one in qualities.samplers
         ],
     }
 
@@ -230,8 +230,8 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
     """
 
     def laws() -> str:
-        found = profile_laws(folder, matched=False)
-        return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
+        profiles = profile_laws(folder, matched=False)
+        return markdown_laws(list(zip(profiles, for_each(measured_profile, profiles), strict=True)))
 
     def samplers() -> str:
         return markdown_samplers(

@@ -138,7 +138,7 @@ def sections(records: Mapping[str, Content]) -> dict[str, str]:
         for name, content in records.items()
         if _is_searchlight(content) and content["law"] in OF_THE_PAPER
     }
-    found = {
+    tables = {
         "short": _short_quality(records),
         "quality": _profile_quality(paper),
         "constants": markdown_constants(paper),
@@ -147,7 +147,7 @@ def sections(records: Mapping[str, Content]) -> dict[str, str]:
         "inversion": _inversion_quality(records),
         "maps": _albedo_quality(records),
     }
-    return {name: text for name, text in found.items() if text}
+    return {name: text for name, text in tables.items() if text}
 
 
 def fill(text: str, tables: Mapping[str, str]) -> str:
@@ -172,14 +172,14 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
 def _short_quality(records: Mapping[str, Content]) -> str:
     """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
     searchlight = {name: c for name, c in records.items() if _is_searchlight(c) or _is_refracting(c)}
-    found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     rows = [
         (
             owner + at_index(records.get(owner, {})),
             which,
             *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])),
         )
-        for owner, which, values in sorted(found, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+        for owner, which, values in sorted(chosen, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
     ]
     header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
@@ -205,16 +205,16 @@ def _albedo_quality(records: Mapping[str, Content]) -> str:
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
     """Return (record or law, set, measures) of each set once, printed constants of a law only once."""
-    found: list[tuple[str, str, Content]] = []
+    sets: list[tuple[str, str, Content]] = []
     for name, content in _fits(records).items():
         for which in measured_sets(content):
             regenerated = which == "regenerated"
             owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
             values = content["quality"][which]
             failed = regenerated and not converged(content)
-            if measure in values and not failed and (owner, which) not in [item[:2] for item in found]:
-                found.append((owner, which, values))
-    return found
+            if measure in values and not failed and (owner, which) not in [item[:2] for item in sets]:
+                sets.append((owner, which, values))
+    return sets
 
 
 def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:

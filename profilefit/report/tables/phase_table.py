@@ -65,13 +65,13 @@ def premise_lines(content: Content) -> list[str]:
 
 def phase_table(folder: Path) -> RenderableType | None:
     """Return the records of phase functions that lie in a folder of records; None where there are none."""
-    found = [load(path).content for path in record.available(folder / PHASES).values()]
-    if not found:
+    contents = [load(path).content for path in record.available(folder / PHASES).values()]
+    if not contents:
         return None
-    columns: dict[str, list[str]] = {"table": [str(one["name"]) for one in found]}
-    columns["rows"] = [str(one["data"]["rows"]) for one in found]
+    columns: dict[str, list[str]] = {"table": [str(one["name"]) for one in contents]}
+    columns["rows"] = [str(one["data"]["rows"]) for one in contents]
     for form in FORMS.values():
-        columns[form.name] = [significant(one["phases"][form.name][HELD]["rms"]) for one in found]
+        columns[form.name] = [significant(one["phases"][form.name][HELD]["rms"]) for one in contents]
     caption = "root mean square of ln(form / table), mean cosine and backscattered share those of the table"
     return column_table("Phase functions", columns, f"{caption} where a form has numbers for it", ("table",))
 

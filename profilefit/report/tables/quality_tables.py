@@ -88,14 +88,14 @@ def quality_tables(content: Content) -> list[RenderableType]:
 
 def index_table(content: Content) -> RenderableType:
     """Return the worst measures over alpha at each index that a record was judged at."""
-    found = by_index(content)
-    columns = {name: [f"{value:g}" for value in found[name]] for name in SPANS if name in found}
+    worst = by_index(content)
+    columns = {name: [f"{value:g}" for value in worst[name]] for name in SPANS if name in worst}
     for measure in INDEX_MEASURES:
-        if measure in found:
-            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in found[measure]])
-    known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in found]
+        if measure in worst:
+            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in worst[measure]])
+    known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in worst]
     caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
-    title = "By refractive index" + (" and g" if "g" in found else "")
+    title = "By refractive index" + (" and g" if "g" in worst else "")
     return column_table(title + _failed(content), columns, caption, left=("n",))
 
 

@@ -37,7 +37,7 @@ def summary(records: Records) -> RenderableType:
     """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
     kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    told = [make(found) for make, found in kinds.items() if found]
+    told = [make(group) for make, group in kinds.items() if group]
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
@@ -58,12 +58,12 @@ def outcome(path: Path) -> dict[str, Any]:
 
 
 def reproduced(
-    seconds: Mapping[str, float], paths: Mapping[str, Path], found: Mapping[str, Reproduction | None]
+    seconds: Mapping[str, float], paths: Mapping[str, Path], reproductions: Mapping[str, Reproduction | None]
 ) -> RenderableType:
     """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
     rows = []
     for name, spent in seconds.items():
-        one, result = found.get(name), _result(record.read(paths[name])) if name in paths else ""
+        one, result = reproductions.get(name), _result(record.read(paths[name])) if name in paths else ""
         numbers = (one.moved, one.relative, one.intervals) if one else ()
         cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
         rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
@@ -72,10 +72,10 @@ def reproduced(
     return column_table(REPRODUCED, columns, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 
 
-def verdict(found: Sequence[Reproduction]) -> str:
+def verdict(reproductions: Sequence[Reproduction]) -> str:
     """Return one line: how many records are reproduced, and the largest move of a constant."""
-    count, moved = sum(one.is_reproduced for one in found), max(one.moved for one in found)
-    return f"{count} of {len(found)} records reproduced; largest move {moved:.1g} of a stated error"
+    count, moved = sum(one.is_reproduced for one in reproductions), max(one.moved for one in reproductions)
+    return f"{count} of {len(reproductions)} records reproduced; largest move {moved:.1g} of a stated error"
 
 
 def _result(content: Content) -> str:
@@ -139,8 +139,8 @@ def _indices(content: Content) -> str:
 
 def _course(content: Content, measure: str, last: bool = False) -> str:
     """Return the worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
-    found = worst_measures(content).get(measure, {})
-    shown = [significant(found[name]) for name in SETS if name in found]
+    worst = worst_measures(content).get(measure, {})
+    shown = [significant(worst[name]) for name in SETS if name in worst]
     if not converged(content):
         shown.append(FAILED)
     return shown[-1] if last else " → ".join(shown)

@@ -78,13 +78,13 @@ def laws(setting: Setting) -> dict[str, ProfileLaw]:
 
     The record is one whose constants hold for the setting, else that of a matched surface.
     """
-    records, found = Records(fits_folder()), {}
+    records, laws = Records(fits_folder()), {}
     for name, kind in profile_classes().items():
         for base in kind.entry.records if kind.entry.has_text else ():
             own = setting if records.name(base, setting) in records.paths else Setting(setting.illumination)
             if kind.entry.records == (base,) and (of := records.name(base, own)) in records.paths:
-                found[of] = catalogue.load(name, setting=own, folder=records)
-    return found
+                laws[of] = catalogue.load(name, setting=own, folder=records)
+    return laws
 
 
 def options(setting: Setting) -> list[Option]:
@@ -132,18 +132,18 @@ def choose(scene: Requirements, ratios: Ratios, track: Track = iter) -> Choice:
         for option in options(scene.setting)
         if ratios.knows(option)
     }
-    found: list[Predicted] = []
+    predicted: list[Predicted] = []
     for option in track(sorted(priced, key=lambda option: priced[option].estimate)):
-        found.append(Predicted(option, priced[option], worst(option, scene)))
-        if _is_settled(found, scene.tolerance):  # what is dearer still need not be known
+        predicted.append(Predicted(option, priced[option], worst(option, scene)))
+        if _is_settled(predicted, scene.tolerance):  # what is dearer still need not be known
             break
-    return chosen(scene, found)
+    return chosen(scene, predicted)
 
 
-def _is_settled(found: list[Predicted], tolerance: float) -> bool:
+def _is_settled(predicted: list[Predicted], tolerance: float) -> bool:
     """Return whether one serves, and a dearer one that is more accurate is known."""
-    serving = next((one for one in found if one.error.total <= tolerance), None)
-    return serving is not None and found[-1].error.total < serving.error.total
+    serving = next((one for one in predicted if one.error.total <= tolerance), None)
+    return serving is not None and predicted[-1].error.total < serving.error.total
 
 
 def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:

@@ -46,9 +46,9 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
     share = light.beyond(reflectance)
     truth = averaged(share, x, case.pixel, mfp, case.radius, case.window[0])
     here = response(share, x, mfp, case.radius, case.window[0])
-    found = _found(option, case, light, channel, x)
-    noise = found.var(axis=1, ddof=1) if found.shape[1] > 1 else np.zeros(len(x))
-    bias = found.mean(axis=1) - truth
+    estimates = _found(option, case, light, channel, x)
+    noise = estimates.var(axis=1, ddof=1) if estimates.shape[1] > 1 else np.zeros(len(x))
+    bias = estimates.mean(axis=1) - truth
     flat = _mean(option, plane, light, channel, x) - response(share, x, mfp, plane.radius, plane.window[0])
     curved = _mean(option, case, light, channel, x) - here
 
@@ -56,7 +56,7 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
         return reflectance * float(np.sqrt(np.mean(squares)))
 
     return Error(
-        total=rms(bias**2 + noise * (1.0 - 1.0 / found.shape[1])),
+        total=rms(bias**2 + noise * (1.0 - 1.0 / estimates.shape[1])),
         model=rms(flat**2),
         curvature=rms((curved - flat) ** 2),
         pixel=rms((here - truth) ** 2),

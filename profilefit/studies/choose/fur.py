@@ -131,8 +131,8 @@ def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:
             f"{of.file}: [fur] length must be at most {SLENDEREST:g} times the radius, {SLENDEREST * of.radius:g} mm, "
             f"where layers are chosen by rays, got {of.length:g}"
         )
-    found: dict[int, dict[str, int | None]] = {}
+    layers: dict[int, dict[str, int | None]] = {}
     for angle in angles:
         fur = RandomFur(of.density, of.radius, of.length, float(np.radians(angle)), of.seed)
-        found[angle] = {way.name: fur.least_layers(way, of.tolerance) for way in WAYS}
-    return FurNeed(found, of.tolerance)
+        layers[angle] = {way.name: fur.least_layers(way, of.tolerance) for way in WAYS}
+    return FurNeed(layers, of.tolerance)

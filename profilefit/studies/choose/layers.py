@@ -117,11 +117,11 @@ def of_each_colour(
     illumination: str = "searchlight",
 ) -> tuple[OneLayer, ...]:
     """Return `one_layer` of red, green and blue, equal ones traced once; of one alone where all three are equal."""
-    found = {
+    layers = {
         medium: one_layer(medium, tolerance, within, progress=progress, illumination=illumination)
         for medium in dict.fromkeys(stack.media)
     }
-    return tuple(found[medium] for medium in stack.media[: 1 if stack.is_grey else None])
+    return tuple(layers[medium] for medium in stack.media[: 1 if stack.is_grey else None])
 
 
 def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:

@@ -79,13 +79,13 @@ def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floa
         own = np.array([kernel_quartile(strength) for strength in kernel.strength])
         return [(np.ones(3), kernel, mfp * np.array([share.quartile for share in shares]) / own)]
     of_channels = [fitted(share, option.count) for share in shares]
-    found: list[tuple[Floats, Separable, Floats]] = []
+    filters: list[tuple[Floats, Separable, Floats]] = []
     for k in range(option.count):
         share = np.array([weight[k] for weight, _ in of_channels])
         sigma = np.array([s[k] for _, s in of_channels]) * mfp
         red, green, blue = sigma.tolist()
-        found.append((share, OneGaussian(setting=light.setting, sigma=(red, green, blue)), sigma))
-    return found
+        filters.append((share, OneGaussian(setting=light.setting, sigma=(red, green, blue)), sigma))
+    return filters
 
 
 def filtered(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
@@ -156,10 +156,10 @@ def estimates(law: ProfileLaw, alpha: tuple[float, ...], samples: int, case: Cas
         weight = area * side / distance * own(distance / length) / length / p
     weight = np.where(shown, weight, 0.0)
     rest = OWN * samples
-    found = (rest + np.sum(weight * (across > 0), axis=2)) / (rest + np.sum(weight, axis=2))
+    gathered = (rest + np.sum(weight * (across > 0), axis=2)) / (rest + np.sum(weight, axis=2))
     low, high = LAMBERT
     blurred = np.clip((length / case.pixel - low) / (high - low), 0.0, 1.0)
-    return 1.0 + blurred * (found - 1.0)
+    return 1.0 + blurred * (gathered - 1.0)
 
 
 def _met(side: Floats, across: Floats, x: Floats, case: Case) -> tuple[Floats, Floats]:

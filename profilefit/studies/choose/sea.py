@@ -99,8 +99,8 @@ def _views(of: SeaRequest) -> Floats:
     """Return unit vectors (5, 3) to the middle of the picture and to its corners."""
     right, up, forward = axes(of.camera, of.size)
     sides = ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
-    found = np.array([forward + x * right + y * up for x, y in sides])
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+    views = np.array([forward + x * right + y * up for x, y in sides])
+    return np.asarray(views / np.linalg.norm(views, axis=1, keepdims=True))
 
 
 def _steepest_view(of: SeaRequest, world: World) -> float:

@@ -157,15 +157,22 @@ def _stacked(law: Constants, data: list[Rings]) -> Any:
 
 
 def _case(
-    label: str, case: str, value: str, names: tuple[str, ...], found: list[Solution], start: Floats | None
+    label: str, case: str, value: str, names: tuple[str, ...], solutions: list[Solution], start: Floats | None
 ) -> FitCase:
-    done = [one for one in found if one.converged]
+    done = [one for one in solutions if one.converged]
     least = min((one.cost for one in done), default=np.inf)
     best = [one for one in done if one.cost <= least * (1.0 + SAME_COST) + 1e-20]
     spread, worst = _spread(np.array([one.parameters for one in (done if case == NOISE else best)]), names, start)
-    results = Counter(re.split("[,:]", one.result)[0] for one in found)
+    results = Counter(re.split("[,:]", one.result)[0] for one in solutions)
     return FitCase(
-        label, case, value, len(done) / len(found), len(best) / len(found), spread, worst, tuple(results.most_common())
+        label,
+        case,
+        value,
+        len(done) / len(solutions),
+        len(best) / len(solutions),
+        spread,
+        worst,
+        tuple(results.most_common()),
     )
 
 

@@ -58,7 +58,7 @@ def of_ball(context: moderngl.Context) -> Cells:
     size = (TEXELS[0] + 2 * MARGIN, TEXELS[1] + 2 * MARGIN)
     rows = [MARGIN + int((0.5 + one / 180.0) * TEXELS[1]) for one in LATITUDES]
     columns = [MARGIN + one for one in FROM_SEAM]
-    found = []
+    pairs = []
     with Stage(context, (16, 16), 16) as stage, Atlas(context, size, MARGIN) as atlas:
         stage.draw(Scene((part,)))
         atlas.draw(stage, part)
@@ -66,8 +66,8 @@ def of_ball(context: moderngl.Context) -> Cells:
         for sigma in SIGMAS:
             light = _blurred(atlas, 1.0 + towards, sigma * RADIUS)
             right = sphere_blur(RADIUS, towards, [(sigma * RADIUS) ** 2], [1.0])
-            found.append([one[np.ix_(rows, columns)] for one in (light, right)])
-    value, reference = np.stack(found, axis=1)
+            pairs.append([one[np.ix_(rows, columns)] for one in (light, right)])
+    value, reference = np.stack(pairs, axis=1)
     axes = (
         ArgumentAxis("σ/R", "-", np.array(SIGMAS)),
         ArgumentAxis("latitude", "degrees", np.array(LATITUDES)),

@@ -105,7 +105,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             title,
             f"time of {what}, one core [s]",
             "relative change of the annuli's energies by noise [-]",
-            tuple(point_of(name, *key, found) for key, found in trials.items()),
+            tuple(point_of(name, *key, group) for key, group in trials.items()),
             joined=True,
         )
         for name, title, what in (
@@ -132,9 +132,9 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
         return fit(profiles, start, "radial", free, used, jackknife=False)
 
     def all_at_once(profiles: Profiles, _: int) -> FittedConstants:
-        found = fitted(profiles)
-        errors = {} if found.statistical is None else _errors(free, found.statistical)
-        return FittedConstants(found.constants, errors, found.result)
+        result = fitted(profiles)
+        errors = {} if result.statistical is None else _errors(free, result.statistical)
+        return FittedConstants(result.constants, errors, result.result)
 
     def two_stages(profiles: Profiles, _: int) -> FittedConstants:
         points = staged.fit_per_albedo(profiles, start, 1.0, TRIMMED, EPSILON)
@@ -161,10 +161,10 @@ def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
 
 def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: FittedConstants, start: Any) -> Trial:
     begin = time.perf_counter()
-    found = way(profiles, seed)
+    result = way(profiles, seed)
     seconds = time.perf_counter() - begin
-    rms, worst = change(with_constants(start, found.constants), with_constants(start, limit.constants))
-    return Trial(seconds, light, rms, worst, standardised(found, limit), found.result == "converged")
+    rms, worst = change(with_constants(start, result.constants), with_constants(start, limit.constants))
+    return Trial(seconds, light, rms, worst, standardised(result, limit), result.result == "converged")
 
 
 def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
@@ -194,11 +194,11 @@ def energy_within(law: ProfileLaw) -> Floats:
         return np.asarray(law.unscaled_energy(jnp.asarray(RINGS), jnp.asarray(ALPHAS)[:, None]))
 
 
-def standardised(found: FittedConstants, limit: FittedConstants) -> float:
+def standardised(result: FittedConstants, limit: FittedConstants) -> float:
     """Return the root mean square distance of constants from their limits, in standard errors [-], or NaN."""
-    if not found.errors:
+    if not result.errors:
         return float("nan")
-    distances = [(found.constants[name] - limit.constants[name]) / error for name, error in found.errors.items()]
+    distances = [(result.constants[name] - limit.constants[name]) / error for name, error in result.errors.items()]
     return float(np.sqrt(np.mean(np.square(distances))))
 
 
@@ -219,9 +219,9 @@ def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Po
 
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
     failed = [
-        f"{sum(not t.converged for t in found)} of {len(found)} did not converge: {name}, {photons:.0e} photons"
-        for (name, photons), found in trials.items()
-        if not all(t.converged for t in found)
+        f"{sum(not t.converged for t in group)} of {len(group)} did not converge: {name}, {photons:.0e} photons"
+        for (name, photons), group in trials.items()
+        if not all(t.converged for t in group)
     ]
     compiled = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
     return (*failed, f"first fits, which compile, not in the times [s]: {compiled}")

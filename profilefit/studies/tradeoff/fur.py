@@ -59,14 +59,14 @@ def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FULL) -> 
     """Return every way and number of layers toward one angle."""
     theta = float(np.radians(degrees))
     patch = wide_patch(DENSITY, RADIUS, LENGTH, theta, LEAST_SIDE, SEED)
-    found = over_layers(context, patch, theta, sizes.layers, (sizes.rays, sizes.rays), sizes.turns)
+    points = over_layers(context, patch, theta, sizes.layers, (sizes.rays, sizes.rays), sizes.turns)
     name = f"angle-{degrees:g}"
     return Panel(
         name,
         f"{degrees:g} degrees, layers",
         f"time of {sizes.rays} x {sizes.rays} rays [ms]",
         "root mean square error of heights / length [-]",
-        tuple(_point(name, one) for one in found),
+        tuple(_point(name, one) for one in points),
         joined=True,
     )
 

@@ -72,10 +72,10 @@ class ContenderResult:
 def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
-    found, left_out = contenders(folder, [one for one in SPECS if not quick or one.label in QUICKLY])
+    contestants, left_out = contenders(folder, [one for one in SPECS if not quick or one.label in QUICKLY])
     if not quick:
-        found.append(table_contender(MATERIAL))
-    rows = measured(found, sizes, track)
+        contestants.append(table_contender(MATERIAL))
+    rows = measured(contestants, sizes, track)
     panels = tuple(Panel(part, title, AXES[part], ERROR, points_of(rows, part)) for part, title in TITLES.items())
     notes = [f"left out: {line}" for line in left_out]
     return TradeoffPart("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
@@ -94,12 +94,12 @@ def counts(contender: Contender) -> dict[str, FunctionCounts]:
 
 def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, stopwatch.Work]:
     """Return the timed calls of a contender, by part."""
-    found = {}
+    calls = {}
     for part, function in contender.parts.items():
         each = counted[part].transcendental
         if each <= TOO_MANY:
-            found[part] = timed(function, part == "profile", sizes.points if each <= MANY else sizes.costly)
-    return found
+            calls[part] = timed(function, part == "profile", sizes.points if each <= MANY else sizes.costly)
+    return calls
 
 
 def timed(function: Callable[[Array, Array], object], radii: bool, points: int) -> stopwatch.Work:
@@ -116,19 +116,21 @@ def timed(function: Callable[[Array, Array], object], radii: bool, points: int) 
     return work
 
 
-def measured(found: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent) -> list[ContenderResult]:
+def measured(
+    contestants: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent
+) -> list[ContenderResult]:
     """Count, time and judge every contender; the yardstick must be one of them."""
-    counted = {contender.name: counts(contender) for contender in found}
+    counted = {contender.name: counts(contender) for contender in contestants}
     jobs: dict[tuple[str, str], stopwatch.Work] = {}
-    for contender in found:
+    for contender in contestants:
         jobs |= {
             (part, contender.name): work for part, work in works(contender, counted[contender.name], sizes).items()
         }
         if (work := _setup_work(contender, sizes.albedos)) is not None:
             jobs["setup", contender.name] = work
     rates = stopwatch.take_turns({" of ".join(key): work for key, work in jobs.items()}, sizes.turns, track, "laws")
-    rows: Iterable[int] = track(range(len(found)), "errors of laws")
-    return [_row(found[i], counted[found[i].name], rates, sizes) for i in rows]
+    rows: Iterable[int] = track(range(len(contestants)), "errors of laws")
+    return [_row(contestants[i], counted[contestants[i].name], rates, sizes) for i in rows]
 
 
 def nanoseconds(rates: Rates, name: str, yardstick: str) -> WithSpread:

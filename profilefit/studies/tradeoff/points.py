@@ -96,14 +96,14 @@ def standings(points: Sequence[Point]) -> list[str]:
     front   none of this: nobody is known to be better in one without being worse in the other
     Ties are not transitive, so that points may tie each other in a ring and leave no front: then all of them are it.
     """
-    found = [_standing(point, points) for point in points]
-    return found if FRONT in found else [FRONT if one == TIED else one for one in found]
+    places = [_standing(point, points) for point in points]
+    return places if FRONT in places else [FRONT if one == TIED else one for one in places]
 
 
 def front(points: Sequence[Point]) -> list[int]:
     """Return the points on the front, cheapest first."""
-    found = [i for i, standing in enumerate(standings(points)) if standing == FRONT]
-    return sorted(found, key=lambda i: (points[i].cost.value, points[i].error.value))
+    best = [i for i, standing in enumerate(standings(points)) if standing == FRONT]
+    return sorted(best, key=lambda i: (points[i].cost.value, points[i].error.value))
 
 
 def _standing(point: Point, among: Sequence[Point]) -> str:

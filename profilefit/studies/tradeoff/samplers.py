@@ -112,11 +112,11 @@ def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track
     """Time every sampler, and judge it both ways."""
     quick = sizes.trials <= QUICK.trials
     specs = [one for one in SPECS if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
-    found, left_out = contenders(folder, specs)
-    found += [_uniform(one) for one in found if isinstance(one.law, Hazard) and not one.another]
-    counted = {one.name: laws.counts(one)["both"].transcendental for one in found}
-    timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
-    dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in found if one not in timed]
+    contestants, left_out = contenders(folder, specs)
+    contestants += [_uniform(one) for one in contestants if isinstance(one.law, Hazard) and not one.another]
+    counted = {one.name: laws.counts(one)["both"].transcendental for one in contestants}
+    timed = [one for one in contestants if counted[one.name] <= laws.TOO_MANY]
+    dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in contestants if one not in timed]
     judged = [way for i in track(range(len(timed)), "noise and bias") for way in ways_of(timed[i], sizes)]
 
     def calls(way: WeighedSampler) -> int:

@@ -188,24 +188,24 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
 def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
     """Return every method at every effort, and a line for what is left out."""
-    found, notes = [], []
+    contestants, notes = [], []
     trace = scalar.compiled()
     if trace is None:
         notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
     else:
         for n in sizes.scalar:
-            found.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
+            contestants.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
     for case in (MATCHED, REFRACTING, STACK):
         for n in sizes.simulate:
-            found.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
+            contestants.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
     for case in (MATCHED, REFRACTING):
-        found += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
+        contestants += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
     for label in sizes.rules:
-        found.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
-    found.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
-    found.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
-    found += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
-    return found, notes
+        contestants.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
+    contestants.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
+    contestants.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
+    contestants += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
+    return contestants, notes
 
 
 def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
@@ -222,10 +222,10 @@ def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate
     return Point(one.annuli.panel, one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
 
 
-def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
+def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
     """Return what a method's very first call took longer than later ones [s]: the first effort compiles for all."""
     first: dict[str, float] = {}
-    for one in found:
+    for one in contestants:
         more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
         name = f"{one.method} ({one.annuli.panel})"
         first[name] = first.get(name, 0.0) + max(more, 0.0)
@@ -263,8 +263,8 @@ def by_orders(case: Annuli, photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
-        found = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
-        energy = found.energy(ALPHAS)
+        orders = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
+        energy = orders.energy(ALPHAS)
         return RingEnergies(np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference)
 
     return run
