@@ -31,7 +31,26 @@ RULE = "*{stroke-linejoin: round; stroke-linecap: butt}"
 REACHING = re.compile(r"url\s*\(|[\\@<>&]|expression|script", re.IGNORECASE)
 POINTED_AT = re.compile(r"#([^)]+)")
 DIGITS = re.compile(r"-?\d+\.\d+")
-PLACES = ("d", "x", "y", "width", "height")  # attributes whose digits beyond a hundredth of a point nobody sees
+PLACES = ("d", "x", "y", "width", "height")  # attributes whose digits beyond a tenth of a point nobody sees
+QUALITY = 80  # of a photograph as WebP
+UNTURNED = re.compile(r"rotate\(-?0(?: [^)]*)?\)")
+# Neighbours that are one element: letters of a formula, each at its place, and lines of one style; definitions of none.
+TOGETHER = tuple(
+    (re.compile(pattern), whole)
+    for pattern, whole in (
+        (
+            r'<tspan x="([^"]*)" y="([^"]*)" style="([^"]*)">([^<]*)</tspan><tspan x="([^"]*)" y="\2" style="\3">',
+            r'<tspan x="\1 \5" y="\2" style="\3">\4',
+        ),
+        (
+            r'<path d="([^"]*)" ((?:clip-path="[^"]*" )?style="fill:none;(?![^"]*opacity)[^"]*")/>'
+            r'<path d="([^"]*)" \2/>',
+            r'<path d="\1\3" \2/>',
+        ),
+        (r"<defs>(?:<path (?![^>]* id=)[^>]*/>)*</defs>|<defs/>", ""),
+    )
+)
+TICK = re.compile(r"M \S+ \S+\s+L \S+ \S+\s*")
 DRAWING, STYLE = re.compile(r"<svg .*?</svg>", re.DOTALL), re.compile(r' style="([^"]*)"')
 PLAIN = re.compile(r"(?:[\w.:;,#% -]|var\(--[\w-]+\))*")  # ends no rule of a style sheet
 
@@ -78,6 +97,7 @@ def inline(svg: str, prefix: str, title: str, variables: Mapping[str, str] = VAR
     for parent in (root, *root.iter(f"{SVG}defs")):  # their rule is in the page's style
         for part in [one for one in parent if one.tag in (f"{SVG}metadata", f"{SVG}style")]:
             parent.remove(part)
+    _draw_ticks(root)
     links = [(one, key) for one in root.iter() for key in (HREF, "clip-path") if POINTED_AT.search(one.get(key, ""))]
     used = sorted({POINTED_AT.findall(one.attrib[key])[0] for one, key in links})
     names = {name: f"{prefix}-{place}" for place, name in enumerate(used)}
@@ -93,29 +113,46 @@ def inline(svg: str, prefix: str, title: str, variables: Mapping[str, str] = VAR
             part.set("style", colours.sub(lambda colour: words[colour[0].lower()], part.attrib["style"]))
     frame, black = root.attrib["viewBox"], f"var({variables[BLACK]})"
     root.attrib = {"viewBox": frame, "role": "img", "aria-label": title, "fill": black}
-    return tostring(root, encoding="unicode")
+    drawn = tostring(root, encoding="unicode").replace(" />", "/>")
+    for pieces, whole in TOGETHER:
+        while (joined := pieces.sub(whole, drawn)) != drawn:
+            drawn = joined
+    return drawn
+
+
+def _draw_ticks(root: Element) -> None:
+    """Replace each use of a shape that is one straight line by that line: a tick, of which an axis has many."""
+    shapes = {f"#{one.get('id')}": one for one in root.iter(f"{SVG}path") if TICK.fullmatch(one.get("d", ""))}
+    for use in root.iter(f"{SVG}use"):
+        if (shape := shapes.get(use.get(HREF, ""))) is not None:
+            x, y = (float(use.attrib.pop(key)) for key in ("x", "y"))
+            a, b, c, d = map(float, shape.attrib["d"].replace("M", "").replace("L", "").split())
+            rest = {key: value for key, value in use.attrib.items() if key == "clip-path"}
+            use.tag, style = f"{SVG}path", f"fill:none;{shape.get('style') or use.get('style', '')}"
+            use.attrib = {"d": f"M {x + a:.1f} {y + b:.1f} L {x + c:.1f} {y + d:.1f}", **rest, "style": style}
 
 
 def _shorten(part: Element) -> None:
-    """Leave out blanks, digits that nobody sees and names of letters, which the page says; pictures become WebP."""
+    """Leave out blanks, bare groups, digits that nobody sees and names of letters, which the page says."""
     part.tag, part.tail = str(part.tag).removeprefix(SVG), None
+    while bare := [one for one in part if one.tag == f"{SVG}g" and not set(one.attrib) - {"id"}]:
+        for one in bare:
+            at = list(part).index(one)
+            part[at : at + 1] = list(one)
     if part.tag not in ("text", "tspan") or len(part):
         part.text = None
     if (link := part.attrib.pop(HREF, None)) is not None:
         part.set("href", link if link.startswith("#") else address(base64.b64decode(link.partition(",")[2])))
-    for key in PLACES:
-        if key in part.attrib:
-            part.set(key, DIGITS.sub(_rounded, part.attrib[key]))
-    if "d" in part.attrib:
-        part.set("d", re.sub(r"\s*([A-Za-z])\s*", r"\1", part.attrib["d"]))
+    digits = 2 if "id" in part.attrib else 1  # markers are drawn often
+    for key in set(PLACES) & set(part.attrib):
+        places = DIGITS.sub(lambda text: f"{float(text[0]):.{digits}f}".rstrip("0").rstrip("."), part.attrib[key])
+        part.set(key, re.sub(r"\s*([A-Za-z])\s*", r"\1", places).strip())
+    if turned := UNTURNED.sub("", part.attrib.pop("transform", "")).strip():
+        part.set("transform", turned)
     if "style" in part.attrib:
-        said = (one.partition(":") for one in part.attrib["style"].split(";") if one.strip())
-        style = ((key.strip(), value.strip()) for key, _, value in said)
+        words = (one.partition(":") for one in part.attrib["style"].split(";") if one.strip())
+        style = ((key.strip(), value.strip()) for key, _, value in words)
         part.set("style", ";".join(f"{key}:{value}" for key, value in style if key != "font-family"))
-
-
-def _rounded(number: re.Match[str]) -> str:
-    return f"{float(number[0]):.2f}".rstrip("0").rstrip(".")
 
 
 def classed(html: str) -> tuple[str, str]:
@@ -130,15 +167,17 @@ def classed(html: str) -> tuple[str, str]:
     return rules, DRAWING.sub(lambda drawing: STYLE.sub(named, drawing[0]), html)
 
 
-def address(png: bytes) -> str:
+def address(png: bytes, loss: bool = False) -> str:
     """Return `data:image/webp;base64,...` of a PNG file; OSError, ValueError on what is none.
 
-    Without loss: in a map of errors the noise is what is shown, and the sign is a colour.
+    Without loss by default: in a map the sign is a colour. With `loss`, the smaller of that and of quality 80.
     """
-    file = io.BytesIO()
+    files = []
     try:
         with Image.open(io.BytesIO(png), formats=["png"]) as picture:
-            picture.save(file, "webp", lossless=True)
+            for settings in ({"lossless": True}, {"quality": QUALITY})[: 1 + loss]:
+                picture.save(file := io.BytesIO(), "webp", **settings)
+                files.append(file.getvalue())
     except (SyntaxError, Image.DecompressionBombError) as error:  # Pillow's words for a damaged one, and for a bomb
         raise ValueError(f"a picture that cannot be read: {error}") from None
-    return f"data:image/webp;base64,{base64.b64encode(file.getvalue()).decode('ascii')}"
+    return f"data:image/webp;base64,{base64.b64encode(min(files, key=len)).decode('ascii')}"

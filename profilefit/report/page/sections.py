@@ -124,7 +124,7 @@ def _costs(costs: Told) -> dict[str, list[str]]:
 
 
 def _picture(png: bytes, title: str) -> str:
-    return figure(f'<img alt="{escape(title)}" src="{address(png)}">', title)
+    return figure(f'<img alt="{escape(title)}" src="{address(png, loss=True)}">', title)
 
 
 CHARTS = {
