@@ -1,4 +1,4 @@
-"""profilefit stability: where laws, maps, samplers, conversions, the exact solution and fits fail, why, what helps."""
+"""profilefit stability: where laws, maps, samplers, conversions, the exact solution and fits fail, and what helps."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def _show(parts: Sequence[Findings], named: bool) -> None:
     with interruptible(__name__):
         from mcml_sim.cli.screen import screen, show
         from profilefit.report.tables.stability_tables import (
-            cause_table,
+            advice_table,
             fit_summary,
             fit_table,
             region_table,
@@ -89,11 +89,11 @@ def _show(parts: Sequence[Findings], named: bool) -> None:
         )
 
     tables = [region_table(part) for part in parts if part.regions] if named else []
-    found = [one for part in parts for one in part.fits]
+    fits = [one for part in parts for one in part.fits]
     if any(part.regions for part in parts):
-        tables.append(cause_table(parts))
-    if found:
-        tables.append(fit_table(found) if named else fit_summary(found))
+        tables.append(advice_table(parts))
+    if fits:
+        tables.append(fit_table(fits) if named else fit_summary(fits))
     console = screen()
     show(tables, console)
     for line in verdict_lines(parts):
@@ -108,5 +108,5 @@ def _write(parts: Sequence[Findings], out: Path) -> None:
 
     stability_figures([one for part in parts for one in part.cells], out)
     write_whole(out / "stability.csv", regions_csv(parts))
-    if found := [one for part in parts for one in part.fits]:
-        write_whole(out / "stability-fits.csv", fits_csv(found))
+    if fits := [one for part in parts for one in part.fits]:
+        write_whole(out / "stability-fits.csv", fits_csv(fits))

@@ -55,14 +55,14 @@ def tradeoff(
         from profilefit.recipes.evidence import made, require_apart
         from profilefit.report.tables.tradeoff_tables import as_numbers, tradeoff_tables
         from profilefit.studies.tradeoff import stopwatch
-        from profilefit.studies.tradeoff.parts import chosen, is_alike, keep, measured, read
+        from profilefit.studies.tradeoff.parts import chosen, is_comparable, keep, measured, read
 
     names = chosen(parts or [])
     folder = records_folder(fits, quiet)
     require_apart(out, folder, "tradeoff.json", *(f"tradeoff-{name}.csv" for name in names))
     file, said = out / "tradeoff.json", notes(quiet)
     origin = {"made": made(typed(), folder)}
-    if file.exists() and not is_alike(read(file), origin):
+    if file.exists() and not is_comparable(read(file), origin):
         said.print(f"{file} is of other records, another version or machine: written afresh", markup=False)
 
     def track(turns: range, title: str) -> Iterable[int]:
@@ -71,24 +71,24 @@ def tradeoff(
     with stopwatch.on_processor(), stopwatch.on_one_core() as pinned:
         body: dict[str, Any] = {**origin, "machine": (known := stopwatch.facts(pinned))}
         for name in names:
-            found = measured(name, quick, folder, track)
-            files = _written(found, known, out)
-            body[name] = {**as_numbers(found), **origin, "machine": known}
+            part = measured(name, quick, folder, track)
+            files = _written(part, known, out)
+            body[name] = {**as_numbers(part), **origin, "machine": known}
             keep(file, body)
             if not as_json:
-                show(list(tradeoff_tables(found)), screen(WIDTH))
+                show(list(tradeoff_tables(part)), screen(WIDTH))
             said.print(f"wrote {', '.join(map(str, (*files, file)))}", markup=False)
     if as_json:
         print_json(body)
 
 
-def _written(found: TradeoffPart, known: dict[str, str], out: Path) -> list[Path]:
+def _written(part: TradeoffPart, known: dict[str, str], out: Path) -> list[Path]:
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
         from profilefit.report.figures.tradeoff_figure import tradeoff_figure
         from profilefit.report.tables.tradeoff_tables import as_csv
         from profilefit.studies.tradeoff import stopwatch
 
-    data = out / f"tradeoff-{found.name}.csv"
-    write_whole(data, as_csv(found, known))
-    return [*tradeoff_figure(found, stopwatch.caption(known), out), data]
+    data = out / f"tradeoff-{part.name}.csv"
+    write_whole(data, as_csv(part, known))
+    return [*tradeoff_figure(part, stopwatch.caption(known), out), data]

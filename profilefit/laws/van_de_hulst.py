@@ -24,6 +24,9 @@ class VanDeHulst(AlbedoLaw):
     shipped 9.59271 for q0. alpha(0) is 6e-6 and alpha(1) is 1 - 3e-11 with these digits. The inverse is the root near 0
     of (p1^2 - q2) A^2 + (2 p1 (p0 - s) - q1) A + (p0 - s)^2 - q0 = 0, cut to [0, 1].
 
+    Near white s passes 0 just before A = 1, so that alpha = 1 - s^2 falls again, by 3e-11; clamping s at 0 mends it.
+    The rational map, which is exact at both ends, has no such place.
+
     p0, p1, q0, q1, q2  constants [-]
     """
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache, cached_property
 from typing import Any
@@ -28,17 +28,17 @@ TOTAL = "photons, dr, and the larger of model and jackknife"
 
 
 def converged(content: Content) -> bool:
-    """Whether the fit says so: constants of a failed one are no law."""
+    """Return whether the fit says so: constants of a failed one are no law."""
     return content["fit"]["result"] == "converged"
 
 
 def largest_error(constant: Content) -> float | None:
-    """The largest of a constant's errors, in its own unit; None if it was held."""
+    """Return the largest of a constant's errors, in its own unit; None if it was held."""
     return max((constant[key] for key in ERRORS if constant.get(key) is not None), default=None)
 
 
 def total_error(constant: Content) -> float | None:
-    """Photons, ring width, the larger of model and jackknife, together in squares; None if held or without model error.
+    """Return photons, ring width, the larger of model and jackknife, together in squares; None without model error.
 
     Model and jackknife are two views of what the law cannot follow: they do not add.
     """
@@ -49,52 +49,58 @@ def total_error(constant: Content) -> float | None:
 
 
 def z_score(constant: Content) -> float | None:
-    """(published - regenerated) / `total_error`; None where there is no printed value or no error."""
+    """Return (published - regenerated) / `total_error`; None where there is no printed value or no error."""
     error, published = total_error(constant), constant.get("published")
     return (published - constant["regenerated"]) / error if error and published is not None else None
 
 
 def known_errors(constants: Content) -> dict[str, str]:
-    """Those of `ERRORS` that a record's constants, by name, have."""
+    """Return those of `ERRORS` that a record's constants, by name, have."""
     return {key: word for key, word in ERRORS.items() if any(key in one for one in constants.values())}
 
 
+def numbered_errors(constants: Iterable[Content]) -> dict[str, str]:
+    """Return those of `ERRORS` that any constant has a number for: exact light has none of photons."""
+    every = list(constants)
+    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in every)}
+
+
 def measured_sets(content: Content) -> list[str]:
-    """The sets of constants that a record measures, printed ones first."""
+    """Return the sets of constants that a record measures, printed ones first."""
     return [name for name in SETS if name in content["quality"]]
 
 
 def measures(content: Content, measure: str) -> bool:
-    """Whether a record knows this measure of its regenerated constants."""
+    """Return whether a record knows this measure of its regenerated constants."""
     return measure in (content.get("quality") or {}).get("regenerated", {})
 
 
 def index_words(content: Content) -> str:
-    """The refractive index that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
+    """Return the refractive index that a record is of, or those that its constants span: "1", "(1, 1.6]"."""
     span = content.get("indices")
     return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['n']:g}"
 
 
 def at_index(content: Content) -> str:
-    """In a title, the index, and the g, at which a record that spans several is reported; nothing for others."""
+    """Return for a title the index, and g, at which a record that spans several is reported; nothing for others."""
     spanned = [name for name, span in SPANS.items() if content.get(span)]
     return "".join(f", {name} = {content['setting'][name]:g}" for name in spanned)
 
 
 def cosine_words(content: Content) -> str:
-    """The mean cosine that a record is of, or those that its constants span: "0", "(0, 0.95]"."""
+    """Return the mean cosine that a record is of, or those that its constants span: "0", "(0, 0.95]"."""
     span = content.get("cosines")
     return f"({span[0]:g}, {span[1]:g}]" if span else f"{content['setting']['g']:g}"
 
 
 def by_index(content: Content) -> Mapping[str, list[float]]:
-    """The worst measures of a record at each index n, and g, that it was judged at; empty if it is of one."""
-    found: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
-    return found
+    """Return the worst measures of a record at each index n, and g, that it was judged at; empty if it is of one."""
+    worst: Mapping[str, list[float]] = (content.get("quality") or {}).get("by_index", {})
+    return worst
 
 
 def regenerated_worst(content: Content, measure: str) -> float:
-    """The worst over alpha of the regenerated constants, and over n and g where a record spans them."""
+    """Return the worst over alpha of the regenerated constants, and over n and g where a record spans them."""
     values = [content["quality"]["regenerated"][measure], by_index(content).get(measure, [])]
     return MEASURES[measure].worst(np.concatenate([np.atleast_1d(one) for one in values]))
 
@@ -121,7 +127,7 @@ class Fitted:
         return converged(self.content)
 
     def band(self, evaluate: Callable[[Any], ArrayLike], kind: str = "misfit") -> tuple[Floats, Floats] | None:
-        """The 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
+        """Return the 95 % band (low, high) of `evaluate(law)` over posterior draws; None where the record has no chain.
 
         `evaluate` is given a law whose constants are (draws, 1), and must answer (draws, n).
         """
@@ -143,7 +149,7 @@ class Source(Records):
         return {}
 
     def fitted(self, name: str) -> Fitted | None:
-        """A record and its law; None if the folder has none of that name. RecordError if it is damaged."""
+        """Return a record and its law; None if the folder has none of that name. RecordError if it is damaged."""
         if name not in self.paths:
             return None
         if name not in self._fitted:
@@ -152,19 +158,19 @@ class Source(Records):
         return self._fitted[name]
 
     def needed(self, name: str) -> Fitted:
-        """A record and its law; RecordError if the folder has none of that name."""
-        found = self.fitted(name)
-        if found is None:
+        """Return a record and its law; RecordError if the folder has none of that name."""
+        fitted = self.fitted(name)
+        if fitted is None:
             raise RecordError(f"{self.folder} has no record {name!r}; `profilefit regenerate` makes it")
-        return found
+        return fitted
 
     def usable(self, name: str) -> Fitted | None:
-        """A record whose fit converged, or None: constants of a failed fit are no law to draw."""
-        found = self.fitted(name)
-        return found if found is not None and found.converged else None
+        """Return a record whose fit converged, or None: constants of a failed fit are no law to draw."""
+        fitted = self.fitted(name)
+        return fitted if fitted is not None and fitted.converged else None
 
     def printed(self, law: str, constants: str = "published", setting: Setting | None = None) -> ProfileLaw:
-        """A profile law with printed constants, normalised as the records here are."""
+        """Return a profile law with printed constants, normalised as the records here are."""
         return catalogue.load(law, constants, setting, self)
 
     def _law(self, name: str, content: dict[str, Any]) -> ProfileLaw | AlbedoLaw:
@@ -174,14 +180,14 @@ class Source(Records):
 
 
 def coefficients(law: Any, alpha: ArrayLike) -> tuple[Floats, Floats, Floats]:
-    """a [1/mfp], b [-], c [mfp] of (7) in double precision."""
+    """Return a [1/mfp], b [-], c [mfp] of (7) in double precision."""
     with jax.enable_x64(True):
         a, b, c = (np.asarray(value, float) for value in law.coefficients(np.asarray(alpha, float)))
     return a, b, c
 
 
 def unscaled(law: Constants, r: Floats, alpha: float) -> Floats:
-    """r R_d [1/mfp] of (7) at radii `r` [mfp], before the correction (18), and zero beyond r_max."""
+    """Return r R_d [1/mfp] of (7) at radii `r` [mfp], before the correction (18), and zero beyond r_max."""
     a, b, c = coefficients(law, alpha)
     return np.maximum((a * r + b) / (r + c), 0.0)
 
@@ -193,5 +199,5 @@ def _exact_profile(alpha: float, setting: Setting, low: float, high: float, coun
 
 
 def exact_profile(alpha: float, setting: Setting, low: float, high: float, count: int = 160) -> tuple[Floats, Floats]:
-    """Radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
+    """Return radii [mfp], even in their logarithm, and the exact R_d [1/mfp^2] there: the slow part, so kept."""
     return _exact_profile(float(alpha), setting, float(low), float(high), count)

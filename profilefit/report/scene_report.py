@@ -1,4 +1,4 @@
-"""What was drawn of a scene: its pictures, and its error and cost in lines and as data."""
+"""Pictures of a scene, and its error and cost in lines and as data."""
 
 from __future__ import annotations
 
@@ -20,15 +20,15 @@ NOWHERE = "#BBBBBB"  # where no error is measured
 
 
 def scene_figures(drawn: Drawn, device: str) -> dict[str, bytes]:
-    """PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart" of several points."""
-    found = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
+    """Return PNG files by the ends of their names: "" the picture, "-truth", "-error", and "-chart"."""
+    files = {"": _png(drawn.picture), "-truth": _png(drawn.truth), "-error": _error_map(drawn)}
     if len(drawn.chart) > 1:
-        found["-chart"] = _chart(drawn.chart, device)
-    return found
+        files["-chart"] = _chart(drawn.chart, device)
+    return files
 
 
 def _png(picture: NDArray[np.uint8]) -> bytes:
-    """A pixel for a pixel."""
+    """Return the picture as PNG, a pixel for a pixel."""
     written = io.BytesIO()
     image.imsave(written, picture, format="png")
     return written.getvalue()
@@ -82,7 +82,7 @@ def _written(figure: Figure) -> bytes:
 
 
 def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
-    """What is printed: a line for each number of samples, then a whole frame, and the truth's own error."""
+    """Yield what is printed: a line for each number of samples, then a whole frame, and the truth's own error."""
     for point in drawn.chart:
         what = f"{point.label}, {point.samples} samples"
         yield f"{what}: error {point.rmse:.3g}, {_times(point.milliseconds)} for its passes"
@@ -97,7 +97,7 @@ def scene_lines(drawn: Drawn, device: str) -> Iterator[str]:
 
 
 def content(drawn: Drawn, device: str) -> dict[str, Any]:
-    """The same as data, for --json and a file: errors over the mean of the truth [-], times in ms."""
+    """Return the numbers for --json and a file: errors over the mean of the truth [-], times in ms."""
     return {
         "device": device,
         **_point(drawn.point),

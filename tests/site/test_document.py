@@ -83,6 +83,7 @@ MEASURED = {
         "regions": [
             {"cause": "misprint", "law": "liang, published", "count": "412", "class": "inaccurate", "remedy": "b0"},
             {"cause": "misprint", "law": "liang, other", "count": "8", "class": "negative", "remedy": "b0"},
+            {"advice": "compute in float32", "law": "liang, other", "count": "3", "class": "NaN or Inf"},
         ],
     },
     "tradeoff": {
@@ -159,8 +160,9 @@ def test_it_says_what_was_measured_where_and_what_is_missing(page, records, meas
     text = page.read_text(encoding="utf-8")
     for told in (
         "some &lt;GPU&gt;",
-        "misprint",
+        "misprint: b0",
         "420",
+        "compute in float32",
         "hazard, two steps",
         "alone on its core",
         "bounds are broken",

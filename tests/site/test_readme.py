@@ -9,9 +9,8 @@ from benchmarks.claims import RUNS
 from profilefit.recipes import record
 from profilefit.recipes.inventory import profile_laws
 from profilefit.report import fill, sections
-from profilefit.report.tables.all_laws import measured_profile
 from profilefit.report.tables.claims_table import markdown_claims
-from profilefit.report.tables.law_tables import markdown_laws, markdown_sections
+from profilefit.report.tables.law_tables import markdown_laws, markdown_sections, measured_profile
 from profilefit.shader.check.chosen import REGENERATED, chosen
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -46,7 +46,7 @@ def grid_of(setting: Setting) -> TableGrid:
 
 @lru_cache(maxsize=len(LIGHTS) * (1 + len(KNOTS)))
 def baked(setting: Setting) -> str:
-    """A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64. Seconds at a new n."""
+    """Return A / alpha (rows,), then both tables (rows, columns): float32, little-endian, in base64."""
     grid = grid_of(setting)
     s = 1.0 - (1.0 - np.linspace(0.0, 1.0, grid.rows) ** 3) ** 2
     alpha = np.maximum((1.0 - s) * (1.0 + s), LEAST_ALPHA)
@@ -60,7 +60,7 @@ def baked(setting: Setting) -> str:
 
 
 def _refracted(y: Floats, alpha: Floats, setting: Setting) -> Floats:
-    """ln(R_d l^2) + kappa x (albedos, radii), continued as x^-2 from where R_d is `FAINT` [-]."""
+    """Return ln(R_d l^2) + kappa x (albedos, radii), continued as x^-2 from where R_d is `FAINT` [-]."""
     x = np.exp(y)
     profile = np.asarray(exact.profile(x, alpha[:, None], setting=setting))
     reflectance = np.asarray(exact.reflectance(alpha, setting))

@@ -32,7 +32,7 @@ MEASURES = (
 
 
 def explorer_section(folder: Folder) -> str:
-    """What goes into the page's section: laws with the records in `folder`, in a `<div class="explorer">`.
+    """Return what goes into the page's section: laws with the records in `folder`, in a `<div class="explorer">`.
 
     It needs no network and no other file, works from file://, and follows the page's variables for colours, --fg, --bg,
     --muted, --line, --blue, --green and --vermilion, where there are such. RecordError on a damaged record. Seconds.
@@ -59,7 +59,7 @@ def _slider(name: str, channel: str, low: float, high: float, step: float, label
 
 
 def _data(folder: Folder) -> str:
-    """All that the script reads, as JSON that cannot end the element it stands in.
+    """Return all that the script reads, as JSON that cannot end the element it stands in.
 
     The texts of laws share two thirds of their lines: each is told by the numbers of its lines.
     """
@@ -88,7 +88,7 @@ def _told(law: Offered, lines: dict[str, int]) -> dict[str, object]:
 
 
 def _shaders() -> dict[str, str]:
-    """What stands behind a law's text, by program."""
+    """Return what stands behind a law's text, by program."""
     sphere = _asset("sphere.glsl")
     alone = {name: _asset(f"{name}.frag") for name in ("values", "edge", "inside")}
     return alone | {name: sphere + _asset(f"{name}.frag") for name in ("ball", "show")}

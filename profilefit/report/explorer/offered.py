@@ -44,24 +44,24 @@ class Offered:
 
 
 def offered(folder: Folder) -> list[Offered]:
-    """Every law of a matched surface that has a text, the best first; records are those in `folder`."""
-    records, found = Records.of(folder), []
+    """Return every law of a matched surface that has a text, the best first; records are those in `folder`."""
+    records, laws = Records.of(folder), []
     for named in sorted(profile_laws(records), key=_place):
         if named.law.entry.has_text:
             text = _text(named, records)
             light = named.setting.illumination
-            found.append(Offered(address(named), named.name, light, _label(named), text, _refracting(named, records)))
-    return found
+            laws.append(Offered(address(named), named.name, light, _label(named), text, _refracting(named, records)))
+    return laws
 
 
 def first(laws: list[Offered]) -> str:
-    """The id of the law to begin with."""
+    """Return the id of the law to begin with."""
     there = [law.id for law in laws]
     return next((name for name in FIRST if name in there), there[0])
 
 
 def address(named: Named) -> str:
-    """The id of a law: its label, without what the address of a page may not hold."""
+    """Return the id of a law: its label, without what the address of a page may not hold."""
     return re.sub(r"[^\w.]+", "-", named.label)
 
 
@@ -70,7 +70,7 @@ def _text(named: Named, records: Records) -> str:
 
 
 def _refracting(named: Named, records: Records) -> Refracting | None:
-    """That of the record of the same law and light whose constants hold for every index, if the folder has one."""
+    """Return the text of the record of the same law and light that holds for every index, if the folder has one."""
     of = profile_laws(records, matched=False) if named.records else []
     same = (one for one in of if one.name == named.name and one.setting == replace(named.setting, n=one.setting.n))
     label = next((one.label for one in same if one.setting.n != named.setting.n), None)

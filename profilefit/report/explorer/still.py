@@ -37,7 +37,7 @@ VARIABLES = {
 
 
 def still() -> str:
-    """The picture as SVG. It takes the installation's own record: what it shows is the same in every report."""
+    """Return the picture as SVG. It takes the installation's own record: what it shows is the same in every report."""
     law = catalogue.load(LAW, setting=SETTING)
     return inline(_drawn(law), "explorer-still", TITLE, VARIABLES)
 
@@ -69,7 +69,7 @@ def _profiles(profile: Axes, cdf: Axes, law: ProfileLaw) -> None:
 
 
 def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
-    """A line (channels, n) of the law for each channel, the exact one dashed on it."""
+    """Draw a line (channels, n) of the law for each channel, the exact one dashed on it."""
     for name, colour, by_law, true in zip(CHANNELS, COLOURS, law, truth, strict=True):
         ax.plot(x, by_law, color=colour, linewidth=2.2, label=name)
         ax.plot(x, true, color=BLACK, linestyle="--", linewidth=0.9)
@@ -77,7 +77,7 @@ def _pairs(ax: Axes, x: Floats, law: Floats, truth: Floats) -> None:
 
 
 def _letters(ax: Axes, x: Floats, law: Floats) -> None:
-    """The initial of each channel on its line, where it is farthest from the others: colour is not all there is."""
+    """Draw the initial of each channel on its line, where it is farthest from the others."""
     ends = x.size // 12  # beside the frame
     for c, name in enumerate(CHANNELS):
         apart = np.min(np.abs(np.delete(law, c, axis=0) - law[c]), axis=0)
@@ -87,7 +87,7 @@ def _letters(ax: Axes, x: Floats, law: Floats) -> None:
 
 
 def _edge(ax: Axes, law: ProfileLaw) -> None:
-    """Radiance beside the edge, over the strip of colours that it makes."""
+    """Draw radiance beside the edge, over the strip of colours that it makes."""
     material = BY_NAME[MATERIAL]
     alpha, mfp = np.array(material.alpha), np.array(material.mfp)
     x = np.linspace(-REACH, REACH, 121)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -19,8 +18,9 @@ from profilefit.report.figures.canvas import (
     GREEN,
     PUBLISHED,
     WHOLE,
-    band_under,
+    Curve,
     canvas,
+    draw_curves,
     legend_below,
     plain_log,
     save,
@@ -30,12 +30,11 @@ from profilefit.report.records import Fitted, Source
 
 Floats = NDArray[np.float64]
 Points = tuple[Floats, Floats, Floats]
-Curve = tuple[str, Any, dict[str, Any], Fitted | None]
 
 
 @styled
 def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> list[Path]:
-    """alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
+    """Draw alpha [-] against A [-]; its error [-]; and sqrt(1 - alpha) over the exact one [-]: how far light goes."""
     data = source.needed("albedo-liang")
     curves = _curves(source, data)
     figure = canvas(6.4)
@@ -59,17 +58,17 @@ def albedo_figure(source: Source, out: Path, name: str = "liang-8-albedo") -> li
 def _curves(source: Source, data: Fitted) -> list[Curve]:
     setting = data.law.setting
     printed = catalogue.albedo_law("liang", "published", setting, source.folder)
-    found: list[Curve] = [("(8) as printed", printed, dict(PUBLISHED), None)]
+    curves = [Curve("(8) as printed", printed, PUBLISHED)]
     if data.converged:
-        found.append(("(8) regenerated", data.law, dict(WHOLE), data))
+        curves.append(Curve("(8) regenerated", data.law, WHOLE, data))
     rational = source.usable("albedo-rational")
     if rational is not None:
-        found.append(("rational in √(1 − α)", rational.law, {"color": GREEN, "linestyle": "-."}, rational))
-    return found
+        curves.append(Curve("rational in √(1 − α)", rational.law, {"color": GREEN, "linestyle": "-."}, rational))
+    return curves
 
 
 def _points(data: Fitted) -> Points:
-    """alpha, A and the standard error of A [-] of the fitted points."""
+    """Return alpha, A and the standard error of A [-] of the fitted points."""
     at = data.arrays.get("alpha")
     alpha = albedo_values(Albedos(**data.content["protocol"]["albedos"])) if at is None else at
     return alpha, data.arrays["reflectance"], data.arrays["reflectance_error"]
@@ -78,9 +77,7 @@ def _points(data: Fitted) -> Points:
 def _map(ax: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
     even = np.linspace(0.0, 1.0, 1001)
     ax.plot(*exact_map, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    for label, law, style, fitted in curves:
-        band_under(ax, even, fitted.band(lambda law: law.alpha(even)) if fitted else None, style["color"])
-        ax.plot(even, law.alpha(even), label=label, **style)
+    draw_curves(ax, even, curves, lambda law: law.alpha(even))
     alpha, measured, error = points
     ax.errorbar(measured, alpha, xerr=error, label="photons, ± 1 standard error", **DATA)
     ax.set_ylabel("single-scattering albedo α [-]")
@@ -89,13 +86,11 @@ def _map(ax: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats,
 def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact_map: tuple[Floats, Floats]) -> None:
     reflectance, alpha = exact_map
     s = np.sqrt(1.0 - alpha)
-    for label, law, style, fitted in curves:
-        mapped = law.alpha(reflectance)
-        error.plot(reflectance, mapped - alpha, label=label, **style)
-        band = fitted.band(lambda law: law.alpha(reflectance) - alpha) if fitted else None
-        band_under(error, reflectance, band, style["color"])
+    draw_curves(error, reflectance, curves, lambda law: law.alpha(reflectance) - alpha)
+    for one in curves:
+        mapped = one.law.alpha(reflectance)
         inside = mapped < 1.0
-        ratio.plot(reflectance[inside], np.sqrt(1.0 - mapped[inside]) / s[inside], label=label, **style)
+        ratio.plot(reflectance[inside], np.sqrt(1.0 - mapped[inside]) / s[inside], label=one.label, **one.style)
     true_alpha, measured, sigma = points
     slope = np.interp(measured, reflectance, np.gradient(alpha, reflectance))
     error.errorbar(measured, true_alpha - np.interp(measured, reflectance, alpha), sigma * slope, **DATA)
@@ -108,7 +103,7 @@ def _errors(error: Axes, ratio: Axes, points: Points, curves: list[Curve], exact
 
 
 def _folds(panels: dict[str, Axes], curves: list[Curve]) -> None:
-    """Where a map falls again, two reflectances share one albedo."""
+    """Mark where a map falls again, so that two reflectances share one albedo."""
     for place, (_, law, style, _) in enumerate(curves):
         fold = getattr(law, "fold", 1.0)
         if fold >= 1.0:

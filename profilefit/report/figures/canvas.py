@@ -1,15 +1,15 @@
-"""What every figure shares: its size, colours that colour-blind readers can distinguish, files whole or not at all."""
+"""Canvas of every figure: its size, colours that colour-blind readers can distinguish, files whole or not at all."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib
 import numpy as np
@@ -74,20 +74,20 @@ def styled(draw: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def canvas(height: float, width: float = WIDTH, layout: Any = "constrained") -> Figure:
-    """An empty figure of `width` x `height` [inch] with its own Agg canvas: pyplot never hears of it."""
+    """Return an empty figure of `width` x `height` [inch] with its own Agg canvas: pyplot never hears of it."""
     figure = Figure(figsize=(width, height), layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
 
 def legend_below(figure: Figure, axes: list[Axes]) -> None:
-    """One legend for all `axes`, under the figure, where it covers no data, in as many columns as fit."""
-    found: dict[str, Any] = {}
+    """Draw one legend for all `axes` under the figure, in as many columns as fit."""
+    handles: dict[str, Any] = {}
     for ax in axes:
         for handle, label in zip(*ax.get_legend_handles_labels(), strict=True):
-            found.setdefault(label, handle)
+            handles.setdefault(label, handle)
     for columns in (4, 3, 2, 1):
-        legend = figure.legend(list(found.values()), list(found), loc="outside lower center", ncols=columns)
+        legend = figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns)
         if columns == 1 or legend.get_window_extent().width < 0.98 * figure.bbox.width:
             return
         legend.remove()
@@ -100,6 +100,22 @@ def band_under(ax: Axes, x: Any, band: tuple[Any, Any] | None, color: str, label
         ax.fill_between([], [], [], color=GREY, alpha=0.4, linewidth=0, label=label)
 
 
+class Curve(NamedTuple):
+    """Law in a figure: its label and look, and the record with its posterior, if it has one."""
+
+    label: str
+    law: Any
+    style: Mapping[str, Any]
+    fitted: Any = None
+
+
+def draw_curves(ax: Axes, x: Any, curves: Iterable[Curve], evaluate: Callable[[Any], Any]) -> None:
+    """Draw `evaluate(law)` of each curve over x, and under it the 95 % band of its record."""
+    for one in curves:
+        band_under(ax, x, one.fitted.band(evaluate) if one.fitted else None, one.style["color"])
+        ax.plot(x, evaluate(one.law), label=one.label, **one.style)
+
+
 def plain_log(axis: Axis) -> None:
     """Label a short logarithmic axis with plain numbers at 1, 2 and 5."""
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
@@ -108,7 +124,7 @@ def plain_log(axis: Axis) -> None:
 
 
 def albedo_axis(ax: Axes) -> None:
-    """alpha [-] from 0 to 1 along x, stretched evenly in sqrt(1 - alpha): the end near 1 is where laws differ."""
+    """Stretch x evenly in sqrt(1 - alpha), alpha [-] from 0 to 1: the end near 1 is where laws differ."""
 
     def forward(alpha: Any) -> Any:
         return 1.0 - np.sqrt(np.clip(1.0 - np.asarray(alpha), 0.0, None))

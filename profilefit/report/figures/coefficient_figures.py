@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -25,8 +24,9 @@ from profilefit.report.figures.canvas import (
     PURPLE,
     VERMILION,
     WHOLE,
-    band_under,
+    Curve,
     canvas,
+    draw_curves,
     legend_below,
     plain_log,
     save,
@@ -39,12 +39,11 @@ EQUATION = {"a": "(11)", "b": "(13)", "c": "(15)"}
 UNIT = {"a": "1/mfp", "b": "-", "c": "mfp"}
 STAGED = {"color": PURPLE, "linestyle": (0, (1, 1.2))}
 RATIOS = (0.6, 1.4)  # shown of law over fitted point [-]
-Line = tuple[str, Any, Any, Fitted | None]
 
 
 @styled
 def coefficient_figure(letter: str, source: Source, out: Path, name: str = "") -> list[Path]:
-    """One coefficient against alpha [-], the end near 1 enlarged, and below each the laws over the fitted points."""
+    """Draw one coefficient against alpha [-], the end near 1 enlarged, and the laws over the fitted points below."""
     data = source.needed("liang-as-published")
     lines = _lines(letter, source, data)
     figure = canvas(6.4)
@@ -78,17 +77,18 @@ b_figure = partial(coefficient_figure, "b")
 c_figure = partial(coefficient_figure, "c")
 
 
-def _lines(letter: str, source: Source, data: Fitted) -> list[Line]:
+def _lines(letter: str, source: Source, data: Fitted) -> list[Curve]:
     setting, equation = data.law.setting, EQUATION[letter]
     printed = source.printed("liang", "published", setting)
-    lines: list[Line] = [(f"{equation} as printed", printed, PUBLISHED, None)]
+    lines = [Curve(f"{equation} as printed", printed, PUBLISHED)]
     corrected = source.printed("liang", "corrected", setting)
     if any(getattr(corrected, name) != getattr(printed, name) for name in CONSTANTS_OF[letter]):
-        lines.append((f"{equation} as printed but b0 = {corrected.constants()['b0']:g}", corrected, CORRECTED, None))
+        label = f"{equation} as printed but b0 = {corrected.constants()['b0']:g}"
+        lines.append(Curve(label, corrected, CORRECTED))
     stage = data.content["stages"]["coefficient_laws"][letter]
     staged = data.law.with_vector(tuple(stage["constants"]), list(stage["constants"].values()))
     failed = "" if stage["result"] == "converged" else " (did not converge)"
-    lines.append((f"{equation} through the points{failed}", staged, STAGED, None))
+    lines.append(Curve(f"{equation} through the points{failed}", staged, STAGED))
     labels = {
         "liang-as-published": ("regenerated, the paper's protocol, jointly", AS_PUBLISHED),
         "liang-whole": ("regenerated, whole profile", WHOLE),
@@ -96,21 +96,18 @@ def _lines(letter: str, source: Source, data: Fitted) -> list[Line]:
     for name, (label, style) in labels.items():
         fitted = source.usable(name)
         if fitted is not None:
-            lines.append((label, fitted.law, style, fitted))
+            lines.append(Curve(label, fitted.law, style, fitted))
     return lines
 
 
-def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitted) -> None:
+def _values(ax: Axes, letter: str, alpha: Floats, lines: list[Curve], data: Fitted) -> None:
     column = COEFFICIENTS.index(letter)
-    for label, law, style, fitted in lines:
-        band = fitted.band(lambda law: coefficients(law, alpha)[column]) if fitted else None
-        band_under(ax, alpha, band, style["color"])
-        ax.plot(alpha, coefficients(law, alpha)[column], label=label, **style)
+    draw_curves(ax, alpha, lines, lambda law: coefficients(law, alpha)[column])
     points, errors = data.arrays["coefficients"][:, column], data.arrays["coefficient_errors"][:, column]
     ax.errorbar(data.arrays["alpha"], points, errors, label="(7) fitted at one albedo, ± photon noise", **DATA)
 
 
-def _ratios(ax: Axes, letter: str, lines: list[Line], data: Fitted) -> None:
+def _ratios(ax: Axes, letter: str, lines: list[Curve], data: Fitted) -> None:
     column = COEFFICIENTS.index(letter)
     alpha, points = data.arrays["alpha"], data.arrays["coefficients"][:, column]
     for label, law, style, _ in lines:
@@ -125,7 +122,7 @@ def _ratios(ax: Axes, letter: str, lines: list[Line], data: Fitted) -> None:
     ax.set_ylim(*RATIOS)
 
 
-def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[Line], data: Fitted, low: float) -> None:
+def _fit_y(ax: Axes, letter: str, alpha: Floats, lines: list[Curve], data: Fitted, low: float) -> None:
     """Scale the enlarged panel to what it shows."""
     column = COEFFICIENTS.index(letter)
     near = data.arrays["alpha"] >= low
@@ -145,7 +142,7 @@ FAR = 3.0  # standard errors
 
 @styled
 def constants_figure(source: Source, out: Path, name: str = "constants") -> list[Path]:
-    """(published - regenerated) / |regenerated| [-] of every constant that is printed, ± its total error, and z."""
+    """Draw (published - regenerated) / |regenerated| [-] of every printed constant, ± its total error, and z."""
     rows = _printed(source)
     figure = canvas(ROW * len(rows) + FEET, layout=ConstrainedLayoutEngine(w_pad=0.1))
     ax = figure.subplots()
@@ -170,21 +167,21 @@ def constants_figure(source: Source, out: Path, name: str = "constants") -> list
 
 
 def has_printed(source: Source) -> tuple[str, ...]:
-    """Records with a constant that was printed."""
+    """Return records with a constant that was printed."""
     return tuple(dict.fromkeys(label.split(" ")[0] for label, _ in _printed(source)))
 
 
 def _printed(source: Source) -> list[tuple[str, Content]]:
-    """(record and name, constant) of each that was printed; those of a failed fit are no law."""
-    found = []
+    """Return (record and name, constant) of each that was printed; those of a failed fit are no law."""
+    rows = []
     for record_name in source.paths:
         content = source.content(record_name)
         if "constants" not in content or not converged(content):
             continue
         source.needed(record_name)  # whole, or an error that says what is wrong with it
         of = content["constants"].items()
-        found += [(f"{record_name} {name}", one) for name, one in of if one.get("published") is not None]
-    return found
+        rows += [(f"{record_name} {name}", one) for name, one in of if one.get("published") is not None]
+    return rows
 
 
 def _legend(figure: Figure) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import corner
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
@@ -30,7 +31,7 @@ LARGE = 5  # constants beyond which the numbers on the axes must be few
 
 @styled
 def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misfit", name: str = "") -> list[Path]:
-    """The posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
+    """Draw the posterior draws of a record's constants, in pairs and alone, with the regenerated and printed values.
 
     kind  "misfit" or "statistical", as in `profilefit.fitting.chains`
     """
@@ -44,13 +45,8 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
     constants = [fitted.content["constants"][name] for name in names]
     size = len(names)
     figure = canvas(8.0, layout="none")
-    corner.corner(
-        samples, fig=figure, bins=BINS, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
-        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
-        contour_kwargs={"linewidths": 0.6}, max_n_ticks=2 if size > LARGE else 4,
-    )  # fmt: skip
+    grid = corner_grid(figure, samples, BINS, max_n_ticks=2 if size > LARGE else 4)
     figure.subplots_adjust(left=0.09, right=0.97, bottom=0.09, top=0.965, wspace=0.06, hspace=0.06)
-    grid = np.array(figure.axes).reshape(size, size)
     _marks(grid, samples, constants)
     _axes(grid, names)
     title = f"{record_name}: spread by {MEANING[kind]}" + (f";\n{held_back}" if held_back else "")
@@ -59,30 +55,43 @@ def corner_figure(record_name: str, source: Source, out: Path, kind: str = "misf
 
 
 def _most_correlated(samples: Floats, count: int) -> list[int]:
-    """Places of the constants that have the largest correlation with any other, in order."""
+    """Return places of the constants that have the largest correlation with any other, in order."""
     correlation = np.abs(np.corrcoef(samples, rowvar=False))
     np.fill_diagonal(correlation, 0.0)
     return sorted(np.argsort(-correlation.max(axis=0), kind="stable")[:count].tolist())
 
 
+def corner_grid(figure: Figure, samples: Floats, bins: int, **more: Any) -> NDArray[Any]:
+    """Draw samples (draws, n) in pairs and alone, and return the panels (n, n)."""
+    corner.corner(
+        samples, fig=figure, bins=bins, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
+        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
+        contour_kwargs={"linewidths": 0.6}, **more,
+    )  # fmt: skip
+    return np.array(figure.axes).reshape(samples.shape[1], -1)
+
+
+def mark(grid: NDArray[Any], place: int, value: float, **look: Any) -> None:
+    """Draw lines at a value of one constant in all panels that show it."""
+    for row in range(place, len(grid)):
+        grid[row, place].axvline(value, linewidth=0.8, **look)
+    for column in range(place):
+        grid[place, column].axhline(value, linewidth=0.8, **look)
+
+
 def _marks(grid: NDArray[Any], samples: Floats, constants: list[dict[str, Any]]) -> None:
-    """Lines at the regenerated value and, where it lies in the panel, at the printed one."""
+    """Draw lines at the regenerated value and, where it lies in the panel, at the printed one."""
+    looks = {"regenerated": (BLACK, "-"), "published": (VERMILION, "--")}
     for column, constant in enumerate(constants):
         low, high = samples[:, column].min(), samples[:, column].max()
-        for value, color, style in (
-            (constant["regenerated"], BLACK, "-"),
-            (constant.get("published"), VERMILION, "--"),
-        ):
-            if value is None or not low <= value <= high:
-                continue
-            for row in range(column, len(constants)):
-                grid[row, column].axvline(value, color=color, linestyle=style, linewidth=0.8)
-            for left in range(column):
-                grid[column, left].axhline(value, color=color, linestyle=style, linewidth=0.8)
+        for which, (color, style) in looks.items():
+            value = constant.get(which)
+            if value is not None and low <= value <= high:
+                mark(grid, column, value, color=color, linestyle=style)
 
 
 def _axes(grid: NDArray[Any], names: list[str]) -> None:
-    """Names on the outside, few numbers, none with an offset that the reader must add."""
+    """Write names on the outside and few numbers, none with an offset that the reader must add."""
     size = len(names)
     small = size > LARGE
     for row in range(size):
@@ -112,7 +121,7 @@ def _outer(axis: Any, label: str, rotation: float) -> None:
 
 
 def _caption(figure: Any, samples: Floats, names: list[str], constants: list[Any], title: str) -> None:
-    """What is seen, and what is not, in the empty upper right."""
+    """Write what is seen, and what is not, into the empty upper right."""
     low, high = samples.min(axis=0), samples.max(axis=0)
     printed = [constant.get("published") for constant in constants]
     outside = [

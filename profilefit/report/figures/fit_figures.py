@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import corner
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator, ScalarFormatter
@@ -24,17 +23,18 @@ from profilefit.report.figures.canvas import (
     save,
     styled,
 )
-from profilefit.report.figures.corner_figure import LEVELS
+from profilefit.report.figures.corner_figure import corner_grid, mark
 
 BINS = 24
 ENDS = 1.15  # how far axes go beyond the data
 CURVE = 64  # radii of the fitted line
+SYMBOLS = {"alpha": "α", "mu_s'": "µs′", "mu_a": "µa"}
 LABEL_DISTANCE = 0.3  # of an axis name, in panels
 
 
 @styled
 def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residuals") -> list[Path]:
-    """Reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
+    """Draw reflectance per area with the fitted law, over r [unit]; under it the residuals in standard errors."""
     fit, data = result.fit, result.fit.data
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
@@ -67,26 +67,22 @@ def residual_figure(result: MediumPosterior, out: Path, name: str = "fit-residua
 
 @styled
 def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner") -> list[Path]:
-    """The posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
+    """Draw the posterior draws of what was fitted, in pairs and alone, and the best fit; nothing without a chain."""
     names = shown(result)
     if not names:
         return []
     samples = np.column_stack([result.draws[one] for one in names])
     size = len(names)
     figure = canvas(2.0 + 1.5 * size, width=2.0 + 1.5 * size, layout="none")
-    corner.corner(
-        samples, fig=figure, bins=BINS, color=BLUE, levels=LEVELS, smooth=1.0, plot_datapoints=False,
-        plot_density=False, fill_contours=True, hist_kwargs={"linewidth": 1.0, "color": BLUE},
-        contour_kwargs={"linewidths": 0.6},
-    )  # fmt: skip
-    grid = np.array(figure.axes).reshape(size, size)
+    grid = corner_grid(figure, samples, BINS)
     for row in range(size):
         for column in range(row + 1):
             _dressed(grid[row, column], row, column)
-            _marked(grid[row, column], [result.value(names[at]) for at in (column, row)], row != column)
     for at, one in enumerate(names):
+        if (best := result.value(one)) is not None:
+            mark(grid, at, best, color=BLACK)
         unit = unit_of(one, result.fit.data.unit)
-        label = f"{_symbol(one)} [{unit or '-'}]"
+        label = f"{SYMBOLS.get(one, one)} [{unit or '-'}]"
         grid[size - 1, at].set_xlabel(label)
         grid[size - 1, at].xaxis.set_label_coords(0.5, -LABEL_DISTANCE)
         if at:
@@ -98,7 +94,7 @@ def posterior_figure(result: MediumPosterior, out: Path, name: str = "fit-corner
 
 
 def shown(result: MediumPosterior) -> tuple[str, ...]:
-    """The quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
+    """Return the quantities of a corner plot: no two that say the same, where one coordinate alone was free."""
     if result.walk is None:
         return ()
     free = result.fit.spec.free
@@ -107,20 +103,8 @@ def shown(result: MediumPosterior) -> tuple[str, ...]:
     return tuple(name for name in ("A", "l", "mu_s'", "mu_a", "scale") if name in result.moving)
 
 
-def _marked(ax: Axes, best: list[float | None], is_pair: bool) -> None:
-    """Thin lines at the best fit, where it is a value."""
-    if best[0] is not None:
-        ax.axvline(best[0], color=BLACK, linewidth=0.8)
-    if is_pair and best[1] is not None:
-        ax.axhline(best[1], color=BLACK, linewidth=0.8)
-
-
-def _symbol(name: str) -> str:
-    return {"alpha": "α", "mu_s'": "µs′", "mu_a": "µa"}.get(name, name)
-
-
 def _dressed(ax: Axes, row: int, column: int) -> None:
-    """Few numbers, none with an offset that the reader must add."""
+    """Write few numbers, none with an offset that the reader must add."""
     ax.grid(False)
     axes: list[Any] = [ax.xaxis] if row == column else [ax.xaxis, ax.yaxis]
     for axis in axes:

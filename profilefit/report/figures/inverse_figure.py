@@ -24,9 +24,10 @@ from profilefit.report.figures.canvas import (
     PUBLISHED,
     PURPLE,
     WHOLE,
+    Curve,
     albedo_axis,
-    band_under,
     canvas,
+    draw_curves,
     legend_below,
     plain_log,
     save,
@@ -45,7 +46,7 @@ LABELS = {
 
 @styled
 def inverse_figure(source: Source, out: Path, name: str = "liang-19-inverse") -> list[Path]:
-    """r [mfp] against xi [-] at six albedos; max |cdf(r(xi)) - xi| [-] against alpha [-] for each set of constants."""
+    """Draw r [mfp] against xi [-] at six albedos, and max |cdf(r(xi)) - xi| [-] against alpha [-]."""
     data = source.needed("liang-inverse-whole")
     figure = canvas(8.2)
     grid = figure.add_gridspec(3, 3, height_ratios=(1.0, 1.0, 1.1))
@@ -69,14 +70,11 @@ def _panel(ax: Axes, source: Source, data: Fitted, row: int) -> None:
     r = np.geomspace(1e-4, 100.0 * float(exact.quantile(0.9, alpha, setting=setting)), 400)
     share = np.asarray(exact.cdf(r, alpha, setting=setting))
     ax.plot(share, r, color=BLACK, linewidth=0.9, label="exact", zorder=3)
-    printed = source.printed("liang", "published", setting)
-    ax.plot(xi, _radius(printed, xi, alpha), label="(19) as printed", **PUBLISHED)
+    curves = [Curve("(19) as printed", source.printed("liang", "published", setting), PUBLISHED)]
     for name, (label, style) in LABELS.items():
-        fitted = source.usable(name)
-        if fitted is None:
-            continue
-        band_under(ax, xi, fitted.band(lambda law: _radius(law, xi, alpha)), style["color"])
-        ax.plot(xi, _radius(fitted.law, xi, alpha), label=label, **style)
+        if (fitted := source.usable(name)) is not None:
+            curves.append(Curve(label, fitted.law, style, fitted))
+    draw_curves(ax, xi, curves, lambda law: _radius(law, xi, alpha))
     whole = source.usable("liang-whole")
     if whole is not None:
         label = "r$_{max}$ where (21) clips, whole profile"
@@ -106,12 +104,12 @@ def _errors(ax: Axes, source: Source) -> None:
 
 
 def _radius(law: Any, xi: Floats, alpha: float) -> Floats:
-    """|g(xi)| [mfp] of (19), before the clip (21) at r_max."""
+    """Return |g(xi)| [mfp] of (19), before the clip (21) at r_max."""
     return np.maximum(np.abs(np.asarray(law.sampler.unclipped(xi, alpha))), 1e-9)
 
 
 def _rings(ax: Axes, data: Fitted, row: int) -> None:
-    """The tallied cdf at some ring edges, with the standard error of its sum."""
+    """Draw the tallied cdf at some ring edges, with the standard error of its sum."""
     energy, error = data.arrays["energy"][row], data.arrays["energy_error"][row]
     total = energy.sum() + data.arrays["beyond"][row]
     share, sigma = np.cumsum(energy) / total, np.sqrt(np.cumsum(error**2)) / total
@@ -139,7 +137,7 @@ REQUIRED = 1e-3
 
 @styled
 def inversion_figure(source: Source, out: Path, name: str = "inversion-error") -> list[Path]:
-    """max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
+    """Draw max |cdf(g(xi)) - xi| [-], xi in [0, 0.999], against alpha [-]: the paper's inverse and others, by light."""
     figure = canvas(4.6)
     axes = list(figure.subplots(1, 2, sharey=True))
     for ax, (light, records) in zip(axes, RECORDS.items(), strict=True):
@@ -168,7 +166,7 @@ def draw(ax: Axes, source: Source, record: str) -> None:
 
 
 def points_of(fitted: Fitted) -> Points:
-    """alpha and the error of the regenerated law: as its record says, or measured now."""
+    """Return alpha and the error of the regenerated law: as its record says, or measured now."""
     quality = fitted.content["quality"]
     alpha = np.asarray(quality["alpha"], float)
     if "inversion_error" in quality["regenerated"]:
@@ -177,14 +175,14 @@ def points_of(fitted: Fitted) -> Points:
 
 
 def _printed(source: Source, record: str) -> Points | None:
-    """The same of the printed constants, where the record has judged them."""
+    """Return alpha and the error of the printed constants, where the record has judged them."""
     quality = source.content(record)["quality"]
-    found = quality.get("published", {}).get("inversion_error")
-    return None if found is None else (np.asarray(quality["alpha"], float), np.asarray(found, float))
+    error = quality.get("published", {}).get("inversion_error")
+    return None if error is None else (np.asarray(quality["alpha"], float), np.asarray(error, float))
 
 
 def caption_of(source: Source) -> str:
-    """How bad the printed inverse is where its authors doubt it, and on either side of that."""
+    """Return how bad the printed inverse is where its authors doubt it, and on either side of that."""
     name = "liang-inverse-whole"
     printed = _printed(source, name) if name in source.paths else None
     if printed is None:

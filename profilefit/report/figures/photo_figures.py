@@ -30,21 +30,21 @@ EVERY = 4  # rings of which one is drawn
 
 
 @styled
-def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
-    """The merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
+def spot_figure(photo: Photo, out: Path, name: str = SPOT) -> list[Path]:
+    """Draw the merged picture on a logarithmic scale, the spot's centre, some rings, and what no exposure recorded."""
     figure = canvas(5.4)
     axes = figure.subplots()
-    colour = next((one for one in found.fits if one == "green"), next(iter(found.fits)))
-    (picture, *_), centre = found.shot.pictures(colour), found.shot.spot.centre
+    colour = next((one for one in photo.fits if one == "green"), next(iter(photo.fits)))
+    (picture, *_), centre = photo.shot.pictures(colour), photo.shot.spot.centre
     stride = max(1, max(picture.light.shape) // SHOWN)
     light = picture.light[::stride, ::stride]
     most = float(np.nanmax(light))
     shown = np.log10(np.clip(np.where(np.isfinite(light), light, np.nan) / most, 10.0**-DECADES, 1.0))
-    columns, rows = found.shot.sides
+    columns, rows = photo.shot.sides
     shades = matplotlib.colormaps["magma"].with_extremes(bad=VERMILION)
     image = axes.imshow(shown, cmap=shades, extent=(0, columns, rows, 0), vmin=-DECADES, vmax=0.0)
-    pixel = found.plate.pixel(centre)
-    for edge in found.fits[colour].shot.medium.outer[::EVERY]:
+    pixel = photo.plate.pixel(centre)
+    for edge in photo.fits[colour].shot.medium.outer[::EVERY]:
         axes.add_patch(Circle(centre, edge / pixel, fill=False, color="white", linewidth=0.4, alpha=0.7))
     axes.plot(*centre, marker="+", color="white", markersize=8, linestyle="none")
     axes.set(xlabel="column [pixel]", ylabel="row [pixel]")
@@ -54,11 +54,11 @@ def spot_figure(found: Photo, out: Path, name: str = SPOT) -> list[Path]:
 
 
 @styled
-def rings_figure(found: Photo, out: Path, name: str = RINGS) -> list[Path]:
-    """Light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
+def rings_figure(photo: Photo, out: Path, name: str = RINGS) -> list[Path]:
+    """Draw light of the rings by colour with the fit, over r [mm]; under it the residuals in standard errors."""
     figure = canvas(5.6)
     top, below = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
-    for colour, fit in found.fits.items():
+    for colour, fit in photo.fits.items():
         rings, shade = fit.shot.medium, COLOURS[colour]
         light, rows = (one[0][: rings.value.size] for one in (fit.shot.rows(fit.x), fit.shot.residuals(fit.x)))
         error = np.sqrt(np.diag(rings.covariance))
@@ -68,7 +68,7 @@ def rings_figure(found: Photo, out: Path, name: str = RINGS) -> list[Path]:
         )
         top.plot(rings.r, light, label=f"{colour}: fit", **{**WHOLE, "color": shade})
         below.plot(rings.r, rows, marker="o", markersize=2.6, linewidth=0.6, color=shade)
-    unit = "counts" if found.shot.seconds is None else "counts a second"
+    unit = "counts" if photo.shot.seconds is None else "counts a second"
     top.set(xscale="log", yscale="log", ylabel=f"light [{unit}]")
     below.axhspan(-2, 2, color=GREY, alpha=0.12, linewidth=0)
     below.set(xlabel="r [mm]", ylabel="residual, whitened [σ]")

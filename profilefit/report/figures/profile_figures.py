@@ -20,8 +20,10 @@ from profilefit.report.figures.canvas import (
     PUBLISHED,
     TRUTH_BAND,
     WHOLE,
+    Curve,
     band_under,
     canvas,
+    draw_curves,
     legend_below,
     save,
     styled,
@@ -44,7 +46,7 @@ STYLES = {"published": PUBLISHED, "corrected": CORRECTED, "liang-as-published": 
 
 @styled
 def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> list[Path]:
-    """r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
+    """Draw r R_d [1/mfp] against r [mfp], on a logarithmic scale that shows the tail, before the correction (18)."""
     data = source.needed("liang-as-published")
     figure = canvas(6.6)
     axes = list(figure.subplots(2, 3).flat)
@@ -58,7 +60,7 @@ def profile_figure(source: Source, out: Path, name: str = "liang-7-profile") -> 
 
 @styled
 def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list[Path]:
-    """R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their photon noise."""
+    """Draw R_d after the correction (18) over the exact one, less 1 [-], and the tallied rings with their noise."""
     data = source.needed("liang-whole")
     figure = canvas(6.4)
     axes = list(figure.subplots(2, 3, sharey=True).flat)
@@ -70,29 +72,31 @@ def error_figure(source: Source, out: Path, name: str = "liang-7-error") -> list
     return save(figure, out, name)
 
 
-def _laws(source: Source, data: Fitted) -> dict[str, Any]:
-    """Name -> a printed law, or a record with its band."""
+def _laws(source: Source, data: Fitted) -> dict[str, Curve]:
+    """Return printed laws, and records with their bands, by name."""
     law, setting = data.content["law"], data.law.setting
-    regenerated = {name: source.usable(name) for name in ("liang-as-published", "liang-whole")}
-    printed = {name: source.printed(law, name, setting) for name in ("published", "corrected")}
-    return printed | {name: fitted for name, fitted in regenerated.items() if fitted is not None}
+    printed = ("published", "corrected")
+    laws = {name: Curve(LABELS[name], source.printed(law, name, setting), STYLES[name]) for name in printed}
+    for name in ("liang-as-published", "liang-whole"):
+        if (fitted := source.usable(name)) is not None:
+            laws[name] = Curve(LABELS[name], fitted.law, STYLES[name], fitted)
+    return laws
 
 
 def _rows(data: Fitted) -> list[int]:
     return [round(share * (data.arrays["alpha"].size - 1)) for share in PANELS]
 
 
-def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None:
+def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Curve]) -> None:
     alpha = float(data.arrays["alpha"][row])
     cut = float(data.arrays["r_trim"][row])
-    radii = {name: _largest_radius(one, alpha) for name, one in laws.items() if name != "published"}
+    radii = {name: float(one.law.largest_radius(alpha)) for name, one in laws.items() if name != "published"}
     radii = {name: radius for name, radius in radii.items() if radius > 0}  # a > 0 has none
     end = 1.25 * max(cut, *radii.values())
     r_exact, profile = exact_profile(alpha, data.law.setting, NEAREST, end)
     source_limit = alpha / (4 * np.pi)
     r = np.linspace(0.0, end, 600)
-    for name, one in laws.items():
-        _draw(ax, r, one, lambda law: np.maximum(unscaled(law, r, alpha), 1e-12), name)
+    draw_curves(ax, r, laws.values(), lambda law: np.maximum(unscaled(law, r, alpha), 1e-12))
     ax.plot(r_exact, r_exact * profile, color=BLACK, linewidth=0.9, label="exact", zorder=3)
     _rings(ax, data, row, end)
     at_foot: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 5}
@@ -104,16 +108,15 @@ def _profile_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> No
     ax.set_title(f"α = {alpha:.3f}")
 
 
-def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None:
+def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Curve]) -> None:
     alpha, setting = float(data.arrays["alpha"][row]), data.law.setting
     outer = exact.quantile(ENERGY_WITHIN, alpha, setting=setting)
     r, truth = exact_profile(alpha, setting, NEAREST, 3.0 * float(outer))
-    for name, one in laws.items():
-        band = _truth_band(one, r, alpha)
+    for one in laws.values():
+        band = _truth_band(one.fitted, r, alpha)
         if band is not None:
-            band_under(ax, r, (band[0] / truth - 1.0, band[1] / truth - 1.0), STYLES[name]["color"], TRUTH_BAND)
-        law = one.law if isinstance(one, Fitted) else one
-        ax.plot(r, law.profile(r, alpha) / truth - 1.0, label=LABELS[name], **STYLES[name])
+            band_under(ax, r, (band[0] / truth - 1.0, band[1] / truth - 1.0), one.style["color"], TRUTH_BAND)
+        ax.plot(r, one.law.profile(r, alpha) / truth - 1.0, label=one.label, **one.style)
     edges = data.arrays["r_edges"]
     expected = np.diff(exact.cdf(edges, alpha, setting=setting)) * exact.reflectance(alpha, setting=setting)
     energy, error = data.arrays["energy"][row], data.arrays["energy_error"][row]
@@ -128,23 +131,16 @@ def _error_panel(ax: Axes, data: Fitted, row: int, laws: dict[str, Any]) -> None
     ax.set(xscale="log", xlim=(NEAREST, r[-1]), ylim=(-1.05, 1.05), title=f"α = {alpha:.3f}")
 
 
-def _truth_band(one: Any, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
-    """The band in which a fitted law states the exact profile to lie; None of printed laws and of old records."""
-    if not isinstance(one, Fitted):
+def _truth_band(one: Fitted | None, r: Floats, alpha: float) -> tuple[Floats, Floats] | None:
+    """Return the band in which a fitted law states the exact profile to lie; None for printed laws and old records."""
+    if one is None:
         return None
     known = derived.LawWithErrors.of_record(one.law, one.content, one.arrays)
     return None if known.off is None else derived.profile(known, r, alpha).interval()
 
 
-def _draw(ax: Axes, r: Floats, one: Any, evaluate: Any, name: str) -> None:
-    """A law's line; under it the 95 % band, where it has one."""
-    fitted = isinstance(one, Fitted)
-    band_under(ax, r, one.band(evaluate) if fitted else None, STYLES[name]["color"])
-    ax.plot(r, evaluate(one.law if fitted else one), label=LABELS[name], **STYLES[name])
-
-
 def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
-    """Some of the rings, with the photons' standard error: even in r would crowd the start with none to see."""
+    """Draw some of the rings, with the photons' standard error: even in r would crowd the start with none to see."""
     edges, energy, error = (data.arrays[key] for key in ("r_edges", "energy", "energy_error"))
     r = 0.5 * (edges[1:] + edges[:-1])
     wanted = np.linspace(0.0, min(end, r[-1]), RINGS_SHOWN)
@@ -153,11 +149,6 @@ def _rings(ax: Axes, data: Fitted, row: int, end: float) -> None:
     to_profile = 1.0 / (2 * np.pi * np.diff(edges))[index]  # E = 2 pi r R_d dr
     value, sigma = energy[row][index] * to_profile, error[row][index] * to_profile
     ax.errorbar(r[index], value, sigma, label="photons, ± 1 standard error", **DATA)
-
-
-def _largest_radius(one: Any, alpha: float) -> float:
-    law = one.law if isinstance(one, Fitted) else one
-    return float(law.largest_radius(alpha))
 
 
 def _outer_labels(axes: list[Axes], x: str, y: str) -> None:

@@ -1,4 +1,4 @@
-"""How good each law is: the relative error of R_d and the largest error of the cdf, over the albedos."""
+"""Quality of each law: the relative error of R_d and the largest error of the cdf, over the albedos."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class Line:
 
 @styled
 def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Path]:
-    """rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
+    """Draw rel and ks [-] of every profile law and set of constants against alpha [-], at held-out albedos.
 
     A row of panels for each light, one for all surfaces that refract.
     """
@@ -58,14 +58,14 @@ def quality_figure(source: Source, out: Path, name: str = "quality") -> list[Pat
 
 @styled
 def record_quality_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
-    """The same of one record: its constants, and those printed for its law."""
+    """Draw rel and ks [-] of one record: its constants, and those printed for its law."""
     return _drawn(source, [record_name], out, name or f"quality-{record_name}")
 
 
 def _drawn(source: Source, names: Iterable[str], out: Path, name: str) -> list[Path]:
     contents = {one: source.content(one) for one in names if measures(source.content(one), "rel")}
     rows = {kind: [c for c in contents.items() if _kind(c[1]) == kind] for kind in KINDS}
-    shown = {kind: list(_lines(found)) for kind, found in rows.items() if found}
+    shown = {kind: list(_lines(group)) for kind, group in rows.items() if group}
     figure = canvas(HEAD + ROW * len(shown) + FEET)
     grid = figure.subplots(len(shown), len(SHOWN), squeeze=False)
     for row, (kind, lines) in zip(grid, shown.items(), strict=True):
@@ -103,7 +103,7 @@ def _kind(content: Content) -> str:
 
 
 def _lines(contents: Iterable[tuple[str, Content]]) -> Iterator[Line]:
-    """Each set once: printed constants are the same in every record of their law."""
+    """Yield each set once: printed constants are the same in every record of their law."""
     drawn: set[str] = set()
     for name, content in contents:
         quality = content["quality"]

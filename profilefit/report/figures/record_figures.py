@@ -84,9 +84,9 @@ def draw_all(
     drawn: dict[int, list[Path]] = {}
     with Workers(min(processes, len(possible))) as workers:
         task = partial(_drawn, source if processes == 1 else Source(folder), out)  # what is read travels with it
-        found = workers.each(task, possible)
+        figures = workers.each(task, possible)
         for _ in track(possible):
-            number, drawn[number] = next(found)
+            number, drawn[number] = next(figures)
     return [path for number in range(len(possible)) for path in drawn[number]], left_out
 
 
@@ -95,7 +95,7 @@ def _drawn(source: Source, out: Path, plan: Plan) -> list[Path]:
 
 
 def plans(source: Source) -> tuple[Plan, ...]:
-    """The paper's figures, those of all laws and stacks, and of each record residuals, quality and a corner plot."""
+    """Return the paper's figures, those of all laws and stacks, and of each record."""
     profiles = tuple(name for name in source.paths if measures(source.content(name), "rel"))
     lacking = "" if profiles else f"{source.folder} has no record of a profile law"
     printed = has_printed(source)
@@ -110,7 +110,7 @@ def plans(source: Source) -> tuple[Plan, ...]:
 
 
 def record_plans(source: Source, name: str) -> tuple[Plan, ...]:
-    """The figures of one record."""
+    """Return the figures of one record."""
     content = source.content(name)
     if "constants" not in content:
         return ()

@@ -28,7 +28,7 @@ HEIGHT = 3.2  # [inch]
 
 @styled
 def residual_figure(record_name: str, source: Source, out: Path, name: str = "") -> list[Path]:
-    """Of a profile law: energy of a ring over that of the data, less 1 [-], with the data's standard errors.
+    """Draw a profile law's energy of a ring over that of the data, less 1 [-], with the data's standard errors.
 
     Of an inverse cdf: exact cdf(r(xi)) - xi [-]. Of a map: alpha or A, whichever was fitted, less that of the data [-].
     """
@@ -42,7 +42,7 @@ def residual_figure(record_name: str, source: Source, out: Path, name: str = "")
 
 
 def _of_map(ax: Axes, fitted: Fitted) -> None:
-    """Of what was fitted: alpha at the data's A, or A at the data's alpha."""
+    """Return alpha at the data's A, or A at the data's alpha, of the fitted map."""
     alpha = albedo_values(Albedos(**fitted.content["protocol"]["albedos"]), fitted.law.setting)
     law = fitted.law.in_reduced()  # as the data's albedos are
     reflectance, error = fitted.arrays["reflectance"], np.nan_to_num(fitted.arrays["reflectance_error"])
@@ -83,7 +83,7 @@ def _of_profile(ax: Axes, fitted: Fitted) -> None:
 
 
 def energy_within(law: ProfileLaw, edges: Floats, alpha: float) -> Floats:
-    """What the fit compared, within each edge (..., n) [-]."""
+    """Return what the fit compared, within each edge (..., n) [-]."""
     short = -edges.shape[-1] % MOST_RINGS  # so that one compilation serves all albedos
     full = np.pad(edges, [(0, 0)] * (edges.ndim - 1) + [(0, short)], mode="edge")
     with jax.enable_x64(True):
@@ -96,7 +96,7 @@ def _energy_within(law: ProfileLaw, edges: jax.Array, alpha: jax.Array) -> jax.A
 
 
 def _chosen(fitted: Fitted) -> list[tuple[float, tuple[float, ...], int]]:
-    """(alpha, colour, row) of the albedos shown."""
+    """Return (alpha, colour, row) of the albedos shown."""
     rows = np.unique(np.linspace(0, fitted.arrays["alpha"].size - 1, ALBEDOS).round().astype(int))
     colours = matplotlib.colormaps[COLOURS](np.linspace(0.05, 0.9, rows.size))
     pairs = zip(rows, colours, strict=True)

@@ -1,4 +1,4 @@
-"""Where laws fail, as a map: a panel a law and quantity, a cell an albedo and a radius or uniform number."""
+"""Maps of failures: a panel a law and quantity, a cell an albedo and a radius or uniform number."""
 
 from __future__ import annotations
 
@@ -14,20 +14,21 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from profilefit.report.figures.canvas import BLACK, ORANGE, PURPLE, VERMILION, WIDTH, YELLOW, canvas, save, styled
+from profilefit.report.tables.stability_tables import SIGNS
 from profilefit.studies.stability.cells import Cells, Verdict
 from profilefit.studies.stability.layout import ARITHMETICS, LENGTHS, QUANTITIES, ArgumentAxis
 
 # Red classes differ in lightness and carry a sign, as does what is not judged; the others are pale.
-LOOKS: Mapping[Verdict, tuple[str, str]] = {
-    Verdict.RIGHT: ("#DCEAF4", ""),
-    Verdict.OUTSIDE: ("#EDEDED", ""),
-    Verdict.BEYOND: ("#C4CED6", ""),
-    Verdict.NOT_JUDGED: ("#FFFFFF", "?"),
-    Verdict.INACCURATE: (YELLOW, "≈"),
-    Verdict.NOT_MONOTONE: (ORANGE, "↕"),
-    Verdict.NEGATIVE: (PURPLE, "−"),
-    Verdict.NOT_FINITE: (VERMILION, "×"),
-    Verdict.RAISES: (BLACK, "!"),
+COLOURS = {
+    Verdict.RIGHT: "#DCEAF4",
+    Verdict.OUTSIDE: "#EDEDED",
+    Verdict.BEYOND: "#C4CED6",
+    Verdict.NOT_JUDGED: "#FFFFFF",
+    Verdict.INACCURATE: YELLOW,
+    Verdict.NOT_MONOTONE: ORANGE,
+    Verdict.NEGATIVE: PURPLE,
+    Verdict.NOT_FINITE: VERMILION,
+    Verdict.RAISES: BLACK,
 }
 # One of a kind, where all are there: a figure has room for these.
 ROWS = (
@@ -54,11 +55,11 @@ SIGNED = 12  # cells that a region needs for its sign
 
 
 def stability_figures(cells: Iterable[Cells], out: Path) -> list[Path]:
-    """A figure for each arithmetic that occurs; the files."""
-    found = list(cells)
+    """Draw a figure for each arithmetic that occurs, and return the files."""
+    tensors = list(cells)
     files: list[Path] = []
     for arithmetic in ARITHMETICS:
-        panels = {(one.subject, one.quantity): one for one in found if _is_drawn(one, arithmetic)}
+        panels = {(one.subject, one.quantity): one for one in tensors if _is_drawn(one, arithmetic)}
         if panels:
             files += stability_figure(panels, arithmetic, out, f"stability-{arithmetic.replace(' ', '-')}")
     return files
@@ -66,7 +67,7 @@ def stability_figures(cells: Iterable[Cells], out: Path) -> list[Path]:
 
 @styled
 def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, out: Path, name: str) -> list[Path]:
-    """Laws down, quantities across; the class of every cell, the worst over all lengths that a law accepts."""
+    """Draw the class of every cell, the worst over all lengths that a law accepts: laws down, quantities across."""
     subjects = _rows([subject for subject, _ in panels])
     figure = canvas(MARGIN + ROW_HEIGHT * len(subjects), WIDTH)
     quantities = [one for one in QUANTITIES if any(quantity == one for _, quantity in panels)]
@@ -80,7 +81,7 @@ def stability_figure(panels: Mapping[tuple[str, str], Cells], arithmetic: str, o
     _share_labels(grid)
     seen = {code for one in panels.values() for code in np.unique(_worst(one))}
     handles = [
-        Patch(facecolor=LOOKS[one][0], edgecolor=BLACK, linewidth=0.4, label=f"{LOOKS[one][1]} {one.words}".strip())
+        Patch(facecolor=COLOURS[one], edgecolor=BLACK, linewidth=0.4, label=f"{SIGNS.get(one, '')} {one.words}".strip())
         for one in Verdict
         if one in seen
     ]
@@ -95,19 +96,19 @@ def _is_drawn(one: Cells, arithmetic: str) -> bool:
 
 
 def _rows(subjects: Sequence[str]) -> list[str]:
-    """Those of `ROWS`, or all, where few were requested."""
+    """Return the subjects among `ROWS`, or all where few were requested."""
     distinct = list(dict.fromkeys(subjects))
     return distinct if len(distinct) <= len(ROWS) else [one for one in ROWS if one in distinct]
 
 
 def _worst(cells: Cells) -> NDArray[np.int8]:
-    """(alphas, radii or shares)."""
+    """Return the worst class over usual lengths, (alphas, radii or shares)."""
     if len(cells.axes) == 2:
         return cells.codes
     lengths, (low, high) = cells.axes[2].values, LENGTHS[cells.dtype]
     usual = (lengths >= max(low, USUAL[0])) & (lengths <= min(high, USUAL[1]))
-    found: NDArray[np.int8] = np.max(cells.codes[..., usual], axis=2)
-    return found
+    worst: NDArray[np.int8] = np.max(cells.codes[..., usual], axis=2)
+    return worst
 
 
 def _draw(ax: Axes, cells: Cells | None) -> None:
@@ -117,11 +118,11 @@ def _draw(ax: Axes, cells: Cells | None) -> None:
         ax.text(0.5, 0.5, "not measured", transform=ax.transAxes, ha="center", va="center", fontsize=7.0)
         return
     codes = _worst(cells)
-    colours = ListedColormap([LOOKS[one][0] for one in Verdict])
+    colours = ListedColormap([COLOURS[one] for one in Verdict])
     norm = BoundaryNorm(np.arange(len(Verdict) + 1) - 0.5, len(Verdict))
     ax.imshow(codes, origin="lower", aspect="auto", interpolation="nearest", cmap=colours, norm=norm)
     for verdict in Verdict:
-        if sign := LOOKS[verdict][1]:
+        if sign := SIGNS.get(verdict):
             _sign(ax, codes == verdict, sign)
     _ticks(ax.set_yticks, cells.axes[0])
     _ticks(ax.set_xticks, cells.axes[1])
@@ -129,7 +130,7 @@ def _draw(ax: Axes, cells: Cells | None) -> None:
 
 
 def _sign(ax: Axes, part: NDArray[np.bool_], sign: str) -> None:
-    """A sign in the middle of every region that has room for it."""
+    """Write a sign in the middle of every region that has room for it."""
     labels, count = ndimage.label(part, structure=np.ones((3, 3), int))
     for number in range(1, count + 1):
         inside = labels == number
@@ -152,7 +153,7 @@ def _ticks(put: Any, axis: ArgumentAxis) -> None:
 
 
 def _share_labels(grid: NDArray[Any]) -> None:
-    """Numbers only at the left and below."""
+    """Leave numbers only at the left and below."""
     for row in grid[:-1]:
         for ax in row:
             ax.tick_params(labelbottom=False)

@@ -1,4 +1,4 @@
-"""What N Gaussians cost: the error of sums of them over their number, of every stack that a folder has records of."""
+"""Error of sums of Gaussians over their number, of every stack that a folder has records of."""
 
 from __future__ import annotations
 
@@ -27,34 +27,34 @@ LINES = {"searchlight": (0, (1, 1.5)), "diffuse": "-"}
 
 
 def sums_of(folder: Path) -> dict[str, SumRecord]:
-    """The records of sums that lie in a folder of records, by the names of their stacks."""
+    """Return the records of sums that lie in a folder of records, by the names of their stacks."""
     return {name: load(path) for name, path in record.available(folder / SUMS).items()}
 
 
 @styled
 def sum_figure(source: Source, out: Path, name: str = NAME) -> list[Path]:
-    """rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
-    found = sums_of(source.folder)
-    columns = min(len(found), LONGEST)
-    rows = -(-len(found) // columns)
+    """Draw rel [-] of 1 to 8 Gaussians, a panel a stack; of skin the six published ones too."""
+    sums = sums_of(source.folder)
+    columns = min(len(sums), LONGEST)
+    rows = -(-len(sums) // columns)
     figure = canvas(ROW * rows + FEET)
     panels = list(figure.subplots(rows, columns, sharey=True, squeeze=False).flat)
-    for ax in panels[len(found) :]:
+    for ax in panels[len(sums) :]:
         ax.remove()
-    for ax, (stack, one) in zip(panels, found.items(), strict=False):
+    for ax, (stack, one) in zip(panels, sums.items(), strict=False):
         _draw(ax, one)
         ax.set_title(stack)
     for ax in panels[0::columns]:
         ax.set_ylabel("mean relative error of R$_d$ [-]")
-    legend_below(figure, panels[: len(found)])
+    legend_below(figure, panels[: len(sums)])
     return save(figure, out, name)
 
 
-def sum_caption(found: Mapping[str, SumRecord]) -> str:
-    """What the figure shows, and what six Gaussians cost by these records."""
+def sum_caption(sums: Mapping[str, SumRecord]) -> str:
+    """Return what the figure shows, and what six Gaussians cost by these records."""
     of_six = {
         (key, stack, light, channel): value
-        for stack, one in found.items()
+        for stack, one in sums.items()
         for light in ILLUMINATIONS
         for key in ("rel", "alone")
         for channel, value in zip(CHANNELS, one.content["sums"][light]["by_count"][DEFAULT - 1][key], strict=True)
@@ -67,7 +67,7 @@ def sum_caption(found: Mapping[str, SumRecord]) -> str:
         f"Six are off by {_percent(min(rel.values()))} to {_percent(max(rel.values()))} (worst: {worst[0]}, "
         f"{worst[2]}, {worst[1]}), by at most {_percent(max(alone.values()))} where each colour has its own variances."
     )
-    for one in found.values():
+    for one in sums.values():
         if others := published(one).get(one.content["setting"]["illumination"]):
             own = one.content["sums"][one.content["setting"]["illumination"]]["by_count"][DEFAULT - 1]
             off = ", ".join(_percent(each["rel"]) for each in others)

@@ -87,7 +87,7 @@ def place_labels(axes: Axes, labels: Sequence[Label], taken: Sequence[Bbox], siz
 
 
 def box_of(axes: Axes, points: Sequence[tuple[float, float]], around: float = 0.0) -> Bbox:
-    """The box in pixels of points in data coordinates, so many points wider on all sides."""
+    """Return the box in pixels of places in data coordinates, `around` points wider on all sides."""
     places = axes.transData.transform(np.asarray(points, float))
     margin = around * _pixels(axes)
     (x0, y0), (x1, y1) = places.min(axis=0) - margin, places.max(axis=0) + margin
@@ -95,12 +95,12 @@ def box_of(axes: Axes, points: Sequence[tuple[float, float]], around: float = 0.
 
 
 def renderer_of(axes: Axes) -> RendererBase:
-    """What measures text on this figure's canvas."""
+    """Return the renderer that measures text on this figure's canvas."""
     return axes.figure.canvas.get_renderer()  # type: ignore[attr-defined]
 
 
 def _pixels(axes: Axes) -> float:
-    """Pixels of a point, 1/72 inch."""
+    """Return the pixels of a point, 1/72 inch."""
     figure = axes.figure
     return (figure.dpi if isinstance(figure, Figure) else figure.figure.dpi) / 72.0
 
@@ -130,7 +130,7 @@ def _placed(note: Annotation, place: tuple[float, float], renderer: RendererBase
 
 
 def _crowding(box: Bbox, taken: Sequence[Bbox], inside: Bbox) -> float:
-    """Square pixels that a label would share with others, or have outside the axes."""
+    """Return square pixels that a label would share with others, or have outside the axes."""
     shared = sum(_area(Bbox.intersection(box, other)) for other in taken)
     return shared + 10.0 * (_area(box) - _area(Bbox.intersection(box, inside)))
 
@@ -190,7 +190,7 @@ def draw(axes: Axes, panel: Panel, colours: dict[str, str]) -> None:
 
 
 def _mark(axes: Axes, point: Point, standing: str, colour: str) -> None:
-    """The point, its spread in both directions, and a thin line to the worst error."""
+    """Draw the point, its spread in both directions, and a thin line to the worst error."""
     x, y = point.cost, point.error
     style: dict[str, Any] = {"color": colour, **MARKS[standing]}
     if standing == FRONT:
@@ -216,18 +216,14 @@ def _label(axes: Axes, panel: Panel) -> None:
 
 
 def text_of(point: Point, first: bool) -> str:
-    """The method, and what distinguishes it from others of its line; of the later ones only that."""
-    effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: _power(m[1], m[2]), point.label)
+    """Return the method, and what distinguishes it from others of its line; of the later ones only that."""
+    effort = re.sub(r"\b(\d)e(\d+)\b", lambda m: f"{'' if m[1] == '1' else m[1] + '·'}10$^{m[2]}$", point.label)
     method = point.method.replace("normalized diffusion, Xie", "Xie").replace("normalized diffusion", "norm. diffusion")
     return f"{method}: {effort}" if first and effort else effort or method
 
 
-def _power(digit: str, exponent: str) -> str:
-    return f"10$^{exponent}$" if digit == "1" else f"{digit}·10$^{exponent}$"
-
-
 def _boxes(axes: Axes, point: Point) -> list[Bbox]:
-    """Of the bars: no label should hide them."""
+    """Return the boxes of a point's bars, which no label should hide."""
     x, y = point.cost, point.error
     top = y.high if point.worst is None else point.worst.value
     return [
@@ -237,7 +233,7 @@ def _boxes(axes: Axes, point: Point) -> list[Bbox]:
 
 
 def _steps(axes: Axes, panel: Panel) -> Iterator[Bbox]:
-    """The front's line."""
+    """Yield boxes along the line of the front."""
     best = [panel.points[i] for i in front(panel.points)]
     for one, other in pairwise(best):
         (x, y), (next_x, next_y) = (one.cost.value, one.error.value), (other.cost.value, other.error.value)
@@ -246,7 +242,7 @@ def _steps(axes: Axes, panel: Panel) -> Iterator[Bbox]:
 
 
 def _feet(figure: Figure, part: TradeoffPart, caption: str) -> None:
-    """What the marks mean, and on which machine."""
+    """Write what the marks mean, and on which machine."""
     used = {standing for panel in part.panels for standing in standings(panel.points)}
     joined = any(panel.joined for panel in part.panels)
     handles = [_handle(standing, GREY if joined else _colour(standing)) for standing in MARKS if standing in used]
@@ -276,7 +272,7 @@ def _methods(points: Sequence[Point]) -> list[str]:
 
 
 def colours_of(points: Sequence[Point]) -> dict[str, str]:
-    """By method; of a part's points, so that a method looks the same in all its panels."""
+    """Return a colour by method, the same in all panels of a part."""
     return {method: LINES[i % len(LINES)] for i, method in enumerate(_methods(points))}
 
 

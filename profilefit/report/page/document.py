@@ -95,25 +95,25 @@ def write_page(
     """
     require_writable(path, room=ROOM)
     source = Source(folder, tuple(names) if names else None)
-    found = EvidenceFolder(evidence, folder)
+    measures = EvidenceFolder(evidence, folder)
     for file in source.paths.values():  # damage is reported now, not after a minute
         record.read(file, whole=True)
-    measured = {key: found.section(name, parts) for key, (name, parts) in MEASURED.items()}
-    measured["claims"] = "\n".join(promises(found))
-    makers = _makers(source, found, path.name) | {key: partial(str, text) for key, text in measured.items()}
+    measured = {key: measures.section(name, parts) for key, (name, parts) in MEASURED.items()}
+    measured["claims"] = "\n".join(promises(measures))
+    makers = _makers(source, measures, path.name) | {key: partial(str, text) for key, text in measured.items()}
     made = {key: makers[key]() for key in (tracked(list(makers)) if tracked else makers)}
     write_whole(path, _document(made, len(source.paths)))
 
 
-def _makers(source: Source, found: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
-    """Part -> what makes it; each record is a part of its own, since they take longest."""
+def _makers(source: Source, measures: EvidenceFolder, page: str) -> dict[str, Callable[[], str]]:
+    """Return the makers of the parts by name; each record is a part of its own, since they take longest."""
     return {
         "fits": lambda: fits.overview(source),
         "explorer": lambda: explorer_section(source.folder),
         "constants": lambda: fits.whole_figure(source, "constants"),
         "quality": lambda: fits.whole_figure(source, "quality"),
         "paper": lambda: "\n".join(fits.paper_figures(source)),
-        "stacks": lambda: "\n".join(layers(source, found)),
+        "stacks": lambda: "\n".join(layers(source, measures)),
         **{f"{RECORD}{name}": partial(fits.record_part, source, name) for name in source.paths},
         "provenance": lambda: "\n".join(provenance(source, page)),
     }
@@ -128,7 +128,7 @@ def _document(made: Mapping[str, str], count: int) -> str:
 
 
 def document(title: str, lead: str, told: str, parts: Mapping[str, tuple[str, str]]) -> str:
-    """A page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
+    """Return a page of sections, each with its title and HTML, by what a link to it ends in; the rest is plain text."""
     rules, sections = classed("\n".join(section(key, head, [text]) for key, (head, text) in parts.items()))
     links = "".join(element("li", element("a", escape(head), href=f"#{key}")) for key, (head, _) in parts.items())
     return PAGE.substitute(

@@ -1,4 +1,4 @@
-"""What was fitted from what: records, each with tables, figures, the command that makes it; digests and versions."""
+"""Records as parts of the page, each with tables, figures, the command that makes it; digests and versions."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SHOWN = 12  # letters of a SHA-256
 
 
 def provenance(source: Source, page: str) -> Iterator[str]:
-    """Digests of data and records, libraries, the commands that make it again; `page` is the file's own name."""
+    """Yield digests of data and records, libraries, the commands that make it again; `page` is the file's own name."""
     contents = {name: source.content(name) for name in source.paths}
     columns = {
         "record": list(contents),
@@ -32,7 +32,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
         "seed": [str(one["seed"]) for one in contents.values()],
         "preset": [str(one["preset"]) for one in contents.values()],
         "data": [str(one.get("data_digest", ABSENT))[:SHOWN] for one in contents.values()],
-        "record's own": [_sha(path.read_bytes()) for path in source.paths.values()],
+        "record's own": [hashlib.sha256(path.read_bytes()).hexdigest()[:SHOWN] for path in source.paths.values()],
     }
     caption = f"SHA-256, the first {SHOWN} letters, of the numbers that were fitted and of the record's file"
     yield markup(column_table("Records", columns, caption, left=("record", "preset", "data", "record's own")))
@@ -46,7 +46,7 @@ def provenance(source: Source, page: str) -> Iterator[str]:
 
 
 def again(contents: Mapping[str, Content], named: bool = True) -> list[str]:
-    """The commands that make these records again, a line for each preset, seed and number of photons."""
+    """Return the commands that make these records again, a line for each preset, seed and number of photons."""
     groups: dict[str, list[str]] = {}
     for name, one in contents.items():
         groups.setdefault(_options(one), []).append(name)
@@ -69,10 +69,6 @@ def _photons(content: Content) -> str:
     return ABSENT if photons is None else f"{photons:.3g}".replace("e+0", "e")
 
 
-def _sha(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()[:SHOWN]
-
-
 # What a figure shows, by how its name begins.
 CAPTIONS = {
     "liang-7-profile": "Equation (7): r R_d of photons, of the exact half space, of the law printed and regenerated.",
@@ -90,7 +86,7 @@ CAPTIONS = {
 
 
 def drawn(plan: Plan, source: Source) -> str:
-    """The figure of a plan as part of a page; where it cannot be drawn, why."""
+    """Return the figure of a plan as part of a page; where it cannot be drawn, why."""
     reason = plan.missing or ", ".join(f"no record {name}" for name in plan.needs if name not in source.paths)
     if reason:
         return paragraph(f"{plan.name}: {reason}", "dim")
@@ -98,7 +94,7 @@ def drawn(plan: Plan, source: Source) -> str:
 
 
 def drawing(name: str, draw: Callable[[Path], list[Path]], title: str = "") -> str:
-    """The figure `name` that `draw` writes into a folder; its title is its name's `caption` where none is given."""
+    """Return the figure `name` that `draw` writes into a folder; its title is by default the `caption` of its name."""
     with tempfile.TemporaryDirectory() as folder, only("svg"):
         (file,) = draw(Path(folder))
         svg = file.read_text(encoding="utf-8")
@@ -107,30 +103,30 @@ def drawing(name: str, draw: Callable[[Path], list[Path]], title: str = "") -> s
 
 
 def caption(name: str) -> str:
-    """What a figure shows: by its name, or by how that begins."""
+    """Return what a figure shows: by its name, or by how that begins."""
     return CAPTIONS.get(name) or CAPTIONS[name.split("-")[0]]
 
 
 def overview(source: Source) -> str:
-    """A line a record."""
+    """Return the summary of all records, a line each."""
     return markup(summary({name: source.content(name) for name in source.paths}))
 
 
 def whole_figure(source: Source, name: str) -> str:
-    """A figure of more than one record: constants, printed against regenerated, or quality by albedo."""
+    """Return a figure of more than one record: constants, printed against regenerated, or quality by albedo."""
     (plan,) = (one for one in plans(source) if one.name == name)
     return drawn(plan, source)
 
 
 def paper_figures(source: Source) -> Iterator[str]:
-    """The figures of the paper again, as far as there are records for them."""
+    """Yield the figures of the paper again, as far as there are records for them."""
     for plan in PAPER:
         if all(name in source.paths for name in plan.needs):
             yield drawn(plan, source)
 
 
 def record_part(source: Source, name: str, figures: bool = True) -> str:
-    """Everything of one record, folded; without `figures` only what its .json has."""
+    """Return everything of one record, folded; without `figures` only what its .json has."""
     content = source.content(name)
     tables = "\n".join(markup(part) for part in record_tables(content))
     plans_of = [plan for plan in record_plans(source, name) if not plan.missing] if figures else []

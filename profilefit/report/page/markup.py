@@ -16,34 +16,34 @@ LETTERS = Console(file=None, color_system=None, highlight=False, markup=False)
 
 
 def element(tag: str, inside: str, **attributes: str) -> str:
-    """`<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens."""
+    """Return `<tag ...>inside</tag>`; `class_` stands for class, underscores for hyphens."""
     told = "".join(f' {key.rstrip("_").replace("_", "-")}="{escape(text)}"' for key, text in attributes.items())
     return f"<{tag}{told}>{inside}</{tag}>"
 
 
 def paragraph(text: str, class_: str = "") -> str:
-    """A paragraph of plain text."""
+    """Return a paragraph of plain text."""
     return element("p", escape(text), **({"class_": class_} if class_ else {}))
 
 
 def command(line: str) -> str:
-    """A command to type."""
+    """Return a command to type."""
     return element("pre", element("code", escape(line)), class_="command", tabindex="0")
 
 
 def details(summary: str, inside: str, id_: str = "", is_open: bool = False) -> str:
-    """What a click opens."""
+    """Return a summary with content that a click opens."""
     given = ({"id_": id_} if id_ else {}) | ({"open": ""} if is_open else {})
     return element("details", f"<summary>{summary}</summary>\n{inside}", **given)
 
 
 def section(id_: str, title: str, parts: Iterable[str]) -> str:
-    """A section with its heading."""
+    """Return a section with its heading."""
     return element("section", f"<h2>{escape(title)}</h2>\n" + "\n".join(parts), id_=id_)
 
 
 def figure(drawn: str, title: str, on_paper: bool = False) -> str:
-    """A drawing or picture with its title below.
+    """Return a drawing or picture with its title below.
 
     on_paper  keeps its own light colours, also on a dark page: pictures of pixels have no variables
     """
@@ -52,7 +52,7 @@ def figure(drawn: str, title: str, on_paper: bool = False) -> str:
 
 
 def markup(part: RenderableType) -> str:
-    """The HTML of a text, a table, or a group of them, as `profilefit.report` makes them for the terminal."""
+    """Return the HTML of a text, a table, or a group of them, as `profilefit.report` makes them for the terminal."""
     if isinstance(part, str):
         return paragraph(part)
     if isinstance(part, Text):
@@ -94,7 +94,7 @@ def _cell(cell: RenderableType) -> str:
 
 
 def _letters(text: Text, around: Style) -> str:
-    """The text, each stretch with its style unless it is that of what stands around; a new line is a break."""
+    """Return the text, each stretch with its style unless it is that of what stands around; a new line is a break."""
     own, stretches = _style(text), []
     for letters, stretch, _ in text.render(LETTERS):
         inside, style = escape(letters).replace("\n", "<br>"), stretch or own  # a text of one style names none
@@ -108,7 +108,7 @@ def _style(text: Text) -> Style:
 
 
 def _classes(style: Style) -> dict[str, str]:
-    """Class names for a style's weight and colour."""
+    """Return class names for a style's weight and colour."""
     words = [word for word in ("bold", "dim") if getattr(style, word)]
     if style.color is not None:
         words.append(style.color.name)

@@ -30,7 +30,7 @@ class EvidenceFolder:
     records: Path
 
     def section(self, name: str, parts: Callable[[EvidenceFolder], Iterator[str]]) -> str:
-        """The parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
+        """Return the parts of one section; InputError where the files of `profilefit NAME` lack what it shows."""
         try:
             return "\n".join(parts(self))
         except (KeyError, TypeError, ValueError, AttributeError, OSError) as error:
@@ -40,7 +40,7 @@ class EvidenceFolder:
             ) from error
 
     def told(self, name: str) -> Told | None:
-        """The content of `name`.json; None if there is none. InputError on a file of another kind."""
+        """Return the content of `name`.json; None if there is none. InputError on a file of another kind."""
         path = self.folder / f"{name}.json"
         expected = f"{path}: expected what `profilefit {name} --out` writes"
         if not path.exists():
@@ -54,7 +54,7 @@ class EvidenceFolder:
         return content
 
     def drawing(self, name: str, title: str, on_paper: bool = False) -> str:
-        """The figure `name`.svg beside it, or nothing."""
+        """Return the figure `name`.svg beside it, or nothing."""
         path = self.folder / f"{name}.svg"
         if not path.exists():
             return ""
@@ -64,22 +64,20 @@ class EvidenceFolder:
         return figure(inline(checked(content.decode("utf-8")), name, title), title, on_paper)
 
     def origin(self, told: Told) -> str:
-        """When, where and by which command; and whether the records have changed since."""
+        """Return when, where and by which command it was measured, and whether the records have changed since."""
         made = told["made"]
         machine = made.get("machine") or {}
         when = f"Measured {made.get('date')} on {machine.get('processor')} ({machine.get('cores')} cores) by"
         parts = [paragraph(when, "dim"), command(str(made.get("command")))]
         if told.get("of", ALL) != ALL:
-            parts.append(paragraph(f"Not of everything: of {_listed(told['of'])}.", "red"))
+            of = told["of"]
+            listed = ", ".join(of) if isinstance(of, list) else str(of)
+            parts.append(paragraph(f"Not of everything: of {listed}.", "red"))
         if evidence.stale(made, self.records):
             parts.append(paragraph("Since then records or version have changed: run it again.", "red"))
         return "\n".join(parts)
 
 
-def _listed(of: Any) -> str:
-    return ", ".join(of) if isinstance(of, list) else str(of)
-
-
 def missing(name: str) -> str:
-    """What stands where nothing was measured."""
+    """Return the text for a measurement that is absent."""
     return paragraph("Not measured here. This does it:", "dim") + command(f"profilefit {name} --out evidence")

@@ -1,4 +1,4 @@
-"""What a photograph leaves behind: the medium as a shader's text, and a page of it, of the spot and of the fit."""
+"""Files of a photograph: the medium as a shader's text, and a page of it, of the spot and of the fit."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ SHADER = (
 
 
 def diffuse_law(setting: Setting) -> Named:
-    """The law for diffuse light at a medium's n and g; SettingError where there is none."""
+    """Return the law for diffuse light at a medium's n and g; SettingError where there is none."""
     try:
         return find("hazard-diffuse", fits_folder(), None, setting.n, setting.g)
     except SettingError as error:
@@ -44,7 +44,7 @@ def diffuse_law(setting: Setting) -> Named:
 
 
 def medium_text(found: Photo, law: Named) -> str:
-    """GLSL of a law for diffuse light, and after it albedo and mean free path by colour."""
+    """Return GLSL of a law for diffuse light, and after it albedo and mean free path by colour."""
     fits = list(found.fits.values())
     values = {
         name: np.array([[one.values[of] for one in fits], [one.errors[of] for one in fits]])
@@ -58,7 +58,7 @@ def medium_text(found: Photo, law: Named) -> str:
 
 
 def photo_page(found: Photo, folder: Path, text: str) -> str:
-    """The page as HTML that needs no other file; `folder` holds the drawings, text is that of the shader."""
+    """Return the page as HTML that needs no other file; `folder` holds the drawings, text is that of the shader."""
     parts = {
         "medium": ("The medium", "\n".join([*map(markup, photo_tables(found)), *map(paragraph, photo_lines(found))])),
         "spot": ("The spot", _drawing(folder, SPOT, on_paper=True)),

@@ -1,4 +1,4 @@
-"""What was measured with the laws, as sections of the page: shader check, cost, failures."""
+"""Measurements of the laws as sections of the page: shader check, cost, failures."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ from profilefit.report.tables.cells import ABSENT, column_table, significant
 from profilefit.report.tables.claims_table import FILE, claim_tables, read_claims
 from profilefit.report.tables.stack_table import stack_table
 from profilefit.report.tables.sum_table import sum_tables
+from profilefit.report.tables.tradeoff_tables import with_spread
 from profilefit.studies.stability.cells import Verdict
 
 # `python -m benchmarks.render` makes them.
@@ -54,18 +55,18 @@ MEANING = (
 COSTS = "Cost of one evaluation: ns of the fastest turn; in brackets the median of its ratios to normalized diffusion's"
 
 
-def shader(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
-    told = found.told("check")
-    yield missing("check") if told is None else "\n".join([found.origin(told), *_check(told)])
+def shader(evidence: EvidenceFolder) -> Iterator[str]:
+    """Yield the parts of the section."""
+    told = evidence.told("check")
+    yield missing("check") if told is None else "\n".join([evidence.origin(told), *_check(told)])
     for name, title in RENDERS.items():
-        path = found.folder / name
+        path = evidence.folder / name
         if path.exists():
             yield _picture(path.read_bytes(), title)
 
 
-def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section: records of stacks, sums of Gaussians, and pictures; none where there is no record."""
+def layers(source: Source, evidence: EvidenceFolder) -> Iterator[str]:
+    """Yield the parts of the section: records of stacks, sums of Gaussians, pictures; none without a record."""
     table = None if source.names else stack_table(source.folder)
     if table is None:
         return
@@ -75,7 +76,7 @@ def layers(source: Source, found: EvidenceFolder) -> Iterator[str]:
         for name, one in sums.items():
             yield details(f"{escape(name)}: the numbers", "\n".join(map(markup, sum_tables(one))))
     for name, title in OF_LAYERS.items():
-        path = found.folder / name
+        path = evidence.folder / name
         if path.exists():
             yield _picture(path.read_bytes(), title)
 
@@ -106,16 +107,12 @@ def _columns(group: Sequence[Told], measures: Sequence[str]) -> dict[str, list[s
         columns[f"{short}\nmodel"] = [significant(one["model"]["values"].get(name)) for one in group]
         columns[f"{short}\nfloat32"] = [significant(one["rounding"].get(name)) for one in group]
     for place in ("inside", "outside"):
-        columns[f"bad\n{place}"] = [_count(one[place]) for one in group]
+        columns[f"bad\n{place}"] = [str(sum(v for v in one[place].values() if isinstance(v, int))) for one in group]
     return columns
 
 
 def _label(one: Told) -> str:
     return f"{one['name']}, {one['constants']}" if one["constants"] else str(one["name"])
-
-
-def _count(bad: Told) -> str:
-    return str(sum(value for value in bad.values() if isinstance(value, int)))
 
 
 def _costs(costs: Told) -> dict[str, list[str]]:
@@ -127,7 +124,7 @@ def _costs(costs: Told) -> dict[str, list[str]]:
 
 
 def _picture(png: bytes, title: str) -> str:
-    return figure(f'<img alt="{escape(title)}" src="{address(png)}">', title)
+    return figure(f'<img alt="{escape(title)}" src="{address(png, loss=True)}">', title)
 
 
 CHARTS = {
@@ -138,16 +135,17 @@ CHARTS = {
 }
 
 
-def speed(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
-    told = found.told("tradeoff")
+def speed(evidence: EvidenceFolder) -> Iterator[str]:
+    """Yield the parts of the section."""
+    told = evidence.told("tradeoff")
     if told is None:
         yield missing("tradeoff")
         return
     for name, title in CHARTS.items():
         if name in told:
-            yield found.origin({"made": told["made"], **told[name]})  # parts may have been measured on different days
-            yield found.drawing(f"tradeoff-{name}", title)
+            # Parts may have been measured on different days.
+            yield evidence.origin({"made": told["made"], **told[name]})
+            yield evidence.drawing(f"tradeoff-{name}", title)
             yield details(f"{escape(title)} The numbers", _numbers(told[name]))
 
 
@@ -157,25 +155,14 @@ def _numbers(part: Told) -> str:
         points = panel["points"]
         columns = {
             "": [f"{one['method']}, {one['label']}" if one["label"] else one["method"] for one in points],
-            "cost": [_with_spread(one["cost"]) for one in points],
-            "error": [_with_spread(one["error"]) for one in points],
+            "cost": [with_spread(**one["cost"]) for one in points],
+            "error": [with_spread(**one["error"]) for one in points],
             "worst": [significant(one["worst"]["value"]) if one["worst"] else ABSENT for one in points],
             "stands": [one["standing"] for one in points],
         }
-        caption = _plain(f"cost: {panel['cost']}; error: {panel['error']}")
-        tables.append(markup(column_table(_plain(panel["title"]), columns, caption, left=("", "stands"))))
+        caption = f"cost: {panel['cost']}; error: {panel['error']}".replace("$", "")
+        tables.append(markup(column_table(panel["title"].replace("$", ""), columns, caption, left=("", "stands"))))
     return "\n".join([*tables, *(paragraph(note, "dim") for note in part["notes"])])
-
-
-def _plain(text: str) -> str:
-    """Without the marks that make a subscript in a figure."""
-    return text.replace("$", "")
-
-
-def _with_spread(measured: Told) -> str:
-    value, low, high = (measured[key] for key in ("value", "low", "high"))
-    alone = significant(value, 3)
-    return alone if low == high else f"{alone} ({significant(low)} … {significant(high)})"
 
 
 HOLDS = {
@@ -188,49 +175,42 @@ ATLAS = "stability-"
 FIRST = "stability-float32"  # the arithmetic of shaders: open, the others folded
 
 
-def failures(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section."""
-    told = found.told("stability")
+def failures(evidence: EvidenceFolder) -> Iterator[str]:
+    """Yield the parts of the section."""
+    told = evidence.told("stability")
     if told is None:
         yield missing("stability")
         return
-    yield found.origin(told)
+    yield evidence.origin(told)
     yield paragraph(HOLDS[bool(told["passed"])], "bold")
-    yield paragraph(_unjudged(told["regions"]), "dim")
-    causes = _causes(told["regions"])
-    yield markup(column_table("Why cells are red, and what helps", causes, left=("cause", "as"), fold=("remedy",)))
-    for path in sorted(found.folder.glob(f"{ATLAS}*.svg")):
+    aside = sum(int(one["count"]) for one in told["regions"] if one["class"] == NOT_JUDGED)
+    yield paragraph(f"{aside} cells, of all laws, are not judged: there is no reference value.", "dim")
+    columns = _advice(told["regions"])
+    yield markup(column_table("Where cells are red, and what helps", columns, left=("as",), fold=("what helps",)))
+    for path in sorted(evidence.folder.glob(f"{ATLAS}*.svg")):
         title = f"Where laws fail: {path.stem.removeprefix(ATLAS).replace('-', ' ')}"
-        figure = found.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
+        figure = evidence.drawing(path.stem, f"{title}. A cell is an albedo and a radius or share.", on_paper=True)
         yield details(title, figure, is_open=path.stem == FIRST)
 
 
-def _unjudged(regions: Sequence[Told]) -> str:
-    count = sum(int(one["count"]) for one in regions if one["class"] == NOT_JUDGED)
-    return f"{count} cells, of all laws, are not judged: there is no reference value."
-
-
-def _causes(regions: Sequence[Told]) -> dict[str, list[str]]:
+def _advice(regions: Sequence[Told]) -> dict[str, list[str]]:
     groups: dict[str, list[Told]] = {}
     for region in regions:
-        groups.setdefault(str(region["cause"]), []).append(region)
-    rows = sorted(groups.values(), key=lambda group: -len(_laws(group)))
+        # Earlier versions wrote a cause and its remedy.
+        sentence = region["advice"] if "advice" in region else f"{region['cause']}: {region['remedy'] or UNKNOWN}"
+        groups.setdefault(sentence or UNKNOWN, []).append(region)
+    rows = sorted(groups.items(), key=lambda item: -len({one["law"] for one in item[1]}))
     return {
-        "cause": [group[0]["cause"] for group in rows],
-        "laws": [str(len(_laws(group))) for group in rows],
-        "cells": [str(sum(int(one["count"]) for one in group)) for group in rows],
-        "as": [", ".join(sorted({one["class"] for one in group})) for group in rows],
-        "remedy": [group[0]["remedy"] or UNKNOWN for group in rows],
+        "laws": [str(len({one["law"] for one in group})) for _, group in rows],
+        "cells": [str(sum(int(one["count"]) for one in group)) for _, group in rows],
+        "as": [", ".join(sorted({one["class"] for one in group})) for _, group in rows],
+        "what helps": [sentence for sentence, _ in rows],
     }
 
 
-def _laws(group: Sequence[Told]) -> set[str]:
-    return {one["law"] for one in group}
-
-
-def promises(found: EvidenceFolder) -> Iterator[str]:
-    """The parts of the section; nothing where no checkout measured them."""
-    if (found.folder / FILE).exists():
-        made, claims = read_claims(found.folder)
-        yield found.origin({"made": made})
+def promises(evidence: EvidenceFolder) -> Iterator[str]:
+    """Yield the parts of the section; nothing where no checkout measured them."""
+    if (evidence.folder / FILE).exists():
+        made, claims = read_claims(evidence.folder)
+        yield evidence.origin({"made": made})
         yield from map(markup, claim_tables(claims))

@@ -1,4 +1,4 @@
-"""How tables show numbers: digits that errors leave, columns of text, rows of blocks."""
+"""Cells of tables: digits that errors leave, columns and rows of text, blocks for numbers."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SEARCHLIGHT = "searchlight: a pencil beam (normal, collimated)"  # for captions
 
 
 def to_error(value: float | None, error: float | None) -> str:
-    """`value` to two digits of `error`, but never to fewer than three of its own."""
+    """Return `value` to two digits of `error`, but never to fewer than three of its own."""
     if value is None or not math.isfinite(value):
         return ABSENT
     places = LEAST_DIGITS - 1 - _exponent(value)
@@ -31,7 +31,7 @@ def to_error(value: float | None, error: float | None) -> str:
 
 
 def significant(value: float | None, digits: int = 2) -> str:
-    """`value` to so many significant digits, zeros kept."""
+    """Return `value` to so many significant digits, zeros kept."""
     if value is None or not math.isfinite(value):
         return ABSENT
     if value == 0:
@@ -42,9 +42,9 @@ def significant(value: float | None, digits: int = 2) -> str:
 
 
 def interval(ends: Sequence[float | None] | None, most: float | None = None) -> str:
-    """Both ends, to two digits of half their distance; one that is None leaves a limit.
+    """Return both ends, to two digits of half their distance; one that is None leaves a limit.
 
-    That has three digits, or two of its half distance from `most`, the end of what such a number can be.
+    A limit has three digits, or two of its half distance from `most`, the end of what such a number can be.
     """
     if ends is None:
         return ABSENT
@@ -57,19 +57,14 @@ def interval(ends: Sequence[float | None] | None, most: float | None = None) -> 
 
 
 def on_the_point(texts: Sequence[str]) -> list[str]:
-    """The same texts, blanks added on the right so that in a right-aligned column the decimal points stand together."""
-    tails = [len(text) - _point(text) for text in texts]
+    """Return the texts with blanks on the right, so that a right-aligned column has its decimal points together."""
+    tails = [len(text) - text.index(".") if "." in text else 0 for text in texts]
     widest = max(tails, default=0)
     return [text + " " * (widest - tail) for text, tail in zip(texts, tails, strict=True)]
 
 
-def _point(text: str) -> int:
-    """Where the decimal point stands, or would."""
-    return text.index(".") if "." in text else len(text)
-
-
 def _exponent(value: float) -> int:
-    """The power of ten of the first digit, after rounding to two of them."""
+    """Return the power of ten of the first digit, after rounding to two of them."""
     return int(f"{value:.1e}".split("e")[1])
 
 
@@ -80,7 +75,7 @@ def column_table(
     left: Sequence[str] = ("",),
     fold: Sequence[str] = (),
 ) -> Group:
-    """Columns of equally many texts under their headers, numbers to the right; title and caption as wide as the screen.
+    """Return columns of equally many texts under their headers, numbers to the right, as wide as the screen.
 
     left  headers of columns that stand to the left; fold those that may wrap, while all others keep to one line
     """
@@ -95,8 +90,26 @@ def column_table(
     return Group(*parts, Text(caption, style="dim")) if caption else Group(*parts)
 
 
+def row_table(
+    title: str,
+    header: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    caption: str = "",
+    left: Sequence[str] = ("",),
+    fold: Sequence[str] = (),
+    aligned: Sequence[str] = (),
+) -> Group:
+    """Return rows under their headers, as `column_table` shows columns; those `aligned` stand on the decimal point."""
+    columns: dict[str, list[str]] = {name: [] for name in header}
+    for row in rows:
+        for name, cell in zip(columns, row, strict=True):
+            columns[name].append(cell)
+    shown = {name: on_the_point(cells) if name in aligned else cells for name, cells in columns.items()}
+    return column_table(title, shown, caption, left, fold)
+
+
 def _width(texts: Sequence[str]) -> int:
-    """Columns of the screen that the widest line takes."""
+    """Return the columns of the screen that the widest line takes."""
     return max(cell_len(line) for text in texts for line in (text.splitlines() or [""]))
 
 
@@ -105,7 +118,7 @@ GAP = " "  # for what is no positive number
 
 
 def spark(values: Sequence[float | None], ends: tuple[float, float] | None, width: int | None = None) -> str:
-    """A block a value, the lowest at the first of `ends`, the highest at the second, logarithmic between.
+    """Return a block a value, the lowest at the first of `ends`, the highest at the second, logarithmic between.
 
     width  the most characters; of more values the largest of each stretch is shown, since an error may not be averaged
     """
@@ -115,7 +128,7 @@ def spark(values: Sequence[float | None], ends: tuple[float, float] | None, widt
 
 
 def span(rows: Iterable[Sequence[float | None]]) -> tuple[float, float] | None:
-    """The smallest and the largest positive number of all, so that sparks of one table have one scale; None of none."""
+    """Return the smallest and the largest positive number of all, the one scale of a table's sparks; None of none."""
     known = [value for row in rows for value in row if _is_shown(value)]
     return (min(known), max(known)) if known else None  # type: ignore[type-var, return-value]
 
@@ -132,7 +145,7 @@ def _is_shown(value: float | None) -> bool:
 
 
 def _at_most(values: Sequence[float | None], width: int) -> list[float | None]:
-    """The largest of each of `width` stretches of equally many values; all of them if they are no more."""
+    """Return the largest of each of `width` stretches of equally many values; all of them if they are no more."""
     count = min(width, len(values))
     ends = [round(i * len(values) / count) for i in range(count + 1)]
     stretches = [values[a:b] for a, b in pairwise(ends)]

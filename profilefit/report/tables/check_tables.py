@@ -39,7 +39,7 @@ HALF_CAPTION = "mean relative error of R_d / largest error of the cdf by float16
 
 
 def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str) -> list[RenderableType]:
-    """A line a law and a line a map."""
+    """Return a line a law and a line a map."""
     parts: list[RenderableType] = []
     if laws:
         columns = {"law": [one.of.label for one in laws], **_places(laws)}
@@ -53,7 +53,7 @@ def check_tables(laws: Sequence[LawCheck], maps: Sequence[MapCheck], device: str
 
 
 def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
-    """Of each law the distribution of its errors, and where the largest is."""
+    """Return the distribution of each law's errors, and where the largest is."""
     parts: list[RenderableType] = []
     for one in laws:
         spreads = one.spreads.values()
@@ -69,7 +69,7 @@ def place_tables(laws: Sequence[LawCheck]) -> list[RenderableType]:
 
 
 def _against_exact(one: LawCheck) -> str:
-    """The GPU's own errors beside the record's."""
+    """Return the GPU's own errors beside the record's."""
     pairs = [
         f"{name} {significant(value, 3)} (model {significant(one.model.get(name), 3)})"
         for name, value in one.measured.items()
@@ -78,27 +78,27 @@ def _against_exact(one: LawCheck) -> str:
 
 
 def cost_table(costs: Mapping[str, Cost], device: str) -> RenderableType:
-    """A row for each source."""
+    """Return a row for each source."""
     columns = {"source": list(costs)}
     for work in WORKS:
         columns[work] = [f"{significant(cost.ns[work])} ({cost.ratio[work]:.2f})" for cost in costs.values()]
     return column_table(f"Cost of one evaluation, {device}", columns, COST_CAPTION, left=("source",))
 
 
-def half_table(found: Sequence[HalfCheck]) -> RenderableType:
-    """A line a law, a column for each thing that is stored in float16."""
-    columns = {"law": [_at_index(one.of) for one in found]}
+def half_table(checks: Sequence[HalfCheck]) -> RenderableType:
+    """Return a line a law, a column for each thing that is stored in float16."""
+    columns = {"law": [_at_index(one.of) for one in checks]}
     for name in (half.ALPHA, half.REFLECTANCE, half.RADIUS, half.RESULTS, half.ARITHMETIC):
-        if any(name in one.rel for one in found):
+        if any(name in one.rel for one in checks):
             columns[name] = [
                 f"{significant(one.rel[name])} / {significant(one.ks[name])}" if name in one.rel else ABSENT
-                for one in found
+                for one in checks
             ]
     return column_table("Half precision", columns, HALF_CAPTION, fold=("law",))
 
 
 def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
-    """The broken bounds, a line each, and the sum of it."""
+    """Return the broken bounds, a line each, and the sum of it."""
     lines = [Text(f"{FAIL} {_called(one)}: {bound}") for one in checks for bound in one.broken]
     failed = sum(bool(one.broken) for one in checks)
     count = f"{len(checks)} law{'s' if len(checks) != 1 else ''} or map{'s' if len(checks) != 1 else ''}"
@@ -106,14 +106,14 @@ def verdict_lines(checks: Sequence[LawCheck | MapCheck]) -> list[Text]:
 
 
 def markdown_check(folder: Path) -> str:
-    """The README's tables: all that was regenerated, and what Liang et al. printed. ShaderError without OpenGL."""
+    """Return the README's tables: all regenerated laws, and Liang et al.'s printed ones. ShaderError without OpenGL."""
     regenerated, printed = chosen((), REGENERATED, folder), chosen(("liang",), "published", folder)
-    found = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
-    return markdown_checks(found.laws, found.maps, found.costs, found.device)
+    results = checked((regenerated[0] + printed[0], regenerated[1] + printed[1]), folder)
+    return markdown_checks(results.laws, results.maps, results.costs, results.device)
 
 
 def markdown_checks(laws: Sequence[LawCheck], maps: Sequence[MapCheck], costs: Mapping[str, Cost], device: str) -> str:
-    """The README's tables: laws, maps, costs, and the broken bounds."""
+    """Return the README's tables: laws, maps, costs, and the broken bounds."""
     parts = []
     if laws:
         header = ("law", "light", "n", "g", *(_flat(name) for name in (*LAW_COLUMNS, *COUNTS)), "result")
@@ -144,7 +144,7 @@ def content(
     halves: Sequence[HalfCheck],
     device: str,
 ) -> dict[str, Any]:
-    """All of it as plain numbers and text, for --json; what is not finite is null."""
+    """Return all checks as plain numbers and text, for --json; null stands for what is not finite."""
     checks: list[LawCheck | MapCheck] = [*laws, *maps]
     whole = {
         "device": device,
@@ -173,7 +173,7 @@ def _check_content(one: LawCheck | MapCheck) -> dict[str, Any]:
 
 
 def _called(one: LawCheck | MapCheck) -> str:
-    """A label that distinguishes a map from the law of its name, and an index from others."""
+    """Return a label that distinguishes a map from the law of its name, and an index from others."""
     name = _at_index(one.of)
     return f"map {name}" if isinstance(one, MapCheck) and not one.of.records else name
 
@@ -184,7 +184,7 @@ def _at_index(one: Named) -> str:
 
 
 def _places(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
-    """n; and g, where one has it."""
+    """Return columns of n, and of g where one has it."""
     g = {"g": [f"{one.of.setting.g:g}" for one in checks]} if any(one.of.setting.g for one in checks) else {}
     return {"n": [f"{one.of.setting.n:g}" for one in checks], **g}
 
@@ -194,12 +194,12 @@ def _columns(headers: Sequence[str], rows: Sequence[Sequence[str]]) -> dict[str,
 
 
 def _verdicts(checks: Sequence[LawCheck] | Sequence[MapCheck]) -> dict[str, list[str]]:
-    found = _columns(COUNTS, [_counts(one) for one in checks])
-    return {**found, "result": [_result(one) for one in checks]}
+    columns = _columns(COUNTS, [_counts(one) for one in checks])
+    return {**columns, "result": [_result(one) for one in checks]}
 
 
 def _law_cells(one: LawCheck) -> tuple[str, ...]:
-    """Model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
+    """Return model and float32 error of profile and cdf; float32 error of radii, and of their pdf."""
     rounding = {name: value for name, value in one.rounding.items() if JUDGED[name] in one.spreads}
     own = one.spreads.get(OWN)
     cells = [value for name in ("rel", "ks") for value in (one.model.get(name), rounding.get(name))]

@@ -40,7 +40,7 @@ SEVERITY = ("enough", "enough alone", "undecided", "not enough")
 
 
 def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> RenderableType:
-    """The whole report of a choice.
+    """Return the report of a choice.
 
     layers  the one layer for a stack: none without one, one of a grey stack, or those of red, green and blue
     """
@@ -50,7 +50,8 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
         "next dearer": choice.dearer,
     }
     rows = {name: one for name, one in shown.items() if one is not None}
-    places = _places([one.error.total for one in rows.values()])
+    least = min(one.error.total for one in rows.values())
+    places = max(1 - math.floor(math.log10(max(100.0 * least, 1e-4))), 0)  # two digits of the least
     columns = {
         "": list(rows),
         "way": [one.option.label for one in rows.values()],
@@ -73,7 +74,7 @@ def choose_table(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()
 
 
 def atlas_line(need: AtlasNeed) -> str:
-    """Whether a heart's scene needs an atlas."""
+    """Return whether a heart's scene needs an atlas."""
     error, hidden = (significant(100 * one) for one in (need.error, need.hidden))
     misses = f"the screen by itself is wrong by {error} % of the light, by {hidden} % for what it does not see"
     is_coarse = need.is_broken and need.verdict == "no atlas"
@@ -82,12 +83,12 @@ def atlas_line(need: AtlasNeed) -> str:
 
 
 def atlas_content(need: AtlasNeed) -> dict[str, Any]:
-    """The same as data."""
+    """Return the answer as data."""
     return {"verdict": need.verdict, "error": need.error, "hidden": need.hidden, "tolerance": need.tolerance}
 
 
 def sea_lines(need: SeaNeed) -> list[str]:
-    """What a scene under the sea needs, a line each for terms, splat and steps, with the numbers."""
+    """Return what a scene under the sea needs, a line each for terms, splat and steps, with the numbers."""
     off = ", ".join(f"{kind} {_percent(error)} %" for kind, error in need.haze.items())
     folds = "light folds" if need.focus >= 1.0 else "no light folds"
     ways = {"sunlight": (need.light_steps, need.light), "views": (need.view_steps, need.view)}
@@ -102,7 +103,7 @@ def sea_lines(need: SeaNeed) -> list[str]:
 
 
 def sea_content(need: SeaNeed) -> dict[str, Any]:
-    """The same as data."""
+    """Return the answer as data."""
     return {
         "terms": need.terms,
         "haze": dict(need.haze),
@@ -115,20 +116,20 @@ def sea_content(need: SeaNeed) -> dict[str, Any]:
 
 
 def fur_lines(need: FurNeed) -> list[str]:
-    """How many layers fur needs, a line an angle, and the answer."""
-    found = []
+    """Return how many layers fur needs, a line an angle, and the answer."""
+    lines = []
     for angle, layers in need.layers.items():
         told = ", ".join(f"{_plain(name)} {count or 'none'}" for name, count in layers.items())
         best = need.cheapest(angle)
-        found.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
+        lines.append(f"{angle} degrees: {told}; cheapest: {'none' if best is None else _plain(best.name)}")
     wanted = f"(requested: {_percent(need.tolerance)} % of the length)"
     if need.way is None:
-        return [*found, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
-    return [*found, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
+        return [*lines, f"no way is within the tolerance at {need.angle} degrees, by {need.most} layers {wanted}"]
+    return [*lines, f"{_plain(need.way.name)}, {need.count} layers: the cheapest to {need.angle} degrees {wanted}"]
 
 
 def fur_content(need: FurNeed) -> dict[str, Any]:
-    """The same as data."""
+    """Return the answer as data."""
     return {
         "way": None if need.way is None else need.way.name,
         "layers": need.count,
@@ -147,12 +148,12 @@ def fur_content(need: FurNeed) -> dict[str, Any]:
 
 
 def _plain(name: str) -> str:
-    """Of a way, in a list."""
+    """Return the name of a way without commas, for a list."""
     return name.replace(",", "")
 
 
 def headline(choice: Choice) -> str:
-    """The answer in a line."""
+    """Return the answer in a line."""
     scene, one = choice.scene, choice.nearest
     requested, limits = f"{_percent(scene.tolerance)} %", "tolerance"
     if scene.budget.ms is not None:
@@ -166,7 +167,7 @@ def headline(choice: Choice) -> str:
 
 
 def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> dict[str, Any]:
-    """The same and all options, as data; filters with the constants that a shader needs; layers of every colour."""
+    """Return a choice and all options as data, with the constants that a shader needs, and layers of every colour."""
     scene = choice.scene
     made: dict[str, Any] = {
         "tolerance": scene.tolerance,
@@ -190,7 +191,7 @@ def content(choice: Choice, ratios: Ratios, layers: Sequence[OneLayer] = ()) -> 
 
 
 def export_hint(choice: Choice) -> str:
-    """How to get the shader source of what was chosen."""
+    """Return how to get the shader source of what was chosen."""
     option = choice.nearest.option
     if option.law is not None:
         index = option.law.setting.n
@@ -217,19 +218,19 @@ def _data(one: Predicted) -> dict[str, Any]:
 
 
 def _filters(choice: Choice) -> list[dict[str, Any]]:
-    """Weights [-] and offsets [unit] of the taps of each filter of the choice, in the middle of the scene's ranges."""
+    """Return weights [-] and offsets [unit] of the taps of each filter, in the middle of the scene's ranges."""
     option, scene = choice.nearest.option, choice.scene
     if not is_filter(option):
         return []
-    found = passes(option, middle(scene), reference_light(scene.setting))
+    filters = passes(option, middle(scene), reference_light(scene.setting))
     return [
         {"share": share.tolist(), "taps": kernel.taps(option.number, stretches).astype(float).tolist()}
-        for share, kernel, stretches in found
+        for share, kernel, stretches in filters
     ]
 
 
 def _serves(one: Predicted, choice: Choice) -> str:
-    """Which of the limits it keeps."""
+    """Return which of the limits an option keeps."""
     precise, paid = one.error.total <= choice.scene.tolerance, affordable(one, choice.scene)
     if precise and paid:
         budget = choice.scene.budget.ms
@@ -238,7 +239,7 @@ def _serves(one: Predicted, choice: Choice) -> str:
 
 
 def _reason(error: Error, unit: str) -> str:
-    """Where the error is worst, and what most of it comes from."""
+    """Return where the error is worst, and what most of it comes from."""
     part = max(PARTS, key=lambda name: getattr(error, name))
     case = error.case
     shape = "flat" if case.is_flat else f"radius {significant(case.radius)} {unit}"
@@ -263,14 +264,14 @@ def _caption(choice: Choice, ratios: Ratios) -> str:
 
 
 def _verdict(layer: OneLayer, choice: Choice) -> str:
-    """Whether it is within the tolerance, by itself and in what the choice leaves of it, in squares."""
+    """Return whether it is within the tolerance, by itself and in what the choice leaves of it, in squares."""
     alone = layer.verdict(choice.scene.tolerance)
     left = max(choice.scene.tolerance**2 - choice.nearest.error.total**2, 0.0) if choice.meets_tolerance else 0.0
     return "enough alone" if alone == "enough" and layer.verdict(math.sqrt(left)) != "enough" else alone
 
 
 def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
-    """What stands for the stack, of several colours for that which it serves worst."""
+    """Return what one layer in place of the stack costs, of several colours in the worst."""
     verdicts = [_verdict(layer, choice) for layer in layers]
     worst = max(range(len(layers)), key=lambda one: (SEVERITY.index(verdicts[one]), layers[one].error))
     layer, verdict = layers[worst], verdicts[worst]
@@ -295,11 +296,6 @@ def _layer(layers: Sequence[OneLayer], choice: Choice) -> str:
     return text
 
 
-def _places(shares: list[float]) -> int:
-    """Decimals of a percentage that show two digits of the least of these."""
-    return max(1 - math.floor(math.log10(max(100.0 * min(shares), 1e-4))), 0)
-
-
 def _percent(share: float, places: int | None = None) -> str:
-    """Without the sign: to so many decimals, or two digits."""
+    """Return a percentage without the sign, to so many decimals or two digits."""
     return significant(100.0 * share) if places is None else f"{100.0 * share:.{places}f}"

@@ -1,4 +1,4 @@
-"""What README and guides promise, beside what was measured: the rows that `make claims` writes in a checkout."""
+"""Claims of README and guides beside what was measured: the rows that `make claims` writes in a checkout."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Claim:
 
     @property
     def cells(self) -> tuple[str, str, str, str]:
-        """As text: of what, what is promised, what was measured, and its noise."""
+        """Texts of the claim, the promise, the measured value and its noise."""
         unit = f" {self.unit}" if self.unit else ""
         value, low, high = (significant(number, 3) for number in (self.value, self.low, self.high))
         measured = f"{value}{unit}{'' if self.holds else ' BROKEN'}"
@@ -63,7 +63,7 @@ class Claim:
 
 
 def read_claims(folder: Path) -> tuple[dict[str, Any], list[Claim]]:
-    """How the rows in `folder` were made, and the rows; InputError where there are none, or others than ours."""
+    """Return the origin of the claims in `folder`, and the claims; InputError where there are none."""
     path = folder / FILE
     told = read_json(path)
     try:
@@ -83,7 +83,7 @@ def _claim(row: Any) -> Claim:
 
 
 def claim_tables(claims: Sequence[Claim]) -> list[RenderableType]:
-    """A table for each command, under its name."""
+    """Return a table for each command, under its name."""
     return [_table(command, list(rows)) for command, rows in groupby(claims, key=lambda one: one.command)]
 
 
@@ -95,7 +95,7 @@ def _table(command: str, rows: Sequence[Claim]) -> RenderableType:
 
 
 def markdown_claims(folder: Path) -> str:
-    """All rows as one table for the documentation."""
+    """Return all rows as one table for the documentation."""
     made, claims = read_claims(folder)
     header = ("claim", "promised", "measured", "noise", "held against", "command", "load")
     rows = [(*one.cells, one.truth, f"`{one.command}`", one.load) for one in claims]

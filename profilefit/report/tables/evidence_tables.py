@@ -20,7 +20,7 @@ BEST = 3  # readings shown of each equation, nearest to print first
 
 
 def evidence_line(content: Content) -> str:
-    """How many equations have a reading that reproduces them, for the summary."""
+    """Return how many equations have a reading that reproduces them, for the summary."""
     readings = content.get("readings") or []
     equations = {reading.get("equation") for reading in readings}
     good = {r.get("equation") for r in readings if r.get("verdict") == "reproduced"}
@@ -28,19 +28,19 @@ def evidence_line(content: Content) -> str:
 
 
 def evidence_tables(content: Content) -> list[RenderableType]:
-    """The best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
-    found: list[RenderableType] = []
+    """Return the best readings of each equation with their evidence, and the nearest rows of the paper's table 1."""
+    parts: list[RenderableType] = []
     for equation, readings in _by(content.get("readings") or [], "equation").items():
-        found.append(_readings(equation, readings))
+        parts.append(_readings(equation, readings))
     if content.get("table1"):
-        found.append(_table1(content["table1"]))
+        parts.append(_table1(content["table1"]))
     if content.get("halves"):
-        found.append(_halves(content["halves"]))
-    return found or [Text("This record holds no readings.")]
+        parts.append(_halves(content["halves"]))
+    return parts or [Text("This record holds no readings.")]
 
 
 def _readings(equation: str, readings: list[Content]) -> RenderableType:
-    best = sorted(readings, key=lambda reading: _number(reading.get("curve_distance"), inf))[:BEST]
+    best = sorted(readings, key=_curve_distance)[:BEST]
     columns = {
         "verdict": [str(reading.get("verdict", ABSENT)) for reading in best],
         "curve": [_share(reading.get("curve_distance")) for reading in best],
@@ -64,14 +64,14 @@ def _summary(reading: Content) -> str:
 
 
 def _table1(rows: list[Content]) -> RenderableType:
-    """Every model of each material, at the channel and range that the other law's printed error points to."""
+    """Return every model of each material, at the channel and range that the other law's printed error points to."""
     shown = [row for group in _by(rows, "material").values() for row in _at_its_range(group)]
     columns = {
         "material": [f"{row.get('material', ABSENT)}, {row.get('channel', '')}, {_range(row)}" for row in shown],
         "model": [str(row.get("model", ABSENT)) for row in shown],
     }
     for place, part in enumerate(("near half", "far half", "all")):
-        columns[part] = [_at(_ratio(row), place) for row in shown]
+        columns[part] = [significant(ratio[place], 3) if place < len(ratio) else ABSENT for ratio in map(_ratio, shown)]
     caption = (
         f"MSE over the printed one, {len(shown)} of {len(rows)} rows. Channel and range are not printed: here they are "
         "those at which normalized diffusion, which has no unknown constant, comes nearest to its printed error."
@@ -107,10 +107,6 @@ def _distance(row: Content) -> float:
     return abs(log(whole)) if whole else inf
 
 
-def _at(values: list[Any], place: int) -> str:
-    return significant(values[place], 3) if place < len(values) else ABSENT
-
-
 def _range(row: Content) -> str:
     size = row.get("range_mm", row.get("range"))
     return f"{size:g} mm" if isinstance(size, int | float) else str(size or ABSENT)
@@ -120,14 +116,15 @@ def _share(value: float | None) -> str:
     return ABSENT if value is None else f"{100 * value:.1f} %"
 
 
-def _number(value: float | None, absent: float) -> float:
-    return absent if value is None else value
+def _curve_distance(reading: Content) -> float:
+    distance = reading.get("curve_distance")
+    return inf if distance is None else float(distance)
 
 
 def _by(rows: Iterable[Content], *keys: str) -> dict[Any, list[Content]]:
-    """Rows by the values of these keys, in order."""
-    found: dict[Any, list[Content]] = {}
+    """Return rows by the values of these keys, in order."""
+    groups: dict[Any, list[Content]] = {}
     for row in rows:
         values = tuple(row.get(key, ABSENT) for key in keys)
-        found.setdefault(values if len(keys) > 1 else values[0], []).append(row)
-    return found
+        groups.setdefault(values if len(keys) > 1 else values[0], []).append(row)
+    return groups

@@ -42,7 +42,7 @@ OF_LAW = "; ± model: from the law's own error, taken for a Gaussian process alo
 
 
 def fit_tables(result: MediumPosterior, title: str) -> list[RenderableType]:
-    """Estimates with errors, their correlations, and the most informative additional measurement."""
+    """Return estimates with errors, their correlations, and the most informative additional measurement."""
     parts: list[RenderableType] = [_quantity_table(result, title)]
     if result.identifiability is not None:
         if len(result.identified) > 1:
@@ -52,7 +52,7 @@ def fit_tables(result: MediumPosterior, title: str) -> list[RenderableType]:
 
 
 def fit_lines(result: MediumPosterior) -> list[Text]:
-    """A sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
+    """Return a sentence each on goodness of fit, misfit, identifiability, and how the data were prepared."""
     return [Text(line) for line in _lines(result)]
 
 
@@ -97,14 +97,14 @@ def _quantity_table(result: MediumPosterior, title: str) -> RenderableType:
 
 
 def _ends(ends: Sequence[float | None] | None, most: float | None) -> str:
-    """An interval, or in words that it says nothing."""
+    """Return an interval, or in words that it says nothing."""
     low, high = ends or (None, None)
     wide = low is not None and high is not None and low > 0 and high > WIDE * low
     return ANYTHING if wide else interval(ends, most)
 
 
 def _mark(result: MediumPosterior, name: str) -> str:
-    """What stands where a quantity has no symmetric error."""
+    """Return what stands where a quantity has no symmetric error."""
     if name not in result.moving:
         return HELD
     return EDGE if any(result.ends(name)) else ABSENT
@@ -136,7 +136,7 @@ def _advice_table(result: MediumPosterior) -> RenderableType:
 
 
 def described(one: Candidate, unit: str) -> str:
-    """A candidate in words."""
+    """Return a candidate in words."""
     if one.kind == "point":
         where = f"at r = {0.5 * (one.inner + one.outer):.3g} {unit}"
         if one.outer > one.inner:
@@ -183,7 +183,7 @@ def _lines(result: MediumPosterior) -> Iterator[str]:
 
 
 def _estimated(result: MediumPosterior) -> Iterator[str]:
-    """How errors that are themselves estimates are allowed for."""
+    """Yield a line on errors of data that are themselves estimates."""
     fit = result.fit
     yield (
         f"these are estimates of {np.median(fit.data.freedom):.2g} degrees of freedom each, their trend of "
@@ -212,9 +212,11 @@ def _goodness(result: MediumPosterior) -> Iterator[str]:
     if one.detected:
         added = _added(result)
         loud = max(added.values(), default=one.relative) >= LOUD
+        share = f"residuals of {100 * one.relative:.2g} % of a value are unexplained"
+        missed = share if one.relative < 1 else "it misses whole values"
         yield (
             f"{'MISFIT' if loud else 'misfit'} (p-value {p_value(one.joined)}): one layer does not explain the data "
-            f"under this light, scattering and surface; {_unexplained(one.relative)}; {_effect(result, added)}"
+            f"under this light, scattering and surface; {missed}; {_effect(result, added)}"
         )
     elif result.fit.plain is not None:
         ranges = result.fit.spec.ranges
@@ -229,7 +231,7 @@ def _goodness(result: MediumPosterior) -> Iterator[str]:
 
 
 def _added(result: MediumPosterior) -> dict[str, float]:
-    """Relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for or has no such errors."""
+    """Return relative errors of mu_a and mu_s' by lack of fit; empty where it is not allowed for."""
     fit = result.fit
     if fit.plain is None:
         return {}
@@ -250,14 +252,8 @@ def _effect(result: MediumPosterior, added: dict[str, float]) -> str:
     return f"it adds {by_lack}, where all other errors are {rest}; 95 % includes it"
 
 
-def _unexplained(relative: float) -> str:
-    return (
-        f"residuals of {100 * relative:.2g} % of a value are unexplained" if relative < 1 else "it misses whole values"
-    )
-
-
 def _rivals(result: MediumPosterior) -> Iterator[str]:
-    """Other media that explain the data as well."""
+    """Yield other media that explain the data as well."""
     fit, unit = result.fit, result.fit.data.unit
     for one in fit.rivals:
         values = rival_values(fit, one)
@@ -269,7 +265,7 @@ def _rivals(result: MediumPosterior) -> Iterator[str]:
 
 
 def _oblique(result: MediumPosterior) -> Iterator[str]:
-    """Whether the centre of light aslant is explained, and known well where it was measured."""
+    """Yield lines on the centre of oblique light: whether it is explained, and known well where it was measured."""
     fit, unit = result.fit, result.fit.data.unit or "units of r"
     one = fit.spec.oblique
     if one is None:
@@ -286,7 +282,7 @@ def _oblique(result: MediumPosterior) -> Iterator[str]:
 
 
 def _beam(result: MediumPosterior) -> Iterator[str]:
-    """Which beam was assumed, and whether another one would matter."""
+    """Yield lines on the beam that was assumed, and whether another one would matter."""
     fit, width = result.fit, result.width
     unit = fit.data.unit or "units of r"
     if fit.spec.instrument.beam is not None:
@@ -308,7 +304,7 @@ def _beam(result: MediumPosterior) -> Iterator[str]:
 
 
 def _narrowed(fit: MediumFit) -> str:
-    """What the data say of ranges."""
+    """Return what the data say of ranges."""
     if fit.range_marginal is None:
         return "no value of theirs gives a fit with errors, so the middle is fitted"
     units = {"beam": f" {fit.data.unit or 'units of r'}"}
@@ -320,7 +316,7 @@ def _narrowed(fit: MediumFit) -> str:
 
 
 def _medium(result: MediumPosterior) -> Iterator[str]:
-    """What is open of n and g, or assumed."""
+    """Yield lines on n and g: known as ranges, or assumed."""
     spec, there, unit = result.fit.spec, result.tissue, result.fit.data.unit
     if spec.ranges:
         known = ", ".join(f"{name} from {low:g} to {high:g}" for name, (low, high) in spec.ranges.items())
@@ -340,7 +336,7 @@ def _named(names: tuple[str, ...], setting: Setting) -> str:
 
 
 def _scale(result: MediumPosterior) -> Iterator[str]:
-    """A free scale that no reflectance has, and a length that the data do not reach."""
+    """Yield lines on a free scale that no reflectance has, and a length that the data do not reach."""
     fit = result.fit
     scale, mfp, r = fit.values["scale"], fit.values["l"], fit.data.r
     free = "scale" in result.moving and fit.spec.scale is None and fit.data.unit

@@ -70,18 +70,19 @@ class Page:
 
 
 def law_pages(folder: Folder) -> list[Page]:
-    """Every law and map that loads with the records in `folder`, profile laws first."""
+    """Return every law and map that loads with the records in `folder`, profile laws first."""
     records = Records.of(folder)
     profiles = sorted(all_profiles(records), key=lambda one: one.setting.n)  # that of n = 1 first
     laws = _grouped(profiles, lambda one: one.name.split(":")[0])
     maps = _grouped(
         sorted(albedo_laws(records, matched=False), key=lambda one: one.setting.n), lambda one: MAP + one.name
     )
-    return [Page(name, _title(name), tuple(found)) for name, found in {**laws, **maps}.items()]
+    titles = {name: f"{name.removeprefix(MAP)}, map between alpha and A" for name in maps}
+    return [Page(name, titles.get(name, name), tuple(members)) for name, members in {**laws, **maps}.items()]
 
 
 def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
-    """One page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
+    """Return one page in MyST Markdown; `figure` the path of a picture of its quality, as seen from the page."""
     parts = [
         f"# {page.title}",
         *(f"```{{eval-rst}}\n.. autoclass:: {_constructor(one)}\n   :no-members:\n```" for one in page.law_classes),
@@ -98,7 +99,7 @@ def page_text(page: Page, folder: Folder, figure: str | None = None) -> str:
 
 
 def index_text(pages: Sequence[Page], folder: Folder) -> str:
-    """The table of all laws with the worst errors that their records state, and the list of the pages."""
+    """Return the table of all laws with the worst errors that their records state, and the list of the pages."""
     contents = _contents(folder)
     header = ("law", "constants", "light", "n", "number", *(f"{MEASURES[key].symbol} worst" for key in WORST))
     rows = [_row(page, one, contents) for page in pages for one in page.members]
@@ -117,25 +118,21 @@ def _contents(folder: Folder) -> Mapping[str, Content]:
     return Records.of(folder).contents()
 
 
-def _grouped(found: Iterable[Named], key: Any) -> dict[str, list[Named]]:
+def _grouped(members: Iterable[Named], key: Any) -> dict[str, list[Named]]:
     groups: dict[str, list[Named]] = {}
-    for one in found:
+    for one in members:
         groups.setdefault(key(one), []).append(one)
     return groups
 
 
-def _title(name: str) -> str:
-    return f"{name.removeprefix(MAP)}, map between alpha and A" if name.startswith(MAP) else name
-
-
 def _spans(one: Named) -> bool:
-    """Whether its constants hold for every index of a range."""
+    """Return whether its constants hold for every index of a range."""
     n = one.law.entry.n
     return bool(one.records) and n.low < n.high
 
 
 def _constructor(kind: type) -> str:
-    """The class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
+    """Return the class with the names that it is made of; a sum of so many Gaussians is made by the catalogue."""
     names = [field.name for field in fields(kind)]
     return f"{kind.__module__}.{kind.__qualname__}({', '.join(names)})"
 
@@ -153,26 +150,22 @@ def _row(page: Page, one: Named, contents: Mapping[str, Content]) -> Sequence[st
 
 
 def _surface(one: Named) -> str:
-    """n, or the indices that its constants span."""
+    """Return n, or the indices that its constants span."""
     return str(one.law.entry.n) if _spans(one) else f"{one.setting.n:g}"
 
 
 def _worst(one: Named, contents: Mapping[str, Content]) -> dict[str, float]:
-    """The largest error of each measure: of its own records, or of a record that measured the printed set as well."""
+    """Return the largest error of each measure, from its own records or one that measured the printed set."""
     if one.records:
-        own: list[Content] = [_of_record(contents[name]) for name in one.records]
+        every = [contents[name] for name in one.records]  # where constants span indices, of every index
+        own: list[Content] = [{**content["quality"]["regenerated"], **by_index(content)} for content in every]
     else:
         own = [values for _, values in _measured_sets(one, contents)]
     return {key: MEASURES[key].worst(values[key]) for values in own for key in WORST if values.get(key) is not None}
 
 
-def _of_record(content: Content) -> Content:
-    """The measures of its constants; where they span indices, those of every index."""
-    return {**content["quality"]["regenerated"], **by_index(content)}
-
-
 def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tuple[Content, Content]]:
-    """Records of the same law and light that measured this printed set as well: the record, and what it measured."""
+    """Yield each record of the same law and light that measured this printed set, and the measures."""
     pipelines = ("albedo",) if isinstance(one.law, AlbedoLaw) else ("profile", "as-published", "inverse")
     which = one.constants if one.constants in SETS else SETS[0]  # records call the printed set of their light so
     for content in contents.values():
@@ -182,7 +175,7 @@ def _measured_sets(one: Named, contents: Mapping[str, Content]) -> Iterator[tupl
 
 
 def _loading(one: Named) -> str:
-    """How Python and the shell get this very law."""
+    """Return the lines by which Python and the shell get this law."""
     call = "albedo_law" if isinstance(one.law, AlbedoLaw) else "load"
     lines = [f"Light: {one.setting.illumination}, n = {one.setting.n:g}, g = {one.setting.g:g}."]
     if _spans(one):
@@ -196,7 +189,7 @@ def _loading(one: Named) -> str:
 
 
 def _arguments(one: Named) -> list[str]:
-    """Of `load` or `albedo_law`: the constants' name, a record's path, or the setting of regenerated ones."""
+    """Return the arguments of `load` or `albedo_law`: name, and constants, record's path or setting."""
     name = f'"{one.name}"'
     if not one.records:
         return [name, f'constants="{one.constants}"'] if one.constants else [name]
@@ -213,7 +206,7 @@ def _setting(setting: Setting) -> str:
 
 
 def _export(one: Named) -> str:
-    """The command that writes this law's shader source; none where it has none."""
+    """Return the command that writes this law's shader source; none where it has none."""
     if not one.law.entry.has_text:
         return ""
     if one.records:
@@ -223,7 +216,7 @@ def _export(one: Named) -> str:
 
 
 def _ranges(entry: Entry) -> str:
-    """Where the law says that it holds."""
+    """Return where the law says that it holds."""
     n = f"n = {entry.n.low:g}" if entry.n.low == entry.n.high else f"n in {entry.n}"
     profile = f", R_d in {entry.profile}" if entry.profile != entry.alpha and entry.profile != EVERYWHERE else ""
     return f"Holds for alpha in {entry.alpha}{profile}; made for a surface of {n}."
@@ -239,20 +232,20 @@ def _shader(page: Page) -> str:
 
 
 def _printed(one: Named, folder: Folder) -> str:
-    """A printed set: its source, its constants and the errors that a record found for it."""
+    """Return a printed set: its source, its constants and the errors that a record found for it."""
     own = one.law.entry.printed, one.constants
-    found = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
-    if found is None:
+    printed = next((s for s in published.SETS if not one.records and (s.law, s.name) == own), None)
+    if printed is None:
         return "" if one.records else "It has no constants: everything follows from alpha and the surface."
-    table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in found.constants.items()])
+    table = markdown_table(("constant", "value"), [(name, f"{value:g}") for name, value in printed.constants.items()])
     contents = _contents(folder)
     measured = next(_measured_sets(one, contents), None)
-    parts = [f"Source: {found.source}.", table]
+    parts = [f"Source: {printed.source}.", table]
     return "\n\n".join(parts if measured is None else [*parts, _quality(measured[0], measured[1])])
 
 
 def _recorded(name: str, folder: Folder) -> str:
-    """A record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
+    """Return a record: what was fitted to what, constants, quality, digests, and the command that makes it again."""
     records = Records.of(folder)
     path, content = records.paths[name], records.content(name, whole=True)
     facts = [
@@ -293,7 +286,7 @@ def _constants(content: Content) -> str:
 
 
 def _with_errors(value: Content, kinds: Sequence[str]) -> list[str]:
-    """A constant, to the digits of its largest error, and its errors."""
+    """Return a constant, to the digits of its largest error, and its errors."""
     errors = [significant(value.get(key)) for key in kinds]
     held = ["held", *[ABSENT] * (len(kinds) - 1)]
     return [to_error(value["regenerated"], largest_error(value)), *(errors if value.get("free", True) else held)]
@@ -317,18 +310,18 @@ def _quality(content: Content, values: Content) -> str:
 
 
 def _by_index(content: Content) -> str:
-    """The worst measures at each index that a record was judged at; what follows is at that of its setting."""
-    found = by_index(content)
-    if not found:
+    """Return the worst measures at each index that a record was judged at; what follows is at that of its setting."""
+    worst = by_index(content)
+    if not worst:
         return ""
-    keys = [key for key in INDEX_MEASURES if key in found]
-    places = [name for name in SPANS if name in found]
+    keys = [key for key in INDEX_MEASURES if key in worst]
+    places = [name for name in SPANS if name in worst]
     rows = [
-        (*(f"{found[name][i]:g}" for name in places), *(significant(found[key][i]) for key in keys))
-        for i in range(len(found["n"]))
+        (*(f"{worst[name][i]:g}" for name in places), *(significant(worst[key][i]) for key in keys))
+        for i in range(len(worst["n"]))
     ]
     meaning = "; ".join(f"`{key}`: {MEASURES[key].formula}" for key in keys)
-    table, by = markdown_table((*places, *keys), rows), "refractive index" + (" and g" if "g" in found else "")
+    table, by = markdown_table((*places, *keys), rows), "refractive index" + (" and g" if "g" in worst else "")
     return f"By {by}, the worst albedo:\n\n{table}\n\n{meaning}.\n\nAt{at_index(content).removeprefix(',')}:"
 
 

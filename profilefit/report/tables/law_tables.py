@@ -3,40 +3,103 @@
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from itertools import chain, groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from rich.console import RenderableType
 from rich.text import Text
 
+from mcml_sim.exact.light import unreduced
 from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP
-from profilefit.fitting.quality import AlbedoQuality, Quality
-from profilefit.fitting.sampling import SamplerQuality
+from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
+from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
+from profilefit.laws.base import Sampler
 from profilefit.recipes.folder import EVIDENCE
 from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
+from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.record_folder import Folder, Records
-from profilefit.report.tables.all_laws import (
-    ALBEDOS,
-    Floats,
-    MeasuredSampler,
-    Track,
-    for_each,
-    measured_map,
-    measured_profile,
-    measured_samplers,
-    untracked,
-)
+from profilefit.recipes.targets import albedo_values
 from profilefit.report.tables.cells import SEARCHLIGHT, column_table, on_the_point, significant, span, spark
 from profilefit.report.tables.check_tables import markdown_check
 from profilefit.report.tables.claims_table import markdown_claims
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.report.tables.quality_tables import albedo_number
+
+Floats = NDArray[np.float64]
+Measured = TypeVar("Measured")
+Track = Callable[[Iterator[Any], str, int], Iterator[Any]]
+"""Items as they come, what they are, how many -> the items, as they are shown to come."""
+# Where laws are judged: held-out albedos. Samplers take longer and hardly change with alpha.
+ALBEDOS = np.asarray(albedo_values(QUALITY_ALBEDOS))
+SAMPLED_ALBEDOS = (0.1, 0.5, 0.9)
+# A law without a shader source is a quadrature of tens of milliseconds, which its sampler inverts in many steps: one
+# albedo will do.
+SLOW_ALBEDOS = (0.5,)
+SHARES = 256
+
+
+@dataclass(frozen=True)
+class MeasuredSampler:
+    """One sampler of a law.
+
+    quality      for the light of the law itself, at reduced albedos, its lengths in l*
+    exact_error  (m,) max over xi in [0, 0.999] of |exact cdf(r(xi)) - xi| at the same albedos [-]; of two xi that draw
+                 one radius, the one meant
+    """
+
+    of: Named
+    name: str
+    quality: SamplerQuality
+    exact_error: Floats
+
+
+def untracked(items: Iterator[Measured], title: str, total: int) -> Iterator[Measured]:
+    """Yield the items, without any progress shown."""
+    del title, total
+    return items
+
+
+def for_each(
+    measure: Callable[[Named], Measured], laws: Sequence[Named], track: Track = untracked, title: str = ""
+) -> list[Measured]:
+    """Measure every law, in order, side by side: most of it is compiling and small arrays, which take one core."""
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        return list(track(pool.map(measure, laws), title, len(laws)))
+
+
+def measured_profile(one: Named, alpha: ArrayLike = ALBEDOS) -> Quality:
+    """Return the measures of a profile law at `alpha` (m,)."""
+    return profile_quality(one.law, alpha)
+
+
+def measured_map(one: Named) -> AlbedoQuality:
+    """Return the measures of an A -> alpha map."""
+    return albedo_quality(one.law)
+
+
+def measured_samplers(one: Named, alpha: Sequence[float] | None = None) -> list[MeasuredSampler]:
+    """Return every sampler of a profile law at (reduced) `alpha` (m,)."""
+    albedos = alpha or (SAMPLED_ALBEDOS if one.law.entry.has_text else SLOW_ALBEDOS)
+    samplers = []
+    for name, sampler in one.law.in_reduced().samplers.items():
+        errors = np.array([_exact_error(one.law.samplers[name], float(value)) for value in albedos])
+        samplers.append(MeasuredSampler(one, name, sampler_quality(sampler, albedos), errors))
+    return samplers
+
+
+def _exact_error(sampler: Sampler, reduced: float) -> float:
+    xi, setting = np.linspace(0.0, LAST_SHARE, SHARES), sampler.law.setting
+    share = drawn_by(sampler, xi, float(unreduced(reduced, setting.g)), ExactTarget(setting))
+    return float(np.max(np.abs(share - xi)))
+
 
 INFINITE = "∞"
 NEGLIGIBLE = 5e-6  # a draw from 2^24 steps and the quadrature know no better
@@ -58,7 +121,7 @@ CAPTION = (
 
 
 def sampler_tables(qualities: Mapping[str, SamplerQuality]) -> list[RenderableType]:
-    """A table a sampler, by albedo, the worst last; what the columns are stands under the last."""
+    """Return a table a sampler, by albedo, the worst last; what the columns are stands under the last."""
     names = list(qualities)
     return [_table(name, qualities[name], CAPTION if name == names[-1] else "") for name in names]
 
@@ -73,7 +136,7 @@ def _table(name: str, quality: SamplerQuality, caption: str) -> RenderableType:
 
 
 def sampler_number(value: float) -> str:
-    """A measure of a sampler as text."""
+    """Return a measure of a sampler as text."""
     if abs(value) < NEGLIGIBLE:
         return "0"
     if math.isinf(value):
@@ -95,7 +158,7 @@ NOTHING = "None of these records holds a law that can be measured against the ex
 
 @dataclass(frozen=True)
 class Qualities:
-    """What was measured of the laws of a folder, in the order in which it is shown."""
+    """Measures of the laws of a folder, in the order in which they are shown."""
 
     profiles: list[tuple[Named, Quality]]
     maps: list[tuple[Named, AlbedoQuality]]
@@ -127,31 +190,31 @@ def measured(
     )
 
 
-def every_law(found: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
-    """Profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
-    for setting, laws in groupby(found.profiles, key=lambda pair: pair[0].setting):
+def every_law(qualities: Qualities, in_detail: bool = False) -> Iterator[RenderableType]:
+    """Yield profiles by setting, a table a measure; then maps; then samplers, in_detail by albedo, too."""
+    for setting, laws in groupby(qualities.profiles, key=lambda pair: pair[0].setting):
         by_label = {one.label: quality for one, quality in laws}
         for measure in SCALES:
             yield _profile_table(measure, setting, by_label)
-    if found.maps:
-        yield _map_table(found.maps)
-    for setting, of_setting in groupby(found.samplers, key=lambda one: one.of.setting):
+    if qualities.maps:
+        yield _map_table(qualities.maps)
+    for setting, of_setting in groupby(qualities.samplers, key=lambda one: one.of.setting):
         samplers = list(of_setting)
         yield _sampler_table(setting, samplers)
         if in_detail:
             yield from sampler_tables({_sampler_label(one): one.quality for one in samplers})
-    if not (found.profiles or found.maps or found.samplers):
+    if not (qualities.profiles or qualities.maps or qualities.samplers):
         yield Text(NOTHING)
 
 
-def content(found: Qualities) -> dict[str, Any]:
-    """The same for JSON: every measure at every albedo."""
+def content(qualities: Qualities) -> dict[str, Any]:
+    """Return every measure at every albedo, for JSON."""
     return {
-        "profiles": [{**_whose(one), "quality": quality} for one, quality in found.profiles],
-        "maps": [{**_whose(one), "quality": quality} for one, quality in found.maps],
+        "profiles": [{**_whose(one), "quality": quality} for one, quality in qualities.profiles],
+        "maps": [{**_whose(one), "quality": quality} for one, quality in qualities.maps],
         "samplers": [
             {**_whose(one.of), "sampler": one.name, "exact_error": one.exact_error, "quality": one.quality}
-            for one in found.samplers
+            for one in qualities.samplers
         ],
     }
 
@@ -161,14 +224,14 @@ def _whose(one: Named) -> dict[str, Any]:
 
 
 def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
-    """Tables of a README that are measured, not read from records, by the names of their marks.
+    """Return tables of a README that are measured, not read from records, by the names of their marks.
 
     "check" needs OpenGL, and raises ShaderError where there is none.
     """
 
     def laws() -> str:
-        found = profile_laws(folder, matched=False)
-        return markdown_laws(list(zip(found, for_each(measured_profile, found), strict=True)))
+        profiles = profile_laws(folder, matched=False)
+        return markdown_laws(list(zip(profiles, for_each(measured_profile, profiles), strict=True)))
 
     def samplers() -> str:
         return markdown_samplers(
@@ -180,7 +243,7 @@ def markdown_sections(folder: Path) -> dict[str, Callable[[], str]]:
 
 
 def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
-    """A line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
+    """Return a line a law: where it belongs, its constants, `rel` and `ks`, mean and worst over alpha."""
     header = (
         "law",
         "constants",
@@ -201,14 +264,14 @@ def markdown_laws(measured: Sequence[tuple[Named, Quality]]) -> str:
 
 
 def markdown_samplers(measured: Sequence[MeasuredSampler]) -> str:
-    """A line a sampler, each measure at its worst albedo."""
+    """Return a line a sampler, each measure at its worst albedo."""
     header = ("law", "constants", "light", "n", "sampler", *_sampler_headers())
     rows = [(*_home(s.of), s.name, *_sampler_cells(s)) for s in sorted(measured, key=lambda s: _order(s.of.setting))]
     return markdown_table(header, rows)
 
 
 def _home(one: Named) -> tuple[str, str, str, str]:
-    """Law, constants, light, n."""
+    """Return law, constants, light, n."""
     return one.name, one.constants or "none", one.setting.illumination, f"{one.setting.n:g}"
 
 
@@ -264,7 +327,7 @@ def _sampler_label(one: MeasuredSampler) -> str:
 
 
 def _number(measure: str, value: float) -> str:
-    """A value in the measure's unit, in few characters."""
+    """Return a value in the measure's unit, in few characters."""
     value *= SCALES[measure][0]
     if measure == "r2":
         return f"{value:.3f}" if value > -1.0 else f"{value:.1f}"
@@ -274,5 +337,5 @@ def _number(measure: str, value: float) -> str:
 
 
 def _order(setting: Setting) -> tuple[bool, float, float]:
-    """The searchlight setting first."""
+    """Return a key by which pencil beams come first."""
     return setting.illumination != Setting().illumination, setting.n, setting.g

@@ -20,7 +20,7 @@ MOST = 9.0  # relative error, as a logarithm, beyond which a product is not know
 
 
 def layers_tables(found: LayersFit, title: str) -> list[RenderableType]:
-    """What is free, with errors and correlations; and the products of powers that the data know, best first."""
+    """Return what is free, with errors and correlations; and the products of powers that the data know, best first."""
     free = {
         "": found.names,
         "value": [to_error(value, value * error) for value, error in zip(found.values, found.errors, strict=True)],
@@ -45,7 +45,7 @@ def layers_tables(found: LayersFit, title: str) -> list[RenderableType]:
 
 
 def layers_lines(found: LayersFit) -> Iterator[str]:
-    """A sentence each on what was held, the goodness of fit, and what is not identified."""
+    """Yield a sentence each on what was held, the goodness of fit, and what is not identified."""
     if found.result != "converged":
         yield f"the fit failed: {found.result}"
     for number, layer in enumerate(found.medium.layers, start=1):
@@ -61,7 +61,7 @@ def layers_lines(found: LayersFit) -> Iterator[str]:
 
 
 def layers_content(found: LayersFit) -> dict[str, Any]:
-    """Everything, as JSON content."""
+    """Return all results as JSON content."""
     data = found.data
     plain: dict[str, Any] = record.plain(
         {

@@ -26,6 +26,7 @@ from profilefit.report.records import (
 from profilefit.report.tables.cells import ABSENT, significant, to_error
 from profilefit.report.tables.quality_tables import albedo_number
 
+OF_THE_PAPER = ("liang", "burley", "rational")  # its own laws, and those it is compared with
 PROFILE_MEASURES = ("rel", "ks", "l1", "mse", "r2")
 # Which equation of the paper a constant of its profile law belongs to.
 EQUATION = {name: equation for equation, printed in PUBLISHED.items() if equation != LENGTH for name in printed}
@@ -41,7 +42,7 @@ SHORT |= {("hazard-refracting", "regenerated")}
 
 
 def markdown_constants(records: Mapping[str, Content]) -> str:
-    """Every constant of every record: printed, regenerated, and its errors; a failed fit says why and has no row."""
+    """Return every constant of every record: printed, regenerated, and its errors; a failed fit has no row."""
     present = {key: word for c in _fits(records).values() for key, word in known_errors(c["constants"]).items()}
     known = {key: word for key, word in ERRORS.items() if key in present}
     header = ("record", "equation", "constant", "published", "regenerated", *(f"± {word}" for word in known.values()))
@@ -71,8 +72,10 @@ def markdown_constants(records: Mapping[str, Content]) -> str:
 
 
 def markdown_hazard(records: Mapping[str, Content]) -> str:
-    """The constants of the hazard law in every setting, a record a column, and its worst errors there; first those of
-    n = 1, then those that span the indices of a surface that refracts."""
+    """Return the constants of the hazard law in every setting, a record a column, and its worst errors there.
+
+    Records of n = 1 come first, then those that span the indices of a surface that refracts.
+    """
     fits = {name: c for name, c in _fits(records).items() if c["law"] == "hazard" and c["pipeline"] == "profile"}
     fitted = {name: c for name, c in fits.items() if converged(c)}
     forms: dict[tuple[str, ...], dict[str, Content]] = {}
@@ -82,7 +85,7 @@ def markdown_hazard(records: Mapping[str, Content]) -> str:
 
 
 def _hazard_constants(fitted: Mapping[str, Content]) -> str:
-    """Records of the same constants, a column each."""
+    """Return records of the same constants, a column each."""
     names = next(iter(fitted.values()))["constants"]
     rows = [
         (name, *(to_error(c["constants"][name]["regenerated"], largest_error(c["constants"][name])) for c in columns))
@@ -97,7 +100,7 @@ def _hazard_constants(fitted: Mapping[str, Content]) -> str:
 
 
 def markdown_quality(records: Mapping[str, Content]) -> str:
-    """Measures of every set of constants, mean and worst over alpha; those of A -> alpha maps; inversion errors."""
+    """Return measures of every set of constants, mean and worst over alpha, of A -> alpha maps and inversions."""
     parts = [
         _profile_quality(records),
         _inversion_quality(records),
@@ -107,7 +110,7 @@ def markdown_quality(records: Mapping[str, Content]) -> str:
 
 
 def markdown_readings(records: Mapping[str, Content]) -> str:
-    """Of each equation the reading nearest to print: what it chose, what came out, and the verdict."""
+    """Return the reading nearest to print of each equation: its choices, its result, and the verdict."""
     header = ("equation", "nearest reading", "constants found", "printed", "worst constant", "curve, rms", "verdict")
     readings = [r for content in records.values() for r in content.get("readings") or ()]
     best: dict[str, Content] = {}
@@ -129,9 +132,13 @@ def markdown_readings(records: Mapping[str, Content]) -> str:
 
 
 def sections(records: Mapping[str, Content]) -> dict[str, str]:
-    """The tables that are made of records, by the names of their marks in README and documentation."""
-    paper = {name: content for name, content in records.items() if _is_of_the_paper(content)}
-    found = {
+    """Return the tables that are made of records, by the names of their marks in README and documentation."""
+    paper = {
+        name: content
+        for name, content in records.items()
+        if _is_searchlight(content) and content["law"] in OF_THE_PAPER
+    }
+    tables = {
         "short": _short_quality(records),
         "quality": _profile_quality(paper),
         "constants": markdown_constants(paper),
@@ -140,7 +147,7 @@ def sections(records: Mapping[str, Content]) -> dict[str, str]:
         "inversion": _inversion_quality(records),
         "maps": _albedo_quality(records),
     }
-    return {name: text for name, text in found.items() if text}
+    return {name: text for name, text in tables.items() if text}
 
 
 def fill(text: str, tables: Mapping[str, str]) -> str:
@@ -163,16 +170,16 @@ def _profile_quality(records: Mapping[str, Content]) -> str:
 
 
 def _short_quality(records: Mapping[str, Content]) -> str:
-    """A few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
+    """Return a few laws under a searchlight by `rel` and `ks`, the worst first; one that spans indices at its own."""
     searchlight = {name: c for name, c in records.items() if _is_searchlight(c) or _is_refracting(c)}
-    found = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
+    chosen = [item for item in _measured(searchlight, "rel") if item[:2] in SHORT]
     rows = [
         (
             owner + at_index(records.get(owner, {})),
             which,
             *(text for key in ("rel", "ks") for text in _mean_and_worst(key, values[key])),
         )
-        for owner, which, values in sorted(found, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
+        for owner, which, values in sorted(chosen, key=lambda item: -MEASURES["rel"].worst(item[2]["rel"]))
     ]
     header = ("law", "constants", *(f"{key} {which}" for key in ("rel", "ks") for which in ("mean", "worst")))
     return markdown_table(header, rows) if rows else ""
@@ -197,17 +204,17 @@ def _albedo_quality(records: Mapping[str, Content]) -> str:
 
 
 def _measured(records: Mapping[str, Content], measure: str) -> list[tuple[str, str, Content]]:
-    """(record or law, set, measures) of each set once: printed constants are the same in every record of their law."""
-    found: list[tuple[str, str, Content]] = []
+    """Return (record or law, set, measures) of each set once, printed constants of a law only once."""
+    sets: list[tuple[str, str, Content]] = []
     for name, content in _fits(records).items():
         for which in measured_sets(content):
             regenerated = which == "regenerated"
             owner = name if regenerated else f"{content['law']}{' map' if measures(content, 'delta_A') else ''}"
             values = content["quality"][which]
             failed = regenerated and not converged(content)
-            if measure in values and not failed and (owner, which) not in [item[:2] for item in found]:
-                found.append((owner, which, values))
-    return found
+            if measure in values and not failed and (owner, which) not in [item[:2] for item in sets]:
+                sets.append((owner, which, values))
+    return sets
 
 
 def _mean_and_worst(measure: str, values: Any) -> tuple[str, str]:
@@ -220,18 +227,13 @@ def _number(measure: str, value: float) -> str:
     return f"{value:.4f}" if measure == "r2" else significant(value)
 
 
-def _is_of_the_paper(content: Content) -> bool:
-    """Its own laws, and those it is compared with, under its own light."""
-    return _is_searchlight(content) and content["law"] in ("liang", "burley", "rational")
-
-
 def _is_searchlight(content: Content) -> bool:
     setting = content.get("setting") or {}
     return (setting.get("illumination"), setting.get("n")) == ("searchlight", 1)
 
 
 def _is_refracting(content: Content) -> bool:
-    """Whether it spans the indices of a surface under a searchlight."""
+    """Return whether it spans the indices of a surface under a searchlight."""
     return bool(content.get("indices")) and content["setting"]["illumination"] == "searchlight"
 
 
@@ -244,12 +246,12 @@ def _percent(share: float | None) -> str:
 
 
 def _text(cell: str) -> str:
-    """Text for Markdown: no element, and no column of a table."""
+    """Return text for Markdown: no element, and no column of a table."""
     return MARKUP.sub(r"\\\g<0>", cell)
 
 
 def markdown_table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A GitHub table, names to the left and numbers to the right, every line filled to the same width.
+    """Return a GitHub table, names to the left and numbers to the right, every line filled to the same width.
 
     What is in its cells begins no element and no further column.
     """

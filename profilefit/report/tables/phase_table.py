@@ -1,4 +1,4 @@
-"""Phase functions fitted to a table: how far each form is from it, and the constants with their errors."""
+"""Phase functions fitted to a table: the error of each form, and the constants with their errors."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from profilefit.recipes import record
 from profilefit.recipes.folder import PHASES
 from profilefit.recipes.phases.fit import BANDS
 from profilefit.recipes.phases.record import FREE, HELD, load, table_lines
-from profilefit.report.records import known_errors, largest_error
-from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
+from profilefit.report.records import largest_error, numbered_errors
+from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
 
 Content = Mapping[str, Any]
@@ -35,22 +35,19 @@ LEFT = ("form", "moments", "constant", "result")
 
 
 def phase_tables(content: Content) -> list[RenderableType]:
-    """Of a record, or of what `profilefit fit --kind phase` found."""
+    """Return the tables of a record, or of a result of `profilefit fit --kind phase`."""
     data = content["data"]
     own = f"{data['source']}: {data['rows']} angles, {data['angles'][0]:g} to {data['angles'][1]:g} degrees"
     title = f"{own}; mean cosine {data['mean_cosine']:.4f}, backscattered {data['backscattered']:.5f}"
-    columns: dict[str, list[str]] = {"form": [], "moments": []}
-    names = ("rms", *OF_BANDS)
-    columns |= {name: [] for name in (*names, "cosine", "back", "result")}
-    for form, how, one in _each(content):
-        columns["form"].append(FORMS[form].title)
-        columns["moments"].append(how)
-        for name, value in zip(names, (one["rms"], *one["bands"]), strict=True):
-            columns[name].append(significant(value))
-        columns["cosine"].append(significant(one["mean_cosine"], MOMENT_DIGITS))
-        columns["back"].append(significant(one["backscattered"], MOMENT_DIGITS))
-        columns["result"].append(one["result"])
-    return [column_table(title, columns, MEASURES, LEFT, ("form",)), _constants(content)]
+    header = ("form", "moments", "rms", *OF_BANDS, "cosine", "back", "result")
+    rows = [(*_measures(form, how, one), one["result"]) for form, how, one in _each(content)]
+    known, constants = _constants(content)
+    meaning = "; ".join(f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values())
+    names = ("form", "moments", "constant", "value", *known.values())
+    return [
+        row_table(title, header, rows, MEASURES, LEFT, ("form",)),
+        row_table("Constants, none with a unit", names, constants, meaning, LEFT, ("form",), ("value",)),
+    ]
 
 
 def premise_lines(content: Content) -> list[str]:
@@ -67,32 +64,37 @@ def premise_lines(content: Content) -> list[str]:
 
 
 def phase_table(folder: Path) -> RenderableType | None:
-    """The records of phase functions that lie in a folder of records; None where there are none."""
-    found = [load(path).content for path in record.available(folder / PHASES).values()]
-    if not found:
+    """Return the records of phase functions that lie in a folder of records; None where there are none."""
+    contents = [load(path).content for path in record.available(folder / PHASES).values()]
+    if not contents:
         return None
-    columns: dict[str, list[str]] = {"table": [str(one["name"]) for one in found]}
-    columns["rows"] = [str(one["data"]["rows"]) for one in found]
+    columns: dict[str, list[str]] = {"table": [str(one["name"]) for one in contents]}
+    columns["rows"] = [str(one["data"]["rows"]) for one in contents]
     for form in FORMS.values():
-        columns[form.name] = [significant(one["phases"][form.name][HELD]["rms"]) for one in found]
+        columns[form.name] = [significant(one["phases"][form.name][HELD]["rms"]) for one in contents]
     caption = "root mean square of ln(form / table), mean cosine and backscattered share those of the table"
     return column_table("Phase functions", columns, f"{caption} where a form has numbers for it", ("table",))
 
 
 def phase_sections(folder: Path) -> dict[str, Callable[[], str]]:
-    """The tables of the records of phase functions for Markdown, by the names of their marks."""
+    """Return the tables of the records of phase functions for Markdown, by the names of their marks."""
     paths = record.available(folder / PHASES)
 
     def fits() -> str:
         rows = [
-            (name, FORMS[form].title, how, *map(significant, (one["rms"], *one["bands"])),
-             significant(one["mean_cosine"], MOMENT_DIGITS), significant(one["backscattered"], MOMENT_DIGITS))
-            for name, path in paths.items() for form, how, one in _each(load(path).content)
-        ]  # fmt: skip
+            (name, *_measures(form, how, one))
+            for name, path in paths.items()
+            for form, how, one in _each(load(path).content)
+        ]
         return markdown_table(("table", "form", "moments", "rms", *OF_BANDS, "cosine", "back"), rows)
 
     def constants() -> str:
-        rows = [(name, *row) for name, path in paths.items() for row in _rows(load(path).content)[1]]
+        contents = {name: load(path).content for name, path in paths.items()}
+        rows = [
+            (name, *row[:4], significant(largest_error(one)))
+            for name, content in contents.items()
+            for row, one in zip(_constants(content)[1], _constant_values(content), strict=True)
+        ]
         return markdown_table(("table", "form", "moments", "constant", "value", "error"), rows)
 
     return {"phase-fits": fits, "phase-constants": constants} if paths else {}
@@ -102,28 +104,23 @@ def _each(content: Content) -> list[tuple[str, str, Content]]:
     return [(form, how, content["phases"][form][how]) for form in FORMS for how in (FREE, HELD)]
 
 
-def _rows(content: Content) -> tuple[dict[str, str], list[tuple[str, ...]]]:
-    of = content["constants"]
-    known = {key: word for key, word in known_errors(of).items() if any(one[key] is not None for one in of.values())}
-    rows: list[tuple[str, ...]] = []
-    for form, how, _ in _each(content):
-        for name in FORMS[form].names:
-            one = of[f"{form}.{how}.{name}"]
-            error = largest_error(one)
-            rows.append((FORMS[form].title, how, name, to_error(one["regenerated"], error), significant(error)))
-    return known, rows
+def _measures(form: str, how: str, one: Content) -> tuple[str, ...]:
+    """Return a form, its moments, its distance from the table, its mean cosine and backscattered share."""
+    moments = (significant(one[name], MOMENT_DIGITS) for name in ("mean_cosine", "backscattered"))
+    return (FORMS[form].title, how, *map(significant, (one["rms"], *one["bands"])), *moments)
 
 
-def _constants(content: Content) -> RenderableType:
-    known, _ = _rows(content)
-    columns: dict[str, list[str]] = {name: [] for name in ("form", "moments", "constant", "value", *known.values())}
-    for form, how, _ in _each(content):
-        for name in FORMS[form].names:
-            one = content["constants"][f"{form}.{how}.{name}"]
-            cells = (FORMS[form].title, how, name, to_error(one["regenerated"], largest_error(one)))
-            errors = (significant(one[key]) for key in known)
-            for column, cell in zip(columns.values(), (*cells, *errors), strict=True):
-                column.append(cell)
-    columns["value"] = on_the_point(columns["value"])
-    meaning = "; ".join(f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values())
-    return column_table("Constants, none with a unit", columns, meaning, LEFT, ("form",))
+def _constant_values(content: Content) -> list[Content]:
+    return [
+        content["constants"][f"{form}.{how}.{name}"] for form, how, _ in _each(content) for name in FORMS[form].names
+    ]
+
+
+def _constants(content: Content) -> tuple[dict[str, str], list[tuple[str, ...]]]:
+    """Return the errors that the constants have, and a row for each constant: form, moments, name, value, errors."""
+    known = numbered_errors(content["constants"].values())
+    names = [(FORMS[form].title, how, name) for form, how, _ in _each(content) for name in FORMS[form].names]
+    return known, [
+        (*place, to_error(one["regenerated"], largest_error(one)), *(significant(one[key]) for key in known))
+        for place, one in zip(names, _constant_values(content), strict=True)
+    ]

@@ -1,4 +1,4 @@
-"""What photographs of a spot tell, as tables, as sentences, and as JSON content."""
+"""Results of photographs of a spot as tables, as sentences, and as JSON content."""
 
 from __future__ import annotations
 
@@ -22,20 +22,20 @@ REMEDY = "photograph cards, or expose longer"
 CARDS = "a white one tells beam and glare, a grey one the scale; --simulate says what they are worth"
 
 
-def photo_tables(found: Photo) -> list[RenderableType]:
-    """A line a colour and quantity, with what such photographs can know at best."""
+def photo_tables(photo: Photo) -> list[RenderableType]:
+    """Return a line a colour and quantity, with what such photographs can know at best."""
     columns: dict[str, list[str]] = {name: [] for name in ("colour", "", "value", "±", "95 %", "at best", "unit")}
-    for colour, fit in found.fits.items():
+    for colour, fit in photo.fits.items():
         for name in NAMES:
             value, error = fit.values[name], fit.errors[name]
-            best = found.bounds[colour].get(name)
+            best = photo.bounds[colour].get(name)
             cells = (
                 colour if name == NAMES[0] else "", name, to_error(value, error), significant(error),
                 interval(fit.interval(name)), "" if best is None else f"{100 * best:.1f} %", UNITS[name],
             )  # fmt: skip
             for column, cell in zip(columns.values(), cells, strict=True):
                 column.append(cell)
-    title = f"{found.shot.sources[0]}: {len(found.shot.sources)} exposures, exact light, {found.setting}"
+    title = f"{photo.shot.sources[0]}: {len(photo.shot.sources)} exposures, exact light, {photo.setting}"
     caption = (
         "±: from the scatter over sectors, a correlated 1 %, and what is known of beam, surface, glare and scale; "
         "at best: by Fisher's information of such rings and of what is known"
@@ -43,17 +43,17 @@ def photo_tables(found: Photo) -> list[RenderableType]:
     return [column_table(title, columns, caption, left=("colour", "", "unit"))]
 
 
-def photo_lines(found: Photo) -> Iterator[str]:
-    """A sentence each on sensor, spot, what surface and lens add, the goodness of fit, and what is not identified."""
-    shot = found.shot
-    yield f"scale: {found.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
+def photo_lines(photo: Photo) -> Iterator[str]:
+    """Yield a sentence each on sensor, spot, surface and lens, the goodness of fit, and what is not identified."""
+    shot = photo.shot
+    yield f"scale: {photo.plate.words}; spot at pixel {shot.spot.centre[0]:.1f}, {shot.spot.centre[1]:.1f}"
     if len(shot.sources) == 1:
         yield "one exposure does not tell gain and read noise: one electron a step is taken for both"
     else:
         yield f"sensor: {shot.sensor.gain:.3g} electrons a step, read noise {shot.sensor.read:.2g} steps"
         yield "times by the pictures: " + ", ".join(f"{time:.3g}" for time in sorted(shot.times.value))
-    yield from found.notes
-    for colour, fit in found.fits.items():
+    yield from photo.notes
+    for colour, fit in photo.fits.items():
         x = dict(zip(fit.shot.names, fit.x, strict=True))
         glare = sum(value for name, value in x.items() if name.startswith("glare"))
         told = f"surface {100 * x['surface']:.2g} %, glare {100 * glare:.2g} %"
@@ -71,8 +71,8 @@ def photo_lines(found: Photo) -> Iterator[str]:
         for name in NAMES[:2]:
             if not fit.errors[name] < LOOSE * fit.values[name]:
                 yield f"{colour}: {name} IS NOT IDENTIFIED: its error is more than {100 * LOOSE:.0f} %; {REMEDY}"
-    if not found.cards:
-        first, *_ = found.fits.values()
+    if not photo.cards:
+        first, *_ = photo.fits.values()
         halos = first.shot.beliefs.halos
         yield (
             f"no card was photographed, so the shape of glare is not known: it is a mixture of halos {halos[0]:.3g} to "
@@ -80,22 +80,22 @@ def photo_lines(found: Photo) -> Iterator[str]:
         )
 
 
-def photo_content(found: Photo) -> dict[str, Any]:
-    """Everything, as JSON content."""
+def photo_content(photo: Photo) -> dict[str, Any]:
+    """Return all results as JSON content."""
     plain: dict[str, Any] = record.plain(
         {
-            "shots": found.shot.sources,
-            "times": found.shot.times.value,
-            "sensor": vars(found.shot.sensor),
-            "spot": vars(found.shot.spot),
-            "scale": {"matrix": found.plate.matrix, "words": found.plate.words},
-            "setting": found.setting,
-            "notes": found.notes,
+            "shots": photo.shot.sources,
+            "times": photo.shot.times.value,
+            "sensor": vars(photo.shot.sensor),
+            "spot": vars(photo.shot.spot),
+            "scale": {"matrix": photo.plate.matrix, "words": photo.plate.words},
+            "setting": photo.setting,
+            "notes": photo.notes,
             "colours": {
                 colour: {
                     "values": fit.values,
                     "errors": fit.errors,
-                    "at_best": found.bounds[colour],
+                    "at_best": photo.bounds[colour],
                     "coordinates": dict(zip(fit.shot.names, fit.x.tolist(), strict=True)),
                     "chi2": fit.chi2,
                     "freedom": fit.freedom,
@@ -108,7 +108,7 @@ def photo_content(found: Photo) -> dict[str, Any]:
                     "value": fit.shot.medium.value,
                     "covariance": fit.shot.medium.covariance,
                 }
-                for colour, fit in found.fits.items()
+                for colour, fit in photo.fits.items()
             },
             "versions": record.versions(),
         }
@@ -117,7 +117,7 @@ def photo_content(found: Photo) -> dict[str, Any]:
 
 
 def setup_tables(bounds: Mapping[str, Mapping[str, Mapping[str, float]]]) -> list[RenderableType]:
-    """What a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
+    """Return what a setup's photographs can know at best, by colour: with the cards that it has, and with others."""
     columns: dict[str, list[str]] = {"photographs": [], "colour": [], "mu_s'": [], "mu_a": []}
     for setup, by_colour in bounds.items():
         for colour, errors in by_colour.items():

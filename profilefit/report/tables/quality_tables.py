@@ -1,4 +1,4 @@
-"""How good a record's constants are, beside the printed ones: by albedo, on average and at worst."""
+"""Quality of a record's constants beside the printed ones: by albedo, on average and at worst."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ TABLES = (
 
 
 def values_of(one: Content, measure: str) -> list[float] | None:
-    """A measure of one set at each albedo, halves apart; None if the record does not know it."""
+    """Return a measure of one set at each albedo, halves apart; None if the record does not know it."""
     name, _, half = measure.partition(" ")
     if not half:
         return one.get(name)
@@ -54,7 +54,7 @@ def _worst(content: Content, name: str, key: str) -> float:
 
 
 def spark_table(content: Content) -> list[RenderableType]:
-    """Every set's errors over alpha as a row of blocks; nothing for what is not measured by albedo."""
+    """Return every set's errors over alpha as a row of blocks; nothing for what is not measured by albedo."""
     quality, names = content["quality"], measured_sets(content)
     keys = [key for key in OF_PROFILE if all(values_of(quality[name], key) for name in names)]
     if not keys:
@@ -77,7 +77,7 @@ def spark_table(content: Content) -> list[RenderableType]:
 
 
 def quality_tables(content: Content) -> list[RenderableType]:
-    """Measures by albedo for every set of constants, or those of an A -> alpha map; by index where it spans several."""
+    """Return measures by albedo for every set of constants, or those of an A -> alpha map, and by index."""
     first = [index_table(content)] if by_index(content) else []
     if measures(content, "delta_A"):
         return [*first, _albedo_table(content)]
@@ -87,15 +87,15 @@ def quality_tables(content: Content) -> list[RenderableType]:
 
 
 def index_table(content: Content) -> RenderableType:
-    """The worst measures over alpha at each index that a record was judged at."""
-    found = by_index(content)
-    columns = {name: [f"{value:g}" for value in found[name]] for name in SPANS if name in found}
+    """Return the worst measures over alpha at each index that a record was judged at."""
+    worst = by_index(content)
+    columns = {name: [f"{value:g}" for value in worst[name]] for name in SPANS if name in worst}
     for measure in INDEX_MEASURES:
-        if measure in found:
-            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in found[measure]])
-    known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in found]
+        if measure in worst:
+            columns[MEASURES[measure].header] = on_the_point([significant(value) for value in worst[measure]])
+    known = [MEASURES[measure] for measure in INDEX_MEASURES if measure in worst]
     caption = "the worst albedo of each; " + "; ".join(f"{one.header}: {one.meaning}" for one in known)
-    title = "By refractive index" + (" and g" if "g" in found else "")
+    title = "By refractive index" + (" and g" if "g" in worst else "")
     return column_table(title + _failed(content), columns, caption, left=("n",))
 
 
@@ -125,7 +125,7 @@ def _albedo_table(content: Content) -> RenderableType:
 
 
 def albedo_number(measure: str, value: Any) -> str:
-    """One measure of an A -> alpha map as text."""
+    """Return one measure of an A -> alpha map as text."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if measure == "fold" and value >= 1.0:

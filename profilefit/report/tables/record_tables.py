@@ -50,13 +50,9 @@ TENFOLD = 10.0  # standard errors beyond which tenths of one say nothing
 KINDS = {"statistical": "photon noise", "misfit": "misfit as noise"}
 
 
-def _is_evidence(content: Content) -> bool:
-    return content["pipeline"] == "evidence"
-
-
 def record_tables(content: Content) -> list[RenderableType]:
-    """Everything about one record: where it comes from, constants, the state of fit and chains, quality."""
-    if _is_evidence(content):
+    """Return everything about one record: where it comes from, constants, the state of fit and chains, quality."""
+    if content["pipeline"] == "evidence":
         return _spaced([_title(content), *evidence_tables(content)])
     if content["pipeline"] == STACK:
         return _spaced([_title(content), *stack_tables(content)])
@@ -91,7 +87,7 @@ def constants_table(content: Content) -> RenderableType:
     scores = [z_score(row) for row in rows]
     meanings = [f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values()]
     if any(score is not None for score in scores):
-        columns["\nz"] = [_signed(score) for score in scores]
+        columns["\nz"] = [ABSENT if z is None else f"{z:+.0f}" if abs(z) >= TENFOLD else f"{z:+.1f}" for z in scores]
         meanings.append(f"z: published less regenerated, over the errors of {TOTAL}, combined")
     title = "Constants, lengths in units of the transport mean free path"
     caption = "; ".join(meanings)
@@ -100,12 +96,8 @@ def constants_table(content: Content) -> RenderableType:
     return column_table(title, {"": list(constants), **columns}, caption)
 
 
-def _signed(score: float | None) -> str:
-    return ABSENT if score is None else f"{score:+.0f}" if abs(score) >= TENFOLD else f"{score:+.1f}"
-
-
 def intervals_table(content: Content) -> RenderableType:
-    """The 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
+    """Return the 68 % and 95 % credible intervals of each constant, one line for each kind of error."""
     chains = content["posterior"]
     if not chains:
         return Text("No credible intervals: a chain starts from a fit that converged.")
@@ -121,7 +113,7 @@ def intervals_table(content: Content) -> RenderableType:
 
 
 def derived_table(derived: Content, surface: str = "") -> RenderableType:
-    """A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
+    """Return A, or the radius of 99.5 % of the energy, at a few albedos, each with its two errors."""
     errors = derived["statistical"], derived["model"]
     both = [max((e for e in pair if e is not None), default=None) for pair in zip(*errors, strict=True)]
     header, title = DERIVED[derived["quantity"]]
@@ -137,7 +129,7 @@ def derived_table(derived: Content, surface: str = "") -> RenderableType:
 
 
 def fit_facts(content: Content) -> RenderableType:
-    """The results of the solver and of the chains."""
+    """Return the results of the solver and of the chains."""
     fit = content["fit"]
     left = fit["residuals"]
     lines: list[Line] = [
@@ -162,7 +154,7 @@ def fit_facts(content: Content) -> RenderableType:
 
 
 def _discrepancy(off: Content) -> list[Line]:
-    """The Gaussian process that the residuals are taken for."""
+    """Return the Gaussian process that the residuals are taken for."""
     if off["amplitude"] is None:
         return [("discrepancy", _verdict(off["result"]))]
     amplitude = to_error(off["amplitude"], off["amplitude_error"])
@@ -174,7 +166,7 @@ def _discrepancy(off: Content) -> list[Line]:
 
 
 def _second_opinions(content: Content) -> list[Line]:
-    """What random starts found, and whether photons give the same constants as the exact profile."""
+    """Return what random starts found, and whether photons give the same constants as the exact profile."""
     lines: list[Line] = []
     if tried := content.get("starts"):
         best = round(tried["share_best"] * tried["count"])
@@ -194,7 +186,7 @@ def _second_opinions(content: Content) -> list[Line]:
 
 
 def stage_tables(stages: Content) -> list[RenderableType]:
-    """The paper's own order: coefficient laws through per-albedo fits, and how a, b, c scale with l."""
+    """Return the paper's own order: coefficient laws through per-albedo fits, and how a, b, c scale with l."""
     cells: dict[str, list[str]] = {"": [], "through the points": [], "± photons": []}
     states: list[Line] = []
     for letter, law in stages["coefficient_laws"].items():
@@ -273,7 +265,7 @@ def _weighting(weighting: Content) -> str:
 
 
 def _verdict(result: str) -> Text:
-    """The result of a solver or a chain; anything but success stands out."""
+    """Return the result of a solver or a chain; anything but success stands out."""
     return Text(result, style="green") if result == "converged" else Text(f"FAILED: {result}", style="bold red")
 
 

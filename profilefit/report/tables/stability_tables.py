@@ -1,4 +1,4 @@
-"""The atlas of failures as tables: causes with remedies, this project's own laws, fits; every region as CSV."""
+"""Atlas of failures as tables: what helps, this project's own laws, fits; every region as CSV."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from profilefit.studies.stability.regions import Region
 
 COLUMNS = (
     "law", "quantity", "precision", "cells", "class", "count", "inside_its_range", "worst_cell", "value", "reference",
-    "error", "bound", "cause", "words", "remedy",
+    "error", "bound", "advice",
 )  # fmt: skip
 FIT_COLUMNS = ("law", "case", "value", "converged", "best", "spread", "constant", "results")
 SHORT = {
@@ -40,8 +40,8 @@ SIGNS = {
     Verdict.RAISES: "!",
 }
 LEGEND = "≈ inaccurate  ↕ not monotone  − negative  × NaN or Inf  ! raises  ? not judged"
-BARE = "no reference there: NaN, sign, order only"
-LONGEST_NAME, LONGEST_REMEDY = 18, 40  # characters: a line of 100 holds both
+BARE = "no reference there: only NaN, sign and order are looked at"
+LONGEST_NAME = 18  # characters: a line of 100 holds it beside the advice
 # What a line a law says of its fits: header, case, how its value begins, and whether shares or spreads.
 SUMMARY = (
     ("from × 2", STARTS, "× e^(0.69", True),
@@ -54,26 +54,32 @@ SUMMARY = (
 )
 
 
-def cause_table(parts: Sequence[Findings]) -> RenderableType:
-    """A row for each cause: the laws it concerns, the classes of failure, and the remedy, shortened."""
-    groups: dict[str, list[Region]] = {}
+def advice_table(parts: Sequence[Findings]) -> RenderableType:
+    """Return a row for each piece of advice: the subjects that it is for, their cells and the classes of failure."""
+    groups: dict[tuple[bool, str], list[Region]] = {}
     for region in _regions(parts):
-        groups.setdefault(region.cause.key, []).append(region)
-    rows = sorted(groups.values(), key=lambda group: (not group[0].verdict.is_red, -len({o.subject for o in group})))
-    columns: dict[str, list[str]] = {
-        "cause": [group[0].cause.key for group in rows],
-        "of": [_among([one.subject for one in group]) for group in rows],
-        "cells": [str(sum(one.count for one in group)) for group in rows],
-        "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for group in rows],
-        "remedy": [_clipped(group[0].cause.remedy.split(";")[0] or BARE, LONGEST_REMEDY) for group in rows],
+        groups.setdefault((not region.verdict.is_red, region.advice), []).append(region)
+    rows = sorted(groups.items(), key=lambda item: (item[0][0], -len({one.subject for one in item[1]})))
+    columns = {
+        "of": [_among([one.subject for one in group]) for _, group in rows],
+        "cells": [str(sum(one.count for one in group)) for _, group in rows],
+        "as": ["".join(SIGNS[v] for v in sorted({one.verdict for one in group})) for _, group in rows],
+        "what helps": [advice or BARE for (_, advice), _ in rows],
     }
     total = cell_count([one for part in parts for one in part.cells])
     caption = f"{LEGEND}\n{total} cells; inaccurate: off by more than a tenth of the model's own error"
-    return column_table("Why cells are red, and what helps", columns, caption, ("cause", "of", "as", "remedy"))
+    return column_table("Where cells are red, and what helps", columns, caption, ("of", "as"), ("what helps",))
+
+
+def _among(subjects: Sequence[str]) -> str:
+    distinct = list(dict.fromkeys(subjects))
+    if len(distinct) > 1:
+        return f"{len(distinct)} of them"
+    return distinct[0] if len(distinct[0]) <= LONGEST_NAME else distinct[0][: LONGEST_NAME - 1].rstrip() + "…"
 
 
 def region_table(part: Findings, most: int = 20) -> RenderableType:
-    """The regions of one subject, those inside its range first."""
+    """Return the regions of one subject, those inside its range first, each with its size and worst error."""
     regions = sorted(part.regions, key=lambda one: (one.inside == 0, -one.count))[:most]
     columns = {
         "quantity": [f"{one.quantity}, {one.arithmetic}" for one in regions],
@@ -83,20 +89,21 @@ def region_table(part: Findings, most: int = 20) -> RenderableType:
         "where": [one.where for one in regions],
         "worst": [significant(one.error) for one in regions],
         "bound": [significant(one.bound) for one in regions],
-        "cause": [one.cause.key for one in regions],
     }
     caption = "" if len(part.regions) <= most else f"the largest {most} of {len(part.regions)} regions; --out has all"
-    return column_table(part.name, columns, caption, ("class",), ("quantity", "where", "cause"))
+    return column_table(part.name, columns, caption, ("class",), ("quantity", "where"))
 
 
 def fit_summary(fits: Sequence[FitCase]) -> RenderableType:
-    """A row for each law: how many fits converge from which starts, and how far its constants change with the data."""
+    """Return a row for each law: the share of fits that converge, and how far its constants change with the data."""
     columns: dict[str, list[str]] = {"fit": [], **{header: [] for header, *_ in SUMMARY}}
     for subject in dict.fromkeys(one.subject for one in fits):
         columns["fit"].append(subject)
         for header, case, begins, is_share in SUMMARY:
-            found = [o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins)]
-            columns[header].append(_cell(found[0], is_share) if found else ABSENT)
+            one = next(
+                (o for o in fits if o.subject == subject and o.case == case and o.value.startswith(begins)), None
+            )
+            columns[header].append(ABSENT if one is None else _cell(one, is_share))
     refused = sum(one.case == NONSENSE and one.converged == 0 for one in fits)
     nonsense = sum(one.case == NONSENSE for one in fits)
     caption = (
@@ -112,7 +119,7 @@ def _cell(one: FitCase, is_share: bool) -> str:
 
 
 def fit_table(fits: Sequence[FitCase]) -> RenderableType:
-    """A line a case: how many converge, and how far their constants spread."""
+    """Return a row for each case: how many fits converge, and how far their constants spread."""
     shown = [one for one in fits if one.case != NONSENSE]
     columns = {
         "fit": [one.subject for one in shown],
@@ -132,18 +139,17 @@ def fit_table(fits: Sequence[FitCase]) -> RenderableType:
 
 
 def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
-    """Each failure of this project's own laws and solvers, and how many have none; each region without a cause."""
+    """Return each failure of this project's own laws and solvers, and how many have none."""
     lines = []
     for part in parts:
-        for region in part.regions:
-            if region.is_failure or (region.is_unexplained and region.verdict.is_red):
-                head = "FAIL" if region.is_failure else "unexplained"
-                lines.append(
-                    Text(
-                        f"{head} {region.subject}: {region.quantity}, {region.arithmetic}, {region.verdict.words} at "
-                        f"{region.place}: {region.value:.4g}, reference {region.reference:.4g}; {region.cause.words}"
-                    )
-                )
+        lines += [
+            Text(
+                f"FAIL {one.subject}: {one.quantity}, {one.arithmetic}, {one.verdict.words} at {one.place}: "
+                f"{one.value:.4g}, reference {one.reference:.4g}; {one.advice}"
+            )
+            for one in part.regions
+            if one.is_failure
+        ]
         lines += [
             Text(f"FAIL {one.subject}: {one.case}, {one.value}: {one.results}") for one in part.fits if one.is_failure
         ]
@@ -158,18 +164,18 @@ def verdict_lines(parts: Sequence[Findings]) -> list[Text]:
 
 
 def _unjudged(parts: Sequence[Findings]) -> tuple[int, int]:
-    """Of our own, cells that are not judged, and all, inside their ranges."""
+    """Return the number of our own cells that are not judged, and of all, inside their ranges."""
     own = [one for part in parts for one in part.cells if one.own]
     aside = sum(int(np.sum((one.codes == Verdict.NOT_JUDGED) & one.inside)) for one in own)
     return aside, sum(int(np.sum(one.inside)) for one in own)
 
 
 def regions_csv(parts: Iterable[Findings]) -> str:
-    """Every region that is red or not judged, a line each."""
+    """Return every region that is red or not judged as CSV, a line each."""
     rows = [
         (
             one.subject, one.quantity, one.arithmetic, one.where, one.verdict.words, one.count, one.inside, one.place,
-            one.value, one.reference, one.error, one.bound, one.cause.key, one.cause.words, one.cause.remedy,
+            one.value, one.reference, one.error, one.bound, one.advice,
         )
         for one in _regions(parts)
     ]  # fmt: skip
@@ -177,7 +183,7 @@ def regions_csv(parts: Iterable[Findings]) -> str:
 
 
 def fits_csv(fits: Iterable[FitCase]) -> str:
-    """Every case of fits, a line each."""
+    """Return every case of fits as CSV, a line each."""
     rows = [
         (
             one.subject, one.case, one.value, one.converged, one.best, one.spread, one.worst,
@@ -189,7 +195,7 @@ def fits_csv(fits: Iterable[FitCase]) -> str:
 
 
 def content(parts: Sequence[Findings]) -> dict[str, Any]:
-    """All of it for JSON."""
+    """Return all of it for JSON."""
     return {
         "passed": not any(part.failures for part in parts),
         "subjects": {part.name: _counts(part.cells) for part in parts if part.cells},
@@ -208,15 +214,6 @@ def _counts(cells: Sequence[Cells]) -> Mapping[str, int]:
 
 def _regions(parts: Iterable[Findings]) -> list[Region]:
     return [region for part in parts for region in part.regions]
-
-
-def _among(subjects: Sequence[str]) -> str:
-    distinct = list(dict.fromkeys(subjects))
-    return f"{len(distinct)} of them" if len(distinct) > 1 else _clipped(distinct[0], LONGEST_NAME)
-
-
-def _clipped(text: str, most: int) -> str:
-    return text if len(text) <= most else text[: most - 1].rstrip() + "…"
 
 
 def _csv(header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

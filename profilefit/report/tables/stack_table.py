@@ -1,4 +1,4 @@
-"""Records of stacks of layers: what they are of, how good their laws are, and each one with all its constants."""
+"""Records of stacks of layers: their layers, the errors of their laws, and each one with all its constants."""
 
 from __future__ import annotations
 
@@ -10,11 +10,10 @@ from rich.console import RenderableType
 
 from profilefit.laws.stack import StackLaw
 from profilefit.recipes import record
-from profilefit.recipes.schema import ERRORS
 from profilefit.recipes.stack.record import FOLDER, PIPELINE
 from profilefit.recipes.stack.schema import BY_THICKNESS, interfaces, read
-from profilefit.report.records import Content, largest_error
-from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
+from profilefit.report.records import Content, largest_error, numbered_errors
+from profilefit.report.tables.cells import column_table, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
 
 Stacks = Mapping[str, Content]
@@ -34,7 +33,7 @@ LEFT = ("layer", "channel", "interface", "constant", "result")
 
 
 def stack_table(folder: Path) -> RenderableType | None:
-    """The records of stacks that lie in a folder of records; None where there are none."""
+    """Return the records of stacks that lie in a folder of records; None where there are none."""
     paths = record.available(folder / FOLDER).values()
     stacks = [read(path) for path in paths if record.read(path)["pipeline"] == PIPELINE]
     if not stacks:
@@ -54,7 +53,7 @@ def stack_table(folder: Path) -> RenderableType | None:
 
 
 def stack_tables(content: Content) -> list[RenderableType]:
-    """Of one record, as `read` gives it: layers, errors by thickness, constants with their errors, how fits ended."""
+    """Return the tables of a record, as `read` gives it: layers, errors by thickness, constants, how fits ended."""
     unit, layers, of = content["unit"], content["layers"], {content["name"]: content}
     columns = {
         "layer": [one["name"] for one in layers],
@@ -63,7 +62,7 @@ def stack_tables(content: Content) -> list[RenderableType]:
     }
     for key in ("mu_a", "mu_s"):
         columns[f"{key} [1/{unit}]"] = [" ".join(f"{each:g}" for each in one[key]) for one in layers]
-    known = [f"{word}: {MEANING_OF_ERROR[word]}" for word in _known_errors(of).values()]
+    known = [f"{word}: {MEANING_OF_ERROR[word]}" for word in numbered_errors(content["constants"].values()).values()]
     return [
         column_table("Layers, from the surface down; red, green, blue", columns, left=LEFT, fold=("layer",)),
         _table("Errors at thicknesses of an interface's upper layer that were not fitted", _errors(of), OF_THICKNESS),
@@ -73,7 +72,7 @@ def stack_tables(content: Content) -> list[RenderableType]:
 
 
 def stack_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
-    """The tables of these records of stacks for Markdown, by the names of their marks; none where there is none."""
+    """Return the tables of these records of stacks for Markdown, by the names of their marks; none without records."""
     tables = {"stack-errors": _errors, "stack-constants": _constants} if paths else {}
 
     def made(rows_of: Callable[[Stacks], Rows]) -> str:
@@ -82,11 +81,10 @@ def stack_sections(paths: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
     return {name: partial(made, rows_of) for name, rows_of in tables.items()}
 
 
-def _table(title: str, rows: Rows, caption: str) -> RenderableType:
-    """Of one stack, whose name stands above."""
-    columns = dict(zip(rows[0], map(list, zip(*rows[1], strict=True)), strict=True))
-    shown = {key: cells if key in LEFT else on_the_point(cells) for key, cells in columns.items() if key != "stack"}
-    return column_table(title, shown, caption, left=LEFT)
+def _table(title: str, table: Rows, caption: str) -> RenderableType:
+    """Return the table of one stack, whose name stands above."""
+    header, rows = table[0][1:], [row[1:] for row in table[1]]
+    return row_table(title, header, rows, caption, LEFT, aligned=[name for name in header if name not in LEFT])
 
 
 def _errors(stacks: Stacks) -> Rows:
@@ -104,7 +102,8 @@ def _errors(stacks: Stacks) -> Rows:
 
 
 def _constants(stacks: Stacks) -> Rows:
-    known, rows = _known_errors(stacks), []
+    rows: list[tuple[str, ...]] = []
+    known = numbered_errors(one for content in stacks.values() for one in content["constants"].values())
     for name, content in stacks.items():
         for channel, number in interfaces(content):
             for constant in StackLaw.constant_names():
@@ -126,9 +125,3 @@ def _fits(stacks: Stacks) -> Rows:
             as_good = f"{starts['as_good']} of {starts['count']}"
             rows.append((name, channel, str(number), fit["result"], steps, condition, as_good))
     return ("stack", "channel", "interface", "result", "steps", "condition number", "starts as good"), rows
-
-
-def _known_errors(stacks: Stacks) -> dict[str, str]:
-    """Those of `ERRORS` that any constant has: exact light has none of photons, traced light none of nodes."""
-    constants = [one for content in stacks.values() for one in content["constants"].values()]
-    return {key: word for key, word in ERRORS.items() if any(one.get(key) is not None for one in constants)}

@@ -13,8 +13,8 @@ from profilefit.laws.gaussians import DEFAULT
 from profilefit.materials import CHANNELS
 from profilefit.recipes.stack.sum_errors import constant_names, quality
 from profilefit.recipes.stack.sum_record import COUNTS, SumRecord, beside, load
-from profilefit.report.records import known_errors, largest_error
-from profilefit.report.tables.cells import column_table, on_the_point, significant, to_error
+from profilefit.report.records import largest_error, numbered_errors
+from profilefit.report.tables.cells import column_table, on_the_point, row_table, significant, to_error
 from profilefit.report.tables.markdown import markdown_table
 from profilefit.scenes.skin.law import D_EON
 
@@ -35,21 +35,21 @@ MEANING_OF_ERROR = {
 LEFT = ("light", "constant")
 
 
-def sum_tables(found: SumRecord) -> list[RenderableType]:
-    """Errors of 1 to 8 Gaussians in both lights, and the constants of six in the light that the stack is for."""
-    return [_over_number(found), _constants(found)]
+def sum_tables(record: SumRecord) -> list[RenderableType]:
+    """Return the errors of 1 to 8 Gaussians in both lights, and the constants of six in the light of the stack."""
+    return [_over_number(record), _constants(record)]
 
 
 def sum_sections(stacks: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
-    """The table of the sums of these records of stacks for Markdown, by the name of its mark; none where none has."""
-    paths = {name: found for name, path in stacks.items() if (found := beside(path)) is not None}
+    """Return the table of these stacks' sums for Markdown, by the name of its mark; none where none has a sum."""
+    paths = {name: record for name, path in stacks.items() if (record := beside(path)) is not None}
 
     def made() -> str:
         rows = [
             (name, light, *(significant(max(one["rel"])) for one in by_count), significant(max(of_six["alone"])))
-            for name, found in ((name, load(path)) for name, path in paths.items())
+            for name, record in ((name, load(path)) for name, path in paths.items())
             for light in ILLUMINATIONS
-            for by_count in [found.content["sums"][light]["by_count"]]
+            for by_count in [record.content["sums"][light]["by_count"]]
             for of_six in [by_count[DEFAULT - 1]]
         ]
         return markdown_table(("stack", "light", *map(str, COUNTS), f"{DEFAULT} each its own"), rows)
@@ -57,42 +57,40 @@ def sum_sections(stacks: Mapping[str, Path]) -> dict[str, Callable[[], str]]:
     return {"stack-gaussians": made} if paths else {}
 
 
-def published(found: SumRecord) -> dict[str, list[dict[str, float]]]:
-    """`quality` of the published Gaussians of human skin at a stack named skin, by light and colour; else none."""
-    if found.path.stem != "skin" or found.stack.unit != "mm":
+def published(record: SumRecord) -> dict[str, list[dict[str, float]]]:
+    """Return `quality` of the published Gaussians of skin at a stack of that name, by light and colour; else none."""
+    if record.path.stem != "skin" or record.stack.unit != "mm":
         return {}
     variances, weights = np.array(D_EON.variances), np.transpose(D_EON.weights)
     return {
-        light: [quality(one, variances, own) for one, own in zip(found.lights(light), weights, strict=True)]
+        light: [quality(one, variances, own) for one, own in zip(record.lights(light), weights, strict=True)]
         for light in ILLUMINATIONS
     }
 
 
-def _over_number(found: SumRecord) -> RenderableType:
+def _over_number(record: SumRecord) -> RenderableType:
     rows: list[tuple[str, ...]] = []
-    others = published(found)
+    others = published(record)
     for light in ILLUMINATIONS:
-        for count, one in zip(COUNTS, found.content["sums"][light]["by_count"], strict=True):
+        for count, one in zip(COUNTS, record.content["sums"][light]["by_count"], strict=True):
             worst = (max(one[key]) for key in ("rms", "ks", "alone"))
             rows.append((light, str(count), *map(significant, one["rel"]), *map(significant, worst)))
         if light in others:
             rel, rms, ks = ([one[key] for one in others[light]] for key in ("rel", "rms", "ks"))
             rows.append((light, "published", *map(significant, (*rel, max(rms), max(ks))), ""))
-    columns = dict(
-        zip(("light", "N", *CHANNELS, "rms", "ks", "alone"), map(list, zip(*rows, strict=True)), strict=True)
-    )
-    return column_table(TITLE, columns, MEASURES + (PUBLISHED if others else ""), left=LEFT)
+    header = ("light", "N", *CHANNELS, "rms", "ks", "alone")
+    return row_table(TITLE, header, rows, MEASURES + (PUBLISHED if others else ""), LEFT)
 
 
-def _constants(found: SumRecord) -> RenderableType:
-    light, unit = found.content["setting"]["illumination"], found.content["unit"]
-    of = {name: found.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
-    known = {key: word for key, word in known_errors(of).items() if any(one[key] is not None for one in of.values())}
+def _constants(record: SumRecord) -> RenderableType:
+    light, unit = record.content["setting"]["illumination"], record.content["unit"]
+    of = {name: record.content["constants"][f"{light}.{DEFAULT}.{name}"] for name in constant_names(DEFAULT)}
+    known = numbered_errors(of.values())
     columns = {
         "constant": [f"{name} [{unit}^2]" if "." not in name else name for name in of],
         "regenerated": on_the_point([to_error(one["regenerated"], largest_error(one)) for one in of.values()]),
         **{f"± {word}": on_the_point([significant(one[key]) for one in of.values()]) for key, word in known.items()},
     }
     meaning = "; ".join(f"{word}: {MEANING_OF_ERROR[word]}" for word in known.values())
-    caption = f"{meaning}. --json has those of every number, in both lights. {found.content['note']}"
+    caption = f"{meaning}. --json has those of every number, in both lights. {record.content['note']}"
     return column_table(f"Six of them, in {light} light", columns, caption, left=LEFT)

@@ -34,10 +34,10 @@ CAPTION = (
 
 
 def summary(records: Records) -> RenderableType:
-    """Profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
+    """Return profile laws, inverse cdfs, maps, and what compares readings, each kind in a table."""
     tables = (_laws, _inverses, _maps, _readings)
     kinds = {make: {name: one for name, one in records.items() if _kind(one) is make} for make in tables}
-    told = [make(found) for make, found in kinds.items() if found]
+    told = [make(group) for make, group in kinds.items() if group]
     failures = [
         Text(f"{name}: {content['fit']['result']}", style="red")
         for name, content in records.items()
@@ -47,7 +47,7 @@ def summary(records: Records) -> RenderableType:
 
 
 def outcome(path: Path) -> dict[str, Any]:
-    """What came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
+    """Return what came out of a recipe, for --json: constants with their errors, and the worst errors over alpha."""
     content = record.read(path)
     told: dict[str, Any] = {"path": path, "law": content["law"], "equations": content.get("equations")}
     if "fit" not in content:
@@ -58,12 +58,12 @@ def outcome(path: Path) -> dict[str, Any]:
 
 
 def reproduced(
-    seconds: Mapping[str, float], paths: Mapping[str, Path], found: Mapping[str, Reproduction | None]
+    seconds: Mapping[str, float], paths: Mapping[str, Path], reproductions: Mapping[str, Reproduction | None]
 ) -> RenderableType:
-    """Seconds of each record and of each setting's light, and how far each record is from the shipped one."""
+    """Return seconds of each record and of each setting's light, and how far each record is from the shipped one."""
     rows = []
     for name, spent in seconds.items():
-        one, result = found.get(name), _result(record.read(paths[name])) if name in paths else ""
+        one, result = reproductions.get(name), _result(record.read(paths[name])) if name in paths else ""
         numbers = (one.moved, one.relative, one.intervals) if one else ()
         cells = [str(one.constants) if one else ABSENT, *(f"{value:.1g}" for value in numbers)] + [ABSENT] * 3
         rows.append([name, f"{spent:.1f}", *cells[:4], (one.problem if one else "") or result])
@@ -72,10 +72,10 @@ def reproduced(
     return column_table(REPRODUCED, columns, REPRODUCED_CAPTION, left=("record",), fold=("result",))
 
 
-def verdict(found: Sequence[Reproduction]) -> str:
-    """One line: how many records are reproduced, and the largest move of a constant."""
-    count, moved = sum(one.is_reproduced for one in found), max(one.moved for one in found)
-    return f"{count} of {len(found)} records reproduced; largest move {moved:.1g} of a stated error"
+def verdict(reproductions: Sequence[Reproduction]) -> str:
+    """Return one line: how many records are reproduced, and the largest move of a constant."""
+    count, moved = sum(one.is_reproduced for one in reproductions), max(one.moved for one in reproductions)
+    return f"{count} of {len(reproductions)} records reproduced; largest move {moved:.1g} of a stated error"
 
 
 def _result(content: Content) -> str:
@@ -83,7 +83,7 @@ def _result(content: Content) -> str:
 
 
 def truth(content: Content) -> str:
-    """What a record was fitted to: the exact solution, or so many photons."""
+    """Return what a record was fitted to: the exact solution, or so many photons."""
     source = content.get("truth") or {}
     if source.get("photons") is None:
         return str(source.get("kind", ABSENT))
@@ -100,7 +100,7 @@ def _inverses(records: Records) -> RenderableType:
 
 
 def _errors(title: str, records: Records, measure: str, more: Mapping[str, str]) -> RenderableType:
-    """A line a record: the worst of a measure, set by set, and how it goes over α."""
+    """Return a line a record: the worst of a measure, set by set, and how it goes over α."""
     rows = {name: values_of(content["quality"]["regenerated"], measure) or [] for name, content in records.items()}
     ends = span(rows.values())
     header = measure.replace("inversion_error", "error")
@@ -132,15 +132,15 @@ def _first(records: Records) -> dict[str, list[str]]:
 
 
 def _indices(content: Content) -> str:
-    """n, or the largest where the constants hold for every n above 1 up to it."""
+    """Return n, or the largest where the constants hold for every n above 1 up to it."""
     span = content.get("indices")
     return f"≤ {span[1]:g}" if span else f"{content['setting']['n']:g}"
 
 
 def _course(content: Content, measure: str, last: bool = False) -> str:
-    """The worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
-    found = worst_measures(content).get(measure, {})
-    shown = [significant(found[name]) for name in SETS if name in found]
+    """Return the worst error of each set in turn, or of the last alone; a failed fit has no law to measure."""
+    worst = worst_measures(content).get(measure, {})
+    shown = [significant(worst[name]) for name in SETS if name in worst]
     if not converged(content):
         shown.append(FAILED)
     return shown[-1] if last else " → ".join(shown)
@@ -151,7 +151,7 @@ def _spaced(tables: list[RenderableType]) -> list[RenderableType]:
 
 
 def _kind(content: Content) -> Callable[[Records], RenderableType]:
-    """The table that a record stands in."""
+    """Return the table that a record stands in."""
     if content["pipeline"] == "evidence":
         return _readings
     if measures(content, "delta_A"):

@@ -45,7 +45,7 @@ ENDS = {"": "value", "_low": "low", "_high": "high"}
 
 
 def tradeoff_tables(part: TradeoffPart) -> list[RenderableType]:
-    """A table a panel; under the last one what was left out, and what is not in the times."""
+    """Return a table a panel; under the last one what was left out, and what is not in the times."""
     last = len(part.panels) - 1
     return [_table(part, panel, "\n".join(part.notes) if i == last else "") for i, panel in enumerate(part.panels)]
 
@@ -54,8 +54,8 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
     points = panel.points
     columns = {
         "": [f"{p.method}, {p.label}" if p.label else p.method for p in points],
-        panel.cost.split("[")[1].rstrip("]"): [_with_spread(p.cost) for p in points],
-        "error": [_with_spread(p.error) for p in points],
+        panel.cost.split("[")[1].rstrip("]"): [with_spread(**vars(p.cost)) for p in points],
+        "error": [with_spread(**vars(p.error)) for p in points],
         "worst": [ABSENT if p.worst is None else significant(p.worst.value) for p in points],
     }
     if any("standardised" in p.facts for p in points):
@@ -68,20 +68,22 @@ def _table(part: TradeoffPart, panel: Panel, notes: str) -> RenderableType:
     return column_table(title, columns, "\n".join(filter(None, (caption, notes))), left=("", "stands"))
 
 
-def _with_spread(measured: WithSpread) -> str:
-    """1.23 (1.20 … 1.31), or the number alone where it has no spread."""
-    value = significant(measured.value, 3)
-    if measured.low == measured.high:
-        return value
-    return f"{value} ({significant(measured.low)} … {significant(measured.high)})"
+def with_spread(value: float, low: float, high: float) -> str:
+    """Return text such as 1.23 (1.20 … 1.31), or the number alone where it has no spread."""
+    shown = significant(value, 3)
+    return shown if low == high else f"{shown} ({significant(low)} … {significant(high)})"
 
 
 def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
-    """The part's file."""
+    """Return the CSV file of a part."""
     comments = [f"{part.name}: {part.title}", *(f"{name}: {value}" for name, value in machine.items())]
     comments += [f"panel {p.name}: {p.title}; cost: {p.cost}; error, worst: {p.error}" for p in part.panels]
     comments += part.notes
-    rows = [row for panel in part.panels for row in _rows(panel)]
+    rows = [
+        _row(point, standing)
+        for panel in part.panels
+        for point, standing in zip(panel.points, standings(panel.points), strict=True)
+    ]
     columns = list(dict.fromkeys(column for row in rows for column in row))
     text = io.StringIO()
     text.writelines(f"# {line.replace('$', '')}\n" for line in comments)
@@ -92,7 +94,7 @@ def as_csv(part: TradeoffPart, machine: Mapping[str, str]) -> str:
 
 
 def as_numbers(part: TradeoffPart) -> dict[str, Any]:
-    """The same for --json."""
+    """Return a part as numbers, for --json."""
     return {
         "title": part.title,
         "notes": list(part.notes),
@@ -109,10 +111,6 @@ def as_numbers(part: TradeoffPart) -> dict[str, Any]:
             for panel in part.panels
         },
     }
-
-
-def _rows(panel: Panel) -> list[dict[str, str]]:
-    return [_row(point, standing) for point, standing in zip(panel.points, standings(panel.points), strict=True)]
 
 
 def _row(point: Point, standing: str) -> dict[str, str]:

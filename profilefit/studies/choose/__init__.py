@@ -1,4 +1,4 @@
-"""The least that a scene needs to scatter light: options, their predicted errors, their costs."""
+"""Least that a scene needs to scatter light: options, their predicted errors, their costs."""
 
 from mcml_sim.cli.lazy import attributes
 

@@ -1,4 +1,4 @@
-"""Does a scene need an atlas? What a gather on the screen by itself is wrong by, and how much of that is hidden."""
+"""Need of an atlas: the error of a gather on the screen alone, and the part of it that hidden surface causes."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class AtlasNeed:
 
 
 def atlas_need(context: moderngl.Context, of: HeartRequest) -> AtlasNeed:
-    """Of a heart's scene: sums at some hundred pixels, with its kernel; a minute where no record has its layers."""
+    """Return what a heart's scene needs, by sums at some hundred pixels; a minute where no record has its layers."""
     light = light_of(of.stack, of.gaussians)
     size, margin = atlas_size(of.mesh, 0.0, FINE, CHARTS_END)
     with staged(context, of, light) as (stage, part), Atlas(context, size, margin) as fine:

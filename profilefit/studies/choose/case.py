@@ -38,7 +38,7 @@ class Option:
 
     @property
     def label(self) -> str:
-        """What a table calls it."""
+        """Name in a table."""
         if self.kind == "nothing":
             return "nothing (Lambert)"
         if self.kind == "separable":
@@ -52,19 +52,19 @@ NOTHING = Option("nothing")
 
 
 def filters() -> list[Option]:
-    """Lambert and all filters."""
+    """Return Lambert and all filters."""
     separable = [Option("separable", taps) for taps in TAPS]
     gaussians = [Option("gaussians", taps, count) for count in GAUSSIANS for taps in GAUSSIAN_TAPS]
     return [NOTHING, *separable, *gaussians]
 
 
 def sampled(law: ProfileLaw, name: str) -> list[Option]:
-    """A law with every number of samples."""
+    """Return the options of a law, one for each number of samples."""
     return [Option("sampled", samples, law=law, name=name) for samples in SAMPLES]
 
 
 def is_filter(option: Option) -> bool:
-    """True for what blurs along rows and columns, without noise."""
+    """Return whether an option blurs along rows and columns, without noise."""
     return option.kind in ("separable", "gaussians")
 
 
@@ -74,7 +74,7 @@ STEEPEST = math.radians(60.0)  # beyond, a pixel shows twice its own side of the
 
 @dataclass(frozen=True)
 class Within:
-    """Which places count: those within `mfp` mean free paths of the edge, and at least so many `pixels` of it."""
+    """Places that count: those within `mfp` mean free paths of the edge, and at least so many `pixels` of it."""
 
     mfp: float = 4.0
     pixels: int = 2
@@ -117,11 +117,11 @@ class Case:
         return math.isinf(self.radius)
 
     def flat(self) -> Case:
-        """The same on a plane."""
+        """Return this case on a plane."""
         return replace(self, radius=math.inf)
 
     def places(self, channel: int, within: Within) -> Floats:
-        """Middles of the pixels on the lit side that count, distances from the edge on the screen (m,), PLACES at most.
+        """Return distances from the edge on the screen (m,) of the pixels on the lit side that count, PLACES at most.
 
         Those on the dark side are as wrong, with the other sign.
         """

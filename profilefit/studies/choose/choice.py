@@ -36,7 +36,7 @@ class Predicted:
 
     @property
     def ms(self) -> float:
-        """Of a frame, as estimated."""
+        """Estimated time of a frame [ms]."""
         return self.frame.estimate
 
 
@@ -69,32 +69,32 @@ class Choice:
 
 
 def affordable(one: Predicted, scene: Requirements) -> bool:
-    """Whether its frame, as estimated, is within the budget."""
+    """Return whether its frame, as estimated, is within the budget."""
     return scene.budget.ms is None or one.ms <= scene.budget.ms
 
 
 def laws(setting: Setting) -> dict[str, ProfileLaw]:
-    """Laws with a shader source and one record under this illumination, by the record's name.
+    """Return laws with a shader source and one record under this illumination, by the record's name.
 
     The record is one whose constants hold for the setting, else that of a matched surface.
     """
-    records, found = Records(fits_folder()), {}
+    records, laws = Records(fits_folder()), {}
     for name, kind in profile_classes().items():
         for base in kind.entry.records if kind.entry.has_text else ():
             own = setting if records.name(base, setting) in records.paths else Setting(setting.illumination)
             if kind.entry.records == (base,) and (of := records.name(base, own)) in records.paths:
-                found[of] = catalogue.load(name, setting=own, folder=records)
-    return found
+                laws[of] = catalogue.load(name, setting=own, folder=records)
+    return laws
 
 
 def options(setting: Setting) -> list[Option]:
-    """All options."""
+    """Return all options under a setting."""
     of_laws = [option for name, law in laws(setting).items() for option in sampled(law, name)]
     return [*filters(), *of_laws]
 
 
 def cases(scene: Requirements) -> Iterator[Case]:
-    """The ends of all ranges: dark and light skin, far and near, flat and as curved as it gets.
+    """Yield the ends of all ranges: dark and light skin, far and near, flat and as curved as it gets.
 
     From the shortest mean free path in the largest pixel to the longest in the smallest in steps of STRIDE at most.
     """
@@ -113,13 +113,13 @@ def cases(scene: Requirements) -> Iterator[Case]:
 
 
 def middle(scene: Requirements) -> Case:
-    """The middle of all ranges, on a plane: what one filter for the whole picture is made for."""
+    """Return the middle of all ranges, on a plane: what one filter for the whole picture is made for."""
     reflectance = _three(tuple(0.5 * (low + high) for low, high in scene.reflectance))
     return Case(reflectance, _three(tuple(_between(one, 0.5) for one in scene.mfp)), _between(scene.pixel, 0.5))
 
 
 def worst(option: Option, scene: Requirements) -> Error:
-    """The option's error in the scene's worst case."""
+    """Return the option's error in the scene's worst case."""
     light = reference_light(scene.setting)
     return max((error(option, case, light, scene.within) for case in cases(scene)), key=lambda one: one.total)
 
@@ -132,22 +132,22 @@ def choose(scene: Requirements, ratios: Ratios, track: Track = iter) -> Choice:
         for option in options(scene.setting)
         if ratios.knows(option)
     }
-    found: list[Predicted] = []
+    predicted: list[Predicted] = []
     for option in track(sorted(priced, key=lambda option: priced[option].estimate)):
-        found.append(Predicted(option, priced[option], worst(option, scene)))
-        if _is_settled(found, scene.tolerance):  # what is dearer still need not be known
+        predicted.append(Predicted(option, priced[option], worst(option, scene)))
+        if _is_settled(predicted, scene.tolerance):  # what is dearer still need not be known
             break
-    return chosen(scene, found)
+    return chosen(scene, predicted)
 
 
-def _is_settled(found: list[Predicted], tolerance: float) -> bool:
-    """Whether one serves, and a dearer one that is more accurate is known."""
-    serving = next((one for one in found if one.error.total <= tolerance), None)
-    return serving is not None and found[-1].error.total < serving.error.total
+def _is_settled(predicted: list[Predicted], tolerance: float) -> bool:
+    """Return whether one serves, and a dearer one that is more accurate is known."""
+    serving = next((one for one in predicted if one.error.total <= tolerance), None)
+    return serving is not None and predicted[-1].error.total < serving.error.total
 
 
 def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
-    """The choice among options, cheapest first."""
+    """Return the choice among options, cheapest first."""
     every = tuple(predicted)
     good = [one for one in every if one.error.total <= scene.tolerance]
     paid = [one for one in every if affordable(one, scene)]
@@ -160,7 +160,7 @@ def chosen(scene: Requirements, predicted: Iterable[Predicted]) -> Choice:
 
 
 def _most_accurate(some: list[Predicted]) -> Predicted:
-    """The cheapest that is as good as any, within the accuracy of a prediction."""
+    """Return the cheapest that is as good as any, within the accuracy of a prediction."""
     least = min(one.error.total for one in some)
     return next(one for one in some if one.error.total <= AS_GOOD * least)
 
@@ -171,5 +171,5 @@ def _three(values: tuple[float, ...]) -> tuple[float, float, float]:
 
 
 def _between(ends: Range, way: float) -> float:
-    """Geometric."""
+    """Return a point between both ends, geometrically."""
     return float(ends[0] ** (1.0 - way) * ends[1] ** way)

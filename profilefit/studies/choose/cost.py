@@ -1,4 +1,4 @@
-"""What a frame costs, in milliseconds: an estimate from a published frame, measured ratios and stated speeds of GPUs.
+"""Cost of a frame in milliseconds: an estimate from a published frame, measured ratios and stated speeds of GPUs.
 
     ms = published(screen_share) x pixels / 1080p x ratio(option) x 1.862 / TFLOPS
 
@@ -72,11 +72,11 @@ class Ratios:
     spread: float = 1.0
 
     def knows(self, option: Option) -> bool:
-        """Whether its cost was measured."""
+        """Return whether its cost was measured."""
         return option.kind == "nothing" or _key(option) in self.each
 
     def of(self, option: Option) -> float:
-        """The frame of an option over the yardstick's [-]."""
+        """Return the frame of an option over the yardstick's [-]."""
         if option.kind == "nothing":
             return self.base
         key = _key(option)
@@ -86,13 +86,13 @@ class Ratios:
 
 
 def _key(option: Option) -> str:
-    """The filter, or the law."""
+    """Return the filter, or the law."""
     return "separable" if option.law is None else source(option.law)
 
 
 @dataclass(frozen=True)
 class Milliseconds:
-    """Of a frame: an estimate, and the range that it lies in by what is not known of the GPU."""
+    """Time of a frame [ms]: an estimate, and the range that it lies in by what is not known of the GPU."""
 
     estimate: float
     least: float
@@ -102,7 +102,7 @@ class Milliseconds:
 def milliseconds(
     option: Option, ratios: Ratios, gpu: str = YARDSTICK, screen_share: float = 0.5, pixels: int = PUBLISHED_PIXELS
 ) -> Milliseconds:
-    """A frame by an option."""
+    """Return a frame by an option."""
     if gpu not in GPUS:
         raise InputError(f"gpu must be one of {', '.join(GPUS)}, got {gpu!r}")
     slope, base = np.polyfit(COVERED, PUBLISHED["separable"], 1)
@@ -115,7 +115,7 @@ def milliseconds(
 
 @cache
 def shipped() -> Ratios:
-    """As they were measured for this release, in software."""
+    """Return the ratios that were measured for this release, in software."""
     content = json.loads((resources.files("profilefit.studies.choose") / SHIPPED).read_text(encoding="utf-8"))
     ratios = Ratios(**content)
     own = ratios.base + ratios.fixed["burley"] + ratios.each["burley"] * YARDSTICK_TAPS
@@ -124,14 +124,14 @@ def shipped() -> Ratios:
 
 
 def as_json(ratios: Ratios) -> str:
-    """What `shipped` reads."""
+    """Return ratios as the JSON that `shipped` reads."""
     content = asdict(ratios)
     del content["spread"]
     return json.dumps(content, indent=1) + "\n"
 
 
 def measured(context: moderngl.Context, laws: Mapping[str, ProfileLaw], size: tuple[int, int] = SIZE) -> Ratios:
-    """On this machine's renderer, a head over half of the screen: seconds to a minute; the least of some turns."""
+    """Measure ratios on this machine's renderer, a head over half of the screen: the least of some turns."""
     scene = covering(context, head_scene(), SHARE, size)
     with Stage(context, size) as stage:
         stage.draw(scene)

@@ -1,4 +1,4 @@
-"""How wrong a way to scatter light will be at a step edge, and through what."""
+"""Error of a technique at a step edge of light, and its parts."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Error:
 
 
 def error(option: Option, case: Case, light: ReferenceLight, within: Within) -> Error:
-    """Of the worst channel."""
+    """Return the error of an option in the worst channel."""
     return max((_of_channel(option, case, light, within, c) for c in range(3)), key=lambda one: one.total)
 
 
@@ -46,9 +46,9 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
     share = light.beyond(reflectance)
     truth = averaged(share, x, case.pixel, mfp, case.radius, case.window[0])
     here = response(share, x, mfp, case.radius, case.window[0])
-    found = _found(option, case, light, channel, x)
-    noise = found.var(axis=1, ddof=1) if found.shape[1] > 1 else np.zeros(len(x))
-    bias = found.mean(axis=1) - truth
+    estimates = _found(option, case, light, channel, x)
+    noise = estimates.var(axis=1, ddof=1) if estimates.shape[1] > 1 else np.zeros(len(x))
+    bias = estimates.mean(axis=1) - truth
     flat = _mean(option, plane, light, channel, x) - response(share, x, mfp, plane.radius, plane.window[0])
     curved = _mean(option, case, light, channel, x) - here
 
@@ -56,7 +56,7 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
         return reflectance * float(np.sqrt(np.mean(squares)))
 
     return Error(
-        total=rms(bias**2 + noise * (1.0 - 1.0 / found.shape[1])),
+        total=rms(bias**2 + noise * (1.0 - 1.0 / estimates.shape[1])),
         model=rms(flat**2),
         curvature=rms((curved - flat) ** 2),
         pixel=rms((here - truth) ** 2),
@@ -67,7 +67,7 @@ def _of_channel(option: Option, case: Case, light: ReferenceLight, within: Withi
 
 
 def _found(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
-    """L / A at places (m,), (m, trials)."""
+    """Return L / A at places (m,), (m, trials)."""
     if option.law is None:
         return _mean(option, case, light, channel, x)[:, None]
     law = option.law
@@ -76,7 +76,7 @@ def _found(option: Option, case: Case, light: ReferenceLight, channel: int, x: F
 
 
 def _mean(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
-    """The same without noise (m,)."""
+    """Return L / A at places (m,) without noise."""
     if option.law is not None:
         share = beyond(_alpha(option.law, case.reflectance[channel]), option.law.setting, option.law)
         return response(share, x, case.mfp[channel], case.radius, case.window[0])
@@ -85,5 +85,5 @@ def _mean(option: Option, case: Case, light: ReferenceLight, channel: int, x: Fl
 
 @cache
 def _alpha(law: ProfileLaw, reflectance: float) -> float:
-    """The albedo that a law's own map gives to a reflectance A [-], as its shader has it."""
+    """Return the albedo that a law's own map gives to a reflectance A [-], as its shader has it."""
     return float(law.albedo.alpha(reflectance))  # type: ignore[attr-defined]

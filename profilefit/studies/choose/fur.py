@@ -1,4 +1,4 @@
-"""How many layers does fur need, and drawn which way? By the angle to the normal, found with rays on random patches.
+"""Layers that fur needs, by the way to draw them and the angle to the normal, from rays on random patches.
 
 A number that just serves some rays may fail with others: what is found holds for the mean over patches with its noise.
 """
@@ -44,7 +44,7 @@ class FurNeed:
     most: int = MOST
 
     def cheapest(self, angle: int) -> FurWay | None:
-        """By layers times the cost of one, at an angle; None if no way is within the tolerance there."""
+        """Return the way of the least layers times cost at an angle; None if no way is within the tolerance there."""
         return cheapest(self.layers[angle])
 
     @property
@@ -54,12 +54,12 @@ class FurNeed:
 
     @property
     def count(self) -> int | None:
-        """Its layers."""
+        """Number of layers of that way."""
         return None if self.way is None else self.layers[self.angle][self.way.name]
 
 
 def cheapest(layers: Mapping[str, int | None]) -> FurWay | None:
-    """The way whose layers, by its name, cost the least together; None if none has any."""
+    """Return the way whose layers, by its name, cost the least together; None if none has any."""
     costs = {way: count * COST[way.tested] for way in WAYS if (count := layers[way.name]) is not None}
     return min(costs, key=lambda way: costs[way], default=None)
 
@@ -80,13 +80,13 @@ class RandomFur:
 
     @property
     def side(self) -> float:
-        """Of a patch. Where it has its most strands a ray may come to its end, but hardly ever unseen."""
+        """Side of a patch. Where it has its most strands a ray may come to its end, but hardly ever unseen."""
         way = WIDER * self.length * float(np.tan(self.theta))
         least, most = (float(np.sqrt(count / self.density)) for count in (STRANDS, MOST_STRANDS))
         return min(max(way, least), most)
 
     def trial(self, number: int) -> FurTrial:
-        """Rays on one of the patches."""
+        """Return rays on one of the patches."""
         while len(self._made) <= number:
             one = 1000 * self.seed + len(self._made)
             patch = random_patch(self.density, self.radius, self.length, self.side, one)
@@ -94,7 +94,7 @@ class RandomFur:
         return self._made[number]
 
     def largest(self, way: FurWay, layers: int, goal: float) -> float:
-        """What the mean square of so many layers' errors is at most, by as many patches as tell whether it is a goal's.
+        """Return an upper limit of the mean square of so many layers' errors, by as many patches as decide on a goal.
 
         Of all rays, with a chance of some 98 %.
         """
@@ -109,13 +109,13 @@ class RandomFur:
         return mean + SAFE * noise
 
     def least_layers(self, way: FurWay, tolerance: float) -> int | None:
-        """The fewest layers that hold, to one in `COARSE`; None if no number up to `MOST` does."""
+        """Return the fewest layers that hold, to one in `COARSE`; None if no number up to `MOST` does."""
         goal = tolerance**2
         return least_layers(lambda layers: self.largest(way, layers, goal), goal, MOST, COARSE)
 
 
 def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:
-    """Of a file's strands, on a flat skin and upright; InputError for a tolerance too small or strands too slender.
+    """Return what a file's strands need, upright on a flat skin.
 
     angles  [degrees], in [0, 90), `WORST` among them
 
@@ -131,8 +131,8 @@ def fur_need(of: FurRequest, angles: Iterable[int] = ANGLES) -> FurNeed:
             f"{of.file}: [fur] length must be at most {SLENDEREST:g} times the radius, {SLENDEREST * of.radius:g} mm, "
             f"where layers are chosen by rays, got {of.length:g}"
         )
-    found: dict[int, dict[str, int | None]] = {}
+    layers: dict[int, dict[str, int | None]] = {}
     for angle in angles:
         fur = RandomFur(of.density, of.radius, of.length, float(np.radians(angle)), of.seed)
-        found[angle] = {way.name: fur.least_layers(way, of.tolerance) for way in WAYS}
-    return FurNeed(found, of.tolerance)
+        layers[angle] = {way.name: fur.least_layers(way, of.tolerance) for way in WAYS}
+    return FurNeed(layers, of.tolerance)

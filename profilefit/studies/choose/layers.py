@@ -1,11 +1,11 @@
-"""Is one layer enough? A stack of layers against the half space that is nearest to it at a step edge of light.
+"""One layer for many: a stack of layers against the half space that is nearest to it at a step edge of light.
 
 By exact light where all layers scatter isotropically under one index; else both are traced, the stack as it is, and a
 half space of the upper layer's index that scatters alike in all directions, at every albedo from one run. The half
 space's albedo is the one that gives the stack's reflectance back; its mean free path is the one whose light near an
 edge is nearest to the stack's.
 
-And does light scattered once need a pass of its own? What it costs to let it leave like all other light.
+The error of single scattering that leaves like all other light says whether it needs a pass of its own.
 """
 
 from __future__ import annotations
@@ -59,7 +59,7 @@ class OneLayer:
     single: float
 
     def verdict(self, tolerance: float) -> str:
-        """Whether it is within the tolerance: "enough", "not enough", or "undecided" by so many photons."""
+        """Return whether it is within the tolerance: "enough", "not enough", or "undecided" by so many photons."""
         if self.error + SURE * self.standard_error <= tolerance:
             return "enough"
         return "not enough" if self.error - SURE * self.standard_error > tolerance else "undecided"
@@ -103,7 +103,7 @@ def one_layer(
 
 
 def _is_solved(stack: Medium) -> bool:
-    """Whether exact light is known of it, and of the half spaces that are tried for it."""
+    """Return whether exact light is known of it, and of the half spaces that are tried for it."""
     n = stack.layers[0].n
     alike = all(layer.g == 0 and layer.n == n and layer.mu_t > 0 for layer in stack.layers)
     return alike and stack.is_half_space and n >= stack.n_above and stack.layers[0].mu_s > 0
@@ -116,22 +116,22 @@ def of_each_colour(
     progress: bool | None = None,
     illumination: str = "searchlight",
 ) -> tuple[OneLayer, ...]:
-    """`one_layer` of red, green and blue, of which equal ones are traced once; one alone where all three are equal."""
-    found = {
+    """Return `one_layer` of red, green and blue, equal ones traced once; of one alone where all three are equal."""
+    layers = {
         medium: one_layer(medium, tolerance, within, progress=progress, illumination=illumination)
         for medium in dict.fromkeys(stack.media)
     }
-    return tuple(found[medium] for medium in stack.media[: 1 if stack.is_grey else None])
+    return tuple(layers[medium] for medium in stack.media[: 1 if stack.is_grey else None])
 
 
 def _rings(edges: Floats, energy: Estimate, overflow: Estimate) -> RingShares:
-    """With one ring more, at the last edge, for the light beyond it."""
+    """Return shares of rings, with one ring more at the last edge for the light beyond it."""
     spread = np.append(energy.standard_error, overflow.standard_error)
     return RingShares.of(edges, np.append(energy.value, overflow.value), spread)
 
 
 def _alpha(white: Orders, reflectance: float) -> float:
-    """The albedo that reflects as much."""
+    """Return the albedo that reflects as much."""
     most = float(white.reflectance(1.0 - WHITE).value)
     if not 0 < reflectance < most:
         raise InputError(f"layers must reflect a share in (0, {most:.3f}) of the light, got {reflectance:.3f}")
@@ -139,7 +139,7 @@ def _alpha(white: Orders, reflectance: float) -> float:
 
 
 def _difference(stack: RingShares, one: RingShares, mfp: float, within: Within) -> tuple[float, float]:
-    """Root mean square difference, and its standard error, over replicates of both by their rings' own errors."""
+    """Return the root mean square difference and its standard error, by replicates of both with their rings' errors."""
     random, d = np.random.default_rng(SEED), places(mfp, within.mfp)
     apart = stack.beyond(d) - one.beyond(d / mfp)
 

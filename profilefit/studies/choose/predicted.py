@@ -1,4 +1,4 @@
-"""What filters and gathers make of the step edge, in float64, on an endless surface.
+"""Light of filters and gathers at the step edge, in float64, on an endless surface.
 
 A filter sums over its taps, which follow the surface as the stage's do; a gather over its samples. A few Gaussians,
 each blurred with on its own along rows and columns, are what a profile's step edge is nearest to:
@@ -39,11 +39,11 @@ class OneGaussian(Separable):
     sigma: Rgb = (1.0, 1.0, 1.0)
 
     def stretches(self, alpha: Floats, mfp: Floats) -> Floats:
-        """The widths themselves: the fit knew albedo and mean free path."""
+        """Return the widths themselves: the fit knew albedo and mean free path."""
         return np.array(self.sigma)
 
     def taps(self, number: int, stretches: Floats) -> NDArray[np.float32]:
-        """(taps, 4): what a channel's Gaussian holds nearest to each tap, and offset [mm]."""
+        """Return (taps, 4): what a channel's Gaussian holds nearest to each tap, and offset [mm]."""
         even = np.linspace(-1.0, 1.0, number | 1)
         offset = REACH * float(np.max(stretches)) * np.sign(even) * even**2
         between = np.concatenate([[-np.inf], 0.5 * (offset[1:] + offset[:-1]), [np.inf]])
@@ -53,7 +53,7 @@ class OneGaussian(Separable):
 
 @lru_cache(maxsize=256)
 def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
-    """Weights (count,) of sum 1 [-] and sigmas (count,) [mfp]."""
+    """Return weights (count,) of sum 1 [-] and sigmas (count,) [mfp]."""
     wanted = share(FITTED)
     quartile = np.interp(-0.25, -wanted, FITTED)
 
@@ -71,7 +71,7 @@ def fitted(share: Beyond, count: int) -> tuple[Floats, Floats]:
 
 
 def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floats, Separable, Floats]]:
-    """Each filter of an option: its share of each channel (3,), itself, and its stretches (3,) in the case's unit."""
+    """Return each filter of an option: its share of each channel (3,), itself, its stretches (3,) [unit]."""
     shares = [light.beyond(a) for a in case.filter_reflectance]
     mfp = np.array(case.mfp)
     if option.kind == "separable":
@@ -79,17 +79,17 @@ def passes(option: Option, case: Case, light: ReferenceLight) -> list[tuple[Floa
         own = np.array([kernel_quartile(strength) for strength in kernel.strength])
         return [(np.ones(3), kernel, mfp * np.array([share.quartile for share in shares]) / own)]
     of_channels = [fitted(share, option.count) for share in shares]
-    found: list[tuple[Floats, Separable, Floats]] = []
+    filters: list[tuple[Floats, Separable, Floats]] = []
     for k in range(option.count):
         share = np.array([weight[k] for weight, _ in of_channels])
         sigma = np.array([s[k] for _, s in of_channels]) * mfp
         red, green, blue = sigma.tolist()
-        found.append((share, OneGaussian(setting=light.setting, sigma=(red, green, blue)), sigma))
-    return found
+        filters.append((share, OneGaussian(setting=light.setting, sigma=(red, green, blue)), sigma))
+    return filters
 
 
 def filtered(option: Option, case: Case, light: ReferenceLight, channel: int, x: Floats) -> Floats:
-    """L / A of a channel at places x (m,) on the lit side."""
+    """Return L / A of a channel at places x (m,) on the lit side."""
     total = np.zeros(x.shape)
     for share, kernel, stretches in passes(option, case, light):
         taps = kernel.taps(option.number, stretches).astype(float)
@@ -130,7 +130,7 @@ def density(law: ProfileLaw, alpha: float) -> Density:
 
 @lru_cache(maxsize=256)
 def drawn(law: ProfileLaw, alpha: float, samples: int) -> tuple[Floats, Floats, Floats]:
-    """Radii x = r/l, their density, and angles of every trial, (trials, samples) each."""
+    """Return radii x = r/l, their density, and angles of every trial, (trials, samples) each."""
     trials = min(MOST, FULL // samples)
     points = shifted_points(samples, trials, SEED)
     xi = np.full(FULL, 0.5)  # one shape, one compilation
@@ -141,7 +141,7 @@ def drawn(law: ProfileLaw, alpha: float, samples: int) -> tuple[Floats, Floats, 
 
 
 def estimates(law: ProfileLaw, alpha: tuple[float, ...], samples: int, case: Case, channel: int, x: Floats) -> Floats:
-    """L / A that the channel gathers at places x (m,) on the lit side, each with trials of its own: (m, trials)."""
+    """Return L / A (m, trials) that the channel gathers at places x (m,) on the lit side, each by its own trials."""
     length, longest = case.mfp[channel], case.mfp[case.longest]
     every = drawn(law, alpha[case.longest], samples)
     each = len(every[0]) // len(x)
@@ -156,14 +156,14 @@ def estimates(law: ProfileLaw, alpha: tuple[float, ...], samples: int, case: Cas
         weight = area * side / distance * own(distance / length) / length / p
     weight = np.where(shown, weight, 0.0)
     rest = OWN * samples
-    found = (rest + np.sum(weight * (across > 0), axis=2)) / (rest + np.sum(weight, axis=2))
+    gathered = (rest + np.sum(weight * (across > 0), axis=2)) / (rest + np.sum(weight, axis=2))
     low, high = LAMBERT
     blurred = np.clip((length / case.pixel - low) / (high - low), 0.0, 1.0)
-    return 1.0 + blurred * (found - 1.0)
+    return 1.0 + blurred * (gathered - 1.0)
 
 
 def _met(side: Floats, across: Floats, x: Floats, case: Case) -> tuple[Floats, Floats]:
-    """Where the ray of each sample meets the tangent plane of the pixel that it hits: distance, and area it stands for.
+    """Return the distance at which each sample's ray meets the tangent plane of its pixel, and the area it stands for.
 
     Beside the cylinder the area is 0.
     """

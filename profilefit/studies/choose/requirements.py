@@ -92,7 +92,7 @@ class _Reader(Tables):
     """The tables of one file, whose name every message begins with."""
 
     def refuse_older(self, content: Table) -> None:
-        """InputError that says what is written today for the keys of an older format."""
+        """Raise InputError for the keys of an older format, which says what is written today."""
         tables = {name: content[name] for name in OLDER if isinstance(content.get(name), dict)}
         if older := [(name, key) for name, table in tables.items() for key in OLDER[name] if key in table]:
             words = ", ".join(f"{OLDER[name][key]} for [{name}] {key}" for name, key in older)
@@ -100,7 +100,7 @@ class _Reader(Tables):
             raise InputError(f"{self.file}: keys are of an older format: write {first}{words}")
 
     def skin(self, content: Table) -> Requirements:
-        """Requirements of a painted or published material."""
+        """Return requirements of a painted or published material."""
         request = skin.read(self.file, content)
         limits = self.limits(content, request)
         setting, material = replace(request.setting, illumination=request.illumination), request.material
@@ -111,7 +111,7 @@ class _Reader(Tables):
         return self.limited(limits, setting, material, stack)
 
     def layers(self, content: Table) -> Requirements:
-        """Requirements of the half space nearest to each colour's stack."""
+        """Return requirements of the half space nearest to each colour's stack."""
         request = layers.read(self.file, content)
         limits = self.limits(content, request)
         stack, illumination = request.stack.stack, request.stack.illumination
@@ -120,7 +120,7 @@ class _Reader(Tables):
         return self.limited(limits, Setting(illumination, n=stack.media[0].layers[0].n), material, stack)
 
     def limits(self, content: Table, request: ViewRequest) -> dict[str, Any]:
-        """The fields of `Requirements` that no material has a part in."""
+        """Return the fields of `Requirements` that no material has a part in."""
         own, named = (self.table(content, name, {}) for name in (CHOOSE, "technique"))
         side, mfp = request.camera.height / request.size[1], self.number(CHOOSE, "mfp", own, 4.0)
         pixels = self.whole(CHOOSE, "pixels", own, 2, 1, 100)
@@ -140,7 +140,7 @@ class _Reader(Tables):
     def limited(
         self, limits: dict[str, Any], setting: Setting, material: Painted, stack: LayerStack | None
     ) -> Requirements:
-        """Requirements of a material; InputError where the surface bends within its mean free paths."""
+        """Return requirements of a material; InputError where the surface bends within its mean free paths."""
         longest = max(most for _, most in material.mfp)
         if not LEAST_RADIUS * longest <= limits["radius"] <= LENGTHS[1] and math.isfinite(limits["radius"]):
             least = f"{LEAST_RADIUS:g} times the longest mean free path, {LEAST_RADIUS * longest:.3g}"

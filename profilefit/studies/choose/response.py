@@ -1,4 +1,4 @@
-"""What a profile makes of the step edge, flat or around a cylinder, at a place or over a pixel: integrals, no noise.
+"""Light of a profile at the step edge, flat or around a cylinder, at a place or over a pixel: integrals, no noise.
 
 On a plane the light from beyond an edge at the distance d is a share F(d) of A (`step_edge`), and what a line at
 the distance c adds is -F'(c). On a cylinder of radius R the line at the arc s is c = 2R sin(s/2R) away, straight
@@ -8,7 +8,7 @@ through, so that what lies within the arc s adds
 
 and the light at a place is the lit part of what is visible over all that is visible: half the cylinder.
 
-Right is the exact half space.
+The reference is the exact half space.
 """
 
 from __future__ import annotations
@@ -53,13 +53,17 @@ class Beyond:
         return float(NEAR * np.sinh(brentq(lambda u: float(self.curve(u)) - np.log(0.25), 0.0, self.curve.x[-1])))
 
 
+@lru_cache(maxsize=512)
 def beyond(alpha: float, setting: Setting, law: ProfileLaw | None = None) -> Beyond:
-    """Of the exact half space, or of a law."""
-    return _of_law(alpha, law) if law is not None else _exact(alpha, setting)
+    """Return F(d) of the exact half space, or of a law."""
+    u = np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOTS)
+    d = NEAR * np.sinh(u)
+    share = step_response(-d, alpha, setting=setting) if law is None else step_response(-d, alpha, law=law)
+    return Beyond(CubicSpline(u, np.log(np.maximum(share, FAINT))))
 
 
 def response(share: Beyond, x: Floats, mfp: float, radius: float, window: float = np.inf) -> Floats:
-    """L / A at distances x > 0 (...) from the edge on the screen, on the lit side; all lengths in the same unit.
+    """Return L / A at distances x > 0 (...) from the edge on the screen, on the lit side; all lengths in the same unit.
 
     window  how far the picture shows the plane on either side of the edge; a cylinder ends by itself
     """
@@ -75,7 +79,7 @@ def response(share: Beyond, x: Floats, mfp: float, radius: float, window: float 
 
 
 def averaged(share: Beyond, x: Floats, pixel: float, mfp: float, radius: float, window: float = np.inf) -> Floats:
-    """The mean of `response` over pixels (m,) whose middles are at x: what their footprints show."""
+    """Return the mean of `response` over pixels (m,) whose middles are at x: what their footprints show."""
     t = 0.5 * (NODES + 1.0)
     inside = x[:, None] + pixel * (t**3 - 0.5)  # close together at the edge, where short paths are all there is
     if not np.isinf(radius):
@@ -84,7 +88,7 @@ def averaged(share: Beyond, x: Floats, pixel: float, mfp: float, radius: float, 
 
 
 def _within(share: Beyond, mfp: float, radius: float) -> CubicSpline:
-    """I(s) of arcs up to half the circle, by the way from u to u of s = s0 sinh u."""
+    """Return I(s) of arcs up to half the circle, by the way from u to u of s = s0 sinh u."""
     first = 1e-3 * min(mfp, radius)
     last = np.arcsinh(np.pi * radius / first)
     u = np.linspace(0.0, last, ARCS)
@@ -95,21 +99,6 @@ def _within(share: Beyond, mfp: float, radius: float) -> CubicSpline:
     return lambda arc: np.interp(np.arcsinh(arc / first), u, total)
 
 
-@lru_cache(maxsize=256)
-def _exact(alpha: float, setting: Setting) -> Beyond:
-    return _curve(lambda d: step_response(-d, alpha, setting=setting))
-
-
-@lru_cache(maxsize=256)
-def _of_law(alpha: float, law: ProfileLaw) -> Beyond:
-    return _curve(lambda d: step_response(-d, alpha, law=law))
-
-
-def _curve(share) -> Beyond:
-    u = np.linspace(0.0, np.arcsinh(FARTHEST / NEAR), KNOTS)
-    return Beyond(CubicSpline(u, np.log(np.maximum(share(NEAR * np.sinh(u)), FAINT))))
-
-
 @dataclass(frozen=True)
 class ReferenceLight:
     """The light of a setting, exact."""
@@ -117,20 +106,20 @@ class ReferenceLight:
     setting: Setting
 
     def alpha(self, reflectance: float) -> float:
-        """Single-scattering albedo [-] of a reflectance A [-]."""
+        """Return the single-scattering albedo [-] of a reflectance A [-]."""
         return max(albedo_of(reflectance, self.setting), DARKEST)
 
     def reflectance(self, alpha: float) -> float:
-        """A [-] of a single-scattering albedo [-]."""
+        """Return A [-] of a single-scattering albedo [-]."""
         return float(exact.reflectance(alpha, self.setting))
 
     def beyond(self, reflectance: float) -> Beyond:
-        """F(d) of a reflectance A [-]."""
+        """Return F(d) of a reflectance A [-]."""
         return beyond(self.alpha(reflectance), self.setting)
 
 
 def reference_light(setting: Setting) -> ReferenceLight:
-    """Of a setting that laws with constants are there for; InputError where the index is none of theirs."""
+    """Return the exact light of a setting; InputError where no law has constants for its index."""
     low, high = 1.0, REFRACTING.high
     if not low <= setting.n <= high:
         raise InputError(f"index must be a refractive index in [{low:g}, {high:g}], got {setting.n:g}")

@@ -1,4 +1,4 @@
-"""What does a scene under the sea need? Which terms of the water's light, which splat, how many steps to a hit."""
+"""Needs of a scene under the sea: terms of the water's light, a splat, steps to a hit."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from profilefit.scenes.sea.passes import axes, reach_of
 from profilefit.scenes.sea.request import SPLATS, SeaRequest
 from profilefit.scenes.sea.waves import FINE, refracted
 from profilefit.scenes.sea.world import World
-from profilefit.studies.stability.causes_of_sea import LIMITS
+from profilefit.studies.stability.sea import LIMITS
 
 Floats = NDArray[np.float64]
 CHEAPER = (SINGLE, SCALED)  # than what they are held against, the cheapest first
@@ -45,7 +45,7 @@ class SeaNeed:
 
     @property
     def splat(self) -> str:
-        """By its name in a file."""
+        """Splat by its name in a file."""
         return next(name for name, one in SPLATS.items() if one is splat_for(self.focus))
 
     @property
@@ -58,12 +58,12 @@ class SeaNeed:
 
 
 def steps_for(steepness: float) -> int:
-    """The fewest of `STEPS` that are held to be right at S [-]."""
+    """Return the fewest of `STEPS` that are held to be right at S [-]."""
     return next((one for one in STEPS if steepness < HELD[one]), STEPS[-1])
 
 
 def sea_need(of: SeaRequest) -> SeaNeed:
-    """Of a scene, by closed forms: nothing is drawn."""
+    """Return what a scene needs, by closed forms: nothing is drawn."""
     world = of.world
     return SeaNeed(
         haze=_haze(of, world),
@@ -74,7 +74,7 @@ def sea_need(of: SeaRequest) -> SeaNeed:
 
 
 def steepest_ray(world: World) -> float:
-    """Tangent to the vertical of the sun's steepest ray below the waves [-]."""
+    """Return tangent to the vertical of the sun's steepest ray below the waves [-]."""
     x = np.arange(FINE) * world.sea.tile / FINE
     _, *slope = world.sea.lattice(x, x)
     along, across, flux = refracted(world.tilt, (slope[0], slope[1]), world.n)
@@ -82,7 +82,7 @@ def steepest_ray(world: World) -> float:
 
 
 def _haze(of: SeaRequest, world: World) -> dict[str, float]:
-    """Toward the picture's middle and corners, as if the sun's calm ray went straight down from a level sea."""
+    """Return the worst errors of the haze toward the picture's middle and corners, below a level sea and a calm ray."""
     depth = -of.camera.eye[2] * world.slant
     worst = dict.fromkeys(CHEAPER, 0.0)
     for view in _views(of):
@@ -96,15 +96,15 @@ def _haze(of: SeaRequest, world: World) -> dict[str, float]:
 
 
 def _views(of: SeaRequest) -> Floats:
-    """Unit vectors (5, 3) to the middle of the picture and to its corners."""
+    """Return unit vectors (5, 3) to the middle of the picture and to its corners."""
     right, up, forward = axes(of.camera, of.size)
     sides = ((0, 0), (-1, -1), (-1, 1), (1, -1), (1, 1))
-    found = np.array([forward + x * right + y * up for x, y in sides])
-    return np.asarray(found / np.linalg.norm(found, axis=1, keepdims=True))
+    views = np.array([forward + x * right + y * up for x, y in sides])
+    return np.asarray(views / np.linalg.norm(views, axis=1, keepdims=True))
 
 
 def _steepest_view(of: SeaRequest, world: World) -> float:
-    """Tangent to the vertical of the steepest view that meets the floor no farther away than one sees [-]."""
+    """Return tangent to the vertical of the steepest view that meets the floor no farther away than one sees [-]."""
     down = -_views(of)[:, 2]
     above = of.camera.eye[2] - world.floor.mean
     least = max(above / reach_of(world), float(np.min(down)))  # cosine; the least of a picture is at a corner

@@ -1,1 +1,1 @@
-"""Where laws, maps, samplers, stacks, conversions, exact light and fits fail: every cell with its cause and remedy."""
+"""Failures of laws, maps, samplers, stacks, conversions, exact light and fits: every cell, and what helps."""

@@ -72,7 +72,7 @@ class FitCase:
 
 
 def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[FitCase]:
-    """All cases of one law."""
+    """Yield all cases of one law."""
     names = law.seen_by(objective)
     problem, own = ResidualFunction(objective, names), law.vector(names)
     label = f"{name}, {objective}"
@@ -101,7 +101,7 @@ def fits_of(law: Constants, objective: str, name: str, lanes: int) -> Iterator[F
 
 
 def trimmed_fits(start: Liang) -> Iterator[FitCase]:
-    """(7) at each albedo, on the rings that (6) keeps: its coefficients over the epsilon of the trimming."""
+    """Yield fits of (7) at each albedo on the rings that (6) keeps, over the epsilon of the trimming."""
     reference: Floats | None = None
     for epsilon in (0.05, 0.005, 0.0005):
         profiles = Profiles.from_exact(ORDINARY, np.linspace(0.0, 20.0, 401))
@@ -125,7 +125,7 @@ def even_rings(alpha: tuple[float, ...], last: float) -> Rings:
 
 
 def merged_rings(rings: Rings, count: int) -> Rings:
-    """Rings so many times as wide up to the same last radius, each beside rings of no width that do not count.
+    """Return rings so many times as wide up to the same last radius, each beside rings of no width that do not count.
 
     So their number, and with it the compiled fit, stays; and every edge weighs the same in what counts edges.
     """
@@ -138,7 +138,7 @@ def merged_rings(rings: Rings, count: int) -> Rings:
 
 
 def _noisy(rings: Rings, photons: float, lane: int) -> Rings:
-    """Every ring with the noise of so many photons, drawn anew in each lane."""
+    """Return every ring with the noise of so many photons, drawn anew in each lane."""
     normal = np.random.default_rng((SEED, lane)).standard_normal((2, *np.shape(rings.energy)))
     energy = np.abs(np.asarray(rings.energy) + normal[0] * np.sqrt(np.asarray(rings.energy) / photons))
     beyond = np.abs(np.asarray(rings.beyond) + normal[1, :, 0] * np.sqrt(np.asarray(rings.beyond) / photons))
@@ -151,26 +151,33 @@ def _replaced(rings: Rings, **changed: Any) -> Rings:
 
 
 def _stacked(law: Constants, data: list[Rings]) -> Any:
-    """Law and rings with a leading axis of lanes."""
+    """Return law and rings with a leading axis of lanes."""
     laws = jax.tree.map(lambda leaf: np.broadcast_to(leaf, (len(data), *np.shape(leaf))), law)
     return laws, jax.tree.map(lambda *leaves: np.stack(leaves), *data)
 
 
 def _case(
-    label: str, case: str, value: str, names: tuple[str, ...], found: list[Solution], start: Floats | None
+    label: str, case: str, value: str, names: tuple[str, ...], solutions: list[Solution], start: Floats | None
 ) -> FitCase:
-    done = [one for one in found if one.converged]
+    done = [one for one in solutions if one.converged]
     least = min((one.cost for one in done), default=np.inf)
     best = [one for one in done if one.cost <= least * (1.0 + SAME_COST) + 1e-20]
     spread, worst = _spread(np.array([one.parameters for one in (done if case == NOISE else best)]), names, start)
-    results = Counter(re.split("[,:]", one.result)[0] for one in found)
+    results = Counter(re.split("[,:]", one.result)[0] for one in solutions)
     return FitCase(
-        label, case, value, len(done) / len(found), len(best) / len(found), spread, worst, tuple(results.most_common())
+        label,
+        case,
+        value,
+        len(done) / len(solutions),
+        len(best) / len(solutions),
+        spread,
+        worst,
+        tuple(results.most_common()),
     )
 
 
 def _spread(parameters: Floats, names: tuple[str, ...], start: Floats | None) -> tuple[float, str]:
-    """The largest, and whose; among the rows, or from `start` to the first; nobody's where there are too few."""
+    """Return the largest relative spread among the rows, or from `start` to the first, and whose it is."""
     if len(parameters) < (2 if start is None else 1):
         return 0.0, ""
     if start is None:

@@ -1,4 +1,4 @@
-"""Derivatives by jax, backwards, in every argument and in the constants: finite, and what differences say.
+"""Derivatives by jax, backwards, in every argument and in the constants: finite, and equal to differences.
 
 In double precision. An end where there is no derivative is outside: R_d at r = 0, all of alpha at 1, where A goes with
 the root of 1 - alpha, and xi = 1.
@@ -7,6 +7,7 @@ the root of 1 - alpha, and xi = 1.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from typing import Any
 
 import equinox as eqx
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 
 from profilefit.recipes.inventory import Named
 from profilefit.shader.check.validity import Range
-from profilefit.studies.stability.cells import Cells, judged
+from profilefit.studies.stability.cells import Cells, judged_cells
 from profilefit.studies.stability.layout import (
     ALPHA_OF,
     CDF,
@@ -29,8 +30,11 @@ from profilefit.studies.stability.layout import (
     SAMPLE,
     ArgumentAxis,
 )
+from profilefit.studies.stability.map_cells import map_label
 
 Floats = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+Triple = tuple[Floats, Floats, Floats]
 ALPHA = (0.0, 1e-12, 1e-6, 0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24, 1.0 - 2.0**-53, 1.0)
 RADIUS = (0.0, 1e-12, 1e-6, 1e-3, 0.01, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 1e6, np.inf)
 SHARE = (0.0, 1e-12, 1e-6, 1e-3, 0.008, 0.02, 0.1, 0.3, 0.5, 0.7, 0.9, 0.99, 0.999, 1.0 - 2.0**-24)
@@ -43,6 +47,7 @@ BOUND = 1e-4  # relative; derivatives that are less than a millionth of value ov
 LEAST = 1e-6
 # Where differences are taken: elsewhere the step, or what is left of the value, is rounding.
 SURE = {"r": (1e-3, 30.0), "ξ": (0.005, 0.99), "α": (1e-3, 0.9985), "A": (1e-3, 0.97)}
+INSIDE = "differentiate inside, alpha < 1, r > 0 and xi > 0, or by sqrt(1 - alpha), in which A is smooth"
 UNSURE = "differences are rounding there: only whether the derivative is a number is looked at"
 Function = Callable[[Any, Array, Array, Array], Array]
 FUNCTIONS: dict[str, Function] = {
@@ -58,47 +63,31 @@ MAPS: dict[str, Function] = {
 
 
 def of_law(one: Named, names: tuple[str, ...], holds: Range) -> Iterator[Cells]:
-    """The derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
+    """Yield the derivatives of these quantities of a profile law, which holds for the albedos of `holds`."""
     alpha = ArgumentAxis("α", "-", np.array(ALPHA))
     for name in names:
-        first = (
-            ArgumentAxis("ξ", "-", np.array(SHARE)) if name == SAMPLE else ArgumentAxis("r/l", "-", np.array(RADIUS))
-        )
         symbol = "ξ" if name == SAMPLE else "r"
+        first = ArgumentAxis(symbol if name == SAMPLE else "r/l", "-", np.array(SHARE if name == SAMPLE else RADIUS))
         u, a = (each.ravel() for each in np.meshgrid(first.values, alpha.values))
         valid = (a < 1.0) & holds.holds(a) & ((u > 0) & np.isfinite(u) if symbol == "r" else u > 0)
-        found = _derivatives(FUNCTIONS[name], one.law, u, a, symbol, one.law.constant_names() != ())
-        for by, (value, difference, scale) in found.items():
-            sure = valid & _within(symbol, u) & _within("α", a)
-            yield _cells(
-                one.label,
-                one.law.entry.own,
-                one.law,
-                name,
-                by,
-                (alpha, first),
-                value,
-                difference,
-                scale,
-                valid,
-                sure,
-            )
+        sure = valid & _within(symbol, u) & _within("α", a)
+        derivatives = _derivatives(FUNCTIONS[name], one.law, u, a, symbol, one.law.constant_names() != ())
+        for by, triple in derivatives.items():
+            yield _cells(one.label, one.law.entry.own, f"∂{name}/∂{by}", (alpha, first), triple, valid, sure)
 
 
 def of_map(one: Named, spans: tuple[Range, Range]) -> Iterator[Cells]:
-    """The derivatives of both directions of a map."""
+    """Yield the derivatives of both directions of a map."""
     ways = ((ALPHA_OF, "A", REFLECTANCE), (REFLECTANCE_OF, "α", ALPHA))
     for (name, symbol, values), span in zip(ways, spans, strict=True):
         axis = ArgumentAxis(symbol, "-", np.array(values))
         u = axis.values
-        found = _derivatives(MAPS[name], one.law, u, np.full_like(u, 0.5), symbol, True)
+        derivatives = _derivatives(MAPS[name], one.law, u, np.full_like(u, 0.5), symbol, True)
         valid = (u < 1.0) & span.holds(u)
+        sure = valid & _within(symbol, u)
         for by in (symbol, "constants"):
-            value, difference, scale = found[by]
-            sure = valid & _within(symbol, u)
-            label = one.label if one.records else f"map {one.label}"
-            own = one.law.entry.own
-            yield _cells(label, own, one.law, name, by, (axis,), value, difference, scale, valid, sure)
+            quantity = f"∂{name}/∂{by}"
+            yield _cells(map_label(one), one.law.entry.own, quantity, (axis,), derivatives[by], valid, sure)
 
 
 def _within(symbol: str, values: Floats) -> NDArray[np.bool_]:
@@ -106,41 +95,43 @@ def _within(symbol: str, values: Floats) -> NDArray[np.bool_]:
     return (values >= low) & (values <= high)
 
 
-def _cells(label: str, own: bool, law: Any, name: str, by: str, places, value, difference, scale, valid, sure) -> Cells:
-    shape = tuple(axis.values.size for axis in places)
-    value, difference, scale, valid, sure = (each.reshape(shape) for each in (value, difference, scale, valid, sure))
+def _cells(
+    label: str, own: bool, quantity: str, axes: tuple[ArgumentAxis, ...], triple: Triple, valid: Mask, sure: Mask
+) -> Cells:
+    """Return the cells of a derivative, its difference, and value over argument."""
+    shape = tuple(axis.values.size for axis in axes)
+    value, difference, scale, valid, sure = (each.reshape(shape) for each in (*triple, valid, sure))
     with np.errstate(all="ignore"):
         error = np.abs(value - difference) / np.maximum(np.abs(difference), LEAST * scale)
     error = np.where(sure & (scale > 0), error, np.nan)
     reference = np.where(sure, difference, np.nan)
-    codes = judged(np.where(np.isnan(value), np.nan, np.abs(value)), reference, error, BOUND, valid, np.float64)
-    return Cells(
-        label, own, f"∂{name}/∂{by}", FLOAT64, places, value, reference, error, BOUND, valid, codes, law,
-        unjudged=UNSURE,
+    sizes = np.where(np.isnan(value), np.nan, np.abs(value))
+    cells = judged_cells(
+        label, own, quantity, FLOAT64, axes, sizes, reference, error, BOUND, valid, judge=valid, unjudged=UNSURE,
+        advice=INSIDE,
     )  # fmt: skip
+    return replace(cells, value=value)
 
 
-def _derivatives(
-    function: Function, law: Any, u: Floats, a: Floats, symbol: str, constants: bool
-) -> dict[str, tuple[Floats, Floats, Floats]]:
-    """By argument: derivative, difference, and value over argument, at each (u, a) and l = 1."""
+def _derivatives(function: Function, law: Any, u: Floats, a: Floats, symbol: str, constants: bool) -> dict[str, Triple]:
+    """Return derivative, difference, and value over argument by argument, at each (u, a) and l = 1."""
     steps = {symbol: STEP * (u if symbol == "r" else np.minimum(u, 1.0 - u)), "α": STEP * np.minimum(a, 1.0 - a)}
     with jax.enable_x64(True):
         own = jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float64), law)
-        made = _computed(function, WEIGHTS, own, *map(jnp.asarray, (u, a, steps[symbol], steps["α"])))
-        value, gradients, differences = jax.tree.map(np.asarray, made)
+        arguments = map(jnp.asarray, (u, a, steps[symbol], steps["α"]))
+        value, gradients, differences = jax.tree.map(np.asarray, _computed(function, WEIGHTS, own, *arguments))
     with np.errstate(all="ignore"):
         over = {symbol: np.abs(value / u), "α": np.abs(value / np.minimum(a, 1.0 - a)), "l": np.abs(value)}
     names = [symbol] if symbol == "α" else [symbol, "α", "l"]
-    found = {by: (gradients[i], differences[i], over[by]) for i, by in enumerate(names)}
+    derivatives = {by: (gradients[i], differences[i], over[by]) for i, by in enumerate(names)}
     if constants:
-        found["constants"] = gradients[3], differences[3], np.abs(value)
-    return found
+        derivatives["constants"] = gradients[3], differences[3], np.abs(value)
+    return derivatives
 
 
 @eqx.filter_jit
 def _computed(function: Function, weights: Weights, law: Any, u: Array, a: Array, du: Array, da: Array):
-    """Values, derivatives by u, alpha, l and along the constants themselves, and the same by differences.
+    """Return values, derivatives by u, alpha, l and along the constants themselves, and these by differences.
 
     `weights` are given and not the module's own: a program that is kept must not outlive them.
     """
@@ -159,7 +150,7 @@ def _computed(function: Function, weights: Weights, law: Any, u: Array, a: Array
         for k, _ in weights:
             points.append([each + (k * width if i == place else nothing) for i, each in enumerate(usual)])
     stacked = [jnp.concatenate(column) for column in zip(usual, *points, strict=True)]  # at once: compiled once
-    made = whole(*stacked).reshape(1 + len(points), u.size)
-    values = made[1:].reshape(len(widths), len(weights), u.size)
+    computed = whole(*stacked).reshape(1 + len(points), u.size)
+    values = computed[1:].reshape(len(widths), len(weights), u.size)
     sums = jnp.einsum("skn,k->sn", values, jnp.array([weight for _, weight in weights]))
-    return made[0], gradients, sums / jnp.where(jnp.stack(widths) > 0, jnp.stack(widths), 1.0)
+    return computed[0], gradients, sums / jnp.where(jnp.stack(widths) > 0, jnp.stack(widths), 1.0)

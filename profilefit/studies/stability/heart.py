@@ -1,4 +1,4 @@
-"""Where blurs of a heart may fail: poles, seams and stretch of an atlas, and a screen seen aslant. It needs OpenGL.
+"""Blurs of a heart: poles, seams and stretch of an atlas, and a screen seen aslant. It needs OpenGL.
 
 Light is blurred by one Gaussian at a time, and held against what is known: a ball lit from one side, and an edge of
 light on a plane. Errors are of white.
@@ -23,19 +23,14 @@ from profilefit.scenes.stage.pattern import Sampling
 from profilefit.scenes.stage.stage import Stage
 from profilefit.scenes.stage.world import Camera, Mesh, Part, Scene, unit
 from profilefit.shader import opened
-from profilefit.studies.stability.causes_of_heart import (
-    IN_ROWS,
-    LATITUDE,
-    LIGHT,
-    RATIO,
-    WIDTH,
-    is_coarse,
-    near_a_pole,
-)
-from profilefit.studies.stability.cells import Cells, absolute, judged
+from profilefit.studies.stability.cells import Cells, absolute, judged_cells
 from profilefit.studies.stability.layout import TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
+WITHIN = 2.0  # sigma from a pole that are not promised: lines of the atlas turn there
+FINE = 1.5  # texels of a sigma that are promised: of less, the edge is as wide as a texel
+AT_POLES = "use charts without poles, such as the faces of a cube, or blur on the screen"
+COARSE = "use a finer atlas, or blur that Gaussian on the screen"
 BOUND = 0.02  # of white: what shows
 RADIUS, TEXELS, MARGIN = 8.0, (192, 96), 24  # of the ball [mm], its atlas, columns and rows
 SIGMAS = (0.02, 0.05, 0.1, 0.2, 0.4)  # [radius]; a texel of the equator is 0.033
@@ -50,7 +45,7 @@ VIEW, SIGMA, SAMPLES = (192, 64), 6.0, 256  # pixels; sigma [pixels, of a plane 
 
 
 def cells_of() -> Iterator[Cells]:
-    """A ball's atlas over sigma, latitude and distance from its seam; a plane's over stretch; a screen over angles."""
+    """Yield a ball's atlas over sigma, latitude and place, a plane's over stretch, and a screen over angles."""
     with opened() as context:
         yield of_ball(context)
         yield of_stretch(context)
@@ -58,12 +53,12 @@ def cells_of() -> Iterator[Cells]:
 
 
 def of_ball(context: moderngl.Context) -> Cells:
-    """Its atlas under a lamp."""
+    """Return the atlas of a ball under a lamp."""
     part = _part(ball(RADIUS))
     size = (TEXELS[0] + 2 * MARGIN, TEXELS[1] + 2 * MARGIN)
     rows = [MARGIN + int((0.5 + one / 180.0) * TEXELS[1]) for one in LATITUDES]
     columns = [MARGIN + one for one in FROM_SEAM]
-    found = []
+    pairs = []
     with Stage(context, (16, 16), 16) as stage, Atlas(context, size, MARGIN) as atlas:
         stage.draw(Scene((part,)))
         atlas.draw(stage, part)
@@ -71,19 +66,19 @@ def of_ball(context: moderngl.Context) -> Cells:
         for sigma in SIGMAS:
             light = _blurred(atlas, 1.0 + towards, sigma * RADIUS)
             right = sphere_blur(RADIUS, towards, [(sigma * RADIUS) ** 2], [1.0])
-            found.append([one[np.ix_(rows, columns)] for one in (light, right)])
-    value, reference = np.stack(found, axis=1)
+            pairs.append([one[np.ix_(rows, columns)] for one in (light, right)])
+    value, reference = np.stack(pairs, axis=1)
     axes = (
-        ArgumentAxis(WIDTH, "-", np.array(SIGMAS)),
-        ArgumentAxis(LATITUDE, "degrees", np.array(LATITUDES)),
+        ArgumentAxis("σ/R", "-", np.array(SIGMAS)),
+        ArgumentAxis("latitude", "degrees", np.array(LATITUDES)),
         ArgumentAxis("from the seam", "texels", np.array(FROM_SEAM, float)),
     )
-    away = ~near_a_pole(np.array(SIGMAS)[:, None, None], np.array(LATITUDES)[:, None])
-    return _cells("atlas of a ball", axes, value, reference, away)
+    away = np.radians(90.0 - np.array(LATITUDES))[:, None] >= WITHIN * np.array(SIGMAS)[:, None, None]
+    return _cells("atlas of a ball", axes, value, reference, away, AT_POLES)
 
 
 def of_stretch(context: moderngl.Context) -> Cells:
-    """An edge of light on a plane, whose columns are wider than its rows: the texel of each that is worst."""
+    """Return an edge of light on a plane whose columns are wider than its rows: the worst texel of each."""
     value, reference = np.empty((2, len(RATIOS), len(WIDTHS), 2))
     part = _part(bumps(ROWS / 3.0, 0.0, float(ROWS), 8))
     with Stage(context, (16, 16), 16) as stage:
@@ -103,16 +98,17 @@ def of_stretch(context: moderngl.Context) -> Cells:
                         at = tuple(here[int(np.argmax(off))])
                         value[i, j, axis], reference[i, j, axis] = light[at], right[at]
     axes = (
-        ArgumentAxis(RATIO, "-", np.array(RATIOS, float)),
-        ArgumentAxis(IN_ROWS, "rows", np.array(WIDTHS)),
+        ArgumentAxis("column / row", "-", np.array(RATIOS, float)),
+        ArgumentAxis("σ", "rows", np.array(WIDTHS)),
         ArgumentAxis("edge", "-", np.arange(2.0), ("across columns", "across rows")),
     )
-    coarse = is_coarse(np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0]), np.array(WIDTHS)[:, None])
-    return _cells("atlas that is stretched", axes, value, reference, ~coarse)
+    texel = np.array(RATIOS)[:, None, None] * np.array([1.0, 0.0])
+    fine = np.array(WIDTHS)[:, None] >= FINE * texel
+    return _cells("atlas that is stretched", axes, value, reference, fine, COARSE)
 
 
 def of_view(context: moderngl.Context) -> Cells:
-    """An edge of light on a plane seen aslant, blurred on the screen."""
+    """Return an edge of light on a plane seen aslant, blurred on the screen."""
     value, reference = np.empty((2, len(ANGLES), len(PLACES)))
     kernel = Kernel(np.array([SIGMA**2]), np.ones((1, 3)))
     part = _part(bumps(1e4, 0.0, 3e4, 8))
@@ -130,7 +126,7 @@ def of_view(context: moderngl.Context) -> Cells:
                 at = int(np.argmin(np.abs(across - place * SIGMA)))
                 value[i, j], reference[i, j] = mean[at], 0.5 + 0.5 * erf(across[at] / (np.sqrt(2.0) * SIGMA))
     axes = ArgumentAxis("angle", "degrees", np.array(ANGLES)), ArgumentAxis("from the edge", "σ", np.array(PLACES))
-    return _cells("screen seen aslant", axes, value, reference, np.ones(value.shape, bool))
+    return _cells("screen seen aslant", axes, value, reference, True)
 
 
 def _part(mesh: Mesh) -> Part:
@@ -138,15 +134,21 @@ def _part(mesh: Mesh) -> Part:
 
 
 def _blurred(atlas: Atlas, light: Floats, sigma: float) -> Floats:
-    """(rows, columns) of an irradiance by one Gaussian [mm]."""
+    """Return an irradiance (rows, columns) blurred by one Gaussian [mm]."""
     texels = np.repeat(light[..., None], 4, axis=-1).astype(np.float32)
     atlas.targets.map("irradiance_map").write(np.ascontiguousarray(texels).tobytes())
     return pixels(atlas.blur(Kernel(np.array([sigma**2]), np.ones(1))))[..., 0].astype(float)
 
 
 def _cells(
-    subject: str, axes: tuple[ArgumentAxis, ...], value: Floats, reference: Floats, inside: NDArray[np.bool_]
+    subject: str,
+    axes: tuple[ArgumentAxis, ...],
+    value: Floats,
+    reference: Floats,
+    inside: NDArray[np.bool_] | bool,
+    advice: str = COARSE,
 ) -> Cells:
-    error, inside = absolute(value, reference), np.broadcast_to(inside, value.shape)
-    codes = judged(value, reference, error, BOUND, np.ones(value.shape, bool), np.float32)
-    return Cells(subject, True, LIGHT, TEXT32, axes, value, reference, error, BOUND, inside, codes, dtype=np.float32)
+    error = absolute(value, reference)
+    return judged_cells(
+        subject, True, "light, blurred", TEXT32, axes, value, reference, error, BOUND, inside, advice=advice
+    )

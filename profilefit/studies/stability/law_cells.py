@@ -1,27 +1,39 @@
-"""Profile laws: R_d, cdf, radii and their density over albedo, radius or uniform number, and mean free path."""
+"""Profile laws: R_d, cdf, radii and their density over albedo, radius or uniform number, and mean free path.
+
+The reference is the law's own shader source in extended precision, at the very arguments that a narrower format was
+given; and the exact half space, for what no arithmetic can mend, because the formula says so.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
+from typing import Any
 
 import jax
 import jax.numpy as jnp
 import numpy as np
 from numpy.typing import NDArray
 
+from mcml_sim import exact
+from mcml_sim.exact.light import unreduced
+from profilefit.fitting import quality
 from profilefit.laws.base import ProfileLaw
+from profilefit.laws.liang import Liang
+from profilefit.laws.quantile import FARTHEST, NEAREST, Quantile
 from profilefit.recipes.inventory import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.studies.stability.cells import (
+    DIMMEST,
+    EXTENDED,
     Cells,
-    Codes,
     Mask,
     RoundedText,
     absolute,
-    judged,
+    judged_cells,
     relative,
     steps_down,
     steps_up,
@@ -41,10 +53,9 @@ from profilefit.studies.stability.layout import (
     SAMPLE,
     STORED16,
     TEXT16,
-    TEXT32,
+    ArgumentAxis,
     ArgumentGrid,
 )
-from profilefit.studies.stability.reference import LEAST_X, Right
 
 Floats = NDArray[np.float64]
 Values = dict[str, Floats]
@@ -57,87 +68,83 @@ MEASURED: dict[str, dict[str, float]] = {
 NO_BOUND = "its record states no error of this quantity"
 BEYOND_TEXT = "beyond the radius at which shader sources stop, where no energy is left"
 COMPUTED = tuple(one for one in ARITHMETICS if one != MODEL)
+# What helps where the formula of a law leaves the half space.
+OF_LIANG = (
+    "take alpha >= 1e-6, b0 = 0.0641 (constants `corrected`) and |g| with the density of that map; hazard and quantile "
+    "need none of this and have the exponential tail"
+)
+OF_DIPOLES = "add single scattering next to the source, or use hazard; of dipoles, beam diffusion has the least error"
+OF_MODELS = {
+    "liang": OF_LIANG,
+    "burley": "use hazard or quantile near white; up to alpha = 0.98 the error is the record's",
+    "gaussians": "use more Gaussians, up to 8, or a law that diverges as 1/r at the source: hazard, quantile, burley",
+    "quantile": "use hazard beyond alpha = 0.995: its profile was fitted, not only its radii",
+    **dict.fromkeys(("dipole", "better_dipole", "beam_diffusion"), OF_DIPOLES),
+}
+
+
+def advice_of(one: Named, arithmetic: str) -> str:
+    """Return what helps where a law is red; that of the arithmetic, an empty text, where it is no law's own."""
+    if arithmetic == MODEL:
+        return OF_MODELS.get(one.name.partition(":")[0], "")
+    return OF_LIANG if isinstance(one.law, Liang) and arithmetic in HELD else ""
 
 
 @dataclass(frozen=True)
 class Limits:
-    """The bounds of one law's errors by quantity, and where it holds."""
+    """Bounds of one law's errors by quantity, and where it holds."""
 
     of: dict[str, float]
     valid: validity.Validity
 
-    def stated(self, quantity: str) -> float:
-        """The model's own error [-], as `quality` measures it; NaN where it is not known."""
-        return self.of.get(quantity, np.nan) / ROUNDING_SHARE
-
     def bound(self, quantity: str, dtype: type) -> float:
-        """A tenth of the model's own error; in half not less than what keeping a number costs."""
+        """Return a tenth of the model's own error; in half not less than what keeping a number costs."""
         own = self.of.get(quantity, np.inf)
         return max(own, HALF_BOUND) if dtype is np.float16 else own
 
 
 def limits_of(one: Named, folder: Folder) -> Limits:
-    """A tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
+    """Return a tenth of the law's own model error, as its record or `MEASURED` states it, and its stated range."""
     model = MEASURED.get(one.name) or bounds.of_profile(one, folder).values
     rel, ks = model.get("rel"), model.get("ks")
     drawn = model.get("inversion_error") or ks
-    found = {PROFILE: rel, PDF: rel, CDF: ks, SAMPLE: drawn}
-    known = {name: ROUNDING_SHARE * value for name, value in found.items() if value is not None}
+    errors = {PROFILE: rel, PDF: rel, CDF: ks, SAMPLE: drawn}
+    known = {name: ROUNDING_SHARE * value for name, value in errors.items() if value is not None}
     return Limits(known, validity.of_profile(one, folder))
 
 
 def cells_of(one: Named, limits: Limits, arithmetics: Sequence[str] = COMPUTED) -> Iterator[Cells]:
-    """All quantities of a law in these arithmetics."""
+    """Yield all quantities of a law in these arithmetics."""
     for arithmetic in arithmetics:
         yield from computed(one, limits, arithmetic, ArgumentGrid.of(DTYPES[arithmetic], arithmetic != FLOAT64))
 
 
 def computed(one: Named, limits: Limits, arithmetic: str, at: ArgumentGrid) -> Iterator[Cells]:
-    found, right = _values(one.law, arithmetic, at), _right(one.law, arithmetic, at)
-    single = _values(one.law, TEXT32, at) if arithmetic == TEXT16 else {}
-    for name, value in found.items():
+    """Yield all quantities of a law in one arithmetic on a grid."""
+    nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else dense_grid.LEAST_X
+    stored = arithmetic == STORED16
+    albedo = _stored_albedo(RoundedText(one.law, np.float32), at.arguments[2]) if stored else None
+    reference = Reference(one.law, at, albedo, nearest)
+    for name, value in _values(one.law, arithmetic, at).items():
         places = (at.alpha, at.xi if name == SAMPLE else at.x, at.mfp)
         shape = tuple(each.values.size for each in places)
-        value, reference = (np.broadcast_to(each, shape) for each in (value, right.of(name)))
+        value, exactly = (np.broadcast_to(each, shape) for each in (value, reference.of(name)))
         inside = np.broadcast_to(_inside(name, limits.valid, at), shape)
         bound = limits.bound(name, at.dtype)
-        error, codes = _classed(name, value, reference, right, bound, inside, at.dtype)
-        twin = None
-        if arithmetic == TEXT16:
-            beside = np.broadcast_to(single[name], shape)
-            twin = _classed(name, beside, reference, right, bound, inside, np.float32)[1]
-        yield Cells(
-            subject=one.label,
-            own=one.law.entry.own,
-            quantity=name,
-            arithmetic=arithmetic,
-            axes=places,
-            value=value,
-            reference=reference,
-            error=error,
-            bound=bound,
-            inside=inside & (arithmetic in HELD),
-            codes=codes,
-            law=one.law,
-            dtype=at.dtype,
-            twin=twin,
-            unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
-        )
-
-
-def _classed(
-    name: str, value: Floats, reference: Floats, right: Right, bound: float, inside: Mask, dtype: type
-) -> tuple[Floats, Codes]:
-    """Errors and classes of what a format made of the arguments of `right`."""
-    error, wrong_way = _error(name, value, reference, right), _wrong_way(name, value, right.at)
-    if name == SAMPLE and wrong_way is not None:  # where another part of the light begins, radii begin anew
-        xi, ulp = right.at.xi.values[:, None], float(np.finfo(right.at.dtype).eps)
-        wrong_way[:, 1:] &= (xi[1:] < right.jump - ulp) | (right.jump + ulp < xi[:-1])
-    return error, judged(value, reference, error, bound, inside, dtype, right.dim(name, reference), wrong_way)
+        if name == SAMPLE:
+            error = reference.misplaced(value)
+        else:
+            error = absolute(value, exactly) if name == CDF else relative(value, exactly)
+        yield judged_cells(
+            one.label, one.law.entry.own, name, arithmetic, places, value, exactly, error, bound,
+            inside & (arithmetic in HELD), judge=inside, dim=reference.dim(name, exactly),
+            wrong_way=_wrong_way(name, value, reference), unjudged=BEYOND_TEXT if np.isfinite(bound) else NO_BOUND,
+            advice=advice_of(one, arithmetic),
+        )  # fmt: skip
 
 
 def _inside(name: str, valid: validity.Validity, at: ArgumentGrid) -> Mask:
-    """Where the law says that the quantity holds; a uniform number is below 1."""
+    """Return where the law says that the quantity holds; a uniform number is below 1."""
     albedos, shares = at.alpha.values, at.xi.values
     profiled, drawn = validity.masks(valid, albedos, np.where(shares < 1.0, shares, np.inf))
     if name == SAMPLE:
@@ -145,41 +152,34 @@ def _inside(name: str, valid: validity.Validity, at: ArgumentGrid) -> Mask:
     return (np.any(drawn, axis=1, keepdims=True) if name == PDF else profiled) & at.accepted
 
 
-def _error(name: str, value: Floats, reference: Floats, right: Right) -> Floats:
-    if name == SAMPLE:
-        return right.misplaced(value)
-    return absolute(value, reference) if name == CDF else relative(value, reference)
-
-
-def _wrong_way(name: str, value: Floats, at: ArgumentGrid) -> Mask | None:
-    """R_d falls with r, the cdf and radii rise. e^-t has as many roundings as t."""
+def _wrong_way(name: str, value: Floats, reference: Reference) -> Mask | None:
+    """Return where R_d rises with r, or the cdf or a radius falls. e^-t has as many roundings as t."""
+    at = reference.at
     with np.errstate(all="ignore"):
         if name == PROFILE:
             depth = np.abs(np.log(np.abs(value * at.mfp.values**2)))
             return steps_up(value, 1, at.dtype, np.abs(value) * np.where(np.isfinite(depth), depth, 0.0))
         if name == CDF:
             return steps_down(value, 1, at.dtype, 1.0)
-        if name == SAMPLE:
-            return steps_down(value, 1, at.dtype, np.abs(value[:, value.shape[1] // 2, None]))
-    return None
-
-
-def _right(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> Right:
-    nearest = 0.0 if arithmetic in (FLOAT64, FLOAT32) else LEAST_X
-    albedo = _stored_albedo(RoundedText(law, np.float32), at.arguments[2]) if arithmetic == STORED16 else None
-    return Right(law, at, albedo, nearest)
+        if name != SAMPLE:
+            return None
+        falls = steps_down(value, 1, at.dtype, np.abs(value[:, value.shape[1] // 2, None]))
+    # Where another part of the light begins, radii begin anew.
+    xi, ulp = at.xi.values[:, None], float(np.finfo(at.dtype).eps)
+    falls[:, 1:] &= (xi[1:] < reference.jump - ulp) | (reference.jump + ulp < xi[:-1])
+    return falls
 
 
 def _values(law: ProfileLaw, arithmetic: str, at: ArgumentGrid) -> Values:
     if arithmetic == FLOAT64:
-        found = _of_law(law, *at.arguments)
+        values = _of_law(law, *at.arguments)
     elif arithmetic == FLOAT32:
         with np.errstate(over="ignore"):
             single = (jnp.asarray(each, jnp.float32) for each in at.arguments)
-        found = _of_law(jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law), *single)
+        values = _of_law(jax.tree.map(lambda leaf: jnp.asarray(leaf, jnp.float32), law), *single)
     else:
-        found = _of_text(law, arithmetic, *at.arguments)
-    return dict(zip(QUANTITIES, (np.asarray(each, float) for each in found), strict=True))
+        values = _of_text(law, arithmetic, *at.arguments)
+    return dict(zip(QUANTITIES, (np.asarray(each, float) for each in values), strict=True))
 
 
 def _of_law(law: ProfileLaw, r, xi, alpha, mfp) -> tuple:
@@ -193,14 +193,205 @@ def _of_text(law: ProfileLaw, arithmetic: str, r, xi, alpha, mfp) -> tuple:
     if arithmetic == STORED16:
         alpha = _stored_albedo(text, alpha)
     calls = (("profile", r), ("cdf", r), ("sample", xi), ("pdf", r))
-    found = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
+    values = tuple(np.asarray(text.call(name, first, alpha, mfp)) for name, first in calls)
     if arithmetic != STORED16:
-        return found
+        return values
     with np.errstate(over="ignore"):
-        return tuple(each.astype(np.float16) for each in found)
+        return tuple(each.astype(np.float16) for each in values)
 
 
 def _stored_albedo(text: RoundedText, alpha: Floats) -> Floats:
-    """alpha by way of the law's own A kept in half, as a texture keeps it."""
+    """Return alpha by way of the law's own A kept in half, as a texture keeps it."""
     reflectance = np.asarray(text.call("reflectance", text.call("shape", alpha)))
     return np.asarray(text.call("alpha", reflectance.astype(np.float16).astype(np.float32)))
+
+
+HALVINGS = 70  # of a bracket of 90 in ln t
+NOWHERE = np.finfo(EXTENDED).tiny ** EXTENDED(0.4)  # r/l that stands for 0 in a quotient
+
+
+class Reference:
+    """A law's shader source in extended precision on a grid.
+
+    albedo   alphas (m, 1, 1) in place of the grid's, where these are kept in some other form
+    nearest  r/l at which R_d is taken where r/l is less, as shader sources do; 0 if it is not
+    """
+
+    def __init__(self, law: ProfileLaw, at: ArgumentGrid, albedo: Floats | None = None, nearest: float = 0.0) -> None:
+        self.at, self._nearest = at, nearest
+        self._finite_source = law.is_finite_at_source
+        self._text = RoundedText(law, EXTENDED)
+        if isinstance(law, Quantile):  # its few steps do not settle for albedos that only float64 has
+            self._text.replace("depth", self._depth)
+        r, xi, alpha, mfp = (each.astype(EXTENDED) for each in at.arguments)
+        self._x, self._mfp, self._xi = r / mfp, mfp, xi
+        self._shape = self._text.call("shape", alpha if albedo is None else albedo.astype(EXTENDED))
+
+    def of(self, name: str) -> Floats:
+        """Return the quantity, in its own unit, as a float64: infinite where it is beyond that."""
+        with np.errstate(all="ignore"):
+            if name == PROFILE:
+                return np.asarray(self._known_at(self._scaled_profile()) / self._mfp**2, float)
+            if name == CDF:
+                return np.asarray(self._text.call("cumulated", self._x, self._shape), float)
+            if name == SAMPLE:
+                return np.asarray(self._radius() * self._mfp, float)
+            density = self._text.call("radius_density", self._x, self._shape)
+            return np.asarray(self._known_at(density) / self._mfp, float)
+
+    def dim(self, name: str, reference: Floats) -> Mask:
+        """Return where a number in units of l has left the format before the unit of length enters."""
+        if name not in (PROFILE, PDF):
+            return np.zeros((1, 1, 1), bool)
+        least = DIMMEST[self.at.dtype]
+        with np.errstate(all="ignore"):
+            scaled = reference * self.at.mfp.values ** (2 if name == PROFILE else 1)
+        # A is a factor, and may be too small itself; a denormal r/l is 0 where denormals are.
+        tiny = float(np.finfo(self.at.dtype).tiny)
+        if name == PDF:  # next to the source laws take it at the root of the least number
+            return (np.abs(scaled) < least) & (reference != 0) | (self._x < 4.0 * tiny**0.5)
+        lost = (self.at.arguments[2] < least) | ((self._x > 0) & (self._x < 4.0 * tiny))
+        return ((np.abs(scaled) < least) | lost) & (reference != 0)
+
+    @property
+    def jump(self) -> Floats:
+        """Uniform number (m, 1, 1) that separates two parts of the light; 1 where there is one part."""
+        share = getattr(self._shape, "share", None)
+        return np.ones((1, 1, 1)) if share is None else np.asarray(share, float)
+
+    def misplaced(self, value: Floats) -> Floats:
+        """Return the share of the energy between a drawn radius and the reference [-], of the part that both are of."""
+        with np.errstate(all="ignore"):
+            x = np.where(value >= 0, value, np.inf).astype(EXTENDED) / self._mfp
+            here, there = (self._undone(each) for each in (x, self._radius()))
+            return np.asarray(np.abs(here - there), float)
+
+    def _undone(self, x: NDArray) -> NDArray:
+        """Return the uniform number that draws x, of two the nearer."""
+        shape = self._shape
+        if not hasattr(shape, "share"):
+            return np.asarray(self._text.call("cumulated", x, shape))
+        single, multiple = (self._text.call("cumulated", x, _of_part(shape, part)) for part in (1.0, 0.0))
+        first, second = shape.share * single, shape.share + shape.rest * multiple
+        return np.where(np.abs(first - self._xi) < np.abs(second - self._xi), first, second)
+
+    def _known_at(self, value: NDArray) -> NDArray:
+        """Return NaN beyond the radius at which texts stop, where no light is left."""
+        return np.where((self._x > FARTHEST) & (value != 0), np.nan, value)
+
+    def _scaled_profile(self) -> NDArray:
+        x = np.maximum(self._x, EXTENDED(self._nearest))
+        near = np.maximum(x, NOWHERE)
+        density = self._text.call("density", near, self._shape)
+        profile = self._text.call("reflectance", self._shape) * density / (2.0 * EXTENDED(np.pi) * near)
+        return profile if self._finite_source else np.where((x > 0) | (profile == 0), profile, np.inf)
+
+    def _depth(self, radius: NDArray, shape: Any) -> NDArray:
+        """Return t at x of the quantile law: a bracket halved, in ln t."""
+        x = np.clip(radius, EXTENDED(NEAREST), EXTENDED(FARTHEST))
+        low, high = np.full_like(x, -65.0), np.full_like(x, 25.0) + 0.0 * shape.kappa
+        low = low + 0.0 * high
+        for _ in range(HALVINGS):
+            middle = 0.5 * (low + high)
+            below = self._text.call("local", np.exp(middle), shape).radius < x
+            low, high = np.where(below, middle, low), np.where(below, high, middle)
+        return np.exp(0.5 * (low + high))
+
+    def _radius(self) -> NDArray:
+        return np.asarray(self._text.call("radius", self._xi, self._shape))
+
+
+def _of_part(shape: Any, share: float) -> Any:
+    """Return the shape of a law whose light is all of its first part, or of its second."""
+    part = copy(shape)
+    part.share, part.rest = EXTENDED(share), EXTENDED(1.0 - share)
+    return part
+
+
+# What a picture shows at once: R_d off by a third, three hundredths of the light in the wrong place.
+MODEL_BOUNDS = {PROFILE: 1.0 / 3.0, CDF: 0.03, SAMPLE: 0.03}
+ALPHA = (0.01, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.995, 0.999, 0.9999, 1.0 - 1e-6, 1.0)
+RADIUS = tuple(float(one) for one in np.geomspace(quality.NEAREST, 300.0, 19))
+SHARE = (1e-3, 5e-3, 0.0099, 0.0101, 0.02, 0.05, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.99, 0.995, 0.999)
+INVERSE, ENERGY = "g, not clipped (19)", "energy (17)"
+ENERGY_BOUND = 0.1  # of cdf(r_max), which (18) hides by dividing
+
+
+def model_cells(one: Named, limits: Limits) -> Iterator[Cells]:
+    """Yield R_d, cdf and radii against the exact profile of a law's setting; and what only Liang et al.'s laws have."""
+    if one.setting.is_solved:
+        yield from _against_exact(one, limits)
+    if isinstance(one.law, Liang):
+        yield unclipped(one, limits)
+        yield own_energy(one, limits)
+
+
+def _against_exact(one: Named, limits: Limits) -> Iterator[Cells]:
+    alpha, x, xi = (ArgumentAxis(n, "-", np.array(v)) for n, v in (("α", ALPHA), ("r/l", RADIUS), ("ξ", SHARE)))
+    albedo, r, share = alpha.values[:, None], x.values[None], xi.values[None]
+    law, setting = one.law.in_reduced(), one.setting
+    own = np.asarray(unreduced(albedo, setting.g))  # of the medium that has this reduced albedo, and l* = 1
+    medium = own, 1.0 - own * setting.g, setting
+    within = np.asarray(exact.cdf(r, *medium))
+    with np.errstate(all="ignore"):
+        drawn = np.asarray(law.sampler.sample(share, albedo))
+        profile, cdf = np.asarray(law.profile(r, albedo)), np.asarray(law.cdf(r, albedo))
+    reached = np.asarray(exact.cdf(np.where(drawn >= 0, drawn, np.inf), *medium))
+    if np.any(law.sampler.jump(alpha.values) < 1.0):  # two shares of the light draw one radius: the law's nearer one
+        reached += np.asarray(law.sampler.undone(drawn, share, albedo)) - np.asarray(law.cdf(drawn, albedo))
+    truth = np.asarray(exact.profile(r, *medium))
+    held, draws = (_holds(span, albedo) for span in (limits.valid.alpha, limits.valid.drawn))
+    seen = (within <= quality.ENERGY_WITHIN) & law.entry.profile.holds(albedo)
+    for name, places, value, reference, error, inside in (
+        (PROFILE, (alpha, x), profile, truth, relative(profile, truth), held & seen),
+        (CDF, (alpha, x), cdf, within, absolute(cdf, within), held),
+        (SAMPLE, (alpha, xi), drawn, drawn, absolute(reached, np.broadcast_to(share, drawn.shape)), draws),
+    ):
+        yield judged_cells(
+            one.label, one.law.entry.own, name, MODEL, places, value, reference, error, MODEL_BOUNDS[name], inside,
+            judge=inside, advice=advice_of(one, MODEL),
+        )  # fmt: skip
+
+
+def _holds(span: validity.Range | None, alpha: Floats) -> Mask:
+    return span.holds(alpha) if span else np.zeros(alpha.shape, bool)
+
+
+def unclipped(one: Named, limits: Limits) -> Cells:
+    """Return g(xi) of (19), which should be a radius, and is judged by its sign; the law takes |g|, up to r_max."""
+    axes = (
+        ArgumentAxis("α", "-", np.array((0.0, *ALPHA))),
+        ArgumentAxis("ξ", "-", np.array((0.0, 1e-6, 1e-4, *SHARE))),
+    )
+    alpha = axes[0].values[:, None]
+    with np.errstate(all="ignore"):
+        value = np.asarray(one.law.sampler.unclipped(axes[1].values[None], alpha))
+    error, inside = np.where(value < 0, np.abs(value), 0.0), _holds(limits.valid.alpha, alpha)
+    cells = judged_cells(
+        one.label,
+        False,
+        INVERSE,
+        FLOAT64,
+        axes,
+        value,
+        np.abs(value),
+        error,
+        0.0,
+        inside,
+        judge=inside,
+        advice=OF_LIANG,
+    )
+    return replace(cells, reference=value)
+
+
+def own_energy(one: Named, limits: Limits) -> Cells:
+    """Return cdf(r_max) of (17) before (18) divides by it: the law's own energy over A, which should be 1."""
+    alpha = ArgumentAxis("α", "-", np.array((0.0, *ALPHA)))
+    with np.errstate(all="ignore"):
+        whole = np.asarray(one.law.unscaled_energy(np.inf, alpha.values))
+        value = whole / np.asarray(one.law.albedo.reflectance(alpha.values))
+    error, inside = absolute(value, np.ones_like(value)), _holds(limits.valid.alpha, alpha.values)
+    return judged_cells(
+        one.label, False, ENERGY, MODEL, (alpha,), value, np.ones(()), error, ENERGY_BOUND, inside, judge=inside,
+        advice=OF_LIANG,
+    )  # fmt: skip

@@ -1,4 +1,4 @@
-"""What is looked at: quantities, arithmetics, and the grid of arguments of each format.
+"""Quantities, arithmetics, and the grid of arguments of each format.
 
 float64           the law in Python, as called with numpy
 float32           the same code, run by jax in single precision
@@ -66,7 +66,7 @@ class ArgumentAxis:
         return self.labels[index] if self.labels else shown(float(self.values[index]))
 
     def span(self, low: int, high: int) -> str:
-        """The cells from one to another, in words."""
+        """Return the cells from one to another, in words."""
         if self.labels:
             return ", ".join(self.labels[low : high + 1])
         if low == high:
@@ -75,36 +75,36 @@ class ArgumentAxis:
         return f"all {self.name}" if whole else f"{self.name} {self.label(low)} … {self.label(high)}"
 
     def nearest(self, value: float) -> int:
-        """The cell of a value, or the nearest one."""
+        """Return the cell of a value, or the nearest one."""
         return int(np.argmin(np.abs(self.values - value)))
 
 
 def alpha(dtype: type) -> ArgumentAxis:
-    """Single-scattering albedos in [0, 1]."""
+    """Return single-scattering albedos in [0, 1]."""
     return ArgumentAxis("α", "-", _cells(dtype, (*ALPHA, *_ends(dtype), *_around_one(dtype))))
 
 
 def reflectance(dtype: type) -> ArgumentAxis:
-    """Total reflectances in [0, 1]."""
+    """Return total reflectances in [0, 1]."""
     return ArgumentAxis("A", "-", _cells(dtype, (*REFLECTANCE, *_ends(dtype), *_around_one(dtype))))
 
 
 def share(dtype: type) -> ArgumentAxis:
-    """Uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
+    """Return uniform numbers in [0, 1]; 1 itself, which no generator should give, is outside."""
     return ArgumentAxis(
         "ξ", "-", _cells(dtype, (*SHARE, *_ends(dtype), *_around_one(dtype), *_pairs(dtype, (0.1, 0.5))))
     )
 
 
 def radius(dtype: type) -> ArgumentAxis:
-    """Radii r/l from 0 to infinity."""
+    """Return radii r/l from 0 to infinity."""
     largest = float(np.finfo(dtype).max)
     far = (*FARTHER, largest**0.5, 0.1 * largest, largest, np.inf)
     return ArgumentAxis("r/l", "-", _cells(dtype, (*RADIUS, *far, *_ends(dtype), *_pairs(dtype, NEIGHBOURS))))
 
 
 def length(dtype: type, accepted: tuple[float, float], beyond: bool) -> ArgumentAxis:
-    """Mean free paths > 0 in any length unit: both ends of what is accepted, and `beyond` them those of the format."""
+    """Return mean free paths > 0 in any unit: both ends of what is accepted, and `beyond` them those of the format."""
     limits = np.finfo(dtype)
     ends = (float(limits.tiny), float(limits.max)) if beyond else ()
     inside = [float(one) for one in np.clip(np.asarray(accepted).astype(dtype), limits.tiny, limits.max)]
@@ -112,7 +112,7 @@ def length(dtype: type, accepted: tuple[float, float], beyond: bool) -> Argument
 
 
 def shown(value: float) -> str:
-    """A number as a person writes it: powers of two near 0 and 1 as such."""
+    """Return a number as a person writes it: powers of two near 0 and 1 as such."""
     if value == 0 or not np.isfinite(value):
         return f"{value:g}"
     if 0.5 < value < 1.0 and _power(1.0 - value) >= min(POWERS):
@@ -123,13 +123,13 @@ def shown(value: float) -> str:
 
 
 def _power(value: float) -> int:
-    """k where value is 2^-k, else -1."""
+    """Return k where value is 2^-k, else -1."""
     mantissa, exponent = np.frexp(value)
     return int(1 - exponent) if mantissa == 0.5 else -1
 
 
 def _ends(dtype: type) -> tuple[float, ...]:
-    """0, the least denormal, the least normal number, powers of two."""
+    """Return 0, the least denormal, the least normal number, powers of two."""
     limits = np.finfo(dtype)
     return (0.0, float(limits.smallest_subnormal), float(limits.tiny), *(2.0**-k for k in POWERS))
 
@@ -139,12 +139,12 @@ def _around_one(dtype: type) -> tuple[float, ...]:
 
 
 def _pairs(dtype: type, values: Iterable[float]) -> list[float]:
-    """Values and their next neighbours."""
+    """Return values and their next neighbours."""
     return [float(one) for value in values for one in (dtype(value), np.nextafter(dtype(value), dtype(np.inf)))]
 
 
 def _cells(dtype: type, values: Iterable[float]) -> Floats:
-    """The values that the format distinguishes, rising; what it turns into infinity is left out but for infinity."""
+    """Return the values that the format distinguishes, rising, without finite ones that it turns into infinity."""
     given = np.asarray(list(values), float)
     with np.errstate(over="ignore", under="ignore"):
         rounded = given.astype(dtype).astype(float)
@@ -174,7 +174,7 @@ HALF_BOUND = 2.0**-10
 
 
 def accepted(length: Floats, dtype: type) -> NDArray[np.bool_]:
-    """Which mean free paths are within `LENGTHS`, whose ends are rounded to the type."""
+    """Return which mean free paths are within `LENGTHS`, whose ends are rounded to the type."""
     low, high = np.asarray(LENGTHS[dtype]).astype(dtype).astype(float)
     return (length >= low) & (length <= high)
 
@@ -191,7 +191,7 @@ class ArgumentGrid:
 
     @classmethod
     def of(cls, dtype: type, beyond: bool = True) -> ArgumentGrid:
-        """`beyond` takes in lengths that the law does not accept."""
+        """Return the grid of a format; `beyond` takes in lengths that the law does not accept."""
         return cls(dtype, alpha(dtype), radius(dtype), share(dtype), length(dtype, LENGTHS[dtype], beyond))
 
     @property

@@ -25,12 +25,10 @@ from profilefit.studies.stability import layout
 from profilefit.studies.stability.cells import (
     EXTENDED,
     Cells,
-    Codes,
-    Mask,
     RoundedText,
     Verdict,
     absolute,
-    judged,
+    judged_cells,
     steps_down,
 )
 from profilefit.studies.stability.layout import (
@@ -53,12 +51,16 @@ FACTOR = 1.5  # of what a record states
 # Against the exact half space: of A, and of sqrt(1 - alpha), in which every law of alpha is smooth.
 MODEL_BOUND = 0.02
 ROOT_STORED = "A(√(1−α))"
-# What a map measures, what its argument is called, and the name of its text's function.
+# Measure of a map in records, and the function of its shader source.
 WAYS = {ALPHA_OF: ("delta_alpha", "alpha"), REFLECTANCE_OF: ("delta_A", "map_reflectance")}
+OF_MAPS = (
+    "use the rational map, which rises to alpha(1) = 1 and misses A by 3e-6; others need A clamped below their fold"
+)
+UNSTATED = "no record states the error of this direction"
 
 
 def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
-    """Both directions in every arithmetic, then what keeping alpha or its root in half costs; of reduced albedos."""
+    """Yield both directions in every arithmetic, then what keeping alpha or its root in half costs; reduced albedos."""
     text, model, spans = in_reduced(one), bounds.of_map(one, folder), validity.of_map(one, folder)
     for (name, (measure, _)), span in zip(WAYS.items(), spans, strict=True):
         limit = ROUNDING_SHARE * (model.get(measure) or np.inf)
@@ -70,51 +72,41 @@ def cells_of(one: Named, folder: Folder) -> Iterator[Cells]:
 
 
 def in_reduced(one: Named) -> Named:
-    """As a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
+    """Return a law as a shader runs it: where there is a g, arguments are the reduced albedo and l*."""
     return replace(one, law=one.law.in_reduced())
 
 
 def _computed(one: Named, name: str, arithmetic: str, limit: float, span: Range) -> Cells:
     dtype = DTYPES[arithmetic]
     axis = layout.reflectance(dtype) if name == ALPHA_OF else layout.alpha(dtype)
-    value, reference = _value(one.law, name, arithmetic, axis), _right(one.law, name, axis)
+    value, reference = _value(one.law, name, arithmetic, axis), _reference(one.law, name, axis)
     limit = max(limit, HALF_BOUND) if dtype is np.float16 else limit
-    beside = _value(one.law, name, TEXT32, axis) if arithmetic == TEXT16 else None
-    return _cells(one, name, arithmetic, axis, value, reference, limit, span, beside=beside)
+    return _cells(one, name, arithmetic, axis, value, reference, limit, span)
 
 
 def _cells(
-    one: Named, name: str, arithmetic: str, axis: ArgumentAxis, value: Floats, reference: Floats, limit: float,
-    span: Range, stated: float = np.nan, beside: Floats | None = None,
-) -> Cells:  # fmt: skip
-    """`beside`: what the same text makes of the same arguments in float32."""
-    dtype = DTYPES[arithmetic]
-    inside = span.holds(axis.values)
-    error, codes = _classed(value, reference, limit, inside, dtype)
-    twin = None if beside is None else _classed(beside, reference, limit, inside, np.float32)[1]
-    return Cells(
-        subject=one.label if one.records else f"map {one.label}",
-        own=one.law.entry.own,
-        quantity=name,
-        arithmetic=arithmetic,
-        axes=(axis,),
-        value=value,
-        reference=reference,
-        error=error,
-        bound=limit,
-        inside=inside & (arithmetic in HELD),
-        codes=codes,
-        law=one.law,
-        dtype=dtype,
-        twin=twin,
-        stated=stated,
-        unjudged="no record states the error of this direction",
-    )
+    one: Named,
+    name: str,
+    arithmetic: str,
+    axis: ArgumentAxis,
+    value: Floats,
+    reference: Floats,
+    limit: float,
+    span: Range,
+    error: Floats | None = None,
+) -> Cells:
+    """Return the cells of one direction; the error is |value - reference| by default."""
+    inside, held = span.holds(axis.values), arithmetic in HELD
+    return judged_cells(
+        map_label(one), one.law.entry.own, name, arithmetic, (axis,), value, reference,
+        absolute(value, reference) if error is None else error, limit, inside & held, judge=inside,
+        wrong_way=steps_down(value, 0, DTYPES[arithmetic], 1.0), unjudged=UNSTATED, advice=OF_MAPS if held else "",
+    )  # fmt: skip
 
 
-def _classed(value: Floats, reference: Floats, limit: float, inside: Mask, dtype: type) -> tuple[Floats, Codes]:
-    error, wrong_way = absolute(value, reference), steps_down(value, 0, dtype, 1.0)
-    return error, judged(value, reference, error, limit, inside, dtype, wrong_way=wrong_way)
+def map_label(one: Named) -> str:
+    """Return the label of a map, apart from the law of its name."""
+    return one.label if one.records else f"map {one.label}"
 
 
 def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: ArgumentAxis) -> Floats:
@@ -128,23 +120,23 @@ def _value(law: AlbedoLaw, name: str, arithmetic: str, axis: ArgumentAxis) -> Fl
         return np.asarray(law.alpha(given) if name == ALPHA_OF else law.reflectance(given), float)
 
 
-def _right(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
+def _reference(law: AlbedoLaw, name: str, axis: ArgumentAxis) -> Floats:
     return np.asarray(RoundedText(law, EXTENDED).call(WAYS[name][1], axis.values), float)
 
 
 def _kept_in_half(one: Named, span: Range) -> Iterator[Cells]:
-    """A where alpha, or its root, is kept in half and the map is computed in single precision."""
+    """Yield A where alpha, or its root, is kept in half and the map is computed in single precision."""
     axis = layout.alpha(np.float32)
-    text, right = RoundedText(one.law, np.float32), _right(one.law, REFLECTANCE_OF, axis)
+    text, reference = RoundedText(one.law, np.float32), _reference(one.law, REFLECTANCE_OF, axis)
     half = axis.values.astype(np.float16).astype(np.float32)
     root = np.sqrt(1.0 - axis.values).astype(np.float16).astype(np.float32)
     for name, alpha in ((REFLECTANCE_OF, half), (ROOT_STORED, (1.0 - root) * (1.0 + root))):
         value = np.asarray(text.call(WAYS[REFLECTANCE_OF][1], alpha), float)
-        yield _cells(one, name, STORED16, axis, value, right, HALF_BOUND, span)
+        yield _cells(one, name, STORED16, axis, value, reference, HALF_BOUND, span)
 
 
 def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bounds.ModelError) -> Iterator[Cells]:
-    """In A and in sqrt(1 - alpha), at albedos even in the latter."""
+    """Yield the errors in A and in sqrt(1 - alpha), at albedos even in the latter."""
     root = np.linspace(1.0, 0.0, 41)
     alpha = ArgumentAxis("α", "-", 1.0 - root**2)
     own = unreduced(alpha.values, one.setting.g)
@@ -152,21 +144,11 @@ def _against_exact(one: Named, of_reflectance: Range, of_alpha: Range, model: bo
     law = one.law.in_reduced()
     with np.errstate(all="ignore"):
         back, there = np.asarray(law.alpha(reflectance.values)), np.asarray(law.reflectance(alpha.values))
-    in_a, in_alpha = (model.get(measure) or np.nan for measure, _ in reversed(WAYS.values()))
-    bound = min(MODEL_BOUND, FACTOR * in_a) if one.law.entry.own else MODEL_BOUND  # ours as their records
-    yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha, in_a)
-    one_more = _cells(one, ALPHA_OF, MODEL, reflectance, back, alpha.values, np.inf, of_reflectance, in_alpha)
+    stated = model.get(WAYS[REFLECTANCE_OF][0]) or np.nan
+    bound = min(MODEL_BOUND, FACTOR * stated) if one.law.entry.own else MODEL_BOUND  # ours as their records
+    yield _cells(one, REFLECTANCE_OF, MODEL, alpha, there, reflectance.values, bound, of_alpha)
     error = np.abs(np.sqrt(np.clip(1.0 - back, 0.0, None)) - root)
-    codes = judged(
-        back,
-        alpha.values,
-        error,
-        MODEL_BOUND,
-        one_more.inside,
-        np.float64,
-        wrong_way=steps_down(back, 0, np.float64, 1.0),
-    )
-    yield replace(one_more, error=error, bound=MODEL_BOUND, codes=codes)
+    yield _cells(one, ALPHA_OF, MODEL, reflectance, back, alpha.values, MODEL_BOUND, of_reflectance, error)
 
 
 # There and back: a few roundings; a colour to what `alpha_of` promises of A.
@@ -174,7 +156,7 @@ RETURN_BOUND, COLOUR_BOUND = 1e-12, 1e-8
 
 
 def conversion_cells() -> Iterator[Cells]:
-    """Lengths in order of `convert.LENGTHS`, then colours under both lights."""
+    """Yield lengths in order of `convert.LENGTHS`, then colours under both lights."""
     for length in LENGTHS:
         yield _length(length.name)
     for light in ("searchlight", "diffuse"):
@@ -182,7 +164,7 @@ def conversion_cells() -> Iterator[Cells]:
 
 
 def _length(name: str) -> Cells:
-    """l = 1 there and back: infinite lengths, where nothing is absorbed, are refused on the way back, by name."""
+    """Return l = 1 there and back: infinite lengths, where nothing is absorbed, are refused by name on the way back."""
     axis = layout.alpha(np.float64)
     with np.errstate(all="ignore"):
         value = np.asarray(Optical(axis.values, np.array(1.0)).length(name))
@@ -190,10 +172,9 @@ def _length(name: str) -> Cells:
     infinite = np.isinf(value) & (axis.values == 1.0)
     error = np.where(infinite, 0.0, np.abs(back - 1.0))
     reference = np.where(infinite, np.inf, value)
-    inside = np.ones(value.shape, bool)
-    codes = judged(value, reference, error, RETURN_BOUND, inside, np.float64)
-    codes[(value == 0) | np.isnan(back)] = Verdict.NOT_FINITE
-    return Cells("convert", False, name, FLOAT64, (axis,), value, reference, error, RETURN_BOUND, inside, codes)
+    cells = judged_cells("convert", False, name, FLOAT64, (axis,), value, reference, error, RETURN_BOUND)
+    cells.codes[(value == 0) | np.isnan(back)] = Verdict.NOT_FINITE
+    return cells
 
 
 def _returned(name: str, value: float, alpha: float) -> float:
@@ -204,7 +185,7 @@ def _returned(name: str, value: float, alpha: float) -> float:
 
 
 def _albedo(reflectance: float, light: str) -> float:
-    """alpha [-], or NaN where something is raised: every A in [0, 1] has one."""
+    """Return alpha [-], or NaN where something is raised: every A in [0, 1] has one."""
     try:
         return float(alpha_of(reflectance, light))
     except Exception:  # whatever comes is what is looked for
@@ -216,10 +197,10 @@ def _colour(light: str) -> Cells:
     value = np.array([_albedo(one, light) for one in axis.values])
     raised = np.isnan(value)
     error = np.abs(reflectance_of(np.where(raised, 0.0, value), light) - axis.values)
-    inside = np.ones(value.shape, bool)
     wrong_way = steps_down(value, 0, np.float64, 1.0)
-    codes = judged(value, value, error, COLOUR_BOUND, inside, np.float64, wrong_way=wrong_way)
-    codes[raised] = Verdict.RAISES
-    return Cells(
-        "convert", False, f"{ALPHA_OF}, {light}", FLOAT64, (axis,), value, value, error, COLOUR_BOUND, inside, codes
+    name = f"{ALPHA_OF}, {light}"
+    cells = judged_cells(
+        "convert", False, name, FLOAT64, (axis,), value, value, error, COLOUR_BOUND, wrong_way=wrong_way
     )
+    cells.codes[raised] = Verdict.RAISES
+    return cells

@@ -1,7 +1,4 @@
-"""Stacks of layers: laws over thickness and radius, recorded and at the ends of albedos; light scattered once.
-
-The half spaces of a law have cells of their own; looked at here is what a stack makes of them.
-"""
+"""Stacks of layers: laws over thickness and radius, recorded and at the ends of albedos; light scattered once."""
 
 from __future__ import annotations
 
@@ -23,8 +20,6 @@ from profilefit.recipes.stack import record
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.stack_text import single_text, stack_text
-from profilefit.studies.stability import model_cells
-from profilefit.studies.stability.causes_of_stacks import ENERGY, ONCE, TOTAL, cancelled, is_backward
 from profilefit.studies.stability.cells import (
     DIMMEST,
     EXTENDED,
@@ -34,12 +29,23 @@ from profilefit.studies.stability.cells import (
     RoundedText,
     absolute,
     judged,
+    judged_cells,
     relative,
     steps_down,
 )
+from profilefit.studies.stability.law_cells import MODEL_BOUNDS
 from profilefit.studies.stability.layout import CDF, DTYPES, FLOAT64, MODEL, PDF, PROFILE, SAMPLE, TEXT32, ArgumentAxis
 
 Floats = NDArray[np.float64]
+TOTAL, ENERGY, ONCE = "A(d)", "energy", "L, once"
+ROUNDINGS = 16.0  # units in the last place that the largest term of a sum may be off by
+BACKWARD = -0.5  # g short of which the text of light scattered once loses digits in float32
+OF_LAWS = (
+    "none for pictures beyond 99.5 % of the light or below A = 0.001; over black layers and under absorbing ones use "
+    "exact.solve, or single_scattering where the first layer is thin"
+)
+OF_BORROWER = "fit the constants to these layers: stack_law, or profilefit regenerate STACK.toml"
+OF_ONCE = "keep g at -0.5 or above; nothing known scatters farther back"
 ARITHMETICS = (FLOAT64, TEXT32)
 CALLED = {PROFILE: "profile", CDF: "cdf", TOTAL: "total", SAMPLE: "sample", PDF: "pdf"}
 UNDRAWN = (PROFILE, CDF, TOTAL)  # of recorded laws in float64: samplers of each of their settings compile for seconds
@@ -58,7 +64,7 @@ OF_STEPS = 3e-3
 NO_DIGITS = "extended precision has no digits of it"
 NEAREST, FARTHEST, POINTS = 1e-9, 1e3, 2000  # of the integral of R_d [mfp]: its ends, and nodes, even in ln r
 ENERGY_BOUND = 1e-4  # of that integral
-BOUNDS = (model_cells.BOUNDS[PROFILE], model_cells.BOUNDS[CDF], 0.03)  # of R_d, cdf, A: what a picture shows at once
+BOUNDS = (MODEL_BOUNDS[PROFILE], MODEL_BOUNDS[CDF], 0.03)  # of R_d, cdf, A: what a picture shows at once
 # What `stack_law` gives at the ends of albedos, diffuse light, n = 1.4, l alike: of the first layer and of what lies
 # below, the largest rel, ks and error of A at thicknesses between the fitted ones, and the nine constants.
 ENDS: tuple[tuple[float, float, tuple[float, ...], tuple[float, ...]], ...] = (
@@ -88,7 +94,10 @@ ONCE_BOUNDS = {FLOAT64: 1e-9, TEXT32: 1e-5}
 
 @dataclass(frozen=True)
 class StackCase:
-    """A law of a stack; errors  rel, ks and the error of A that it states of itself [-];  own  fitted to its layers"""
+    """Law of a stack.
+
+    errors  rel, ks and the error of A that the law states of itself [-];  own  whether it was fitted to its layers
+    """
 
     label: str
     law: StackLaw
@@ -101,13 +110,13 @@ class StackCase:
         return self.own and all(error <= bound for error, bound in zip(self.errors, BOUNDS, strict=True))
 
     def bound(self, quantity: str) -> float:
-        """A tenth of the law's own error, or of a recorded law's, where that is less."""
+        """Return a tenth of the law's own error, or of a recorded law's, where that is less."""
         rel, ks, of_a = (ROUNDING_SHARE * min(pair) for pair in zip(self.errors, ORDINARY, strict=True))
         return {PROFILE: rel, PDF: OF_STEPS, TOTAL: of_a}.get(quantity, ks)
 
     @cached_property
-    def right(self) -> RoundedText:
-        """Its text in extended precision."""
+    def reference(self) -> RoundedText:
+        """Shader source of the law in extended precision."""
         return self.text(EXTENDED)
 
     def text(self, dtype: type) -> RoundedText:
@@ -115,7 +124,7 @@ class StackCase:
 
 
 def cells_of(folder: Path) -> Iterator[Cells]:
-    """Laws of recorded stacks, at the ends of albedos, and of borrowed constants; light scattered once."""
+    """Yield laws of recorded stacks, at the ends of albedos, and of borrowed constants; light scattered once."""
     recorded, ends = list(recorded_stacks(folder)), [end(*row) for row in ENDS]
     for one in recorded:
         yield energies(one)
@@ -132,12 +141,12 @@ def cells_of(folder: Path) -> Iterator[Cells]:
 
 
 def recorded_stacks(folder: Path) -> Iterator[StackCase]:
-    """The laws of a folder's stacks, one a colour."""
+    """Yield the laws of a folder's stacks, one a colour."""
     for name, path in available(folder / record.FOLDER).items():
-        found = record.load(path)
-        for channel, law in zip(CHANNELS, found.laws, strict=True):
+        loaded = record.load(path)
+        for channel, law in zip(CHANNELS, loaded.laws, strict=True):
             try:
-                parts = found.content["interfaces"][channel]["quality"]
+                parts = loaded.content["interfaces"][channel]["quality"]
                 errors = [max(abs(v) for each in parts for v in each[key]) for key in ("rel", "ks", "delta_A")]
             except (KeyError, TypeError, ValueError):
                 raise RecordError(f"{path}: is damaged: its quality has no numbers; regenerate it") from None
@@ -145,7 +154,7 @@ def recorded_stacks(folder: Path) -> Iterator[StackCase]:
 
 
 def end(first: float, below: float, errors: Sequence[float], constants: Sequence[float]) -> StackCase:
-    """A row of `ENDS`."""
+    """Return the law of a row of `ENDS`."""
     setting = Setting("diffuse", n=1.4)
     hazard = catalogue.load("hazard", setting=setting)
     top, under = (LayerLaw(setting, hazard, alpha, 1.0) for alpha in (first, below))
@@ -154,13 +163,39 @@ def end(first: float, below: float, errors: Sequence[float], constants: Sequence
 
 
 def borrower() -> StackCase:
-    """A law whose albedos were changed after its constants, those of the first of `ENDS`, were fitted."""
+    """Return a law whose albedos were changed after its constants, those of the first of `ENDS`, were fitted."""
     one = end(*BORROWER, *ENDS[0][2:])
     return replace(one, label=f"{one.label}, constants of {ENDS[0][0]:g} on {ENDS[0][1]:g}", own=False)
 
 
+def cancelled(law: StackLaw, thickness: Floats, radius: Floats, value: Floats, bound: float) -> Mask:
+    """Return where R_d is so much less than its terms that their rounding exceeds the bound in extended precision.
+
+    thickness (n, 1), radius (m,)  [length of the law]
+    """
+    largest = _largest(law, thickness, radius)
+    with np.errstate(divide="ignore"):
+        depth = np.abs(np.log(largest * law.top.mfp**2))  # e^-t has as many roundings as t
+    rounded = (ROUNDINGS + np.where(np.isfinite(depth), depth, 0.0)) * float(np.finfo(EXTENDED).eps) * largest
+    lost: Mask = np.abs(value) * bound < rounded
+    return lost
+
+
+def _largest(law: StackLaw, d: Floats | float, r: Floats) -> Floats:
+    """Return the largest term of R_d at thicknesses and radii [length]: R_1, the image, or one of a stack below."""
+    unit = law.top.mfp
+    height, rate = law.h0 * unit + law.h1 * np.asarray(d), float(law.decay()) + law.k0 / unit
+    s = np.hypot(r, height)
+    image = float(law.top.whole()) * height * (1.0 + rate * s) * np.exp(-rate * (s - height)) / (2.0 * np.pi * s**3)
+    largest = np.maximum(np.asarray(law.top.profile(r)), image)
+    if isinstance(law.below, StackLaw):
+        inner = _largest(law.below, law.below.thickness, np.hypot(r, law.g2 * np.asarray(d)))
+        largest = np.maximum(largest, np.exp(-law.b2 * np.asarray(d) / unit) * inner)
+    return largest
+
+
 def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)) -> Iterator[Cells]:
-    """Quantities over thickness and radius or uniform number."""
+    """Yield quantities over thickness and radius or uniform number."""
     dtype, law, channel = DTYPES[arithmetic], one.law, np.zeros(1)
 
     def rounded(values: Sequence[float], scale: float = 1.0) -> Floats:
@@ -169,10 +204,10 @@ def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)
     d, r, xi = rounded(THICKNESS, law.top.mfp)[:, None], rounded(RADIUS, law.top.mfp), rounded(SHARE)
     text = one.text(np.float32) if arithmetic == TEXT32 else None
     python = {PROFILE: law.profile, CDF: law.cdf, SAMPLE: law.sampler.sample, PDF: law.sampler.pdf}
-    whole, within = (np.asarray(one.right.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
+    whole, within = (np.asarray(one.reference.call(*of, channel, d), float) for of in (("total",), ("cdf", r)))
     for name in names:
         given = () if name == TOTAL else (xi if name == SAMPLE else r,)
-        reference = np.asarray(one.right.call(CALLED[name], *given, channel, d), float)
+        reference = np.asarray(one.reference.call(CALLED[name], *given, channel, d), float)
         if text is not None:
             value = np.asarray(text.call(CALLED[name], *given, channel, d), float)
         else:
@@ -180,26 +215,26 @@ def of_law(one: StackCase, arithmetic: str, names: Sequence[str] = tuple(CALLED)
         if name == TOTAL:  # whose ends are known
             ends = np.select([d == 0, d == d[-1]], [law.below.whole(), law.top.whole()], reference)
             value, reference = value[:, 0], ends[:, 0]
-        error = _misplaced(one.right, value, xi, d) if name == SAMPLE else _off(one, name, value, reference)
+        if name == SAMPLE:
+            error = _misplaced(one.reference, value, xi, d)
+        else:
+            error = absolute(value, reference) if name == CDF else relative(value, reference)
+        if name == PROFILE:  # NaN where extended precision has no digits of it
+            unit = law.top.mfp
+            lost = cancelled(
+                law, unit * np.array(THICKNESS)[:, None], unit * np.array(RADIUS), reference, one.bound(name)
+            )
+            error[lost] = np.nan
         yield _cells(one, name, arithmetic, (value, reference, error), whole, within)
 
 
-def _off(one: StackCase, name: str, value: Floats, reference: Floats) -> Floats:
-    """The error of a number [-]: NaN where extended precision has no digits of it."""
-    error = absolute(value, reference) if name == CDF else relative(value, reference)
-    if name == PROFILE:
-        error[cancelled(one.law, THICKNESS, RADIUS, reference, one.bound(name), EXTENDED)] = np.nan
-    return error
-
-
 def _cells(
-    one: StackCase, name: str, arithmetic: str, found: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
+    one: StackCase, name: str, arithmetic: str, triple: tuple[Floats, Floats, Floats], whole: Floats, within: Floats
 ) -> Cells:
-    """Of value, reference and error; whole, within  A (thicknesses, 1) and the cdf (thicknesses, radii)."""
-    dtype, bound, (value, reference, error) = DTYPES[arithmetic], one.bound(name), found
+    """Return cells of value, reference and error; whole is A (thicknesses, 1), within the cdf (thicknesses, radii)."""
+    dtype, bound, (value, reference, error) = DTYPES[arithmetic], one.bound(name), triple
     first, below = (float(each.whole()) for each in (one.law.top, one.law.below))
     seen = within <= SEEN if name in (PROFILE, PDF) else np.ones(value.shape, bool)
-    held = seen if name == PDF else np.ones(value.shape, bool)
     bright = (whole[:, 0] if name == TOTAL else whole) >= DARKEST
     inside = seen & bright & one.holds & (within >= NEXT_TO_SOURCE if name == PDF else True)
     dim: Mask | bool = False
@@ -211,10 +246,10 @@ def _cells(
         wrong_way = steps_down(value, 1, dtype, max(first, below) / np.maximum(whole, np.finfo(dtype).tiny))
     elif name == TOTAL:
         wrong_way = steps_down(value * np.sign(first - below), 0, dtype, max(first, below))
-    codes = judged(value, reference, error, bound, held, dtype, dim, wrong_way)
-    return Cells(
-        one.label, one.own, name, arithmetic, _axes(name), value, reference, error, bound, inside, codes, one.law,
-        dtype, unjudged=NO_DIGITS,
+    return judged_cells(
+        one.label, one.own, name, arithmetic, _axes(name), value, reference, error, bound, inside,
+        judge=seen if name == PDF else None, dim=dim, wrong_way=wrong_way, unjudged=NO_DIGITS,
+        advice=OF_LAWS if one.own else OF_BORROWER,
     )  # fmt: skip
 
 
@@ -225,22 +260,22 @@ def _axes(name: str) -> tuple[ArgumentAxis, ...]:
     return first, ArgumentAxis("ξ" if name == SAMPLE else "r/l", "-", np.array(SHARE if name == SAMPLE else RADIUS))
 
 
-def _misplaced(right: RoundedText, value: Floats, xi: Floats, d: Floats) -> Floats:
-    """The least change of xi, of `CHANGES`, between whose radii, less and more, the drawn one lies [-].
+def _misplaced(reference: RoundedText, value: Floats, xi: Floats, d: Floats) -> Floats:
+    """Return the least change of xi, of `CHANGES`, between whose radii, less and more, the drawn one lies [-].
 
     Where one part of the light ends in between, and with it its radii, every radius lies there.
     """
-    found, channel = np.full(value.shape, np.inf), np.zeros(1)
-    own = right.call("sample", xi, channel, d)
+    least, channel = np.full(value.shape, np.inf), np.zeros(1)
+    own = reference.call("sample", xi, channel, d)
     for change in reversed(CHANGES):
-        less, more = (right.call("sample", np.clip(xi + step, 0.0, 1.0), channel, d) for step in (-change, change))
+        less, more = (reference.call("sample", np.clip(xi + step, 0.0, 1.0), channel, d) for step in (-change, change))
         ends = (less > own) | (own > more) | (xi + change >= MOST_XI)
-        found[ends | ((xi <= change) | (less <= value)) & (value <= more)] = change
-    return found
+        least[ends | ((xi <= change) | (less <= value)) & (value <= more)] = change
+    return least
 
 
 def energies(one: StackCase) -> Cells:
-    """Integral of 2 pi r R_d to the last radius over A by the text, which the closed cdf gives as well."""
+    """Return the integral of 2 pi r R_d to the last radius over A by the text, which the closed cdf gives as well."""
     unit, text, channel = one.law.top.mfp, one.text(np.float64), np.zeros(1)
     u, step = np.linspace(np.log(NEAREST), np.log(FARTHEST), POINTS, retstep=True)
     r, d = unit * np.exp(u), unit * np.array(THICKNESS)[:, None]
@@ -249,29 +284,27 @@ def energies(one: StackCase) -> Cells:
     reference = np.asarray(text.call("cdf", r[-1:], channel, d))[:, 0]
     light = (np.sum(ring, axis=1) - 0.5 * (ring[:, 0] + ring[:, -1])) * step
     value = np.where(whole > 0, light / np.where(whole > 0, whole, 1.0), reference)
-    error = absolute(value, reference)
-    codes = judged(value, reference, error, ENERGY_BOUND, np.ones(value.shape, bool), np.float64)
-    inside = (whole >= DARKEST) & one.holds
-    return Cells(
-        one.label, one.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside, codes,
-        one.law,
+    error, inside = absolute(value, reference), (whole >= DARKEST) & one.holds
+    return judged_cells(
+        one.label, one.own, ENERGY, FLOAT64, _axes(ENERGY), value, reference, error, ENERGY_BOUND, inside,
+        advice=OF_LAWS if one.own else OF_BORROWER,
     )  # fmt: skip
 
 
 def stated(group: Sequence[StackCase], promised: bool) -> Iterator[Cells]:
-    """What laws state of themselves against exact light, at thicknesses that were not fitted."""
+    """Yield what laws state of themselves against exact light, at thicknesses that were not fitted."""
     axis = ArgumentAxis("of", "-", np.arange(len(group), dtype=float), tuple(one.label for one in group))
     for name, bound, error in zip((PROFILE, CDF, TOTAL), BOUNDS, np.array([o.errors for o in group]).T, strict=True):
+        codes = judged(error, np.ones_like(error), error, bound, np.ones(error.shape, bool), np.float64)
         inside = np.full(error.shape, promised)
-        codes = judged(error, np.ones_like(error), error, bound, np.ones_like(inside), np.float64)
         yield Cells(
             "stacks", True, name, MODEL, (axis,), error, np.zeros_like(error), error, bound, inside, codes,
-            tuple(one.law for one in group),
+            advice=OF_LAWS,
         )  # fmt: skip
 
 
 def once(n: float, arithmetic: str) -> Cells:
-    """Light scattered once: over g, what lies below, thickness, both directions and the angle between them."""
+    """Return light scattered once: over g, what lies below, thickness, both directions and the angle between them."""
     dtype = DTYPES[arithmetic]
     values = [np.array(each).astype(dtype).astype(float) for each in (DEPTHS, COSINES, COSINES, TURNED)]
     axes = (
@@ -283,21 +316,20 @@ def once(n: float, arithmetic: str) -> Cells:
     value, reference = np.empty((2, *(axis.values.size for axis in axes)))
     for i, g in enumerate(FORWARD):
         source = single_text([_two(n, g, alpha, 1.0) for alpha in BELOW], "python", NAME)
-        right, text = RoundedText(source, EXTENDED), RoundedText(source, np.float32)
+        extended, text = RoundedText(source, EXTENDED), RoundedText(source, np.float32)
         for j, alpha in enumerate(BELOW):
             given = (np.array(float(j)), depth, into, out, turned)  # a channel an albedo
-            reference[i, j] = right.call("radiance", *given)
+            reference[i, j] = extended.call("radiance", *given)
             if arithmetic == TEXT32:
                 value[i, j] = text.call("radiance", *given)
                 continue
             for k, d in enumerate(DEPTHS):
                 value[i, j, k] = single_scattering(_two(n, g, alpha, d), into[0], out[0], np.arccos(turned[0]))
-    error, bound = relative(value, reference), ONCE_BOUNDS[arithmetic]
-    inside = np.ones(value.shape, bool)
-    codes = judged(value, reference, error, bound, inside, dtype)
-    label = f"light scattered once, n = {n:g}"
-    found = Cells(label, True, ONCE, arithmetic, axes, value, reference, error, bound, inside, codes, dtype=dtype)
-    return replace(found, inside=~is_backward(found))
+    forward = np.array(FORWARD).reshape(-1, *[1] * (len(axes) - 1)) >= BACKWARD
+    return judged_cells(
+        f"light scattered once, n = {n:g}", True, ONCE, arithmetic, axes, value, reference,
+        relative(value, reference), ONCE_BOUNDS[arithmetic], forward | (arithmetic != TEXT32), advice=OF_ONCE,
+    )  # fmt: skip
 
 
 def _two(n: float, g: float, below: float, depth: float) -> Medium:

@@ -1,4 +1,4 @@
-"""The profile laws that are timed against each other, each in its fastest form."""
+"""Profile laws that are timed against each other, each in its fastest form."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ Setup = Callable[[Array], Any]
 YARDSTICK = "normalized diffusion"
 
 
-class Wanted(NamedTuple):
+class LawSpec(NamedTuple):
     """A law with its constants, and the refractive index and mean cosine that it is timed and judged at."""
 
     label: str
@@ -62,14 +62,14 @@ class Fast(NormalizedDiffusion):
 
 
 class FastBurley(Fast, Burley):
-    """In units of the mean free path."""
+    """Fast normalized diffusion in units of the mean free path."""
 
     setting: Setting = eqx.field(static=True)
     albedo: Normalisation = eqx.field(static=True)
 
 
 class FastBurleyDiffuseMfp(Fast, BurleyDiffuseMfp):
-    """In units of the diffuse mean free path."""
+    """Fast normalized diffusion in units of the diffuse mean free path."""
 
     setting: Setting = eqx.field(static=True)
     albedo: Normalisation = eqx.field(static=True)
@@ -98,9 +98,8 @@ class FastApproximateSampler(BurleyApproximateSampler):
 
 @dataclass(frozen=True)
 class Contender:
-    """A law with one of its samplers.
+    """Law with one of its samplers.
 
-    constants   fitted, of the profile and besides of the sampler alone; those of A(alpha) not counted
     setup       what depends on alpha only, where the law separates it
     judged      the sampler in the law's own form, guarded where the fast one is not: errors are of this
     another     whether it is another sampler of the law of the contender before
@@ -109,10 +108,15 @@ class Contender:
     name: str
     law: ProfileLaw
     sampler: Sampler
-    constants: tuple[int, int]
     setup: Setup | None
     judged: Sampler
     another: bool = False
+
+    @property
+    def constants(self) -> tuple[int, int]:
+        """Numbers of fitted constants of the profile, and of the sampler alone; those of A(alpha) do not count."""
+        of_profile = len(self.law.seen_by("energy"))
+        return of_profile, len(self.law.constant_names()) - of_profile
 
     def profile(self, x: Array, alpha: Array) -> Array:
         return self.law.scaled_profile(x, alpha)
@@ -121,19 +125,19 @@ class Contender:
         return self.sampler.scaled_sample(xi, alpha)
 
     def both(self, xi: Array, alpha: Array) -> tuple[Array, Array]:
-        """A radius, and the profile there."""
+        """Return a radius, and the profile there."""
         x = self.sample(xi, alpha)
         return x, self.profile(x, alpha)
 
     @property
     def parts(self) -> dict[str, Callable[[Array, Array], Any]]:
-        """What can be timed, by name: the profile of a law once, whatever its samplers."""
+        """Functions to be timed, by name: the profile of a law once, whatever its samplers."""
         drawn: dict[str, Callable[[Array, Array], Any]] = {"sample": self.sample, "both": self.both}
         return drawn if self.another else {"profile": self.profile, **drawn}
 
 
 class QuantileContender(Contender):
-    """A fitted inverse knows its density where it has drawn; from a radius alone a loop must find it."""
+    """Fitted inverse, which knows its density where it has drawn; from a radius alone a loop must find it."""
 
     law: Quantile
 
@@ -143,49 +147,49 @@ class QuantileContender(Contender):
         return x, self.law.albedo.reflectance(alpha) * left / (2.0 * jnp.pi * x * slope)
 
 
-# What cannot be had is left out.
-WANTED: tuple[Wanted, ...] = (
-    Wanted(YARDSTICK, "burley", "published"),
-    Wanted("normalized diffusion, refitted", "burley", "regenerated"),
-    Wanted("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
-    Wanted("Liang, printed", "liang", "published"),
-    Wanted("Liang, corrected", "liang", "corrected"),
-    Wanted("Liang, refitted", "liang", "regenerated"),
-    Wanted("dipole", "dipole", "published"),
-    Wanted("better dipole", "better_dipole", "published"),
-    Wanted("beam diffusion", "beam_diffusion", "published"),
-    Wanted("2 Gaussians", "gaussians:2", "regenerated"),
-    Wanted("4 Gaussians", "gaussians:4", "regenerated"),
-    Wanted("6 Gaussians", "gaussians:6", "regenerated"),
-    Wanted("quantile", "quantile", "regenerated"),
-    Wanted("hazard", "hazard", "regenerated"),
-    Wanted("hazard, n = 1.4", "hazard", "regenerated", 1.4),
-    Wanted("hazard, n = 1.4, g = 0.8", "hazard", "regenerated", 1.4, 0.8),
+# Those that do not load are left out.
+SPECS: tuple[LawSpec, ...] = (
+    LawSpec(YARDSTICK, "burley", "published"),
+    LawSpec("normalized diffusion, refitted", "burley", "regenerated"),
+    LawSpec("normalized diffusion, by its own mfp", "burley_diffuse_mfp", "published"),
+    LawSpec("Liang, printed", "liang", "published"),
+    LawSpec("Liang, corrected", "liang", "corrected"),
+    LawSpec("Liang, refitted", "liang", "regenerated"),
+    LawSpec("dipole", "dipole", "published"),
+    LawSpec("better dipole", "better_dipole", "published"),
+    LawSpec("beam diffusion", "beam_diffusion", "published"),
+    LawSpec("2 Gaussians", "gaussians:2", "regenerated"),
+    LawSpec("4 Gaussians", "gaussians:4", "regenerated"),
+    LawSpec("6 Gaussians", "gaussians:6", "regenerated"),
+    LawSpec("quantile", "quantile", "regenerated"),
+    LawSpec("hazard", "hazard", "regenerated"),
+    LawSpec("hazard, n = 1.4", "hazard", "regenerated", 1.4),
+    LawSpec("hazard, n = 1.4, g = 0.8", "hazard", "regenerated", 1.4, 0.8),
 )
 
 
-def contenders(folder: Path | None = None, wanted: Sequence[Wanted] | None = None) -> tuple[list[Contender], list[str]]:
-    """All that load, or those `wanted`, with the regenerated constants in `folder`; and a line for each that does not.
+def contenders(folder: Path | None = None, specs: Sequence[LawSpec] | None = None) -> tuple[list[Contender], list[str]]:
+    """Return all laws that load, by default of `SPECS`, with the constants in `folder`, and a line for each other.
 
     Raises InputError where the yardstick itself is missing.
     """
-    found: list[Contender] = []
+    loaded: list[Contender] = []
     left_out = []
-    for one in wanted or WANTED:
+    for one in specs or SPECS:
         setting = None if (one.n, one.g) == (1.0, 0.0) else Setting(n=one.n, g=one.g)
         try:
             law = catalogue.load(one.law, one.constants, setting, folder)
         except (InputError, RecordError) as error:
             left_out.append(f"{one.label}: {error}")
         else:
-            found += made(one.label, law)
-    if not any(one.name == YARDSTICK for one in found):
-        raise InputError(f"laws must have {YARDSTICK} among them, which all times are over, got {left_out or wanted}")
-    return found, left_out
+            loaded += with_samplers(one.label, law)
+    if not any(one.name == YARDSTICK for one in loaded):
+        raise InputError(f"laws must have {YARDSTICK} among them, which all times are over, got {left_out or specs}")
+    return loaded, left_out
 
 
-def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
-    """A law with each sampler that costs another time."""
+def with_samplers(label: str, law: ProfileLaw) -> Iterator[Contender]:
+    """Yield a law with each sampler that costs another time."""
     if isinstance(law, Burley):
         fast = FastBurley(law.setting, law.albedo, **law.constants())
         yield _contender(label, fast, fast.sampler, partial(_burley_setup, fast), law.sampler)
@@ -205,7 +209,7 @@ def made(label: str, law: ProfileLaw) -> Iterator[Contender]:
     elif isinstance(law, Liang):
         yield _contender(label, law, law.sampler, partial(_liang_setup, law))
     elif isinstance(law, Quantile):
-        yield QuantileContender(label, law, law.sampler, _constants(law), law.curve, law.sampler)
+        yield QuantileContender(label, law, law.sampler, law.curve, law.sampler)
     else:
         yield _contender(label, law, law.sampler, None)
 
@@ -218,12 +222,7 @@ def _contender(
     judged: Sampler | None = None,
     another: bool = False,
 ) -> Contender:
-    return Contender(label, law, sampler, _constants(law), setup, judged or sampler, another)
-
-
-def _constants(law: ProfileLaw) -> tuple[int, int]:
-    of_profile = len(law.seen_by("energy"))
-    return of_profile, len(law.constant_names()) - of_profile
+    return Contender(label, law, sampler, setup, judged or sampler, another)
 
 
 def _burley_setup(law: Fast, alpha: Array) -> tuple[Array, Array]:
@@ -231,7 +230,7 @@ def _burley_setup(law: Fast, alpha: Array) -> tuple[Array, Array]:
 
 
 def _liang_setup(law: Liang, alpha: Array) -> tuple[Array, ...]:
-    """Coefficients of the profile and its scale, and those of the sampler   (11)-(15), (18), (20)."""
+    """Return the coefficients of the profile and its scale, and those of the sampler   (11)-(15), (18), (20)."""
     k1 = law.g1 * alpha ** (law.g2 * alpha**law.g3 + law.g4)
     k2 = law.h1 * alpha ** (law.h2 * alpha + law.h3)
     return *law.coefficients(alpha), law.albedo.reflectance(alpha) / law.unscaled_energy(jnp.inf, alpha), k1, k2
@@ -244,7 +243,7 @@ SEARCHLIGHT = Setting()
 
 @dataclass(frozen=True)
 class TabulatedRadii:
-    """The exact half space under a searchlight, by cubics between knots of ln r, with the methods of a law.
+    """Exact half space under a searchlight, by cubics between knots of ln r, with the methods of a law.
 
     Methods take one albedo, or several (m, 1) at radii (m, n) with mean free paths (m, 1).
     """
@@ -252,17 +251,17 @@ class TabulatedRadii:
     setting: Setting = SEARCHLIGHT
 
     def curves(self, alpha: float) -> Curves:
-        """The cubics of one albedo."""
+        """Return the cubics of one albedo."""
         return exact_table(self.setting).curves([float(exact.reflectance(alpha, self.setting))])
 
     def profile(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
-        """R_d [1/length^2], looked up in float32: its rounding is nearly all of the error."""
+        """Return R_d [1/length^2], looked up in float32: its rounding is nearly all of the error."""
         length = np.asarray(mfp, float)
         x = np.asarray(r, float) / length
         return self._each(lambda curves, x: looked_up(curves, jnp.asarray(x, jnp.float32)), x, alpha) / length**2
 
     def cdf(self, r: ArrayLike, alpha: ArrayLike, mfp: ArrayLike = 1.0) -> Floats:
-        """Share of the energy within radii [-]."""
+        """Return the share of the energy within radii [-]."""
         x = np.asarray(r, float) / np.asarray(mfp, float)
         return self._each(lambda curves, x: curves.share(x[None])[0], x, alpha)
 
@@ -273,7 +272,7 @@ class TabulatedRadii:
 
 
 def looked_up(curves: Curves, x: Array) -> Array:
-    """R_d [1/mfp^2] at x [mfp]: a logarithm for the place, four numbers of the table, an exponential."""
+    """Return R_d [1/mfp^2] at x [mfp]: a logarithm for the place, four numbers of the table, an exponential."""
     rows = jnp.asarray(curves.profile[0], x.dtype)
     near = jnp.clip(x, NEAREST, FARTHEST)
     place = (jnp.log(near) - float(np.log(NEAREST))) * (1.0 / STEP)
@@ -285,9 +284,13 @@ def looked_up(curves: Curves, x: Array) -> Array:
 
 @dataclass(frozen=True)
 class TableContender(Contender):
-    """The table of one material, whatever the albedo. No sampler."""
+    """Table of one material, whatever the albedo, without a sampler."""
 
     curves: Curves | None = None
+
+    @property
+    def constants(self) -> tuple[int, int]:
+        return 0, 0
 
     def profile(self, x: Array, alpha: Array) -> Array:
         if self.curves is None:
@@ -301,6 +304,6 @@ class TableContender(Contender):
 
 
 def table_contender(material: float) -> TableContender:
-    """The table as a contender; its error is that at every albedo, its time that of one material."""
+    """Return the table as a contender; its error is that at every albedo, its time that of one material."""
     law: Any = TabulatedRadii()
-    return TableContender(NAME, law, law, (0, 0), None, law, curves=law.curves(material))
+    return TableContender(NAME, law, law, None, law, curves=law.curves(material))

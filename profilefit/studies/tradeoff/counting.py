@@ -1,4 +1,4 @@
-"""How many transcendental functions a law computes, read off what jax traces: for each point, and for each material."""
+"""Number of transcendental functions of a law, read off what jax traces: for each point, and for each material."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class FunctionCounts:
 
     @property
     def transcendental(self) -> int:
-        """Of each point, without square roots."""
+        """Number of functions of each point, without square roots."""
         return sum(self.point.values()) - sum(self.point[name] for name in ROOTS)
 
 
@@ -56,7 +56,11 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
         name = equation.primitive.name
         if name in COUNTED:
             result: Any = equation.outvars[0].aval
-            _add_one(name, result.shape, times, counts)
+            size = int(np.prod(result.shape, dtype=int))
+            if POINTS in result.shape:
+                counts.point[name] += times * (size // POINTS)
+            else:
+                counts.material[name] += times * size
         if name == "while":
             raise ValueError(f"function must have no loop of unknown length, got {equation}")
         inner = times * (equation.params["length"] if name == "scan" else 1)
@@ -64,15 +68,7 @@ def _add(jaxpr: core.Jaxpr, times: int, counts: FunctionCounts) -> None:
             _add(nested, inner, counts)
 
 
-def _add_one(name: str, shape: tuple[int, ...], times: int, counts: FunctionCounts) -> None:
-    size = int(np.prod(shape, dtype=int))
-    if POINTS in shape:
-        counts.point[name] += times * (size // POINTS)
-    else:
-        counts.material[name] += times * size
-
-
 def described(functions: Counter[str]) -> str:
-    """As 2 exp, log; a dash where there is none."""
+    """Return functions as text, for example "2 exp, log"; a dash where there is none."""
     parts = [f"{number} {name}" if number > 1 else name for name, number in sorted(functions.items())]
     return ", ".join(parts) or "–"

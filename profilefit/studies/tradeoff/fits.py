@@ -59,7 +59,7 @@ FULL, QUICK = FitSizes(), FitSizes((100_000,), (), 3)
 
 @dataclass(frozen=True)
 class FittedConstants:
-    """What a way ended at: constants by name, their standard errors where there are any, and what the solver said."""
+    """Result of a fit: constants by name, their standard errors where there are any, and the word of the solver."""
 
     constants: Mapping[str, float]
     errors: Mapping[str, float]
@@ -93,7 +93,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     for seed in track(range(sizes.seeds + 1), "fits"):  # the first compiles
         for photons in sizes.photons:
             profiles, light = _light(photons, 1000 * seed + 700)
-            for name in _named(ways, photons, sizes):
+            for name in [name for name in ways if name != EMCEE or photons in sizes.chained]:
                 trial = _trial(ways[name], profiles, seed, light, limits[name], start)
                 if seed == 0:
                     compiling[name] = max(compiling.get(name, 0.0), trial.fit_seconds)
@@ -105,7 +105,7 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
             title,
             f"time of {what}, one core [s]",
             "relative change of the annuli's energies by noise [-]",
-            tuple(point_of(name, *key, found) for key, found in trials.items()),
+            tuple(point_of(name, *key, group) for key, group in trials.items()),
             joined=True,
         )
         for name, title, what in (
@@ -116,12 +116,8 @@ def measure(sizes: FitSizes = FULL, track: Track = silent) -> TradeoffPart:
     return TradeoffPart("fits", "Fits: time against the law's error by noise", panels, notes_of(trials, compiling))
 
 
-def _named(ways: Mapping[str, Way], photons: int, sizes: FitSizes) -> list[str]:
-    return [name for name in ways if name != EMCEE or photons in sizes.chained]
-
-
 def _light(photons: int, seed: int) -> tuple[Profiles, float]:
-    """Profiles with their covariance, and the time it took [s]."""
+    """Return profiles with their covariance, and the time it took [s]."""
     begin = time.perf_counter()
     run = simulate_orders(Grid.from_edges(r=EDGES), photons, seed, workers=1, progress=False)
     profiles = Profiles.from_orders(run, ALPHAS)
@@ -136,9 +132,9 @@ def _ways(start: Any, max_chain: int) -> dict[str, Way]:
         return fit(profiles, start, "radial", free, used, jackknife=False)
 
     def all_at_once(profiles: Profiles, _: int) -> FittedConstants:
-        found = fitted(profiles)
-        errors = {} if found.statistical is None else _errors(free, found.statistical)
-        return FittedConstants(found.constants, errors, found.result)
+        result = fitted(profiles)
+        errors = {} if result.statistical is None else _errors(free, result.statistical)
+        return FittedConstants(result.constants, errors, result.result)
 
     def two_stages(profiles: Profiles, _: int) -> FittedConstants:
         points = staged.fit_per_albedo(profiles, start, 1.0, TRIMMED, EPSILON)
@@ -165,19 +161,19 @@ def _errors(names: Sequence[str], covariance: Floats) -> dict[str, float]:
 
 def _trial(way: Way, profiles: Profiles, seed: int, light: float, limit: FittedConstants, start: Any) -> Trial:
     begin = time.perf_counter()
-    found = way(profiles, seed)
+    result = way(profiles, seed)
     seconds = time.perf_counter() - begin
-    rms, worst = change(with_constants(start, found.constants), with_constants(start, limit.constants))
-    return Trial(seconds, light, rms, worst, standardised(found, limit), found.result == "converged")
+    rms, worst = change(with_constants(start, result.constants), with_constants(start, limit.constants))
+    return Trial(seconds, light, rms, worst, standardised(result, limit), result.result == "converged")
 
 
 def with_constants(law: Any, constants: Mapping[str, float]) -> ProfileLaw:
-    """The law with these constants replaced."""
+    """Return the law with these constants replaced."""
     return law.with_vector(tuple(constants), list(constants.values()))
 
 
 def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:
-    """Root mean square and worst change of ring energies, before any scaling to A, over the exact energies [-]."""
+    """Return root mean square and worst change of ring energies, not scaled to A, over the exact energies [-]."""
     energy, counts = judged()
     ours, theirs = (np.diff(energy_within(one), axis=1) for one in (law, limit))
     relative = np.abs(ours - theirs)[counts] / energy[counts]
@@ -186,23 +182,23 @@ def change(law: ProfileLaw, limit: ProfileLaw) -> tuple[float, float]:
 
 @cache
 def judged() -> tuple[Floats, NDArray[np.bool_]]:
-    """Exact energies of the rings (albedos, rings) [-], and the rings that count."""
+    """Return exact energies of the rings (albedos, rings) [-], and the rings that count."""
     share = np.asarray(exact.cdf(RINGS, ALPHAS[:, None]))
     energy = np.diff(share, axis=1) * np.asarray(exact.reflectance(ALPHAS))[:, None]
     return energy, share[:, 1:] <= ENERGY_WITHIN
 
 
 def energy_within(law: ProfileLaw) -> Floats:
-    """Energy within each edge of the rings (albedos, rings + 1) [-]."""
+    """Return energy within each edge of the rings (albedos, rings + 1) [-]."""
     with jax.enable_x64(True):
         return np.asarray(law.unscaled_energy(jnp.asarray(RINGS), jnp.asarray(ALPHAS)[:, None]))
 
 
-def standardised(found: FittedConstants, limit: FittedConstants) -> float:
-    """Root mean square distance of the constants from their limits, in standard errors [-]; NaN if there are none."""
-    if not found.errors:
+def standardised(result: FittedConstants, limit: FittedConstants) -> float:
+    """Return the root mean square distance of constants from their limits, in standard errors [-], or NaN."""
+    if not result.errors:
         return float("nan")
-    distances = [(found.constants[name] - limit.constants[name]) / error for name, error in found.errors.items()]
+    distances = [(result.constants[name] - limit.constants[name]) / error for name, error in result.errors.items()]
     return float(np.sqrt(np.mean(np.square(distances))))
 
 
@@ -223,9 +219,9 @@ def point_of(panel: str, name: str, photons: int, trials: Sequence[Trial]) -> Po
 
 def notes_of(trials: Mapping[tuple[str, int], Sequence[Trial]], compiling: Mapping[str, float]) -> tuple[str, ...]:
     failed = [
-        f"{sum(not t.converged for t in found)} of {len(found)} did not converge: {name}, {photons:.0e} photons"
-        for (name, photons), found in trials.items()
-        if not all(t.converged for t in found)
+        f"{sum(not t.converged for t in group)} of {len(group)} did not converge: {name}, {photons:.0e} photons"
+        for (name, photons), group in trials.items()
+        if not all(t.converged for t in group)
     ]
     compiled = ", ".join(f"{name} {seconds:.1f}" for name, seconds in compiling.items())
     return (*failed, f"first fits, which compile, not in the times [s]: {compiled}")

@@ -41,7 +41,7 @@ FULL, QUICK = FurSizes(), FurSizes((0.0, 45.0, 75.0), (8, 16, 48), 96, 3)
 
 
 def measure(sizes: FurSizes = FULL, track: Track = silent) -> TradeoffPart:
-    """A panel an angle, and one of the example's picture."""
+    """Return a panel an angle, and one of the example's picture."""
     with opened() as context:
         panels = [angle(context, sizes.degrees[i], sizes) for i in track(range(len(sizes.degrees)), "angles")]
         panels.append(picture(context, sizes))
@@ -50,29 +50,29 @@ def measure(sizes: FurSizes = FULL, track: Track = silent) -> TradeoffPart:
 
 
 def request() -> FurRequest:
-    """The shipped example."""
+    """Return the shipped example."""
     path = shipped("examples") / FILE
     return read(str(path), read_toml(path))
 
 
 def angle(context: moderngl.Context, degrees: float, sizes: FurSizes = FULL) -> Panel:
-    """Every way and number of layers toward one angle."""
+    """Return every way and number of layers toward one angle."""
     theta = float(np.radians(degrees))
     patch = wide_patch(DENSITY, RADIUS, LENGTH, theta, LEAST_SIDE, SEED)
-    found = over_layers(context, patch, theta, sizes.layers, (sizes.rays, sizes.rays), sizes.turns)
+    points = over_layers(context, patch, theta, sizes.layers, (sizes.rays, sizes.rays), sizes.turns)
     name = f"angle-{degrees:g}"
     return Panel(
         name,
         f"{degrees:g} degrees, layers",
         f"time of {sizes.rays} x {sizes.rays} rays [ms]",
         "root mean square error of heights / length [-]",
-        tuple(_point(name, one) for one in found),
+        tuple(_point(name, one) for one in points),
         joined=True,
     )
 
 
 def picture(context: moderngl.Context, sizes: FurSizes = FULL) -> Panel:
-    """The example's ball, its light against rays to every strand."""
+    """Return the example's ball, its light against rays to every strand."""
     with bench(context, request()) as found:
         points = tuple(_point("ball", found.point(way, one, sizes.turns)) for way in WAYS for one in sizes.layers)
     return Panel(

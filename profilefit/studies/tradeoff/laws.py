@@ -19,7 +19,7 @@ from jax import Array
 
 from profilefit.fitting.quality import profile_quality
 from profilefit.studies.tradeoff import stopwatch
-from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders, table_contender
+from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders, table_contender
 from profilefit.studies.tradeoff.counting import FunctionCounts, count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Ratio, Track
@@ -31,6 +31,9 @@ RADII = 0.01, 10.0  # of the timed profiles [mfp]
 NANO = 1e9
 PARTS = ("profile", "sample", "both")
 TITLES = {"profile": "R$_d$ at a given radius", "both": "a radius drawn, and R$_d$ there"}
+COST = "time of one {}, one core, float32 [ns]"
+AXES = {"profile": COST.format("evaluation"), "both": COST.format("sample")}
+ERROR = "relative error of R$_d$ [-]"
 QUICKLY = (YARDSTICK, "Liang, corrected", "hazard", "hazard, n = 1.4")
 
 
@@ -69,38 +72,38 @@ class ContenderResult:
 def measure(sizes: LawSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time and judge every law; quickly, only some of them."""
     quick = sizes.judged <= QUICK.judged
-    found, left_out = contenders(folder, [one for one in WANTED if not quick or one.label in QUICKLY])
+    contestants, left_out = contenders(folder, [one for one in SPECS if not quick or one.label in QUICKLY])
     if not quick:
-        found.append(table_contender(MATERIAL))
-    rows = measured(found, sizes, track)
-    panels = tuple(Panel(part, title, *_axes(part), points_of(rows, part)) for part, title in TITLES.items())
+        contestants.append(table_contender(MATERIAL))
+    rows = measured(contestants, sizes, track)
+    panels = tuple(Panel(part, title, AXES[part], ERROR, points_of(rows, part)) for part, title in TITLES.items())
     notes = [f"left out: {line}" for line in left_out]
     return TradeoffPart("laws", "Profile laws: time of an evaluation against error", panels, tuple(notes))
 
 
 def judged_albedos(number: int) -> np.ndarray:
-    """Even in sqrt(1 - alpha) over [0.05, 0.995]."""
+    """Return albedos even in sqrt(1 - alpha) over [0.05, 0.995]."""
     return 1.0 - np.linspace(np.sqrt(0.95), np.sqrt(0.005), number) ** 2
 
 
 def counts(contender: Contender) -> dict[str, FunctionCounts]:
-    """Functions of each part that there is."""
+    """Count the functions of each part of a contender."""
     functions = {**contender.parts, **({"profile": contender.profile} if contender.another else {})}
     return {part: count(functions[part]) for part in PARTS if part in functions}
 
 
 def works(contender: Contender, counted: dict[str, FunctionCounts], sizes: LawSizes) -> dict[str, stopwatch.Work]:
-    """What to time of a contender, by part."""
-    found = {}
+    """Return the timed calls of a contender, by part."""
+    calls = {}
     for part, function in contender.parts.items():
         each = counted[part].transcendental
         if each <= TOO_MANY:
-            found[part] = timed(function, part == "profile", sizes.points if each <= MANY else sizes.costly)
-    return found
+            calls[part] = timed(function, part == "profile", sizes.points if each <= MANY else sizes.costly)
+    return calls
 
 
 def timed(function: Callable[[Array, Array], object], radii: bool, points: int) -> stopwatch.Work:
-    """Calls on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
+    """Return a call on radii, or on numbers in [0, 1); the albedo is a constant of the compiled call."""
     shares = np.random.default_rng(1).random(points)
     near, far = RADII
     given = jnp.asarray(near * (far / near) ** shares if radii else shares, jnp.float32)
@@ -113,19 +116,21 @@ def timed(function: Callable[[Array, Array], object], radii: bool, points: int) 
     return work
 
 
-def measured(found: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent) -> list[ContenderResult]:
+def measured(
+    contestants: Sequence[Contender], sizes: LawSizes, track: Track = stopwatch.silent
+) -> list[ContenderResult]:
     """Count, time and judge every contender; the yardstick must be one of them."""
-    counted = {contender.name: counts(contender) for contender in found}
+    counted = {contender.name: counts(contender) for contender in contestants}
     jobs: dict[tuple[str, str], stopwatch.Work] = {}
-    for contender in found:
+    for contender in contestants:
         jobs |= {
             (part, contender.name): work for part, work in works(contender, counted[contender.name], sizes).items()
         }
         if (work := _setup_work(contender, sizes.albedos)) is not None:
             jobs["setup", contender.name] = work
     rates = stopwatch.take_turns({" of ".join(key): work for key, work in jobs.items()}, sizes.turns, track, "laws")
-    rows: Iterable[int] = track(range(len(found)), "errors of laws")
-    return [_row(found[i], counted[found[i].name], rates, sizes) for i in rows]
+    rows: Iterable[int] = track(range(len(contestants)), "errors of laws")
+    return [_row(contestants[i], counted[contestants[i].name], rates, sizes) for i in rows]
 
 
 def nanoseconds(rates: Rates, name: str, yardstick: str) -> WithSpread:
@@ -178,8 +183,3 @@ def points_of(rows: Sequence[ContenderResult], part: str) -> tuple[Point, ...]:
         for row in rows
         if part in row.times
     )
-
-
-def _axes(part: str) -> tuple[str, str]:
-    what = "evaluation" if part == "profile" else "sample"
-    return f"time of one {what}, one core, float32 [ns]", "relative error of R$_d$ [-]"

@@ -1,9 +1,10 @@
-"""The parts of the measurement by name, in the order in which they run, and the file that keeps them."""
+"""Parts of the measurement by name, in the order in which they run, and the file that keeps them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from mcml_sim.files.text_file import as_json, read_json
@@ -15,47 +16,17 @@ from profilefit.studies.tradeoff.stopwatch import Track, silent
 
 Content = dict[str, Any]
 SAME = ("version", "sha256", "machine")  # of `made`: what parts beside each other have in common
-Measure = Callable[[bool, Path | None, Track], TradeoffPart]
-"""Whether quickly, where the records lie, who is shown the progress -> part."""
-
-
-def _truth(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    del folder
-    return truth.measure(truth.QUICK if quick else truth.FULL, track)
-
-
-def _laws(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    return laws.measure(laws.QUICK if quick else laws.FULL, folder, track)
-
-
-def _samplers(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    return samplers.measure(samplers.QUICK if quick else samplers.FULL, folder, track)
-
-
-def _fits(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    del folder
-    return fits.measure(fits.QUICK if quick else fits.FULL, track)
-
-
-def _sea(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    del folder
-    return sea.measure(sea.QUICK if quick else sea.FULL, track)
-
-
-def _fur(quick: bool, folder: Path | None, track: Track) -> TradeoffPart:
-    del folder
-    return fur.measure(fur.QUICK if quick else fur.FULL, track)
-
-
 IF_NAMED = ("sea", "fur")  # they need OpenGL, and are of no law
-PARTS: dict[str, Measure] = {
-    **{"truth": _truth, "laws": _laws, "samplers": _samplers, "fits": _fits},
-    **{"sea": _sea, "fur": _fur},
+OF_RECORDS = ("laws", "samplers")
+# Each measures by `measure(sizes, track)`, those of records with their folder, and has sizes FULL and QUICK.
+PARTS: dict[str, ModuleType] = {
+    **{"truth": truth, "laws": laws, "samplers": samplers, "fits": fits},
+    **{"sea": sea, "fur": fur},
 }
 
 
 def chosen(names: list[str]) -> list[str]:
-    """The parts named, each once and in order; if none is, all but `IF_NAMED`. InputError on an unknown one."""
+    """Return the parts named, each once and in order, by default all but `IF_NAMED`; InputError on an unknown one."""
     if unknown := [name for name in names if name not in PARTS]:
         raise InputError(f"part must be one of {', '.join(PARTS)}, got {unknown[0]!r}")
     return [name for name in PARTS if name in (names or PARTS.keys() - set(IF_NAMED))]
@@ -63,17 +34,19 @@ def chosen(names: list[str]) -> list[str]:
 
 def measured(name: str, quick: bool = False, folder: Path | None = None, track: Track = silent) -> TradeoffPart:
     """Run one part."""
-    return PARTS[name](quick, folder, track)
+    part, given = PARTS[name], {"folder": folder} if name in OF_RECORDS else {}
+    measured: TradeoffPart = part.measure(part.QUICK if quick else part.FULL, track=track, **given)
+    return measured
 
 
 def keep(file: Path, new: Mapping[str, Any]) -> None:
     """Write what was measured, and the other parts that the file has, if they are comparable.
 
-    new  "made" and "machine" of this run, and by its name each part measured so far, which has both, too
+    `new` holds "made" and "machine" of this run, and by its name each part measured so far, which has both, too.
     """
     before = read(file)
     kept: Content = {}
-    if is_alike(before, new):
+    if is_comparable(before, new):
         own = {key: before[key] for key in ("made", "machine") if key in before}
         kept = {name: {**own, **before[name]} for name in PARTS if isinstance(before.get(name), dict)}
     parts = {**kept, **new}
@@ -82,7 +55,7 @@ def keep(file: Path, new: Mapping[str, Any]) -> None:
 
 
 def read(file: Path) -> Content:
-    """What a tradeoff.json says, which is nothing if it is damaged or not there: it is only added to, or replaced."""
+    """Return the content of a tradeoff.json, nothing if it is damaged or absent: it is only added to, or replaced."""
     try:
         content = read_json(file)
     except InputError:
@@ -90,6 +63,6 @@ def read(file: Path) -> Content:
     return content if isinstance(content, dict) and isinstance(content.get("made"), dict) else {}
 
 
-def is_alike(before: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
-    """Whether both are of the same records, version and machine: else their times and errors do not compare."""
+def is_comparable(before: Mapping[str, Any], new: Mapping[str, Any]) -> bool:
+    """Return whether both are of the same records, version and machine: else they do not compare."""
     return bool(before) and all(before["made"].get(key) == new["made"].get(key) for key in SAME)

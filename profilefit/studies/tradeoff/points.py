@@ -1,4 +1,4 @@
-"""What a method costs and how wrong it is, each with its spread; and the front, the methods that no other beats."""
+"""Cost and error of methods, each with its spread; and the front, the methods that no other beats."""
 
 from __future__ import annotations
 
@@ -22,17 +22,17 @@ class WithSpread:
 
     @classmethod
     def of(cls, values: ArrayLike) -> WithSpread:
-        """Median of repeats, and where the middle 68 % of them lie."""
+        """Return median of repeats, and where the middle 68 % of them lie."""
         low, middle, high = np.percentile(np.asarray(values, float), [SPREAD[0], 50.0, SPREAD[1]])
         return cls(float(middle), float(low), float(high))
 
     @classmethod
     def exactly(cls, value: float) -> WithSpread:
-        """Without error."""
+        """Return a number that is known without error."""
         return cls(float(value), float(value), float(value))
 
     def is_below(self, other: WithSpread) -> bool:
-        """By more than the spread of both."""
+        """Return whether it is below another by more than the spread of both."""
         return self.high < other.low
 
 
@@ -88,7 +88,7 @@ class TradeoffPart:
 
 
 def standings(points: Sequence[Point]) -> list[str]:
-    """Where each point stands among those of one panel.
+    """Return where each point stands among those of one panel.
 
     beaten  another is better by more than the spread of both, in cost as well as in every error
     tied    another is so in one of them, and in the other not worse by more than the spread: nothing measured speaks
@@ -96,14 +96,14 @@ def standings(points: Sequence[Point]) -> list[str]:
     front   none of this: nobody is known to be better in one without being worse in the other
     Ties are not transitive, so that points may tie each other in a ring and leave no front: then all of them are it.
     """
-    found = [_standing(point, points) for point in points]
-    return found if FRONT in found else [FRONT if one == TIED else one for one in found]
+    places = [_standing(point, points) for point in points]
+    return places if FRONT in places else [FRONT if one == TIED else one for one in places]
 
 
 def front(points: Sequence[Point]) -> list[int]:
-    """The points on the front, cheapest first."""
-    found = [i for i, standing in enumerate(standings(points)) if standing == FRONT]
-    return sorted(found, key=lambda i: (points[i].cost.value, points[i].error.value))
+    """Return the points on the front, cheapest first."""
+    best = [i for i, standing in enumerate(standings(points)) if standing == FRONT]
+    return sorted(best, key=lambda i: (points[i].cost.value, points[i].error.value))
 
 
 def _standing(point: Point, among: Sequence[Point]) -> str:
@@ -119,10 +119,10 @@ def _standing(point: Point, among: Sequence[Point]) -> str:
 
 
 def _is_nearer(one: Point, other: Point) -> bool:
-    """Whether all errors that both have are smaller by more than their spread."""
+    """Return whether all errors that both have are smaller by more than their spread."""
     return all(a.is_below(b) for a, b in zip(one.errors, other.errors, strict=False))
 
 
 def _is_farther_off(one: Point, other: Point) -> bool:
-    """Whether any error is larger by more than its spread."""
+    """Return whether any error is larger by more than its spread."""
     return any(b.is_below(a) for a, b in zip(one.errors, other.errors, strict=False))

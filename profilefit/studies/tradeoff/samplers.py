@@ -36,7 +36,7 @@ from profilefit.scenes.stage.step_edge import (
     random_points,
 )
 from profilefit.studies.tradeoff import laws, stopwatch
-from profilefit.studies.tradeoff.contenders import WANTED, YARDSTICK, Contender, contenders
+from profilefit.studies.tradeoff.contenders import SPECS, YARDSTICK, Contender, contenders
 from profilefit.studies.tradeoff.counting import count
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Track
@@ -78,7 +78,7 @@ class UniformSampler(Sampler):
     law: ProfileLaw
 
     def farthest(self, alpha: Array) -> Array:
-        """x of that share [mfp]."""
+        """Return the radius x within which `UNIFORM_SHARE` of the light leaves [mfp]."""
         return self.law.sampler.scaled_sample(jnp.full_like(alpha, UNIFORM_SHARE), alpha)
 
     def scaled_sample(self, xi: Array, alpha: Array) -> Array:
@@ -91,7 +91,7 @@ class UniformSampler(Sampler):
 
 @dataclass(frozen=True)
 class WeighedSampler:
-    """Of one way to weigh: ratios of square error and of variance (2, albedos, blocks), biases (albedos, edges) [A].
+    """Sampler with a weight: ratios of square error and variance (2, albedos, blocks), biases (albedos, edges) [A].
 
     searched  whether the weight takes a density that is not the law's
     """
@@ -103,7 +103,7 @@ class WeighedSampler:
     searched: bool = False
 
     def weighed(self, xi: Array, alpha: Array) -> tuple[Array, ...]:
-        """A radius, and what its weight is made of: what is timed."""
+        """Return a radius, and what its weight is made of: what is timed."""
         x, value = self.owner.both(xi, alpha)
         return (x, value, self.owner.sampler.scaled_pdf(x, alpha)) if self.searched else (x, value)
 
@@ -111,14 +111,18 @@ class WeighedSampler:
 def measure(sizes: SamplerSizes = FULL, folder: Path | None = None, track: Track = stopwatch.silent) -> TradeoffPart:
     """Time every sampler, and judge it both ways."""
     quick = sizes.trials <= QUICK.trials
-    wanted = [one for one in WANTED if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
-    found, left_out = contenders(folder, wanted)
-    found += [_uniform(one) for one in found if isinstance(one.law, Hazard) and not one.another]
-    counted = {one.name: laws.counts(one)["both"].transcendental for one in found}
-    timed = [one for one in found if counted[one.name] <= laws.TOO_MANY]
-    dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in found if one not in timed]
+    specs = [one for one in SPECS if (one.label in QUICKLY if quick else one.label not in LIKE_OTHERS)]
+    contestants, left_out = contenders(folder, specs)
+    contestants += [_uniform(one) for one in contestants if isinstance(one.law, Hazard) and not one.another]
+    counted = {one.name: laws.counts(one)["both"].transcendental for one in contestants}
+    timed = [one for one in contestants if counted[one.name] <= laws.TOO_MANY]
+    dear = [f"left out: {one.name}: a sample takes thousands of functions" for one in contestants if one not in timed]
     judged = [way for i in track(range(len(timed)), "noise and bias") for way in ways_of(timed[i], sizes)]
-    works = {one.name: laws.timed(one.weighed, False, _calls(one, sizes)) for one in judged}
+
+    def calls(way: WeighedSampler) -> int:
+        return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
+
+    works = {one.name: laws.timed(one.weighed, False, calls(one)) for one in judged}
     rates = stopwatch.take_turns(works, sizes.turns, track, "samplers")
     points = [point for one in judged for point in points_of(one, laws.nanoseconds(rates, one.name, YARDSTICK))]
     panels = tuple(
@@ -143,16 +147,11 @@ def _uniform(hazard: Contender) -> Contender:
     if not isinstance(law, Hazard):
         raise TypeError(f"hazard must be the contender of that law, got {hazard.name!r}")
     sampler = UniformSampler(law)
-    return Contender("uniform radii, hazard", law, sampler, hazard.constants, law.shape, sampler, another=True)
-
-
-def _calls(way: WeighedSampler, sizes: SamplerSizes) -> int:
-    """Points of one timed call."""
-    return sizes.points if count(way.weighed).transcendental <= laws.MANY else sizes.costly
+    return Contender("uniform radii, hazard", law, sampler, law.shape, sampler, another=True)
 
 
 def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
-    """A sampler weighed by its own density; and by its law's, where that is another."""
+    """Return a sampler weighed by its own density; and by its law's, where that is another."""
     sampler = one.judged
     biases = np.array([[asymptotic_bias(sampler, a, edge) for edge in sizes.edges] for a in sizes.alphas])
     apart = bool(np.max(np.abs(biases[..., 1] - biases[..., 0])) >= APART)
@@ -166,7 +165,7 @@ def ways_of(one: Contender, sizes: SamplerSizes) -> list[WeighedSampler]:
 
 
 def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float, float]:
-    """Light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
+    """Return light beyond an edge that infinitely many samples find, less the exact, as shares of A [-].
 
     With weights by the sampler's own density, and by its law's. alpha is the reduced albedo, the edge in l*.
     """
@@ -181,13 +180,13 @@ def asymptotic_bias(sampler: Sampler, alpha: float, edge: float) -> tuple[float,
 
 
 def unweighted(law: ProfileLaw, alpha: float, sampler: Sampler) -> EdgeGather:
-    """Weights by the law's own density are all 1."""
+    """Return a gather weighted by the law's own density: all weights are 1."""
     drawn = by_law(law, alpha, sampler)
     return EdgeGather(drawn.sample, np.ones_like)
 
 
 def noise_ratios(gathered, sampler: Sampler, sizes: SamplerSizes) -> Floats:
-    """Square error by the edge, and variance, over those of the exact quantile with the same points (2, m, blocks)."""
+    """Return square error by the edge and variance, over those of the exact quantile (2, m, blocks)."""
     rows = []
     for alpha in unreduced(np.array(sizes.alphas), sampler.law.setting.g).tolist():
         ways = gathered(sampler.law, alpha, sampler), by_quantile(alpha, sampler.law.setting)

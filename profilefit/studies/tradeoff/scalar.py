@@ -83,7 +83,7 @@ def trace(
 
 @cache
 def compiled(function: Callable[..., Any] = trace) -> Callable[..., Any] | None:
-    """A plain loop as machine code, without checks of divisors, as in C; None where numba is not installed."""
+    """Return a plain loop as machine code, without checks of divisors, as in C; None where numba is not installed."""
     try:
         import numba
     except ImportError:

@@ -49,7 +49,7 @@ FULL, QUICK = SeaSizes(), SeaSizes((6, 24), 100_000, (128, 256), 1024, (4, 16, 6
 
 
 def measure(sizes: SeaSizes = FULL, track: Track = silent) -> TradeoffPart:
-    """The example's view, caustic maps before and beyond the first fold, and shafts."""
+    """Return the example's view, caustic maps before and beyond the first fold, and shafts."""
     with opened() as context:
         with bench(context, request(), sizes.paths) as found:
             drawn = (view(found, sizes, track), *maps(context, sizes, track))
@@ -58,13 +58,13 @@ def measure(sizes: SeaSizes = FULL, track: Track = silent) -> TradeoffPart:
 
 
 def request() -> SeaRequest:
-    """The shipped example."""
+    """Return the shipped example."""
     path = shipped("examples") / FILE
     return read(str(path), read_toml(path))
 
 
 def view(found: SeaBench, sizes: SeaSizes = FULL, track: Track = silent) -> Panel:
-    """A picture by each law of the water's light, over pieces of a ray."""
+    """Return a picture by each law of the water's light, over pieces of a ray."""
     errors = {(kind, one): found.rmse(found.view(kind, one)[0]) for kind in KINDS for one in sizes.samples}
     times: dict[tuple[str, int], list[float]] = {each: [] for each in errors}
     for _ in track(range(sizes.turns), "views"):
@@ -78,14 +78,14 @@ def view(found: SeaBench, sizes: SeaSizes = FULL, track: Track = silent) -> Pane
 
 
 def seas() -> dict[str, tuple[float, Waves]]:
-    """F, and a random sea whose most curved crest has it."""
+    """Return F, and a random sea whose most curved crest has it."""
     one = random_sea(0.15, TILE, 1)
     cases = {"before": BEFORE, "beyond": BEYOND}
     return {name: (f, one.scaled(f / focus(one, DEPTH))) for name, f in cases.items()}
 
 
 def maps(context: moderngl.Context, sizes: SeaSizes = FULL, track: Track = silent) -> list[Panel]:
-    """Caustic maps by each splat, over vertices of the sea."""
+    """Return caustic maps by each splat, over vertices of the sea."""
     panels = []
     for name, (f, waves) in seas().items():
         true = caustic_photons(waves, DEPTH, 0.0, 1.34, PIXELS, sizes.photons)
@@ -117,7 +117,7 @@ def maps(context: moderngl.Context, sizes: SeaSizes = FULL, track: Track = silen
 
 
 def shafts(sizes: SeaSizes = FULL) -> Panel:
-    """Twenty view rays through a bundle of light, against quadrature."""
+    """Return twenty view rays through a bundle of light, against quadrature."""
     bundle, one = Bundle(0.0, ((0.05, 1, 0.0), (0.03, 2, 1.0), (0.02, 3, 2.0))), HenyeyGreenstein(0.924)
     views = [
         ViewRay(x, z, (float(np.cos(up) * np.cos(side)), float(np.cos(up) * np.sin(side)), float(np.sin(up))), length)

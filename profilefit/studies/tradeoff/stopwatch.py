@@ -24,13 +24,13 @@ Track = Callable[[range, str], Iterable[int]]
 
 
 def silent(turns: range, title: str) -> Iterable[int]:
-    """The turns, shown to nobody."""
+    """Return the turns, without any progress shown."""
     del title
     return turns
 
 
 def cores() -> list[int]:
-    """Cores this process may use; on systems that do not say, all of them."""
+    """Return cores this process may use; on systems that do not say, all of them."""
     return sorted(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else list(range(os.cpu_count() or 1))
 
 
@@ -44,7 +44,7 @@ def pin(*to: int) -> bool:
 
 @contextlib.contextmanager
 def on_one_core() -> Iterator[bool]:
-    """Pinned to the last core, which has the fewest interrupts; threads that run already stay where they are."""
+    """Pin the process to the last core, which has the fewest interrupts; threads that run already stay."""
     before = cores()
     done = pin(before[-1])
     try:
@@ -65,7 +65,7 @@ class Rates:
     first: dict[str, float] = field(default_factory=dict)
 
     def best(self, name: str) -> float:
-        """The undisturbed rate: that of the fastest turn [1/s]."""
+        """Return the undisturbed rate: that of the fastest turn [1/s]."""
         return max(self.by_name[name])
 
     def seconds(self, name: str) -> Floats:
@@ -73,18 +73,18 @@ class Rates:
         return 1.0 / np.array(self.by_name[name])
 
     def times(self, name: str, over: str) -> Floats:
-        """How many times as long as `over` in each turn (turns,) [-]: what disturbs a turn hits both."""
+        """Return how many times as long as `over` in each turn (turns,) [-]: what disturbs a turn hits both."""
         return self.seconds(name) / self.seconds(over)
 
     def ratio(self, name: str, over: str, factor: float = 1.0) -> Ratio:
-        """Median of the ratios turn by turn, times `factor`, with their spread."""
+        """Return median of the ratios turn by turn, times `factor`, with their spread."""
         ratios = factor * self.times(over, name)
         return Ratio(float(np.median(ratios)), float(ratios.min()), float(ratios.max()))
 
 
 @dataclass(frozen=True)
 class Ratio:
-    """How many times as fast."""
+    """Ratio of speeds: median, least and most over the turns [-]."""
 
     median: float
     least: float
@@ -130,7 +130,7 @@ def facts(pinned: bool) -> dict[str, str]:
     return {
         "processor": processor(),
         "cores": f"{os.cpu_count() or 1}, {'pinned to one' if pinned else f'{len(cores())} used'}",
-        "load before": _load(),
+        "load before": f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown",
         "device": jax.devices()[0].device_kind,
         "system": f"{platform.system()} {platform.machine()}, Python {platform.python_version()}",
         **{name: version(name) for name in LIBRARIES},
@@ -138,10 +138,5 @@ def facts(pinned: bool) -> dict[str, str]:
 
 
 def caption(known: dict[str, str]) -> str:
-    """The facts in one line for a figure."""
+    """Return the facts in one line for a figure."""
     return f"{known['processor']}; cores: {known['cores']}; load before: {known['load before']}; jax {known['jax']}"
-
-
-def _load() -> str:
-    """Processes that wanted a core over the last minute, on average."""
-    return f"{os.getloadavg()[0]:.2f}" if hasattr(os, "getloadavg") else "unknown"

@@ -4,27 +4,109 @@ The scalar tracer and `simulate` run once an albedo, `simulate_orders` once for 
 the number of its nodes; where the surface refracts it needs a table of the index, which is kept. All on one core, in
 turns, each turn with photons of its own: seconds and errors have the spread of the turns. Errors are relative, over all
 albedos and the rings from 0.01 mfp to 99.5 % of the energy, against the exact solution with more nodes; what compiles
-is not timed, but told.
+is not timed, but noted.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property, partial
 
+import jax
 import numpy as np
 from numpy.typing import NDArray
 
-from mcml_sim import Grid, exact, simulate, simulate_orders
-from mcml_sim.exact import table
+from mcml_sim import Grid, Layer, Medium, Setting, exact, half_space, simulate, simulate_orders
+from mcml_sim.exact import hankel, table
+from mcml_sim.exact.by_albedo import by_alpha, forget
 from mcml_sim.exact.stack import solution
-from mcml_sim.exact.transform import STANDARD, Rule
-from profilefit.studies.tradeoff import annuli, scalar, stopwatch
-from profilefit.studies.tradeoff.annuli import ALPHAS, BREAKS, EDGES, EVEN, MATCHED, REFRACTING, STACK, WIDTH, Annuli
+from mcml_sim.exact.stack.depths import Nodes
+from mcml_sim.exact.transform import STANDARD, Rule, Transform
+from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
+from profilefit.studies.tradeoff import scalar, stopwatch
 from profilefit.studies.tradeoff.points import Panel, Point, TradeoffPart, WithSpread
 from profilefit.studies.tradeoff.stopwatch import Rates, Track
 
 Floats = NDArray[np.float64]
+ALPHAS = np.array([0.2, 0.5, 0.8, 0.95, 0.99])
+# The scalar tracer's rings are even, so all rings are unions of those: thirty, near even in ln r to 10 mfp.
+WIDTH, EVEN = 0.01, 1024
+BREAKS = np.append(0, np.unique(np.round(np.geomspace(1, EVEN, 31)).astype(int)))
+EDGES = BREAKS * WIDTH
+MIDDLES = 0.5 * (EDGES[1:] + EDGES[:-1])
+FINEST = 3.0, 1.5  # times the standard nodes: what all errors are against, where n is 1 and else
+LAYERS = Medium((Layer(1.4, 0.2, 1.8, 0.0, 0.3), Layer(1.4, 0.02, 0.98, 0.0, 1.0), Layer(1.4, 0.3, 1.2, 0.0)))
+
+
+@dataclass(frozen=True)
+class Annuli:
+    """Annuli whose energies every method is asked for, at each albedo of a medium or of one stack.
+
+    panel, title  of their chart;  media  a row each;  setting  light and n
+    within        reference: energy within EDGES, (rows, rings + 1) [-];  whole  (rows, 1) [-]
+    """
+
+    panel: str
+    title: str
+    media: tuple[Medium, ...]
+    setting: Setting
+    within: Callable[[], Floats]
+    whole: Callable[[], Floats]
+
+    @cached_property
+    def reference(self) -> Floats:
+        """Energy of each ring (rows, rings) [-]."""
+        return np.diff(self.within(), axis=1)
+
+    @cached_property
+    def judged(self) -> NDArray[np.bool_]:
+        """Rings that count, (rows, rings)."""
+        within = np.cumsum(self.reference, axis=1) / self.whole()
+        return (EDGES[:-1] >= NEAREST) & (within <= ENERGY_WITHIN)
+
+    def errors(self, energy: Floats) -> tuple[float, float]:
+        """Return the root mean square and worst relative error of ring energies (rows, rings) that count."""
+        relative = np.abs(energy / self.reference - 1.0)[self.judged]
+        return float(np.sqrt(np.mean(relative**2))), float(relative.max())
+
+
+def half_spaces(setting: Setting, rule: Rule) -> Floats:
+    """Return the energy within EDGES at ALPHAS from the table of n alone: no transform is kept between calls."""
+    forget()
+    return by_alpha(_energy_within, EDGES, ALPHAS[:, None], setting, rule)
+
+
+def _energy_within(transform: Transform, alpha: jax.Array, x: jax.Array) -> jax.Array:
+    return alpha * transform.reflectance * hankel.cdf(transform, x)
+
+
+def stack(nodes: Nodes) -> Floats:
+    """Return the energy within EDGES of LAYERS, (1, rings + 1), from nothing."""
+    light = exact.solve(LAYERS, nodes=nodes)
+    return np.asarray(light.cdf(EDGES))[None] * light.reflectance
+
+
+def _of_half_space(panel: str, setting: Setting, finest: float) -> Annuli:
+    title = f"{EDGES.size - 1} annuli of a half space with n = {setting.n:g}, g = 0"
+    reference = partial(half_spaces, setting, STANDARD.scaled(finest))
+    media = tuple(half_space(float(alpha), n=float(setting.n)) for alpha in ALPHAS)
+    return Annuli(
+        panel, title, media, setting, reference, lambda: np.asarray(exact.reflectance(ALPHAS, setting))[:, None]
+    )
+
+
+MATCHED = _of_half_space("rings", exact.SEARCHLIGHT, FINEST[0])
+REFRACTING = _of_half_space("refracting", Setting(n=1.4), FINEST[1])
+STACK = Annuli(
+    "stack",
+    f"{EDGES.size - 1} annuli of three layers with n = 1.4, g = 0",
+    (LAYERS,),
+    Setting(n=1.4),
+    partial(stack, solution.FINE),
+    lambda: np.array([[exact.solve(LAYERS).reflectance]]),
+)
+
 AS_IS = "standard nodes"
 RULES = {"half the nodes": 0.5, AS_IS: 1.0, "twice the nodes": 2.0}
 STACK_NODES = {"fewer nodes": solution.STANDARD.fewer, AS_IS: solution.STANDARD}
@@ -36,7 +118,7 @@ STACK_AXES = "time, one core [s]", AXES[1]
 @dataclass(frozen=True)
 class TruthSizes:
     """Photons of a run of the scalar tracer, of `simulate` and of `simulate_orders`; turns; numbers of nodes; and
-    whether the exact solution's own estimate of its error is told, for which it compiles anew."""
+    whether the exact solution's own estimate of its error is given, for which it compiles anew."""
 
     scalar: tuple[int, ...] = (10_000, 100_000, 300_000)
     simulate: tuple[int, ...] = (100_000, 1_000_000, 3_000_000)
@@ -66,7 +148,7 @@ Method = Callable[[int], RingEnergies]
 
 @dataclass(frozen=True)
 class Contestant:
-    """A method with its effort, and the rings that it is to know."""
+    """Method with its effort, and the annuli that it is asked for."""
 
     annuli: Annuli
     method: str
@@ -80,9 +162,9 @@ class Contestant:
 
 
 def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> TradeoffPart:
-    """Run every truth in turns, and judge what it answers."""
-    found, notes = contestants(sizes)
-    energies: dict[str, list[RingEnergies]] = {one.key: [] for one in found}
+    """Run every method in turns, and judge its answers."""
+    every, notes = contestants(sizes)
+    energies: dict[str, list[RingEnergies]] = {one.key: [] for one in every}
 
     def work(one: Contestant) -> stopwatch.Work:
         def run(seed: int) -> int:
@@ -91,9 +173,9 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
         return run
 
-    rates = stopwatch.take_turns({one.key: work(one) for one in found}, sizes.turns, track, "truths")
-    points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in found)
-    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(found, rates).items())
+    rates = stopwatch.take_turns({one.key: work(one) for one in every}, sizes.turns, track, "truths")
+    points = tuple(_point(one, rates, energies[one.key][1:], sizes.estimate) for one in every)
+    compiling = ", ".join(f"{name} {seconds:.1f}" for name, seconds in _compiling(every, rates).items())
     title = f"Energies of annuli at {ALPHAS.size} albedos, and of a stack: seconds against error"
     panels = [
         Panel(one.panel, one.title, *axes, tuple(p for p in points if p.panel == one.panel), joined=True)
@@ -105,32 +187,32 @@ def measure(sizes: TruthSizes = FULL, track: Track = stopwatch.silent) -> Tradeo
 
 
 def contestants(sizes: TruthSizes) -> tuple[list[Contestant], list[str]]:
-    """Every method at every effort; and a line for what is left out."""
-    found, notes = [], []
+    """Return every method at every effort, and a line for what is left out."""
+    contestants, notes = [], []
     trace = scalar.compiled()
     if trace is None:
         notes.append(f"left out: the {SCALAR} {scalar.ABSENT}")
     else:
         for n in sizes.scalar:
-            found.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
+            contestants.append(Contestant(MATCHED, SCALAR, _photons(n), scalar_tracer(trace, n), n * ALPHAS.size))
     for case in (MATCHED, REFRACTING, STACK):
         for n in sizes.simulate:
-            found.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
+            contestants.append(Contestant(case, SIMULATE, _photons(n), _simulated(case, n), n * len(case.media)))
     for case in (MATCHED, REFRACTING):
-        found += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
+        contestants += [Contestant(case, ORDERS, _photons(n), by_orders(case, n), n) for n in sizes.orders]
     for label in sizes.rules:
-        found.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
-    found.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
-    found.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
-    found += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
-    return found, notes
+        contestants.append(Contestant(MATCHED, EXACT, label, _exact(MATCHED, STANDARD.scaled(RULES[label]))))
+    contestants.append(Contestant(REFRACTING, EXACT, AS_IS, _exact(REFRACTING, STANDARD)))
+    contestants.append(Contestant(REFRACTING, EXACT, "and the table of n", _exact(REFRACTING, STANDARD, anew=True)))
+    contestants += [Contestant(STACK, EXACT, label, _exact_stack(nodes)) for label, nodes in STACK_NODES.items()]
+    return contestants, notes
 
 
 def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate: bool) -> Point:
     middle, worst = zip(*(one.annuli.errors(each.energy) for each in energies), strict=True)
     stated = [each.stated[one.annuli.judged] for each in energies if each.stated is not None]
     if estimate and (one.annuli, one.method, one.label) == (MATCHED, EXACT, AS_IS):
-        stated = [np.asarray(exact.error_estimate(annuli.MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
+        stated = [np.asarray(exact.error_estimate(MIDDLES, ALPHAS[:, None]))[MATCHED.judged]]
     facts: dict[str, float | int | str] = {
         "photons": one.photons,
         "first_call": rates.first[one.key],
@@ -140,10 +222,10 @@ def _point(one: Contestant, rates: Rates, energies: list[RingEnergies], estimate
     return Point(one.annuli.panel, one.method, one.label, seconds, WithSpread.of(middle), WithSpread.of(worst), facts)
 
 
-def _compiling(found: list[Contestant], rates: Rates) -> dict[str, float]:
-    """By method, what its very first call took longer than a later one [s]: the first effort compiles for all."""
+def _compiling(contestants: list[Contestant], rates: Rates) -> dict[str, float]:
+    """Return what a method's very first call took longer than later ones [s]: the first effort compiles for all."""
     first: dict[str, float] = {}
-    for one in found:
+    for one in contestants:
         more = rates.first[one.key] - float(np.median(rates.seconds(one.key)))
         name = f"{one.method} ({one.annuli.panel})"
         first[name] = first.get(name, 0.0) + max(more, 0.0)
@@ -181,28 +263,28 @@ def by_orders(case: Annuli, photons: int) -> Method:
     grid = Grid.from_edges(r=EDGES)
 
     def run(seed: int) -> RingEnergies:
-        found = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
-        energy = found.energy(ALPHAS)
+        orders = simulate_orders(grid, photons, 1000 * seed + 500, setting=case.setting, workers=1, progress=False)
+        energy = orders.energy(ALPHAS)
         return RingEnergies(np.asarray(energy.value), np.asarray(energy.standard_error) / case.reference)
 
     return run
 
 
 def _exact(case: Annuli, rule: Rule, anew: bool = False) -> Method:
-    """`anew` makes the table of n, too, that is otherwise kept."""
+    """Return the exact solution; `anew` makes the table of n, too, that is otherwise kept."""
 
     def run(_: int) -> RingEnergies:
         if anew:
             table.made(float(case.setting.n), rule)
-        return RingEnergies(np.diff(annuli.half_spaces(case.setting, rule), axis=1), None)
+        return RingEnergies(np.diff(half_spaces(case.setting, rule), axis=1), None)
 
     return run
 
 
 def _exact_stack(nodes: exact.Nodes) -> Method:
-    return lambda _: RingEnergies(np.diff(annuli.stack(nodes), axis=1), None)
+    return lambda _: RingEnergies(np.diff(stack(nodes), axis=1), None)
 
 
 def _photons(number: int) -> str:
-    """10^5 and the like, as people say it."""
+    """Return the number of photons as people write it, for example 1e5 photons."""
     return f"{number:.0e}".replace("e+0", "e") + " photons"

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from profilefit.studies.stability.cells import Verdict, absolute, judged, red, relative, steps_down, steps_up
+from profilefit.studies.stability.cells import Cells, Verdict, absolute, judged, relative, steps_down, steps_up
+from profilefit.studies.stability.layout import FLOAT64, ArgumentAxis
 
 BOUND = 1e-3
 
@@ -55,9 +56,13 @@ def test_what_is_not_judged_shows_beside_what_is_right():
     assert not Verdict.NOT_JUDGED.is_red
 
 
-def test_red_are_the_classes_that_say_so():
+def test_failures_are_the_red_classes_inside():
     codes = np.array(list(Verdict), np.int8)
-    np.testing.assert_array_equal(red(codes), [one.is_red for one in Verdict])
+    one = np.ones(codes.shape)
+    axis = ArgumentAxis("x", "-", np.arange(1.0 * codes.size))
+    for inside in (True, False):
+        cells = Cells("f", True, "cdf", FLOAT64, (axis,), one, one, one, 0.1, np.full(codes.shape, inside), codes)
+        np.testing.assert_array_equal(cells.failures, [inside and each.is_red for each in Verdict])
 
 
 def test_steps_count_beyond_rounding_only():

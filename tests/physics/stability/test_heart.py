@@ -1,4 +1,4 @@
-"""Blurs of a heart hold where they say so; and what fails has a cause."""
+"""Blurs of a heart hold where they say so; and what fails is known."""
 
 import numpy as np
 import pytest
@@ -22,7 +22,11 @@ def cells():
 
 def test_poles_and_coarse_texels_fail_and_nothing_else(cells):
     regions = [one for each in cells for one in regions_of(each)]
-    assert {one.cause.key for one in regions} == {"wide blur at a pole", "coarse texels"}
+    assert {one.advice for one in regions} == {heart.AT_POLES, heart.COARSE}
+    assert {(one.subject, one.verdict) for one in regions} == {
+        ("atlas of a ball", Verdict.INACCURATE),
+        ("atlas that is stretched", Verdict.INACCURATE),
+    }
     assert not any(one.is_failure for one in regions)
     ball, stretch, view = cells
     assert np.max(ball.error[ball.inside]) < 0.02 < np.max(ball.error) < 0.1

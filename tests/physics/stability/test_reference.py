@@ -10,9 +10,8 @@ from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import find, profile_laws
 from profilefit.shader.check.bounds import ALBEDOS
 from profilefit.studies.stability.cells import EXTENDED, RoundedText, Verdict
-from profilefit.studies.stability.law_cells import MEASURED, computed, limits_of
+from profilefit.studies.stability.law_cells import MEASURED, Reference, computed, limits_of
 from profilefit.studies.stability.layout import CDF, PDF, PROFILE, SAMPLE, TEXT16, TEXT32, ArgumentGrid
-from profilefit.studies.stability.reference import Right
 
 FITS = catalogue.fits_folder()
 
@@ -31,7 +30,7 @@ def small(dtype, x=(0.01, 1.0, 10.0), alpha=(0.3, 0.9), xi=(0.1, 0.5, 0.9)):
 def test_right_is_the_law(name):
     """Of radii the two steps of hazard's text are right to 2e-8 in xi."""
     law, at = catalogue.load(name), small(np.float64)
-    right, (r, xi, alpha, mfp) = Right(law, at), at.arguments
+    right, (r, xi, alpha, mfp) = Reference(law, at), at.arguments
     np.testing.assert_allclose(right.of(PROFILE), law.profile(r, alpha, mfp), rtol=1e-9)
     np.testing.assert_allclose(right.of(CDF), law.cdf(r, alpha, mfp), rtol=1e-10)
     sampler = law.samplers.get("two steps", law.sampler)
@@ -52,8 +51,8 @@ def test_errors_that_no_record_tells_are_as_measured():
 
 def test_the_source_is_infinite_and_a_sum_of_gaussians_is_not():
     at = small(np.float64, x=(0.0, 1.0))
-    assert np.all(np.isinf(Right(catalogue.load("hazard"), at).of(PROFILE)[:, 0]))
-    assert np.all(np.isfinite(Right(catalogue.load("gaussians:2"), at).of(PROFILE)))
+    assert np.all(np.isinf(Reference(catalogue.load("hazard"), at).of(PROFILE)[:, 0]))
+    assert np.all(np.isfinite(Reference(catalogue.load("gaussians:2"), at).of(PROFILE)))
 
 
 def test_single_precision_is_right_and_half_is_not():

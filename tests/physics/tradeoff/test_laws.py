@@ -28,8 +28,8 @@ def test_time_is_over_the_yardsticks_in_each_turn():
 
 @pytest.mark.slow
 def test_rows_become_points():
-    wanted = [one for one in contenders.WANTED if one.label in (contenders.YARDSTICK, "Liang, corrected")]
-    found, _ = contenders.contenders(wanted=wanted)
+    specs = [one for one in contenders.SPECS if one.label in (contenders.YARDSTICK, "Liang, corrected")]
+    found, _ = contenders.contenders(specs=specs)
     rows = laws.measured(found, SMALL)
     profile, both = (laws.points_of(rows, part) for part in laws.TITLES)
     assert [point.method for point in profile] == [one.name for one in found if not one.another]

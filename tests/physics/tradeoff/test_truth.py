@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from mcml_sim import exact
-from profilefit.studies.tradeoff import annuli, truth
-from profilefit.studies.tradeoff.annuli import MATCHED
+from profilefit.studies.tradeoff import truth
 from profilefit.studies.tradeoff.points import standings
+from profilefit.studies.tradeoff.truth import MATCHED
 
 
 @pytest.mark.slow
 def test_reference_is_the_exact_profile():
-    within = exact.cdf(annuli.EDGES, annuli.ALPHAS[:, None]) * np.asarray(exact.reflectance(annuli.ALPHAS))[:, None]
+    within = exact.cdf(truth.EDGES, truth.ALPHAS[:, None]) * np.asarray(exact.reflectance(truth.ALPHAS))[:, None]
     np.testing.assert_allclose(MATCHED.reference[MATCHED.judged], np.diff(within, axis=1)[MATCHED.judged], rtol=1e-9)
     assert MATCHED.judged.any(axis=1).all()
     assert not MATCHED.judged[:, 0].any()  # the disc within 0.01 mfp
@@ -34,14 +34,14 @@ def test_errors_are_those_of_the_rings_that_count():
 
 @pytest.mark.slow
 def test_scalar_rings_are_unions_of_even_ones():
-    np.testing.assert_allclose(annuli.EDGES, annuli.WIDTH * annuli.BREAKS)
+    np.testing.assert_allclose(truth.EDGES, truth.WIDTH * truth.BREAKS)
 
     def trace(seed, photons, mu_a, mu_s, dr, reflected):
         reflected += np.arange(reflected.size) * photons  # a ring's weight is its index
 
     energy = truth.scalar_tracer(trace, 10)(1).energy
     assert energy.shape == MATCHED.reference.shape
-    first, last = annuli.BREAKS[-2], annuli.BREAKS[-1]
+    first, last = truth.BREAKS[-2], truth.BREAKS[-1]
     assert energy[0, -1] == pytest.approx(sum(range(first, last)))
 
 

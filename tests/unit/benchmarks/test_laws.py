@@ -15,7 +15,7 @@ SMALL = LawSizes(points=2000, costly=200, albedos=1000, turns=2, judged=1)
 
 
 def test_many_functions_are_summed():
-    (dipole,) = contenders.made("dipole", profilefit.load("dipole", "published"))
+    (dipole,) = contenders.with_samplers("dipole", profilefit.load("dipole", "published"))
     ratios = {part: Ratio(2.0, 1.0, 3.0) for part in PARTS}
     row = ContenderResult(dipole, counts(dipole), {}, ratios, None, np.array([0.1]), np.array([0.2]))
     assert laws.as_cells(row)[1:4] == ("0", "2 exp, 2 sqrt", "162 in all")
@@ -26,7 +26,7 @@ def test_many_functions_are_summed():
 def test_laws_print_and_write(monkeypatch, tmp_path, capsys):
     wanted = {contenders.YARDSTICK, "Liang, corrected", "hazard"}
     absent = contenders.Wanted("absent", "gaussians", "no-such-set")
-    monkeypatch.setattr(contenders, "WANTED", (*(w for w in contenders.WANTED if w[0] in wanted), absent))
+    monkeypatch.setattr(contenders, "SPECS", (*(w for w in contenders.SPECS if w[0] in wanted), absent))
     monkeypatch.setattr(laws, "QUICK", SMALL)
     numbers = tmp_path / "numbers.json"
     laws.main(["--quick", "--json", str(numbers)])

@@ -8,6 +8,7 @@ import pytest
 
 from profilefit.recipes import catalogue
 from profilefit.recipes.evidence import stale
+from profilefit.studies.stability.cells import ADVICE
 
 FITS = catalogue.fits_folder()
 
@@ -26,11 +27,11 @@ def test_a_map_that_holds_and_one_that_folds(command, tmp_path):
     with open(tmp_path / "atlas" / "stability.csv", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     red = [row for row in rows if row["class"] != "not judged"]
-    assert {row["cause"] for row in red} == {"alpha near 1 in half"}
-    assert all(row["remedy"] and row["inside_its_range"] == "0" for row in red)
+    assert {(row["precision"], row["advice"]) for row in red} == {("float16 stored", ADVICE["float16 stored"])}
+    assert all(row["inside_its_range"] == "0" for row in red)
     aside = [row for row in rows if row["class"] == "not judged"]
     assert aside
-    assert all(row["quantity"].startswith("∂") and "differences are rounding" in row["words"] for row in aside)
+    assert all(row["quantity"].startswith("∂") and "differences are rounding" in row["advice"] for row in aside)
 
 
 def test_json_has_every_region(command):
@@ -39,7 +40,7 @@ def test_json_has_every_region(command):
     assert status == 0
     assert next(iter(found)) == "made"
     assert found["passed"] is True
-    assert any(one["cause"] == "no A above the fold" for one in found["regions"])
+    assert any(one["class"] == "NaN or Inf" and "fold" in one["advice"] for one in found["regions"])
     assert found["subjects"]["albedo-liang"]["right"] > 100
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from profilefit.recipes.evidence import digest
 from profilefit.recipes.folder import fits_folder
-from profilefit.studies.tradeoff.parts import is_alike, keep, read
+from profilefit.studies.tradeoff.parts import is_comparable, keep, read
 
 
 def test_an_unknown_part_is_one_line(command, tmp_path):
@@ -65,8 +65,8 @@ def test_parts_that_do_not_compare_go(tmp_path, change):
     keep(file, before)
     now = told("tuesday", laws=2)
     now["made"][change] = "another"
-    assert is_alike(before, told("tuesday"))
-    assert not is_alike(before, now)
+    assert is_comparable(before, told("tuesday"))
+    assert not is_comparable(before, now)
     keep(file, now)
     assert numbers(file) == {"laws": 2}
 

@@ -13,8 +13,17 @@ from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import profile_quality
 from profilefit.recipes import catalogue
 from profilefit.recipes.inventory import albedo_laws, profile_laws, sampled_laws
-from profilefit.report.tables.all_laws import for_each, measured_profile, measured_samplers
-from profilefit.report.tables.law_tables import NOTHING, content, every_law, markdown_laws, markdown_samplers, measured
+from profilefit.report.tables.law_tables import (
+    NOTHING,
+    content,
+    every_law,
+    for_each,
+    markdown_laws,
+    markdown_samplers,
+    measured,
+    measured_profile,
+    measured_samplers,
+)
 
 FITS = catalogue.fits_folder()
 ALPHA = np.array([0.3, 0.9])
