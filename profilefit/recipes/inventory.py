@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -18,12 +18,14 @@ from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
 
 Names = Sequence[str] | None
+Number = float | None
+REGENERATED = "regenerated"
 NEAR = 0.7  # of difflib's similarity, 1 for the same name: one or two letters off
 
 
 @dataclass(frozen=True)
-class Named:
-    """A law with its constants, at home in one setting.
+class LoadedLaw:
+    """Law with its constants, in one setting.
 
     name     of the law in the catalogue; constants the printed set or the records they come from, "" if it has none
     files    those records; constants that they do not hold are as printed
@@ -52,7 +54,11 @@ class Named:
         return setting
 
 
-def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[Named]:
+Named = LoadedLaw  # its former name, for code outside of this package
+Found = LoadedLaw | None
+
+
+def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
     """Profile laws with their constants; only those of the records `names`, where such are named.
 
     matched  only those of settings that have an exact profile
@@ -62,13 +68,13 @@ def profile_laws(folder: Folder, names: Names = None, matched: bool = True) -> l
     return [*_whole_laws(records, names, matched), *_single(records, names, ("profile", "as-published"), matched)]
 
 
-def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[Named]:
+def sampled_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
     """Laws whose samplers are worth measuring: whole ones, and inverse cdfs beside a printed profile."""
     records = Records.of(folder)
     return [*_whole_laws(records, names, matched), *_single(records, names, ("inverse",), matched)]
 
 
-def all_profiles(folder: Folder) -> list[Named]:
+def all_profiles(folder: Folder) -> list[LoadedLaw]:
     """Every profile law of every setting, and last the inverse cdfs that none of them is made of."""
     records = Records.of(folder)
     whole = profile_laws(records, matched=False)
@@ -76,7 +82,7 @@ def all_profiles(folder: Folder) -> list[Named]:
     return [*whole, *(one for one in sampled_laws(records) if one.records and not set(one.records) & taken)]
 
 
-def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[Named]:
+def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> list[LoadedLaw]:
     """Maps between alpha and A; arguments as for `profile_laws`."""
     records, entries = Records.of(folder), _entries(laws.map_classes())
     return [*(_printed(entries, records) if names is None else ()), *_regenerated(records, entries, names, matched)]
@@ -84,49 +90,82 @@ def albedo_laws(folder: Folder, names: Names = None, matched: bool = True) -> li
 
 def find(
     name: str, folder: Folder, constants: str | None = None, n: float | None = None, g: float | None = None
-) -> Named:
-    """A law or map by the name of one of its records, or by its own name.
+) -> LoadedLaw:
+    """Return a law or map by the name of one of its records, or by its own name.
 
     A name of both is the profile law's; "albedo liang" is the map's.
 
-    constants  as in `catalogue.load`; None takes the regenerated ones or, where there are none, the only printed set
-    n, g       refractive index and mean cosine, if not those of the record or set
-    InputError, with the nearest names that there are, for any other name; SettingError for others without constants.
+    Args:
+        name: of a record, law or map.
+        folder: where the regenerated records lie.
+        constants: as in `catalogue.load`; None takes the regenerated ones or, where there are none, the only printed
+            set.
+        n, g: refractive index and mean cosine, if not those of the record or set [-].
+
+    Raises:
+        InputError: any other name, with the nearest names that there are.
+        SettingError: there are no constants for n and g.
     """
     records = Records.of(folder)
-    found = _found(name, records, constants)
-    given: dict[str, Any] = {name: value for name, value in (("n", n), ("g", g)) if value is not None}
-    if (setting := replace(found.setting, **given)) == found.setting:
+    if (found := find_law(name, records, constants, n, g) or find_map(name, records, constants, n, g)) is not None:
+        return found
+    raise not_found(name, records, constants)
+
+
+def find_law(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+    """Return a profile law or sampler as `find` does; None where the name is of something else."""
+    records = Records.of(folder)
+
+    def of_records() -> list[LoadedLaw]:
+        return [*profile_laws(records, (name,), False), *sampled_laws(records, (name,))]
+
+    return _found(name, records, constants, {"n": n, "g": g}, laws.profile_classes().get(name), of_records)
+
+
+def find_map(name: str, folder: Folder, constants: str | None = None, n: Number = None, g: Number = None) -> Found:
+    """Return a map between alpha and A as `find` does; None where the name is of something else."""
+    records, classes = Records.of(folder), laws.map_classes()
+    own = {kind.entry.key: kind for kind in classes.values()} | classes
+    return _found(
+        name, records, constants, {"n": n, "g": g}, own.get(name), lambda: albedo_laws(records, (name,), False)
+    )
+
+
+def _found(
+    name: str,
+    records: Records,
+    constants: str | None,
+    of: Mapping[str, Number],
+    kind: Any,
+    of_records: Callable[[], Sequence[LoadedLaw]],
+) -> Found:
+    """Return the law of a record, else of a class of that name, in the setting of `of`; None where there is neither."""
+    if name in records.paths and constants in (None, REGENERATED):
+        found = next(iter(of_records()), None)
+    elif kind is not None:
+        which = constants or _default(kind.entry, bool(kind.constant_names()))
+        found = _named(kind.entry, which, _load(kind.entry, which, None, records), records)
+    else:
+        return None
+    given: dict[str, Any] = {key: value for key, value in of.items() if value is not None}
+    if found is None or (setting := replace(found.setting, **given)) == found.setting:
         return found
     entry = found.law.entry
-    which = constants or ("regenerated" if found.records or not found.constants else found.constants)
+    which = constants or (REGENERATED if found.records or not found.constants else found.constants)
     return _named(entry, which, _load(entry, which, setting, records), records)
 
 
-def _found(name: str, records: Records, constants: str | None) -> Named:
-    if name in records.paths and constants in (None, "regenerated"):
-        found = [
-            *profile_laws(records, (name,), False),
-            *sampled_laws(records, (name,)),
-            *albedo_laws(records, (name,), False),
-        ]
-        if found:
-            return found[0]
-        raise RecordError(f"record {name!r} holds no law of a fit that converged")
-    known = {**{kind.entry.key: kind for kind in laws.map_classes().values()}, **laws.map_classes()}
-    if kind := laws.profile_classes().get(name) or known.get(name):
-        entry = kind.entry
-        which = constants or _default(entry, bool(kind.constant_names()))
-        return _named(entry, which, _load(entry, which, None, records), records)
+def not_found(name: str, folder: Folder, constants: str | None = None) -> InputError:
+    """Return the error for a name that no law or map of these constants has."""
+    records = Records.of(folder)
+    if name in records.paths and constants in (None, REGENERATED):
+        return RecordError(f"record {name!r} holds no law of a fit that converged")
     if name in records.paths:
-        raise InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
-    raise InputError(_unknown(name, [*records.paths, *catalogue.names(), *laws.MAPS]))
-
-
-def _unknown(name: str, there: Sequence[str]) -> str:
-    near = get_close_matches(name.lower(), sorted(set(there)), n=2, cutoff=NEAR)
+        return InputError(f"constants of a record are its own: name must be a law's with {constants}, got {name!r}")
+    there = {*records.paths, *catalogue.names(), *laws.MAPS}
+    near = get_close_matches(name.lower(), sorted(there), n=2, cutoff=NEAR)
     hint = f"did you mean {', '.join(near)}?" if near else f"laws: {', '.join(catalogue.names())};"
-    return f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records"
+    return InputError(f"name must be a law, map or record, got {name!r}; {hint} `profilefit report` lists records")
 
 
 def _entries(classes: Mapping[str, Any]) -> list[Entry]:
@@ -138,13 +177,13 @@ def _load(entry: Entry, which: str, setting: Setting | None, records: Records) -
     return (catalogue.albedo_law if entry.is_map else catalogue.load)(entry.name, which, setting, records)
 
 
-def _named(entry: Entry, which: str, law: Any, records: Records) -> Named:
+def _named(entry: Entry, which: str, law: Any, records: Records) -> LoadedLaw:
     if which == "regenerated":
         files = _files(entry, law.setting, records)
     else:
         files = (Path(which),) if which.endswith(".json") else ()
     constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
-    return Named(entry.name, constants if law.constant_names() else "", law, files)
+    return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files)
 
 
 def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]:
@@ -163,14 +202,14 @@ def _default(entry: Entry, has_constants: bool) -> str:
     raise InputError(f"constants must be {several}{accepted}: {entry.key} was not regenerated, got none")
 
 
-def _printed(entries: Iterable[Entry], records: Records) -> list[Named]:
+def _printed(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
     """Every printed set of these, in the order of print."""
     known = {entry.printed: entry for entry in entries}
     found = [(known[s.law], s.name) for s in published.SETS if s.law in known]
-    return [Named(entry.name, which, _load(entry, which, None, records)) for entry, which in found]
+    return [LoadedLaw(entry.name, which, _load(entry, which, None, records)) for entry, which in found]
 
 
-def _whole_laws(records: Records, names: Names, matched: bool) -> list[Named]:
+def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
     """Printed sets, laws without constants, and laws made of all their regenerated records."""
     classes = laws.profile_classes()
     entries = _entries(classes)
@@ -178,11 +217,11 @@ def _whole_laws(records: Records, names: Names, matched: bool) -> list[Named]:
     if names is not None:  # others are of none
         return regenerated
     bare = [name for name, kind in classes.items() if not kind.constant_names()]
-    unfitted = [Named(name, "", catalogue.load(name, folder=records)) for name in bare]
+    unfitted = [LoadedLaw(name, "", catalogue.load(name, folder=records)) for name in bare]
     return [*_printed(entries, records), *unfitted, *regenerated]
 
 
-def _regenerated(records: Records, entries: Sequence[Entry], names: Names, matched: bool) -> list[Named]:
+def _regenerated(records: Records, entries: Sequence[Entry], names: Names, matched: bool) -> list[LoadedLaw]:
     """These laws, in every setting whose records all are in the folder."""
     there = _usable(records.named(names), matched)
     settings = dict.fromkeys(record_setting(content) for content in there.values())
@@ -195,7 +234,7 @@ def _regenerated(records: Records, entries: Sequence[Entry], names: Names, match
     return found
 
 
-def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[Named]:
+def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched: bool) -> list[LoadedLaw]:
     """Records that no law takes by its name alone; constants that they do not hold are as printed."""
     entries = [*_entries(laws.profile_classes()), *_entries(laws.map_classes())]
     found = []
@@ -205,7 +244,7 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
         if content["pipeline"] in pipelines and not taken:
             path = records.folder / f"{name}.json"
             found.append(
-                Named(content["law"], name, catalogue.load(content["law"], str(path), folder=records), (path,))
+                LoadedLaw(content["law"], name, catalogue.load(content["law"], str(path), folder=records), (path,))
             )
     return found
 

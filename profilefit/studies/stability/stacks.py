@@ -18,8 +18,8 @@ from profilefit.errors import RecordError
 from profilefit.laws.stack import LayerLaw, StackLaw
 from profilefit.materials import CHANNELS
 from profilefit.recipes import catalogue
-from profilefit.recipes.record import available
-from profilefit.recipes.stack import record
+from profilefit.recipes.folder import STACKS, available
+from profilefit.recipes.kinds.stack import load
 from profilefit.scenes.layers.law import single_scattering
 from profilefit.shader.check.bounds import ROUNDING_SHARE
 from profilefit.shader.stack_text import single_text, stack_text
@@ -133,8 +133,8 @@ def cells_of(folder: Path) -> Iterator[Cells]:
 
 def recorded_stacks(folder: Path) -> Iterator[StackCase]:
     """The laws of a folder's stacks, one a colour."""
-    for name, path in available(folder / record.FOLDER).items():
-        found = record.load(path)
+    for name, path in available(folder / STACKS).items():
+        found = load(path)
         for channel, law in zip(CHANNELS, found.laws, strict=True):
             try:
                 parts = found.content["interfaces"][channel]["quality"]
