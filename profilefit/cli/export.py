@@ -63,11 +63,11 @@ def export(
     with interruptible(__name__):
         from mcml_sim.files.whole_file import write_whole
         from profilefit.scenes import SOURCES
-        from profilefit.shader.sources import export as exported
+        from profilefit.shader.law_file import export_subject
 
     records_folder(fits)  # says where those are from that are not the shipped ones
     given = {key: value for key, value in (("constants", constants), ("n", n), ("g", g)) if value is not None}
-    text = exported(what, lang, name, fits, SOURCES, **given)
+    text = export_subject(what, lang, name, fits, SOURCES, **given)
     if out is None:
         sys.stdout.write(text)
     else:

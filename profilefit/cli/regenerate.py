@@ -73,8 +73,7 @@ def regenerate(
         from mcml_sim.files.whole_file import require_folder
         from mcml_sim.runs.progress import is_watched
         from profilefit.recipes.regenerate import regenerate as regenerate_records
-        from profilefit.recipes.regenerate import requests_of
-        from profilefit.recipes.reproduction import reproduction
+        from profilefit.recipes.regenerate import reproduction, requests_of
         from profilefit.recipes.run import RecipeRun
         from profilefit.recipes.workers import cores
         from profilefit.report.tables.summary_tables import outcome, reproduced, verdict

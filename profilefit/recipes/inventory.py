@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
@@ -14,6 +14,7 @@ from profilefit.errors import InputError, RecordError
 from profilefit.laws import published
 from profilefit.laws.entry import Entry
 from profilefit.recipes import catalogue
+from profilefit.recipes.folder import fits_folder
 from profilefit.recipes.record import record_setting
 from profilefit.recipes.record_folder import Folder, Records
 
@@ -28,13 +29,14 @@ class LoadedLaw:
     """Law with its constants, in one setting.
 
     name     of the law in the catalogue; constants the printed set or the records they come from, "" if it has none
-    files    those records; constants that they do not hold are as printed
+    files    those records; constants that they do not hold are as printed;  folder  of them and of the map behind it
     """
 
     name: str
     constants: str
     law: Any
     files: tuple[Path, ...] = ()
+    folder: Path = field(default_factory=fits_folder, compare=False, repr=False)
 
     @property
     def records(self) -> tuple[str, ...]:
@@ -183,7 +185,7 @@ def _named(entry: Entry, which: str, law: Any, records: Records) -> LoadedLaw:
     else:
         files = (Path(which),) if which.endswith(".json") else ()
     constants = " + ".join(path.stem for path in files) or which.removeprefix("published:")
-    return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files)
+    return LoadedLaw(entry.name, constants if law.constant_names() else "", law, files, records.folder)
 
 
 def _files(entry: Entry, setting: Setting, records: Records) -> tuple[Path, ...]:
@@ -205,8 +207,8 @@ def _default(entry: Entry, has_constants: bool) -> str:
 def _printed(entries: Iterable[Entry], records: Records) -> list[LoadedLaw]:
     """Every printed set of these, in the order of print."""
     known = {entry.printed: entry for entry in entries}
-    found = [(known[s.law], s.name) for s in published.SETS if s.law in known]
-    return [LoadedLaw(entry.name, which, _load(entry, which, None, records)) for entry, which in found]
+    sets = [(known[s.law], s.name) for s in published.SETS if s.law in known]
+    return [_named(entry, which, _load(entry, which, None, records), records) for entry, which in sets]
 
 
 def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw]:
@@ -217,7 +219,7 @@ def _whole_laws(records: Records, names: Names, matched: bool) -> list[LoadedLaw
     if names is not None:  # others are of none
         return regenerated
     bare = [name for name, kind in classes.items() if not kind.constant_names()]
-    unfitted = [LoadedLaw(name, "", catalogue.load(name, folder=records)) for name in bare]
+    unfitted = [LoadedLaw(name, "", catalogue.load(name, folder=records), (), records.folder) for name in bare]
     return [*_printed(entries, records), *unfitted, *regenerated]
 
 
@@ -243,9 +245,8 @@ def _single(records: Records, names: Names, pipelines: tuple[str, ...], matched:
         taken = any(name in parts and len(_usable(records.named(parts), matched)) == len(parts) for parts in wholes)
         if content["pipeline"] in pipelines and not taken:
             path = records.folder / f"{name}.json"
-            found.append(
-                LoadedLaw(content["law"], name, catalogue.load(content["law"], str(path), folder=records), (path,))
-            )
+            law = catalogue.load(content["law"], str(path), folder=records)
+            found.append(LoadedLaw(content["law"], name, law, (path,), records.folder))
     return found
 
 

@@ -7,6 +7,7 @@ import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -19,8 +20,9 @@ from profilefit.errors import InputError
 from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
-from profilefit.recipes import catalogue
-from profilefit.recipes.inventory import LoadedLaw
+from profilefit.recipes import catalogue, kinds
+from profilefit.recipes.folder import known_folder
+from profilefit.recipes.inventory import LoadedLaw, not_found
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
@@ -61,6 +63,49 @@ DOMAIN = "domain, which nothing checks: alpha in [0, 1]"
 CONVENTIONS = """\
 alpha = mu_s' / (mu_s' + mu_a) is the single-scattering albedo, mfp = 1 / (mu_s' + mu_a),
 A the total diffuse reflectance (the colour) under that light."""
+
+
+# By the key of a kind: the module beside this one whose `source` writes the file of what the kind's `find` returned.
+SOURCES = {"law": "law_file", "albedo_map": "law_file", "stack": "stack_text", "phase": "phase_text"}
+
+
+def export_subject(
+    subject: str,
+    lang: str = "glsl",
+    name: str | None = None,
+    fits: Path | None = None,
+    scenes: Mapping[str, tuple[str, str]] | None = None,
+    **options: Any,
+) -> str:
+    """Return the whole file of a record or law of any kind, or of what a scene exports.
+
+    Args:
+        subject: name of a record, law or map, path of a record, or what scenes export.
+        lang: one of `LANGUAGES`.
+        name: what the names in it begin with, by default its own; two media in one shader need two.
+        fits: folder of records; None stands for ./fits and those shipped.
+        scenes: what scenes export, as `profilefit.scenes.SOURCES`.
+        options: constants, n and g of a law, as for `inventory.find`.
+
+    Raises:
+        InputError: a subject, language, name or option that there is not; RecordError on a damaged record.
+    """
+    for kind in kinds.KINDS:
+        module = import_module(f"profilefit.shader.{SOURCES[kind.key]}") if kind.key in SOURCES else kind.module
+        if hasattr(module, "source") and (found := kind.find(subject, fits, **options)) is not None:
+            text: str = module.source(found, lang, name)
+            return text
+    for ending, (words, home) in (scenes or {}).items():
+        if subject == ending or (ending.startswith(".") and subject.endswith(ending)):
+            kinds.require_none(options, words, subject)
+            text = import_module(home).source(subject, lang, name)
+            return text
+    raise not_found(subject, known_folder(fits), options.get("constants"))
+
+
+def source(named: LoadedLaw, lang: str = "glsl", name: str | None = None) -> str:
+    """Return the whole file of a law or map as `export` does, normalised by the map beside its own record."""
+    return export(named, named.folder, lang, name)
 
 
 def export(named: LoadedLaw, folder: Folder, lang: str = "glsl", name: str | None = None) -> str:

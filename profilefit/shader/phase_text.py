@@ -66,3 +66,6 @@ def _terms(phase: Phase) -> tuple[list[float], list[float]]:
     if len(pairs) > MOST_TERMS:
         raise InputError(f"phase must have at most {MOST_TERMS} terms to become a shader, got {len(pairs)}")
     return [float(weight) for weight, _ in pairs], [float(one.mean_cosine) for _, one in pairs]
+
+
+source = export_phase

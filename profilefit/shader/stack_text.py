@@ -151,6 +151,9 @@ def _plain(record: StackRecord) -> dict[str, Any]:
     }
 
 
+source = export_stack
+
+
 def channel_numbers(law: StackLaw) -> Numbers:
     """The numbers of one channel's text, lengths in mean free paths of its first layer; mfp itself as it is."""
     unit = law.top.mfp

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 
 
 class KindModule(Protocol):
-    """Functions of a kind's module; where no other room writes its source, `source(found, folder, lang, name)`, too."""
+    """Functions of a kind's module; where no other room writes its source, `source(found, lang, name)`, too."""
 
     def find(self, name: str, folder: Path, **options: Any) -> Any | None:
         """Return what a record is made into, such as a law, by its name or path; None if it is of another kind."""
