@@ -78,7 +78,7 @@ class Kind:
         found: dict[str, Path] = {}
         for place in reversed(self.places(fits)):
             found |= available(place / self.folder)
-        return dict(sorted(found.items()))
+        return dict(sorted(found.items(), key=lambda item: item[1].name))
 
     def places(self, fits: Path | None = None) -> tuple[Path, ...]:
         """Return the folders that a name is looked up in: of laws and maps, which refer to one another, one."""
