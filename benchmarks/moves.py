@@ -20,7 +20,7 @@ from mcml_sim import Grid, simulate_orders
 from profilefit.fitting.chains import EVOLUTION, Moves, posterior
 from profilefit.fitting.estimate import Fit
 from profilefit.fitting.profiles import Profiles
-from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("burley-whole", "liang-whole", "albedo-rational")
@@ -55,7 +55,7 @@ def fit_of(name: str, photons: int) -> Fit:
     chosen = recipe.find(name, catalogue.fits_folder())
     light = simulate_orders(Grid.from_edges(r=ring_edges(chosen.rings)), photons, SEED, chosen.setting, progress=False)
     profiles = Profiles.from_orders(light, albedo_values(chosen.albedos, chosen.setting))
-    return fitted(chosen, inventory.find(name, catalogue.fits_folder()).law, profiles)
+    return fitted(chosen, catalogue.find(name, catalogue.fits_folder()).law, profiles)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -18,7 +18,7 @@ from benchmarks.table import show
 from mcml_sim import Grid, Orders, simulate_orders
 from profilefit.fitting.estimate import ResidualFunction, sensitivity
 from profilefit.fitting.profiles import COVARIANCE_RANK, Covariance, Profiles
-from profilefit.recipes import catalogue, inventory, recipe
+from profilefit.recipes import catalogue, recipe
 from profilefit.recipes.targets import albedo_values, ring_edges
 
 LAWS = ("albedo-rational", "burley-whole", "quantile")
@@ -39,7 +39,7 @@ def lines(name: str, photons: int) -> Iterator[tuple[str, ...]]:
     light = simulate_orders(Grid.from_edges(r=ring_edges(chosen.rings)), photons, SEED, chosen.setting, progress=False)
     alpha = albedo_values(chosen.albedos, chosen.setting)
     profiles = Profiles.from_orders(light, alpha)
-    one = fitted(chosen, inventory.find(name, catalogue.fits_folder()).law, profiles)
+    one = fitted(chosen, catalogue.find(name, catalogue.fits_folder()).law, profiles)
     gain = sensitivity(ResidualFunction(one.objective, one.free), one.solution, one.law, one.rings)
     exact = np.sqrt(whole_variance(light, alpha, gain))
     if profiles.covariance is None:

@@ -21,8 +21,8 @@ from profilefit.fitting.measures import MEASURES, OF_PROFILE
 from profilefit.laws import published
 from profilefit.laws.base import AlbedoLaw, Constants
 from profilefit.recipes import catalogue, kinds
+from profilefit.recipes.catalogue import LoadedLaw, not_found
 from profilefit.recipes.folder import known_folder
-from profilefit.recipes.inventory import LoadedLaw, not_found
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.recipes.schema import ERRORS
 from profilefit.shader import emit
@@ -85,7 +85,7 @@ def export_subject(
         name: what the names in it begin with, by default its own; two media in one shader need two.
         fits: folder of records; None stands for ./fits and those shipped.
         scenes: what scenes export, as `profilefit.scenes.SOURCES`.
-        options: constants, n and g of a law, as for `inventory.find`.
+        options: constants, n and g of a law, as for `catalogue.find`.
 
     Raises:
         InputError: a subject, language, name or option that there is not; RecordError on a damaged record.

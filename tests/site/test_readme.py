@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.claims import RUNS
 from profilefit.recipes import record
-from profilefit.recipes.inventory import profile_laws
+from profilefit.recipes.catalogue import profile_laws
 from profilefit.report import fill, sections
 from profilefit.report.tables.all_laws import measured_profile
 from profilefit.report.tables.claims_table import markdown_claims

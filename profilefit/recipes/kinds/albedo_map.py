@@ -2,24 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 from mcml_sim import Orders
 from profilefit.fitting.quality import albedo_quality
-from profilefit.recipes import inventory, pipelines
-from profilefit.recipes.inventory import LoadedLaw
+from profilefit.recipes import pipelines
+from profilefit.recipes.catalogue import find_map as find
 from profilefit.recipes.pipelines import Pipeline, described_fit, judged, places, printed_laws, read
 from profilefit.recipes.recipe import Recipe
 from profilefit.recipes.run import RecipeRun, RecordContent, Work
 from profilefit.recipes.summary import curves
 
 __all__ = ["find", "fit", "quality", "read", "request"]
-
-
-def find(name: str, folder: Path, **options: Any) -> LoadedLaw | None:
-    """Return the map of a record or of its own name, with constants, n and g as of `inventory.find`; None if none."""
-    return inventory.find_map(name, folder, **options)
 
 
 def request(name: str) -> Recipe | None:

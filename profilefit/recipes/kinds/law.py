@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -13,8 +12,8 @@ from profilefit.errors import RecipeError
 from profilefit.fitting import staged
 from profilefit.fitting.quality import profile_quality
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes import catalogue, inventory, pipelines, starts
-from profilefit.recipes.inventory import LoadedLaw
+from profilefit.recipes import catalogue, pipelines, starts
+from profilefit.recipes.catalogue import find_law as find
 from profilefit.recipes.paper.reproduction import readings
 from profilefit.recipes.paper.table1 import printed_halves, table1
 from profilefit.recipes.paper.truth import ExactTruth, TallyTruth, Truth
@@ -38,11 +37,6 @@ from profilefit.recipes.targets import albedo_values, ring_edges, truth_of
 
 __all__ = ["find", "fit", "quality", "read", "request"]
 EVIDENCE_RINGS = RingLayout(last=30.0, dr=0.01)
-
-
-def find(name: str, folder: Path, **options: Any) -> LoadedLaw | None:
-    """Return the law of a record or of its own name, with constants, n and g as of `inventory.find`; None if none."""
-    return inventory.find_law(name, folder, **options)
 
 
 def request(name: str) -> Recipe | None:

@@ -15,7 +15,7 @@ from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import AlbedoQuality, Quality, albedo_quality, profile_quality
 from profilefit.fitting.sampling import LAST_SHARE, ExactTarget, SamplerQuality, drawn_by, sampler_quality
 from profilefit.laws.base import Sampler
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.pipelines import QUALITY_ALBEDOS
 from profilefit.recipes.targets import albedo_values
 

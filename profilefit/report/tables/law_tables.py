@@ -18,8 +18,8 @@ from mcml_sim.media.setting import Setting
 from profilefit.fitting.measures import MEASURES, OF_MAP
 from profilefit.fitting.quality import AlbedoQuality, Quality
 from profilefit.fitting.sampling import SamplerQuality
+from profilefit.recipes.catalogue import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.folder import EVIDENCE
-from profilefit.recipes.inventory import Named, Names, albedo_laws, profile_laws, sampled_laws
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.report.tables.all_laws import (
     ALBEDOS,

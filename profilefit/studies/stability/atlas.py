@@ -10,8 +10,8 @@ from mcml_sim.media.setting import Setting
 from profilefit.errors import InputError
 from profilefit.laws import MAPS
 from profilefit.laws.entry import EVERYWHERE
-from profilefit.recipes import catalogue, inventory
-from profilefit.recipes.inventory import Named
+from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder, Records
 from profilefit.shader.check import validity
 from profilefit.studies.stability import (
@@ -107,8 +107,8 @@ def run(todo: list[Job]) -> Iterator[Findings]:
 
 def _known(folder: Records) -> tuple[list[Named], list[Named]]:
     """Those that have a text: no shader runs a quadrature."""
-    profiles = [one for one in inventory.all_profiles(folder) if one.law.entry.has_text]
-    return profiles, inventory.albedo_laws(folder, matched=False)
+    profiles = [one for one in catalogue.all_profiles(folder) if one.law.entry.has_text]
+    return profiles, catalogue.albedo_laws(folder, matched=False)
 
 
 def _map_label(one: Named) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from profilefit.laws.base import ProfileLaw
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.recipes.record_folder import Folder
 from profilefit.shader.check import bounds, dense_grid, validity
 from profilefit.shader.check.bounds import ROUNDING_SHARE

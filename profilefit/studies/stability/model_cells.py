@@ -11,7 +11,7 @@ from mcml_sim import exact
 from mcml_sim.exact.light import unreduced
 from profilefit.fitting.quality import ENERGY_WITHIN, NEAREST
 from profilefit.laws.liang import Liang
-from profilefit.recipes.inventory import Named
+from profilefit.recipes.catalogue import Named
 from profilefit.studies.stability.cells import Cells, absolute, judged, relative
 from profilefit.studies.stability.law_cells import Limits
 from profilefit.studies.stability.layout import CDF, FLOAT64, MODEL, PROFILE, SAMPLE, ArgumentAxis

@@ -6,8 +6,8 @@ import equinox as eqx
 import numpy as np
 import pytest
 
-from profilefit.recipes import catalogue, inventory
-from profilefit.recipes.inventory import find
+from profilefit.recipes import catalogue
+from profilefit.recipes.catalogue import find
 from profilefit.studies.stability import layout, map_cells, misuse, model_cells
 from profilefit.studies.stability.cells import Cells, Verdict
 from profilefit.studies.stability.law_cells import limits_of
@@ -20,7 +20,7 @@ FITS = catalogue.fits_folder()
 @pytest.fixture(scope="module")
 def printed():
     """The printed laws of Liang et al.: g as it is, and the energy of (17)."""
-    one = next(one for one in inventory.profile_laws(FITS) if one.label == "liang, published")
+    one = next(one for one in catalogue.profile_laws(FITS) if one.label == "liang, published")
     limits = limits_of(one, FITS)
     return [model_cells.unclipped(one, limits), model_cells.own_energy(one, limits)]
 
@@ -29,7 +29,7 @@ def printed():
 def of_maps():
     """All regions of the printed map (8) and of the rational one."""
     wanted = {"liang, published", "albedo-rational"}
-    found = [one for one in inventory.albedo_laws(FITS) if one.label in wanted]
+    found = [one for one in catalogue.albedo_laws(FITS) if one.label in wanted]
     return [region for one in found for cells in map_cells.cells_of(one, FITS) for region in regions_of(cells)]
 
 
@@ -69,7 +69,7 @@ def test_none_of_them_is_unexplained(printed, of_maps):
 @pytest.fixture(scope="module")
 def burley():
     """The printed law of Burley against the half space: as it is, and with a fault in a constant."""
-    one = next(one for one in inventory.profile_laws(FITS) if one.label == "burley, published")
+    one = next(one for one in catalogue.profile_laws(FITS) if one.label == "burley, published")
     limits = limits_of(one, FITS)
 
     def regions(factor):
@@ -88,7 +88,7 @@ def test_a_wrong_constant_is_not_explained_by_the_model(burley):
 
 
 def test_a_wrong_constant_of_our_own_map_is_a_failure():
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "albedo-rational")
+    one = next(one for one in catalogue.albedo_laws(FITS) if one.label == "albedo-rational")
     law = eqx.tree_at(lambda law: law.b, one.law, 1.3 * one.law.b)
     found = [
         each
@@ -140,7 +140,7 @@ def test_what_is_not_judged_is_a_region_that_says_why():
 
 def test_a_failure_of_another_kind_is_unexplained():
     """Negative control: a red cell in the middle of a law that is right there, where no cause holds."""
-    one = next(one for one in inventory.albedo_laws(FITS) if one.label == "albedo-rational")
+    one = next(one for one in catalogue.albedo_laws(FITS) if one.label == "albedo-rational")
     cells = next(cells for cells in map_cells.cells_of(one, FITS) if cells.arithmetic == FLOAT64)
     middle = cells.axes[0].nearest(0.5)
     codes = cells.codes.copy()

@@ -39,7 +39,7 @@ from profilefit.measured.beam import beam_of
 from profilefit.measured.photo.setup import read_setup
 from profilefit.measured.premises import premises
 from profilefit.recipes import recipe, record
-from profilefit.recipes.inventory import LoadedLaw, find
+from profilefit.recipes.catalogue import LoadedLaw, find
 from profilefit.recipes.kinds import gaussians, phase, stack
 from profilefit.recipes.phases.data import read_phase
 from profilefit.recipes.stack.file import read_layers
